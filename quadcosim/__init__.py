@@ -34,9 +34,9 @@ All times are in seconds, all values in the units that the FMUs declare. What go
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from orchestration.basics.errors import in_python, tell_in
+from orchestration.basics.errors import in_python, set_wording
 
-tell_in(in_python)
+set_wording(in_python)
 
 if TYPE_CHECKING:
     from orchestration.basics.errors import QuadcosimError, SimulatorError, UsageError

@@ -1,1 +1,1 @@
-"""What any room may need: errors, units, documents, the terminal, progress, statistics, what a simulator is."""
+"""Basics for every package: errors, units, documents, terminal, progress, statistics, the protocol of simulators."""

@@ -1,4 +1,4 @@
-"""What the source says of the fields of a class, read without importing it: `--help` loads no record."""
+"""Docstrings of the fields of a class, read from its source without importing it, so that `--help` loads no record."""
 
 import ast
 import functools
@@ -9,30 +9,30 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 
-class Said(NamedTuple):
-    """A field in the words of its source."""
+class FieldDoc(NamedTuple):
+    """The documentation of a field."""
 
     text: str
-    """What stands below it, in one line."""
+    """The string below the field, in one line."""
     default: str
-    """Its default as it is written; empty where it has none."""
+    """Source text of its default; empty if it has none."""
 
 
 @functools.cache
-def attribute_docs(module: str, name: str) -> Mapping[str, Said]:
-    """By field what is said of it in the class `name` of a module; none where there is no source."""
+def attribute_docs(module: str, name: str) -> Mapping[str, FieldDoc]:
+    """The documentation of each field of the class `name` in a module; empty if there is no source."""
     body = next((node.body for node in _classes(module) if node.name == name), [])
     return {
-        field.target.id: Said(
-            inspect.cleandoc(said.value.value).replace("\n", " "),
+        field.target.id: FieldDoc(
+            inspect.cleandoc(doc.value.value).replace("\n", " "),
             "" if field.value is None else ast.unparse(field.value),
         )
-        for field, said in itertools.pairwise(body)
+        for field, doc in itertools.pairwise(body)
         if isinstance(field, ast.AnnAssign)
         and isinstance(field.target, ast.Name)
-        and isinstance(said, ast.Expr)
-        and isinstance(said.value, ast.Constant)
-        and isinstance(said.value.value, str)
+        and isinstance(doc, ast.Expr)
+        and isinstance(doc.value, ast.Constant)
+        and isinstance(doc.value.value, str)
     }
 
 

@@ -1,4 +1,4 @@
-"""Looking for the first value that fails: where, by a scan upward, and bisection."""
+"""Search for the first value that fails: a scan upward, then bisection."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -7,12 +7,12 @@ from itertools import pairwise
 from typing import NamedTuple
 
 Fails = Callable[[float], bool]
-Left = Callable[[int], None]
-"""Hears, before a value is tried, how many at most come after it."""
+ReportRemaining = Callable[[int], None]
+"""Called before each trial with the largest number of trials that can follow it."""
 
 
 class Bracket(NamedTuple):
-    """Two values with the edge of what fails between them."""
+    """Two values between which the edge of failure lies."""
 
     good: float | None
     """does not fail; None: the first value of the scan fails"""
@@ -32,24 +32,29 @@ class Range:
     unit: str = " s"
 
     def values(self) -> list[float]:
-        """The scan, upward."""
+        """The values of the scan, in rising order."""
         count = math.floor((self.last - self.first) / self.step + 1e-9)
         steps = (float(f"{self.first + i * self.step:.12g}") for i in range(count + 1))
         return [*(value for value in self.before if value < self.first), *steps]
 
 
 def first_failure(
-    fails: Fails, values: Sequence[float], tolerance: float, *, parts: int = 1, left: Left = lambda most: None
+    fails: Fails,
+    values: Sequence[float],
+    tolerance: float,
+    *,
+    parts: int = 1,
+    remaining: ReportRemaining = lambda most: None,
 ) -> Bracket | None:
     """The last value that does not fail and the first that does, at most `tolerance` apart; None if none fails.
 
-    Goes up through `values`, up again in `parts` of the step before the first that fails, and bisects. The set
-    that does not fail need not be an interval: what is narrower than these steps is not seen.
+    Scans `values` upward, then `parts` of the step before the first that fails, and bisects. The set of values that
+    do not fail need not be an interval: gaps narrower than these steps are not seen.
     """
     good = None
     widest = max((b - a for a, b in pairwise(values)), default=0.0)
     for i, value in enumerate(values, start=1):
-        left(len(values) - i + _most(widest, tolerance, parts))
+        remaining(len(values) - i + _most_trials(widest, tolerance, parts))
         if not fails(value):
             good = value
             continue
@@ -59,20 +64,22 @@ def first_failure(
         if step >= tolerance:
             for i in range(1, parts):
                 finer = float(f"{low + i * step:.12g}")
-                left(parts - 1 - i + _halvings(step, tolerance))
+                remaining(parts - 1 - i + _halvings(step, tolerance))
                 if fails(finer):
                     bad = finer
                     break
                 good = finer
-        return bisected(fails, good, bad, tolerance, left=left)
+        return bisected(fails, good, bad, tolerance, remaining=remaining)
     return None
 
 
-def bisected(fails: Fails, good: float, bad: float, tolerance: float, *, left: Left = lambda most: None) -> Bracket:
-    """`good`, which does not fail, and `bad`, which does, brought together to `tolerance`."""
+def bisected(
+    fails: Fails, good: float, bad: float, tolerance: float, *, remaining: ReportRemaining = lambda most: None
+) -> Bracket:
+    """Bisect between `good`, which does not fail, and `bad`, which does, down to `tolerance`."""
     while bad - good > tolerance:
         middle = 0.5 * (good + bad)
-        left(_halvings(middle - good, tolerance))
+        remaining(_halvings(middle - good, tolerance))
         if fails(middle):
             bad = middle
         else:
@@ -80,8 +87,8 @@ def bisected(fails: Fails, good: float, bad: float, tolerance: float, *, left: L
     return Bracket(good, bad)
 
 
-def _most(width: float, tolerance: float, parts: int) -> int:
-    """How many values are tried at most between two so far apart, of which the upper one fails."""
+def _most_trials(width: float, tolerance: float, parts: int) -> int:
+    """The largest number of trials in an interval of this width whose upper end fails."""
     if width / parts < tolerance:
         return _halvings(width, tolerance)
     return parts - 1 + _halvings(width / parts, tolerance)

@@ -1,7 +1,6 @@
-"""Reads the text files that people write and edit, where whatever is wrong is a `UsageError`; makes values of JSON.
+"""Reads text, TOML and JSON files that people write, raising `UsageError` for whatever is wrong; makes JSON values.
 
-A file is read up to a stated size, so that none fills memory, and may begin with a byte-order mark, as
-editors on Windows write it.
+A file is read up to a stated size, so that none fills memory, and may begin with a byte-order mark.
 """
 
 import json
@@ -23,20 +22,20 @@ else:
 _NOTES = logging.getLogger("quadcosim")
 
 LARGEST = 2**20
-"""Characters of a TOML or JSON file."""
+"""Largest number of characters in a TOML or JSON file"""
 LONGEST_NAME = 200
 DEEPEST = 20
-"""Tables and lists in each other."""
+"""Largest nesting depth of tables and lists"""
 
 _PART = r"""(?:[\w-]+|"(?:[^"\\\n]|\\.)*"?|'[^'\n]*'?)"""
 _NEXT = rf"(?:[ \t]*\.[ \t]*{_PART})"
 _KEYS = re.compile(rf"#[^\n]*|(?P<deep>{_PART}{_NEXT}{{{DEEPEST}}})|{_PART}{_NEXT}*")
-"""Keys, and what looks like them; every character is looked at a few times only."""
+"""Keys, and what looks like keys; linear in the length of the text."""
 
 
 @contextmanager
 def readable(path: Path, what: str) -> Iterator[None]:
-    """Turns the failure to open or decode a file into a `UsageError` that says what was expected."""
+    """Turn a failure to open or decode a file into a `UsageError` that states what was expected."""
     try:
         yield
     except OSError as error:
@@ -67,18 +66,18 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
 
 
 def toml_of(text: str, path: str) -> dict[str, Any]:
-    """The tables of TOML that somebody has written, at a place that is named in errors.
+    """The tables of user-written TOML; errors name `path`.
 
-    Raises `UsageError` for what is no TOML, is nested deeper than `DEEPEST`, or has a whole number beyond 64
-    bits or a NUL character in it.
+    Raises `UsageError` for text that is not TOML, is nested deeper than `DEEPEST`, or contains a whole number beyond
+    64 bits or a NUL character.
     """
-    if any(key["deep"] for key in _KEYS.finditer(text)):  # parsing takes time by the square of a key's parts
+    if any(key["deep"] for key in _KEYS.finditer(text)):  # parsing time is quadratic in the parts of a key
         raise UsageError(f"{path}: expected TOML nested at most {DEEPEST} deep")
     try:
         tables: dict[str, Any] = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise UsageError(f"{path}: expected TOML: {error}") from error
-    except ValueError as error:  # of a number with more digits than Python reads
+    except ValueError as error:  # a number with more digits than Python converts
         raise UsageError(f"{path}: expected whole numbers of at most 64 bits") from error
     except RecursionError as error:
         raise UsageError(f"{path}: expected TOML nested at most {DEEPEST} deep") from error
@@ -87,13 +86,13 @@ def toml_of(text: str, path: str) -> dict[str, Any]:
 
 
 def tables_in(text: str) -> dict[str, Any]:
-    """The tables of TOML that this project has written."""
+    """The tables of TOML that this project has written, without checks."""
     tables: dict[str, Any] = tomllib.loads(text)
     return tables
 
 
 def read_json(path: Path, what: str) -> Any:
-    """The value of a JSON file; raises `UsageError` for what is none, `NaN` and `Infinity` included."""
+    """The value of a JSON file; raises `UsageError` if it is not JSON, which has no `NaN` and `Infinity`."""
     text = read_text(path, what)
     try:
         value = json.loads(text, parse_constant=_refuse_constant)
@@ -104,11 +103,11 @@ def read_json(path: Path, what: str) -> Any:
 
 
 def plain(value: object) -> Any:
-    """`value` in the types of JSON: dataclasses as tables, paths as text, numbers that are not finite as None.
+    """`value` in the types of JSON: dataclasses as objects, paths as text, numbers that are not finite as None.
 
-    Numbers and truths of NumPy are those of Python.
+    NumPy scalars become Python scalars.
     """
-    from pydantic_core import to_jsonable_python  # not before: `--help` loads nothing of it
+    from pydantic_core import to_jsonable_python  # deferred: `--help` does not need it
 
     return to_jsonable_python(value, inf_nan_mode="null", fallback=_other)
 
@@ -118,7 +117,7 @@ def _other(value: object) -> Any:
         return dict(value)
     if isinstance(value, PurePath):
         return str(value)
-    if getattr(value, "shape", None) == ():  # a number or truth of NumPy
+    if getattr(value, "shape", None) == ():  # a NumPy scalar
         return value.item()  # type: ignore[attr-defined]
     raise TypeError(f"{type(value).__name__}: no type that JSON has")
 
@@ -128,7 +127,7 @@ def _refuse_constant(name: str) -> None:
 
 
 def _expect_plain(value: Any, place: str) -> None:
-    """Refuse what later readers cannot take, at its place in the document."""
+    """Raise `UsageError`, naming the place, for values that later readers cannot take."""
     waiting = [(place, 0, value)]
     while waiting:
         place, depth, value = waiting.pop()

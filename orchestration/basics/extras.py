@@ -1,4 +1,4 @@
-"""Packages that the base install does without, and what is said where one of them is needed and not there."""
+"""Optional packages by extra, and the error where a missing one is needed."""
 
 import functools
 import importlib.util
@@ -16,42 +16,42 @@ EXTRAS = {
     "certificates": ("clarabel", "flint", "python-flint"),
     "can": ("cantools",),
 }
-"""By the extra that brings them."""
+"""Packages by the extra that installs them"""
 
-Asked = ParamSpec("Asked")
-Given = TypeVar("Given")
+Parameters = ParamSpec("Parameters")
+Result = TypeVar("Result")
 
 
 def extra_of(package: str | None) -> str | None:
-    """The extra that brings a package; None if none does."""
+    """The extra that installs a package; None if none does."""
     top = (package or "").partition(".")[0]
     return next((extra for extra, packages in EXTRAS.items() if top in packages), None)
 
 
-def needs(*packages: str) -> Callable[[Callable[Asked, Given]], Callable[Asked, Given]]:
-    """Makes a function one that is `explained`, and that says so before it does anything where a package is missing."""
+def needs(*packages: str) -> Callable[[Callable[Parameters, Result]], Callable[Parameters, Result]]:
+    """Decorate a function as `explains_missing`, and check for these packages before it does anything."""
 
-    def with_packages(function: Callable[Asked, Given]) -> Callable[Asked, Given]:
-        @explained
+    def with_packages(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
+        @explains_missing
         @functools.wraps(function)
-        def call(*unnamed: Asked.args, **given: Asked.kwargs) -> Given:
+        def call(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
             for name in packages:
                 if importlib.util.find_spec(name) is None:
                     raise ModuleNotFoundError(f"No module named {name!r}", name=name)
-            return function(*unnamed, **given)
+            return function(*args, **kwargs)
 
         return call
 
     return with_packages
 
 
-def explained(function: Callable[Asked, Given]) -> Callable[Asked, Given]:
-    """A function that raises `QuadcosimError`, in one line that names the extra, where a package of one is missing."""
+def explains_missing(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
+    """Decorate a function to raise `QuadcosimError` naming the extra where an optional package is missing."""
 
     @functools.wraps(function)
-    def call(*unnamed: Asked.args, **given: Asked.kwargs) -> Given:
+    def call(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
         try:
-            return function(*unnamed, **given)
+            return function(*args, **kwargs)
         except ModuleNotFoundError as error:
             extra = extra_of(error.name)
             if extra is None:

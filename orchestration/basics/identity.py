@@ -1,29 +1,29 @@
-"""What follows from objects that many have in common is found once."""
+"""A cache of function results by the identity of the arguments."""
 
 from collections.abc import Callable, Hashable
 from typing import Any, Generic, TypeVar
 
-Found = TypeVar("Found")
+Result = TypeVar("Result")
 MOST = 256
-"""Findings that are kept"""
+"""Largest number of cached results"""
 
 
-class OfSame(Generic[Found]):
-    """What a function says of objects, kept for as long as they are the same ones: runs of a study share most parts.
+class IdentityCache(Generic[Result]):
+    """A function with its results cached by the identity of its arguments: runs of a study share most parts.
 
-    Objects are told by what they are, not by what they hold: they have no hash, and comparing them takes as long. They
-    are held, so they should be small.
+    Arguments are compared by identity, not by content: they have no hash, and comparing them takes as long as the
+    function. The cache keeps them alive, so they should be small.
     """
 
-    def __init__(self, find: Callable[..., Found]) -> None:
-        self._find = find
-        self._known: dict[Hashable, tuple[tuple[Any, ...], Found]] = {}
+    def __init__(self, function: Callable[..., Result]) -> None:
+        self._function = function
+        self._cached: dict[Hashable, tuple[tuple[Any, ...], Result]] = {}
 
-    def __call__(self, *objects: Any) -> Found:
-        """What the function says of them."""
-        key = tuple(map(id, objects))  # of no others, for those that are known are held
-        if key not in self._known:
-            if len(self._known) >= MOST:
-                self._known.clear()
-            self._known[key] = objects, self._find(*objects)
-        return self._known[key][1]
+    def __call__(self, *objects: Any) -> Result:
+        """The result of the function for these objects."""
+        key = tuple(map(id, objects))  # ids stay unique: the cache keeps its arguments alive
+        if key not in self._cached:
+            if len(self._cached) >= MOST:
+                self._cached.clear()
+            self._cached[key] = objects, self._function(*objects)
+        return self._cached[key][1]

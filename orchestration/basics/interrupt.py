@@ -1,4 +1,4 @@
-"""Ctrl-C while FMUs are loaded: it is heard between two of their calls, so that none is blamed for it."""
+"""Ctrl-C while FMUs are loaded: it is acted on between two of their calls, so that no FMU is blamed for it."""
 
 import signal
 import threading
@@ -8,41 +8,41 @@ from types import FrameType
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C was heard; the text says how far the work was."""
+    """Ctrl-C was received; the text states how far the work was."""
 
 
 class Interrupt:
-    """A handler of SIGINT that takes note; the second time it does not wait."""
+    """A handler of SIGINT that records the first signal and raises `KeyboardInterrupt` at the second."""
 
     def __init__(self) -> None:
         self.requested = False
-        self._hear: Callable[[], None] | None = None
+        self._callback: Callable[[], None] | None = None
 
-    def tell(self, hear: Callable[[], None]) -> None:
-        """Have it heard elsewhere too, once: now, if it was heard before."""
-        self._hear = hear
+    def forward(self, callback: Callable[[], None]) -> None:
+        """Call `callback` once at the signal; immediately, if it was received before."""
+        self._callback = callback
         if self.requested:
-            self._pass_on()
+            self._call_back()
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
-        """Hear the signal."""
+        """Handle the signal."""
         if self.requested:
             raise KeyboardInterrupt
         self.requested = True
-        self._pass_on()
+        self._call_back()
 
-    def _pass_on(self) -> None:
-        hear, self._hear = self._hear, None
-        if hear is not None:
-            hear()
+    def _call_back(self) -> None:
+        callback, self._callback = self._callback, None
+        if callback is not None:
+            callback()
 
 
 @contextmanager
-def interrupts_held_back() -> Iterator[Interrupt]:
-    """Ctrl-C is noted while the block runs, and raised as `KeyboardInterrupt` when it ends.
+def deferred_interrupts() -> Iterator[Interrupt]:
+    """Record Ctrl-C while the block runs, and raise `KeyboardInterrupt` when it ends.
 
-    In place of whatever error the block ends with: a slave that is Python takes the signal for one of its own.
-    Where Python's own handler is not in place, or in another thread than the main one, nothing changes.
+    It replaces any error of the block, since a slave in Python may take the signal for its own failure. Without
+    effect in threads other than the main one, and where Python's default handler is not installed.
     """
     interrupt = Interrupt()
     ours = threading.current_thread() is threading.main_thread() and (

@@ -1,4 +1,4 @@
-"""Libraries of the engines, as `fmu_kit.libraries` keeps them; what stands in the way is this package's error."""
+"""Compiled libraries of the engines from the cache of `fmu_kit.libraries`, with errors as `QuadcosimError`."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -9,10 +9,10 @@ from fmu_kit.bundle import PackagingError
 from orchestration.basics.errors import QuadcosimError
 
 
-def kept(folder: str, sources: Mapping[str, bytes], how: Any, compiled: Callable[[], bytes]) -> Path:
-    """The library that `compiled` makes of `sources`, in the cache's `folder`; `how` is what else decides its content.
+def cached_library(folder: str, sources: Mapping[str, bytes], how: Any, compiled: Callable[[], bytes]) -> Path:
+    """The library that `compiled` makes of `sources`, in the cache's `folder`; `how`: what else decides its content.
 
-    Raises `QuadcosimError` that says what stands in the way.
+    Raises `QuadcosimError` if it cannot be compiled or stored.
     """
     try:
         return libraries.kept(folder, sources, how, compiled)

@@ -1,4 +1,4 @@
-"""Who hears how far a study is: a bar, a function, or nobody."""
+"""Where the progress of a study is reported: to a bar, to a function, or nowhere."""
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
@@ -6,26 +6,26 @@ from typing import Literal, TypeAlias, TypeVar
 
 from orchestration.basics.terminal import Count, Share, progress_bar, runs_bar
 
-Heard = TypeVar("Heard")
-ShareHeard: TypeAlias = Share | Literal["bar"] | None
-"""`bar`: one on a terminal, elsewhere and in notebooks a line now and then; a function: hears the share that is done"""
-CountHeard: TypeAlias = Count | Literal["bar"] | None
-"""Likewise, but a function hears how many of how many runs are done"""
+Reporter = TypeVar("Reporter")
+ShareProgress: TypeAlias = Share | Literal["bar"] | None
+"""`bar`: a bar on a terminal, occasional lines elsewhere and in notebooks; a function: called with the share done"""
+CountProgress: TypeAlias = Count | Literal["bar"] | None
+"""Likewise, but a function is called with the number of runs done and the total"""
 
 
-def of_share(progress: ShareHeard, what: str) -> AbstractContextManager[Share]:
-    """What is to be told the share of the work that is done."""
-    return _heard(progress, lambda: progress_bar(what), lambda share: None)
+def share_reporter(progress: ShareProgress, what: str) -> AbstractContextManager[Share]:
+    """The function to call with the share of the work done."""
+    return _reporter(progress, lambda: progress_bar(what), lambda share: None)
 
 
-def of_runs(progress: CountHeard) -> AbstractContextManager[Count]:
-    """What is to be told how many of how many runs are done."""
-    return _heard(progress, runs_bar, lambda done, total: None)
+def runs_reporter(progress: CountProgress) -> AbstractContextManager[Count]:
+    """The function to call with the number of runs done and the total."""
+    return _reporter(progress, runs_bar, lambda done, total: None)
 
 
-def _heard(
-    progress: Heard | Literal["bar"] | None, bar: Callable[[], AbstractContextManager[Heard]], nobody: Heard
-) -> AbstractContextManager[Heard]:
+def _reporter(
+    progress: Reporter | Literal["bar"] | None, bar: Callable[[], AbstractContextManager[Reporter]], silent: Reporter
+) -> AbstractContextManager[Reporter]:
     if isinstance(progress, str):
         return bar()
-    return nullcontext(nobody if progress is None else progress)
+    return nullcontext(silent if progress is None else progress)

@@ -1,4 +1,4 @@
-"""Folders that a process works in: locked while it lives, so that the next one can clear those of the dead."""
+"""Working folders of processes, locked while the process lives, so that a later process can remove abandoned ones."""
 
 import os
 import shutil
@@ -15,10 +15,10 @@ _cleared: set[Path] = set()
 
 
 class Scratch:
-    """A new folder at `path`, made under another name and locked before it takes this one.
+    """A new folder at `path`, created and locked under another name before it is renamed.
 
-    The lock is the system's, on the folder itself, and ends with the process however that ends; where there
-    is none (on Windows) nobody clears what a killed process leaves.
+    The lock is the operating system's, on the folder itself, and ends with the process however that ends. Windows has
+    no such lock: folders of killed processes remain.
     """
 
     def __init__(self, path: Path, *, mode: int = 0o777) -> None:
@@ -29,29 +29,29 @@ class Scratch:
         fresh.rename(path)
 
     def release(self) -> None:
-        """Leave the folder to others."""
+        """Release the lock."""
         if self._lock is not None:
             os.close(self._lock)
             self._lock = None
 
     def remove(self) -> None:
-        """Remove the folder with all that is in it."""
+        """Remove the folder and its content."""
         shutil.rmtree(self.path, ignore_errors=True)
         self.release()
 
 
 def temporary() -> Scratch:
-    """A folder for temporary files that others cannot enter; the first one clears those that the dead left."""
+    """A private folder for temporary files; the first call removes abandoned ones."""
     parent = Path(tempfile.gettempdir())
     if parent not in _cleared:
         _cleared.add(parent)
-        for path in dead(parent.glob(f"{PREFIX}*{SUFFIX}")):
+        for path in abandoned(parent.glob(f"{PREFIX}*{SUFFIX}")):
             shutil.rmtree(path, ignore_errors=True)
     return Scratch(parent / f"{PREFIX}{os.urandom(6).hex()}{SUFFIX}", mode=0o700)
 
 
-def dead(folders: Iterator[Path]) -> Iterator[Path]:
-    """Those of `folders` whose process is no more; each is locked until the next one is asked for."""
+def abandoned(folders: Iterator[Path]) -> Iterator[Path]:
+    """Those of `folders` whose process has ended; each stays locked until the next one is requested."""
     for folder in folders:
         lock = _locked(folder)
         if lock is not None:
@@ -62,12 +62,12 @@ def dead(folders: Iterator[Path]) -> Iterator[Path]:
 
 
 def _locked(folder: Path) -> int | None:
-    """A lock on `folder`, held by this process until it is closed; None if another has it or there is none."""
+    """A lock on `folder`, held by this process until it is closed; None if unavailable."""
     if sys.platform == "win32":
         return None
     try:
         handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
-    except OSError:  # gone meanwhile, or somebody else's
+    except OSError:  # removed meanwhile, or owned by another user
         return None
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -1,4 +1,4 @@
-"""What the master needs of a simulator: an FMU behind an adapter, or a stub in a test."""
+"""The protocol between the master and a simulator: an FMU behind an adapter, or a stub in a test."""
 
 from collections.abc import Callable, Sequence
 from typing import Protocol, TypeAlias
@@ -10,20 +10,20 @@ Floats: TypeAlias = npt.NDArray[np.float64]
 Integers: TypeAlias = npt.NDArray[np.int64]
 Booleans: TypeAlias = npt.NDArray[np.bool_]
 Transfer: TypeAlias = Callable[[], None]
-"""Moves values between a simulator and the array that it was made for."""
+"""Copies values between a simulator and the array that it was created for."""
 
 
 class Simulator(Protocol):
-    """A model that is stepped; every call raises `SimulatorError` where the model refuses it."""
+    """A model that is stepped; every call raises `SimulatorError` if the model refuses it."""
 
     def reader(self, names: Sequence[str], into: Floats) -> Transfer:
-        """A call that puts the values of `names` into the array `into`, contiguous and of their number."""
+        """A function that reads the variables `names` into the contiguous array `into`, one element each."""
 
     def writer(self, names: Sequence[str], source: Floats) -> Transfer:
-        """A call that sets the variables `names` from the array `source`."""
+        """A function that sets the variables `names` from the array `source`."""
 
     def enter_initialization(self, start: float, stop: float) -> None:
-        """Begin initialisation of a run over [start, stop] seconds; without an end if `stop` is infinite."""
+        """Begin initialisation of a run over [start, stop] seconds; `stop` may be infinite."""
 
     def exit_initialization(self) -> None:
         """End initialisation; from here on the simulator can be stepped."""
@@ -38,4 +38,4 @@ class Simulator(Protocol):
         """The whole state, serialised."""
 
     def restore(self, state: bytes) -> None:
-        """Put back what `save` gave."""
+        """Restore a state returned by `save`."""

@@ -1,4 +1,4 @@
-"""What a number of trials says about a share: its interval, and what it refutes."""
+"""Confidence intervals and tests of shares and quantiles."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -12,7 +12,7 @@ def wilson(successes: int, trials: int, confidence: float = 0.95) -> tuple[float
     """Wilson's score interval for a share of which `successes` in `trials` were seen, as (low, high).
 
     Two-sided: the share lies below `low` and above `high` with (1 - confidence)/2 each. It stays in [0, 1]
-    and has a width at 0 and at `trials` successes too. Raises `UsageError` for numbers that cannot be.
+    and has a width at 0 and at `trials` successes too. Raises `UsageError` for invalid numbers.
     """
     if trials < 1 or not 0 <= successes <= trials:
         raise UsageError(f"{successes} of {trials}: expected at least one trial and no more successes than trials")
@@ -23,29 +23,29 @@ def wilson(successes: int, trials: int, confidence: float = 0.95) -> tuple[float
     middle = share + z * z / (2.0 * trials)
     half = z * math.sqrt(share * (1.0 - share) / trials + z * z / (4.0 * trials * trials))
     scale = 1.0 + z * z / trials
-    # At the ends the bound is 0 or 1 exactly; in floats it may miss it by a rounding.
+    # At the ends the bound is exactly 0 or 1; rounding may miss it.
     low = 0.0 if successes == 0 else (middle - half) / scale
     high = 1.0 if successes == trials else (middle + half) / scale
     return low, high
 
 
 class Estimate(NamedTuple):
-    """A quantile that was estimated."""
+    """An estimated quantile."""
 
     value: float
     low: float
     high: float
-    """ends of its interval; minus infinity and infinity where so few values bound nothing"""
+    """ends of its interval; infinite where there are too few values to bound it"""
     confidence: float
-    """of the interval: at least what was asked for, since it ends at values that were seen"""
+    """of the interval: at least the requested one, since it ends at observed values"""
 
 
 def quantile(values: Sequence[float], share: float = 0.5, confidence: float = 0.95) -> Estimate:
     """A quantile, by default the median, with the interval between two order statistics.
 
-    Free of any distribution: of n values the number below the quantile is binomial. The ends are the innermost values
+    Distribution-free: of n values the number below the quantile is binomial. The ends are the innermost values
     beyond each of which the quantile lies with a probability of at most (1 - confidence)/2. Raises `UsageError` for
-    no values or shares that cannot be.
+    no values or an invalid share.
     """
     if not len(values) or not (0.0 < share < 1.0 and 0.0 < confidence < 1.0):
         raise UsageError(f"quantile {share} of {len(values)} values: expected some, and shares between 0 and 1")
@@ -76,16 +76,16 @@ def _binomial(k: int, n: int, share: float) -> float:
 
 
 def refutes(successes: int, trials: int, share: float, confidence: float) -> bool:
-    """Whether `successes` in `trials` are too few for a share that large, by the exact binomial test at `confidence`.
+    """Whether `successes` in `trials` refute a success rate of `share`, by the exact binomial test at `confidence`.
 
-    That is, with such a share so few or fewer would be seen with a probability of at most 1 - confidence.
+    That is, at this rate so few or fewer would be observed with a probability of at most 1 - confidence.
     """
     tail = sum(math.comb(trials, k) * share**k * (1.0 - share) ** (trials - k) for k in range(successes + 1))
     return tail <= 1.0 - confidence
 
 
 def first_end(values: Iterable[float], holds: Iterable[bool]) -> float | None:
-    """Of values that grow, the last before the first at which something does not hold; None: it is the first of all."""
+    """The last of rising `values` before the first at which `holds` is false; None if that is the first value."""
     end = None
     for value, here in zip(values, holds):
         if not here:

@@ -1,4 +1,4 @@
-"""What the commands say beside their results, on standard error."""
+"""Messages and progress of the commands on standard error."""
 
 import logging
 import math
@@ -12,19 +12,19 @@ from pathlib import Path
 from typing import Any
 
 Share = Callable[[float], None]
-"""Hears the share of the work that is done."""
+"""Called with the share of the work done."""
 Count = Callable[[int, int], None]
-"""Hears how many of how many runs are done."""
+"""Called with the number of runs done and the total."""
 
 SPARSE = 10.0
-"""[s] between two lines about work that goes on, where no bar can be drawn"""
+"""[s] between two progress lines, where no bar can be drawn"""
 
 
 class _Screen(logging.Handler):
-    """Standard error, whatever that is at the time; warnings and errors in colour where it can be seen."""
+    """The current standard error; warnings and errors in colour on a terminal."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        with suppress(BrokenPipeError):  # nobody reads any more
+        with suppress(BrokenPipeError):  # the reader has closed it
             print(_painted(record), file=sys.stderr, flush=True)
 
 
@@ -35,7 +35,7 @@ _MESSAGES.setLevel(logging.INFO)
 _MESSAGES.addHandler(_SCREEN)
 
 
-def listen(level: int, log: Path | None) -> None:
+def configure(level: int, log: Path | None) -> None:
     """Show messages from `level` on; append all of them, with times, to the file `log`.
 
     Raises `OSError` if it cannot be written.
@@ -53,29 +53,29 @@ def listen(level: int, log: Path | None) -> None:
 
 
 def detail(text: str) -> None:
-    """One line for those who want to know more."""
+    """Print one line if verbose."""
     _MESSAGES.debug("%s", text)
 
 
-def say(text: str) -> None:
-    """One line about what goes on, on standard error, unless it is to be quiet."""
+def inform(text: str) -> None:
+    """Print one line about the progress of work, unless quiet."""
     _MESSAGES.info("%s", text)
 
 
 def warn(text: str) -> None:
-    """One line about what may be meant otherwise."""
+    """Print one line about a likely mistake."""
     _MESSAGES.warning("warning: %s", text)
 
 
-def complain(text: str, error: BaseException | None = None) -> None:
-    """One line about what went wrong; where, for the log file."""
+def report_error(text: str, error: BaseException | None = None) -> None:
+    """Print one line about a failure; its traceback goes to the log file."""
     _MESSAGES.error("quadcosim: %s", text)
     if error is not None:
         note("".join(traceback.format_exception(error)).rstrip())
 
 
 def note(text: str) -> None:
-    """For the log file only, which has everything."""
+    """Write to the log file only."""
     for handler in _MESSAGES.handlers:
         if handler is not _SCREEN:
             handler.handle(_MESSAGES.makeRecord(_MESSAGES.name, logging.DEBUG, "", 0, text, (), None))
@@ -91,10 +91,10 @@ def _painted(record: logging.LogRecord) -> str:
 
 @contextmanager
 def progress_bar(what: str) -> Iterator[Share]:
-    """A bar while the work goes on, on a terminal that can draw it; else a line now and then."""
+    """A progress bar on a terminal that can draw it; else occasional lines."""
     if not _draws():
-        tell, left = _now_and_then(), _Left()
-        yield lambda share: tell(f"{what}: {share:.0%}", left.after(share))
+        report, left = _occasional_lines(), _TimeLeft()
+        yield lambda share: report(f"{what}: {share:.0%}", left.after(share))
         return
     from rich.progress import Progress
 
@@ -105,10 +105,10 @@ def progress_bar(what: str) -> Iterator[Share]:
 
 @contextmanager
 def runs_bar() -> Iterator[Count]:
-    """A bar with rate and time left, on a terminal that can draw it; else a line now and then."""
+    """A progress bar with rate and time left on a terminal that can draw it; else occasional lines."""
     if not _draws():
-        tell, left = _now_and_then(), _Left()
-        yield lambda done, total: tell(f"{done} of {total} runs", left.after(done / max(total, 1)))
+        report, left = _occasional_lines(), _TimeLeft()
+        yield lambda done, total: report(f"{done} of {total} runs", left.after(done / max(total, 1)))
         return
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -126,28 +126,28 @@ def runs_bar() -> Iterator[Count]:
         yield update
 
 
-def _now_and_then() -> Callable[[str, str], None]:
-    """Says what it is told, but not within `SPARSE` seconds of the start or of what it said before."""
+def _occasional_lines() -> Callable[[str, str], None]:
+    """Prints its argument, but not within `SPARSE` seconds of the start or of the last line."""
     last = time.monotonic()
 
-    def tell(text: str, left: str) -> None:
+    def report(text: str, left: str) -> None:
         nonlocal last
         now = time.monotonic()
         if now - last >= SPARSE:
             last = now
-            say(f"{text}{left}")
+            inform(f"{text}{left}")
 
-    return tell
+    return report
 
 
-class _Left:
-    """How long work will still take, if it goes on at the rate it had since it began."""
+class _TimeLeft:
+    """Estimates the remaining time from the rate since the start."""
 
     def __init__(self) -> None:
         self._began, self._first = time.monotonic(), math.nan
 
     def after(self, share: float) -> str:
-        """For the end of a line; nothing where nothing is known, or left. The share heard first was done before."""
+        """Text for the end of a line; empty if unknown or zero. The first share was done before the start."""
         if math.isnan(self._first):
             self._first = share
         if not self._first < share < 1.0:
@@ -161,7 +161,7 @@ def _duration(seconds: float) -> str:
 
 
 def _draws() -> bool:
-    """Whether standard error is a terminal on which lines can be drawn over; without colours is no hindrance."""
+    """Whether standard error is a terminal that can redraw lines, with colours or without."""
     return sys.stderr.isatty() and os.environ.get("TERM", "").lower() not in ("dumb", "unknown")
 
 

@@ -1,4 +1,4 @@
-"""Tables of files, shaped as the records that are made of them: the first key or type that is wrong is one line."""
+"""Tables of files, typed like the records that they describe; the first wrong key or type is a one-line error."""
 
 import dataclasses
 import json
@@ -16,21 +16,21 @@ from orchestration.basics.records import default_of, is_record, validated
 Shape = TypeVar("Shape")
 
 
-def _explained(schema: dict[str, Any], table: type["Table"]) -> None:
-    """Says in a JSON schema of each key what the source says of it; that is read where a schema is asked for."""
-    for key, said in docs_of_keys(table).items():
-        schema["properties"][key]["description"] = said
+def _add_descriptions(schema: dict[str, Any], table: type["Table"]) -> None:
+    """Describe each key in a JSON schema by the docstring of its field."""
+    for key, text in docs_of_keys(table).items():
+        schema["properties"][key]["description"] = text
 
 
 class Table(pydantic.BaseModel):
-    """A table of a file: keys that are not named here are refused."""
+    """A table of a file; unknown keys are refused."""
 
     model_config = pydantic.ConfigDict(
         extra="forbid",
         strict=True,
         frozen=True,
         protected_namespaces=(),
-        json_schema_extra=_explained,
+        json_schema_extra=_add_descriptions,
     )
     declared_by: ClassVar[type]
 
@@ -44,11 +44,11 @@ def table_of(
     within: Sequence[Any] = (),
     **other: tuple[Any, Any],
 ) -> Any:
-    """The table of a file that says a record, with the keys, types and defaults that the record declares.
+    """The table of a file that describes a record, with the keys, types and defaults that the record declares.
 
-    `only` are the fields that it says, else all but those `without`; `called` are keys by another name, `within` the
-    tables that stand for records in it, and `other` the types and defaults of keys that a file says in other ways than
-    the constructor takes them.
+    `only` are its fields, default: all but those `without`; `called` are keys that differ from the field's name,
+    `within` the tables of the records in it, and `other` the types and defaults of keys whose form in a file differs
+    from that in the constructor.
     """
     tables = {each.declared_by: each for each in within}
     hints = typing.get_type_hints(record, include_extras=True)
@@ -59,13 +59,13 @@ def table_of(
             default = tables[type(default)]() if type(default) in tables else default
             default = ... if default is dataclasses.MISSING else default
             fields[field.name] = (hint, pydantic.Field(default, alias=(called or {}).get(field.name)))
-    made = pydantic.create_model(f"{record.__name__}Table", __base__=Table, __doc__=record.__doc__, **fields)
-    made.declared_by = record
-    return made
+    table = pydantic.create_model(f"{record.__name__}Table", __base__=Table, __doc__=record.__doc__, **fields)
+    table.declared_by = record
+    return table
 
 
 def _in_file(hint: Any, tables: Mapping[Any, Any]) -> Any:
-    """A type with the tables in it that stand for records."""
+    """A type with its records replaced by their tables."""
     origin, parts = typing.get_origin(hint), typing.get_args(hint)
     if hint in tables:
         return tables[hint]
@@ -76,7 +76,7 @@ def _in_file(hint: Any, tables: Mapping[Any, Any]) -> Any:
 
 
 def fields_of(shape: Any) -> dict[str, Any]:
-    """The fields of a table or a record by the keys of its file, as pydantic knows them; none of another type."""
+    """The pydantic fields of a table or a record by the keys of its file; empty for another type."""
     return {field.alias or name: field for name, field in _fields(shape).items()}
 
 
@@ -84,19 +84,19 @@ def _fields(shape: Any) -> dict[str, Any]:
     kind = shape if isinstance(shape, type) else type(shape)
     if is_record(kind):
         kind = validated(kind)
-    found: dict[str, Any] = getattr(kind, "__pydantic_fields__", {})
-    return found
+    fields: dict[str, Any] = getattr(kind, "__pydantic_fields__", {})
+    return fields
 
 
 def docs_of_keys(shape: Any) -> dict[str, str]:
-    """What the source says of each key of a table or a record."""
+    """The docstring of each key of a table or a record."""
     classes = (*reversed(getattr(shape, "declared_by", shape).__mro__), shape)
-    said = {name: each.text for one in classes for name, each in attribute_docs(one.__module__, one.__name__).items()}
-    return {field.alias or name: said[name] for name, field in _fields(shape).items() if name in said}
+    texts = {name: each.text for one in classes for name, each in attribute_docs(one.__module__, one.__name__).items()}
+    return {field.alias or name: texts[name] for name, field in _fields(shape).items() if name in texts}
 
 
 def keys_at(shape: Any, place: Sequence[Any]) -> list[str]:
-    """The keys of the table at a place of a document of a shape."""
+    """The keys of the table at a place of a document of this shape."""
     parts = iter(place)
     for part in parts:
         shape, one_of_many = _table_in(fields_of(shape)[part].annotation)
@@ -106,17 +106,17 @@ def keys_at(shape: Any, place: Sequence[Any]) -> list[str]:
 
 
 def _table_in(hint: Any) -> tuple[Any, bool]:
-    """The table that a value of this type is or has in it, and whether it has several."""
+    """The table that a value of this type is or contains, and whether it contains several."""
     if fields_of(hint):
         return hint, False
     origin = typing.get_origin(hint)
-    found = (_table_in(part) for part in typing.get_args(hint))
-    shape, one_of_many = next((each for each in found if each[0] is not None), (None, False))
+    tables = (_table_in(part) for part in typing.get_args(hint))
+    shape, one_of_many = next((each for each in tables if each[0] is not None), (None, False))
     return shape, one_of_many or origin not in (typing.Union, types.UnionType)
 
 
 def parsed(tables: Mapping[str, Any], shape: type[Shape]) -> Shape:
-    """The typed form of a TOML document; raises `UsageError` in one line for the first thing wrong."""
+    """The typed form of a TOML document; raises `UsageError` in one line for the first error."""
     try:
         return pydantic.TypeAdapter(shape).validate_json(json.dumps(tables, default=str))
     except pydantic.ValidationError as error:
@@ -126,22 +126,22 @@ def parsed(tables: Mapping[str, Any], shape: type[Shape]) -> Shape:
 
 
 _MISSING = ("missing", "missing_argument", "missing_keyword_only_argument")
-_UNREAD = ("unexpected_keyword_argument", "extra_forbidden")
-"""What pydantic calls a key that nobody reads"""
+_UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
+"""Pydantic's names of the error of an unknown key"""
 
 
-def _telling(error: pydantic.ValidationError) -> Any:
-    """The first thing wrong with a document; where a key is missing, one beside it that nobody reads: it was meant."""
+def _most_relevant(error: pydantic.ValidationError) -> Any:
+    """The first error of a document; for a missing key, an unknown key beside it, which is likely a misspelling."""
     problems = error.errors()
     first = _of_a_table(problems)
     if first["type"] not in _MISSING:
         return first
-    beside = [each for each in problems if each["type"] in _UNREAD and each["loc"][:-1] == first["loc"][:-1]]
+    beside = [each for each in problems if each["type"] in _UNKNOWN and each["loc"][:-1] == first["loc"][:-1]]
     return next(iter(beside), first)
 
 
 def _of_a_table(problems: Sequence[Any]) -> Any:
-    """The first thing wrong; of a table where there may also be a number, what is wrong in the table."""
+    """The first error; for a table where a number is also valid, the error within the table."""
     first = problems[0]
     if first["type"] != "float_type" or not isinstance(first["input"], Mapping):
         return first
@@ -151,7 +151,7 @@ def _of_a_table(problems: Sequence[Any]) -> Any:
 
 
 def _place(problem: Any, document: Any) -> list[Any]:
-    """Where a problem is, without the parts that say by which type of several a value was read."""
+    """The place of an error, without the parts that name which of several types was tried."""
     parts, value = [], document
     for part in problem["loc"]:
         try:
@@ -163,11 +163,11 @@ def _place(problem: Any, document: Any) -> list[Any]:
 
 
 def _first_problem(error: pydantic.ValidationError, file: type, document: Mapping[str, Any]) -> str:
-    """The first thing wrong with a document of the shape `file`, in one line that says what is valid."""
-    problem = _telling(error)
+    """The first error of a document of the shape `file`, in one line that states what is valid."""
+    problem = _most_relevant(error)
     parts = _place(problem, document)
     place = ".".join(map(str, parts))
-    if problem["type"] in _UNREAD:
+    if problem["type"] in _UNKNOWN:
         key = str(parts[-1])
         return no_such_key(place.removesuffix(key), key, keys_at(file, parts[:-1]))
     if problem["type"] in _MISSING:

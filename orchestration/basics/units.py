@@ -1,4 +1,4 @@
-"""Units as FMI has them, exponents of SI's base units with a factor and an offset, and what products make of them."""
+"""Units as FMI defines them (exponents of SI base units, factor and offset) and their products and powers."""
 
 import math
 import re
@@ -11,10 +11,10 @@ BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
 @dataclass(frozen=True, kw_only=True)
 class BaseUnits:
-    """What a unit is: value · factor + offset in the base units with these exponents."""
+    """A unit in SI base units: value · factor + offset, with these exponents."""
 
     exponents: tuple[Fraction, ...]
-    """of `BASE`; whole ones in FMI"""
+    """of `BASE`; whole numbers in FMI"""
     factor: float = 1.0
     offset: float = 0.0
 
@@ -33,14 +33,14 @@ _NONE = BaseUnits(exponents=(Fraction(0),) * len(BASE))
 
 @dataclass(frozen=True, kw_only=True)
 class Unit:
-    """The unit of what an expression comes to."""
+    """The unit of the value of an expression."""
 
     symbols: tuple[tuple[str, Fraction], ...] = ()
-    """how it is written: names with their exponents"""
+    """names with their exponents, as written"""
     base: BaseUnits | None = _NONE
-    """None: no FMU says what it is"""
+    """None: no FMU defines it"""
     has_number: bool = False
-    """whether a number is a factor of it, whose unit nobody has written: it goes with anything"""
+    """whether a plain number, whose unit is not stated, is a factor of it: it is compatible with any unit"""
 
     def __str__(self) -> str:
         ordered = sorted(self.symbols, key=lambda symbol: symbol[0] == "s")  # seconds last, as in N.m.s
@@ -70,15 +70,15 @@ class Unit:
 
     @property
     def is_ratio(self) -> bool | None:
-        """Whether it is 1 or rad, which SI takes for 1; None if that is not known."""
+        """Whether it is 1 or rad, which is 1 in SI; None if unknown."""
         return None if self.base is None else _is_same(self.base, _NONE)
 
     def agrees(self, other: "Unit") -> bool | None:
-        """Whether values in the one can be added to values in the other; None if that is not known."""
+        """Whether values in both units can be added; None if unknown."""
         return True if self.has_number or other.has_number else self.is_same(other)
 
     def is_same(self, other: "Unit") -> bool | None:
-        """Whether they are one unit, numbers apart; None if that is not known."""
+        """Whether they are the same unit, apart from numbers; None if unknown."""
         if self is other:
             return True
         same_name = self.symbols == other.symbols
@@ -98,16 +98,16 @@ ONE, SECOND, METRE, RADIAN, NUMBER = (
 
 
 def named(name: str, base: BaseUnits | None) -> Unit:
-    """A unit by the name that an FMU has for it; a name that is no plain product is kept whole."""
+    """A unit by its name in an FMU; a name that is not a plain product stays whole."""
     if name == "1":
         return ONE
     return Unit(symbols=tuple(_factors(name).items()), base=base)
 
 
 def common(units: Sequence[Unit]) -> Unit | None:
-    """That of a sum of values that agree; None if it is not known.
+    """The unit of a sum of values whose units agree; None if unknown.
 
-    Where some have a number as a factor the others decide: 1 and rad by the one that is not 1.
+    Units without a plain number as a factor decide, and of 1 and rad the latter.
     """
     decisive = [u for u in units if not u.has_number] or [u for u in units if u.symbols] or list(units)
     chosen = next((u for u in decisive if u.symbols), decisive[0])
@@ -119,18 +119,18 @@ def _is_same(one: BaseUnits, other: BaseUnits) -> bool:
 
 
 def _factors(name: str) -> dict[str, Fraction]:
-    """Symbols and their exponents of N.m, kg.m2, m/s^2 or W/(m2.K)."""
+    """Symbols and exponents in a name such as N.m, kg.m2, m/s^2 or W/(m2.K)."""
     above, slash, below = name.partition("/")
     below = below[1:-1] if below.startswith("(") and below.endswith(")") else below
-    found: dict[str, Fraction] = {}
+    exponents: dict[str, Fraction] = {}
     for sign, product in ((1, above), (-1, below)) if slash else ((1, above),):
         for factor in re.split(r"[.*]", product):
             parts = re.fullmatch(r"([^\W\d_]+|%|°|1)\^?(-?\d+)?", factor)
             if parts is None or ("." in below and not name.endswith(")")):
                 return {name: Fraction(1)}
             if parts[1] != "1":
-                found[parts[1]] = found.get(parts[1], Fraction(0)) + sign * int(parts[2] or 1)
-    return {symbol: exponent for symbol, exponent in found.items() if exponent}
+                exponents[parts[1]] = exponents.get(parts[1], Fraction(0)) + sign * int(parts[2] or 1)
+    return {symbol: exponent for symbol, exponent in exponents.items() if exponent}
 
 
 def _power(name: str, exponent: Fraction) -> str:
@@ -141,10 +141,10 @@ def _power(name: str, exponent: Fraction) -> str:
 
 
 def after(unit: str | None) -> str:
-    """What stands behind a number in a unit: nothing for none and for 1."""
+    """The text after a number in this unit: empty for none and for 1."""
     return "" if unit in (None, "1") else f" {unit}"
 
 
 def in_brackets(name: str, unit: str | None) -> str:
-    """A quantity with its unit, as axes have it."""
+    """A quantity with its unit, as an axis label."""
     return name if unit in (None, "1") else f"{name} [{unit}]"

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from orchestration.basics.errors import QuadcosimError
-from orchestration.basics.records import like
+from orchestration.basics.records import replaced
 from orchestration.building import fmus
 from orchestration.fmi.model import Model, read_model
 from orchestration.system.component import Component
@@ -89,7 +89,7 @@ def all_with_files(systems: Iterable[System], paths: Mapping[str, Path]) -> list
     """Systems with their files at these paths; what they have in common stays in common."""
     made: dict[int, Any] = {}
     return [
-        like(
+        replaced(
             system,
             components={name: _at(each, paths, made) for name, each in system.components.items()},
             connections=tuple(_at(each, paths, made) for each in system.connections),
@@ -112,6 +112,6 @@ def _at(part: Part, paths: Mapping[str, Path], made: dict[int, Any]) -> Part:
         elif isinstance(part, Source) and part.file is not None:
             fields["file"] = paths[str(part.file)]
         moved = with_traces_at(part, paths)
-        made[id(part)] = like(moved, **fields) if fields else moved
+        made[id(part)] = replaced(moved, **fields) if fields else moved
     found: Part = made[id(part)]
     return found

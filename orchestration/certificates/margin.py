@@ -10,7 +10,7 @@ import numpy as np
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.extras import needs
-from orchestration.basics.progress import ShareHeard, of_share
+from orchestration.basics.progress import ShareProgress, share_reporter
 from orchestration.basics.terminal import Share
 from orchestration.building.inputs import files_of
 from orchestration.certificates.breaking import LONGEST, Broken, broken_at, least_breaking
@@ -74,7 +74,7 @@ class Certified:
 
 
 @needs("flint", "clarabel")
-def margin(asked: Asked, of: str, *, progress: ShareHeard = None) -> Certified:
+def margin(asked: Asked, of: str, *, progress: ShareProgress = None) -> Certified:
     """How far a quantity of a system may vary from draw to draw, the loop linearised about its operating point.
 
     `of` is the path of a sampled component's `sampling.jitter`, of a connection's `delay_jitter`, or of its `loss`,
@@ -87,13 +87,13 @@ def margin(asked: Asked, of: str, *, progress: ShareHeard = None) -> Certified:
     request = asked_for(asked)
     cause = cause_in(request, of)
     if cause is not None:
-        with of_share(progress, "certifying") as heard:
+        with share_reporter(progress, "certifying") as heard:
             return _of_cause(request, cause, heard)
     varying = varying_of(request, of)
     expect_unshared(request)
     loop = measured(request)
     timeline = Timeline(loop, [varying])
-    with of_share(progress, "certifying") as heard:
+    with share_reporter(progress, "certifying") as heard:
         return (_of_losses if varying.kind == LOSS else _of_times)(timeline, varying, heard)
 
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.extras import needs
-from orchestration.basics.progress import ShareHeard, of_share
+from orchestration.basics.progress import ShareProgress, share_reporter
 from orchestration.certificates.breaking import Broken, least_breaking, unstable_sequence
 from orchestration.certificates.family import Family
 from orchestration.certificates.margin import expect_unshared, largest_certified, measured, varying_of
@@ -79,7 +79,7 @@ class Region:
 
 
 @needs("flint", "clarabel")
-def region(asked: Asked, of: str, and_of: str, *, columns: int = COLUMNS, progress: ShareHeard = None) -> Region:
+def region(asked: Asked, of: str, and_of: str, *, columns: int = COLUMNS, progress: ShareProgress = None) -> Region:
     """How far two quantities of a system may vary at once: see `margin`, of which both are paths of times.
 
     Raises `UsageError` as `margin` does, for two quantities of different sampled components, and for a loop that is
@@ -94,7 +94,7 @@ def region(asked: Asked, of: str, and_of: str, *, columns: int = COLUMNS, progre
     if unstable_sequence(timeline.family([0.0, 0.0])) is not None:
         raise UsageError("the loop is unstable where nothing varies, so nothing can be certified")
     paths = (pair[0].path, pair[1].path)
-    with of_share(progress, "certifying") as heard:
+    with share_reporter(progress, "certifying") as heard:
         widest = _broken(timeline, 0.0, first=True)
         most = down_to_nanoseconds(timeline.largest()) if widest is None else widest.value
         certified, breaking, texts = list[Pair](), list[Pair](), list[str]()

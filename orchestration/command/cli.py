@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 import typer.core
 
-from orchestration.basics.errors import QuadcosimError, SimulatorError, UsageError, no_utf8, told_in
+from orchestration.basics.errors import QuadcosimError, SimulatorError, UsageError, no_utf8, worded_by
 from orchestration.basics.extras import extra_of
-from orchestration.basics.terminal import complain, progress_bar, say, warn
+from orchestration.basics.terminal import inform, progress_bar, report_error, warn
 from orchestration.basics.units import after
 from orchestration.building import consent
 from orchestration.command import completion, exact, interop, margin, plotting, scheduling, studies
@@ -150,7 +150,7 @@ def build(
     where = out or (folder or fmus.default_folder()) / packing.folder
     with progress_bar("building") as progress:
         how: Any = {"packing": packing, "systems": target, "progress": progress}
-        return of_files(fmus.build_slaves(slaves, where, say, **how))
+        return of_files(fmus.build_slaves(slaves, where, inform, **how))
 
 
 @takes("variant", VariantFlags)
@@ -210,7 +210,7 @@ def run(
     if pause_at is not None and out is None:
         raise UsageError("--pause-at: expected --out DIR for the state")
     with progress_bar("flying") as progress:
-        how: Any = {"progress": progress, "announce": say, "engine": engine_named(engine), **vars(process)}
+        how: Any = {"progress": progress, "announce": inform, "engine": engine_named(engine), **vars(process)}
         if resume is not None:
             from orchestration.runs import pause
 
@@ -228,17 +228,17 @@ def run(
         else:
             result = fly(request_from(scenario, flags, timing), **how)
     if result is None:
-        say(f"paused in {out}; go on with: quadcosim run --resume {out}")
+        inform(f"paused in {out}; go on with: quadcosim run --resume {out}")
         return Answer(document={"paused_in": out}, lines=[])
     for warning in result.warnings:
         warn(warning)
     exact.say_if_endless(result.asked)
     if follows := result.provenance["follows"]:
-        say(f"follows {follows}")
+        inform(f"follows {follows}")
     if out is not None:
-        say(f"results in {out}")
+        inform(f"results in {out}")
     elif not registering.manners.as_json:
-        say("add --out DIR to keep the signals and the figures")
+        inform("add --out DIR to keep the signals and the figures")
     return _metrics(result)
 
 
@@ -257,7 +257,7 @@ def validate(
     from orchestration.building.models import MODELS
     from orchestration.checks.validation.validator import validate as findings_of
 
-    paths = fmu or [fmus.locate(name, say) for name in MODELS]
+    paths = fmu or [fmus.locate(name, inform) for name in MODELS]
     for path in paths:
         if not path.is_file():
             raise UsageError(f"{path}: expected an .fmu file")
@@ -286,7 +286,7 @@ def doctor(
     from orchestration.checks.doctor.as_lines import as_text
     from orchestration.checks.doctor.report import as_tables, examine
 
-    report = examine(fmu or [fmus.locate(name, say) for name in MODELS], limits.limits)
+    report = examine(fmu or [fmus.locate(name, inform) for name in MODELS], limits.limits)
     return Answer(document=as_tables(report), lines=as_text(report).splitlines(), good=report.good)
 
 
@@ -320,13 +320,13 @@ def ssp(
         usual = fmus.default_folder() / f"{asked.title}.ssp"
     else:
         usual = Path(f"{scenario.stem}.ssp")
-    written, timing = writing.write_with_timing(asked, out or usual, say, warn)
-    say(f"{timing} has its timing, for quadcosim run")
+    written, timing = writing.write_with_timing(asked, out or usual, inform, warn)
+    inform(f"{timing} has its timing, for quadcosim run")
     masters: dict[str, str | None] = {}
     for reading in readings(written, carried(asked)) if read_back else ():
         masters[reading.master] = reading.refusal
         if reading.refusal is None:
-            say(f"{reading.master} flies it")
+            inform(f"{reading.master} flies it")
         else:
             warn(f"{reading.master} does not fly it: {reading.refusal}")
     return Answer(document={"files": [written, timing], "masters": masters}, lines=[str(written)])
@@ -358,7 +358,7 @@ def _metrics(result: "Result") -> Answer:
     if result.divergence is not None:
         lines.append(f"diverged: {result.divergence}")
     if (missed := unmet(result.system, result.metrics, result.units)) is not None:
-        say(f"not good: {missed}")
+        inform(f"not good: {missed}")
     if result.termination is not None:
         lines.append(f"terminated: {result.termination}")
     return Answer(document=found, lines=lines)
@@ -366,7 +366,7 @@ def _metrics(result: "Result") -> Answer:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and end with one of the codes that its help names; one line for an error, in its words."""
-    with told_in(str):
+    with worded_by(str):
         _run(arguments)
 
 
@@ -380,7 +380,7 @@ def _run(arguments: list[str] | None) -> None:
             code = read(given or ["--help"], prog_name="quadcosim", standalone_mode=False)
         sys.exit(code if given else 2)
     except (KeyboardInterrupt, _Stopped) as stop:
-        complain(f"interrupted {stop}".rstrip())
+        report_error(f"interrupted {stop}".rstrip())
         sys.exit(130)
     except (BrokenPipeError, _Unread):
         sys.exit(141)
@@ -407,7 +407,7 @@ def _told(error: Exception) -> int:
     if registering.manners.debug:
         traceback.print_exc()
         if isinstance(error, SimulatorError) and error.details:
-            say(f"in the FMU:\n{error.details}")
+            inform(f"in the FMU:\n{error.details}")
     misread = _misread(error)
     if isinstance(error, UnicodeEncodeError) and error.reason.startswith("surrogates"):
         error = no_utf8(error)
@@ -421,7 +421,7 @@ def _told(error: Exception) -> int:
         text = f"{error}; try without {' '.join(given)}, which may have Python take modules of another one"
     else:
         text = f"{type(error).__name__}: {error} (an error of quadcosim itself; --debug shows where)"
-    complain(text, error)
+    report_error(text, error)
     return 2 if misread is not None or isinstance(error, UsageError) else 1
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.basics.errors import UsageError
-from orchestration.basics.terminal import say
+from orchestration.basics.terminal import inform
 from orchestration.command import comparison_text as terminal
 from orchestration.command.answer import Answer
 from orchestration.command.figure_flags import FigureFlags
@@ -31,14 +31,14 @@ def all_cells(
         comparison, folder=out, workers=workers, engine=engine, time_limit=time_limit, figures=figures, style=style
     )
     summary = found.summary
-    say(f"{summary.path}: {summary.total} runs, {summary.flown} flown now; tables and pictures beside it")
+    inform(f"{summary.path}: {summary.total} runs, {summary.flown} flown now; tables and pictures beside it")
     for each in summary.follows:
-        say(f"follows {each}")
+        inform(f"follows {each}")
     if summary.agreement is not None:
-        say(f"engine {summary.engine}: {summary.agreement}")
-    say(f"one cell again, by its number in cells.csv: {again} K")
+        inform(f"engine {summary.engine}: {summary.agreement}")
+    inform(f"one cell again, by its number in cells.csv: {again} K")
     if summary.failed:
-        say(f"{summary.failed} runs failed: runs.csv shows why")
+        inform(f"{summary.failed} runs failed: runs.csv shows why")
     content: dict[str, Any] = to_json(comparison, found.outcome, found.bandwidths)
     return Answer(
         document={**content, "follows": summary.follows, "files": found.written},
@@ -63,5 +63,5 @@ def flight(comparison: Comparison, index: int | None, start: int, out: Path | No
     if index is None or out is None:
         raise UsageError("--start: expected --cell K, whose start it is, and --out DIR for the flight")
     run.flight(comparison, index, start, out, engine=engine)
-    say(f"results in {out}")
+    inform(f"results in {out}")
     return Answer(document={"directory": out}, lines=[])

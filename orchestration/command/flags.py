@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
-from orchestration.basics.attribute_docs import Said, attribute_docs
+from orchestration.basics.attribute_docs import FieldDoc, attribute_docs
 from orchestration.basics.documents import toml_of
 from orchestration.basics.errors import UsageError
 from orchestration.command import completion
@@ -38,9 +38,9 @@ def _of_record(
     module: str, name: str, key: str, *, words: Any = None, tells_default: bool = False, repeated: bool = False,
     **options: Any,
 ) -> Any:  # fmt: skip
-    said = attribute_docs(f"orchestration.quadrotor.{module}", name).get(key, Said("", ""))
-    text = said.text.replace(" [s]", "")  # the flag says SECONDS
-    text = f"{text[:-1]}; default: {said.default}." if tells_default else text
+    doc = attribute_docs(f"orchestration.quadrotor.{module}", name).get(key, FieldDoc("", ""))
+    text = doc.text.replace(" [s]", "")  # the flag says SECONDS
+    text = f"{text[:-1]}; default: {doc.default}." if tells_default else text
     if words is not None:
         options["metavar"] = "|".join(get_args(words))
     flag = f"--{key.replace('_', '-')}"

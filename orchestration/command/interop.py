@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from orchestration.basics.terminal import progress_bar, say
+from orchestration.basics.terminal import inform, progress_bar
 from orchestration.command import completion
 from orchestration.command import registry as registering
 from orchestration.command.answer import Answer
@@ -47,15 +47,15 @@ def interop(
     asked = request_from(scenario, flags, timing)
     tools = chosen(tool, system_meant(asked).components)
     with progress_bar("flying in other masters") as progress:
-        found = agreements(asked, tools, announce=say, progress=progress)
+        found = agreements(asked, tools, announce=inform, progress=progress)
     if out is not None:
         from orchestration.interop.figure import draw
 
         for path in draw(found, out):
-            say(str(path))
+            inform(str(path))
     far = [agreement.tool.name for agreement in found if not table.agrees(agreement)]
     if far:
-        say(f"farther than {table.AIM:g} from this project's master: {'; '.join(far)}")
+        inform(f"farther than {table.AIM:g} from this project's master: {'; '.join(far)}")
     document = [table.as_dict(agreement) for agreement in found]
     return Answer(document=document, lines=table.text(found).splitlines(), good=not far)
 

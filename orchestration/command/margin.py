@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from orchestration.basics.errors import UsageError
-from orchestration.basics.terminal import say
+from orchestration.basics.terminal import inform
 from orchestration.command import registry as registering
 from orchestration.command.answer import Answer
 from orchestration.command.flags import FlightFlags, Timing, flies, request_from
@@ -94,7 +94,7 @@ def _region(request: "Request", of: str, and_of: str, out: Path | None) -> Answe
     found = region(request, of, and_of, progress="bar")
     written = [] if out is None else found.save(out)
     for path in written:
-        say(str(path))
+        inform(str(path))
     document = dataclasses.asdict(found) | {"certificates": written}
     lines = [f"{of} and {and_of}", f"searched           {found.searched}"]
     lines += [f"certified          {a:.6g} s and {b:.6g} s" for a, b in found.certified]

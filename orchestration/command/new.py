@@ -6,7 +6,7 @@ from typing import Annotated, get_args
 import typer
 
 from orchestration.basics.errors import UsageError
-from orchestration.basics.terminal import say
+from orchestration.basics.terminal import inform
 from orchestration.command import registry as registering
 from orchestration.command.answer import Answer, of_files
 from orchestration.command.registry import FLY
@@ -29,8 +29,8 @@ def new(
     whose = git_author() if author is None else author
     written = write(kinds[kind], name, Path(), author=whose, license=license)
     if not whose:
-        say("the author is left open; it is the line author = in the class, or --author NAME")
-    say(f"next: quadcosim run {name}/system.toml")
+        inform("the author is left open; it is the line author = in the class, or --author NAME")
+    inform(f"next: quadcosim run {name}/system.toml")
     return of_files(written)
 
 
@@ -39,7 +39,7 @@ def examples(
 ) -> Answer:
     """Write the folders examples, studies and gains here: the files that the pages' commands name."""
     written = of_files(shipped.write(out))
-    say(f"next: quadcosim run {out / 'examples' / 'water_tank' / 'system.toml'}")
+    inform(f"next: quadcosim run {out / 'examples' / 'water_tank' / 'system.toml'}")
     return written
 
 

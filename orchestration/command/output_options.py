@@ -39,4 +39,4 @@ class Manners:
 
     def take_hold(self) -> None:
         """From now on messages go where these flags say; raises `OSError` for a log that cannot be written."""
-        terminal.listen(logging.DEBUG if self.verbose else logging.WARNING if self.quiet else logging.INFO, self.log)
+        terminal.configure(logging.DEBUG if self.verbose else logging.WARNING if self.quiet else logging.INFO, self.log)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from orchestration.basics.errors import UsageError
-from orchestration.basics.terminal import say
+from orchestration.basics.terminal import inform
 from orchestration.command import registry as registering
 from orchestration.command.answer import Answer
 from orchestration.command.flags import assigned
@@ -57,7 +57,7 @@ def schedule(
     request = scheduling.asked_until(system, until)
     found = scheduling.schedule(changed(system_meant(request), assigned("set", changes)))
     if out is not None:
-        say(str(_drawn(found, out, start, end)))
+        inform(str(_drawn(found, out, start, end)))
     document = {
         "until": found.until,
         "tasks": {name: asdict(each) for name, each in found.tasks.items()},

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from orchestration.basics.errors import UsageError
-from orchestration.basics.terminal import progress_bar, say
+from orchestration.basics.terminal import inform, progress_bar
 from orchestration.command import completion, exact
 from orchestration.command import registry as registering
 from orchestration.command.answer import Answer, of_files
@@ -66,7 +66,7 @@ def sweep(
     if summary.agreement is not None:
         lines.append(f"engine {summary.engine}: {summary.agreement}")
     for each in summary.follows:
-        say(f"follows {each}")
+        inform(f"follows {each}")
     told = ("total", "flown", "failed", "path", "engine", "agreement", "follows")
     document = {name: getattr(summary, name) for name in told}
     return Answer(document=document, lines=lines, good=not summary.failed)
@@ -294,14 +294,14 @@ def limit(
     chosen = request_from(scenario, flags, timing)
     found = limits.find(
         chosen, of, first=first, last=last, tolerance=tolerance, scan=scan, confidence=confidence,
-        continuous=continuous, workers=workers, engine=how or "auto", announce=say,
+        continuous=continuous, workers=workers, engine=how or "auto", announce=inform,
     )  # fmt: skip
     where = out or (None if scenario is None else scenario.parent)
     if figures and where is not None:
         from orchestration.limits.figure import draw_limit
 
         for written in draw_limit(chosen, found, where):
-            say(str(written))
+            inform(str(written))
     return Answer(document=found, lines=[f"{name:<19}  {value}" for name, value in limits.as_text(found).items()])
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from orchestration.basics.terminal import say
+from orchestration.basics.terminal import inform
 from orchestration.command import registry as registering
 from orchestration.command.answer import Answer
 from orchestration.command.build_flag import builds
@@ -49,14 +49,14 @@ def connect(
         raise UsageError(f"--out {out}: is there already; expected a file that can be made")
     resources, others = resources_of(fmu)
     proposal = propose(
-        [(text, read_model(fmus.locate(text, say))) for text in others],
+        [(text, read_model(fmus.locate(text, inform))) for text in others],
         Path.cwd() if out is None else out.parent,
         resources,
     )
     for line in proposal.guessed:
-        say(f"guessed: {line}")
+        inform(f"guessed: {line}")
     for line in proposal.undecided:
-        say(f"not decided: {line}")
+        inform(f"not decided: {line}")
     document = {"file": out, "text": proposal.text, "guessed": proposal.guessed, "undecided": proposal.undecided}
     if out is None:
         return Answer(document=document, lines=proposal.text.splitlines())
@@ -87,7 +87,7 @@ def show(
     if out is not None:
         from orchestration.figures import diagram
 
-        say(str(diagram.write(meant, out)))
+        inform(str(diagram.write(meant, out)))
     return Answer(document=tables_of(meant), lines=as_text(meant, *_said_by_fmus(meant)).splitlines())
 
 
@@ -102,7 +102,7 @@ def _said_by_fmus(system: "System") -> tuple[dict[str, str], str]:
     from orchestration.fmi.model import read_model
 
     try:
-        paths = {name: fmus.looked_up(fmu, say) for name, fmu in system.fmus.items()}
+        paths = {name: fmus.looked_up(fmu, inform) for name, fmu in system.fmus.items()}
         models = {name: read_model(path) for name, path in paths.items() if path is not None}
         if models.keys() != paths.keys():
             return {}, ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from orchestration.basics.by_kind import ByKind
+from orchestration.basics.registry import Registry
 
 if TYPE_CHECKING:
     from orchestration.system.request import ControlLoop
@@ -13,5 +13,5 @@ if TYPE_CHECKING:
     Crossover = Callable[[ControlLoop], float]
     """Of the loop in which controllers are put side by side [rad/s]; `math.inf` or 0 outside of its range"""
 
-CROSSOVERS: ByKind[Crossover] = ByKind()
+CROSSOVERS: Registry[Crossover] = Registry()
 """Rooms above enter theirs"""

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from orchestration.basics.errors import UsageError
-from orchestration.basics.extras import explained, needs
-from orchestration.basics.progress import CountHeard
-from orchestration.basics.terminal import say
+from orchestration.basics.extras import explains_missing, needs
+from orchestration.basics.progress import CountProgress
+from orchestration.basics.terminal import inform
 from orchestration.building.inputs import Files
 from orchestration.comparison.bandwidth import Bandwidths, bandwidths
 from orchestration.comparison.cells import CellSummary, frame_of, results
@@ -71,7 +71,7 @@ class Compared:
             "A comparison", None, None, f"{len(self.outcome.cells)} cells, {self.summary.total} runs", rows
         )
 
-    @explained
+    @explains_missing
     def to_pandas(self, what: Literal["cells", "limits", "runs"] = "cells") -> "pd.DataFrame":
         """A row for each cell: how many starts survive and settle, medians; or the limits, or the runs."""
         import pandas as pd
@@ -92,8 +92,8 @@ def compare(
     time_limit: float | None = None,
     figures: bool = True,
     style: "Style | None" = None,
-    progress: CountHeard = "bar",
-    announce: Callable[[str], None] | None = say,
+    progress: CountProgress = "bar",
+    announce: Callable[[str], None] | None = inform,
 ) -> Compared:
     """Fly what is missing of a comparison, conclude, and write its tables and pictures beside its store.
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from fmu_kit.compiler.pack.c_compiler import OPTIONS, compiled_here
 from orchestration.basics.errors import QuadcosimError
-from orchestration.basics.libraries import kept
+from orchestration.basics.libraries import cached_library
 from orchestration.basics.simulator import Integers
 from orchestration.computers import parts as constants
 from orchestration.computers.parts import (
@@ -218,7 +218,7 @@ def _tables(
 def _library() -> Any:
     """scheduler.c as a library; raises `QuadcosimError` that says what stands in the way."""
     sources = {"scheduler.c": SOURCE.read_bytes(), "constants.h": _constants().encode()}
-    path = kept(
+    path = cached_library(
         "scheduler", sources, (*OPTIONS, *_FASTER), lambda: compiled_here(sources, "scheduler.c", options=_FASTER)
     )
     try:

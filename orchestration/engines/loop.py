@@ -8,7 +8,7 @@ from typing import Any
 from fmu_kit.compiler.pack.c_compiler import OPTIONS, compiled_here
 from fmu_kit.compiler.runtime import FOLDER
 from orchestration.basics.errors import QuadcosimError
-from orchestration.basics.libraries import kept
+from orchestration.basics.libraries import cached_library
 from orchestration.engines import condition
 from orchestration.engines.structures import HEADER, declared, expect_same_sizes, shared
 
@@ -25,7 +25,7 @@ def library() -> Any:
     """The function `run` of loop.c; raises `QuadcosimError` that says what stands in the way."""
     sources = {path.name: path.read_bytes() for path in FILES}
     sources["operators.h"] = condition.operators().encode()
-    path = kept("loop", sources, OPTIONS, lambda: compiled_here(sources, "loop.c", mathematics="libm"))
+    path = cached_library("loop", sources, OPTIONS, lambda: compiled_here(sources, "loop.c", mathematics="libm"))
     try:
         made = ctypes.CDLL(str(path))
     except OSError as error:

@@ -43,7 +43,7 @@ def _crossover() -> Crossover:
 
 
 VIEWS[KIND] = View(names=FIGURES, first=FIGURES[:4], load=_drawing, needs=NEEDED)
-LAYOUTS.enter(KIND, _layout)
-LOOPS.enter(KIND, _loop)
-CROSSOVERS.enter(KIND, _crossover)
+LAYOUTS.register(KIND, _layout)
+LOOPS.register(KIND, _loop)
+CROSSOVERS.register(KIND, _crossover)
 ROLES.extend((CONTROLLER, PLANT))

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Literal
 
 from orchestration.basics.bisection import Bracket, Range, bisected, first_failure
 from orchestration.basics.errors import UsageError
-from orchestration.basics.extras import explained
-from orchestration.basics.progress import ShareHeard, of_share
-from orchestration.basics.terminal import say
+from orchestration.basics.extras import explains_missing
+from orchestration.basics.progress import ShareProgress, share_reporter
+from orchestration.basics.terminal import inform
 from orchestration.building.inputs import Files, files_of
 from orchestration.engines.engine import Engine
 from orchestration.engines.wiring import checked
@@ -63,7 +63,7 @@ class Limit(Found):
             f"The limit of {self.of}", None, None, self.note, [*rows, ("values tried", str(len(self.tried)), "")]
         )
 
-    @explained
+    @explains_missing
     def plot(self, *, style: Literal["screen", "paper", "slides"] = "screen") -> "Figures":
         """The figure of what was measured over the quantity, with both limits; a notebook shows it.
 
@@ -77,7 +77,7 @@ class Limit(Found):
         with chosen.applied():
             return Figures({"limit": limit_figure.measured(self, chosen)}, chosen)
 
-    @explained
+    @explains_missing
     def to_pandas(self) -> "pd.DataFrame":
         """A row for each value that was tried, upward: outcome, and how many seeds were run and good."""
         import pandas as pd
@@ -85,7 +85,7 @@ class Limit(Found):
         return pd.DataFrame([vars(one) for one in self.tried])
 
 
-@explained
+@explains_missing
 def find(
     asked: Asked,
     of: str | None = None,
@@ -98,8 +98,8 @@ def find(
     continuous: bool = False,
     workers: int = 1,
     engine: Engine | Literal["auto"] = "auto",
-    progress: ShareHeard = "bar",
-    announce: Callable[[str], None] | None = say,
+    progress: ShareProgress = "bar",
+    announce: Callable[[str], None] | None = inform,
 ) -> Limit:
     """Find the largest value of a quantity of a system or a scenario that is still good, all else as it is.
 
@@ -126,14 +126,14 @@ def find(
     seeds = math.ceil(math.log(1.0 - confidence) / math.log(RELIABILITY)) if random else 1
     local = _local(varied, span, files)
     mean_square = _mean_square(varied, span, files, local) if random else MeanSquareLimit()
-    with of_share(progress, "longest search") as hear, RunEvaluator(files, workers, how.engine) as pool:
+    with share_reporter(progress, "longest search") as hear, RunEvaluator(files, workers, how.engine) as pool:
         tell = announce or (lambda line: None)
         if engine == "auto":
             tell(str(how))
         trials = Evaluator(varied, span, seeds, confidence if random else None, units, pool, tell, hear)
         values = span.values()
         bracket = first_failure(
-            trials.fails, values, span.tolerance, parts=FINER, left=lambda left: trials.expect(left + BEYOND)
+            trials.fails, values, span.tolerance, parts=FINER, remaining=lambda most: trials.expect(most + BEYOND)
         )
         above = [value for value in values if bracket is not None and value >= bracket.bad]
         refuted = _refuted(trials, bracket, above) if random else None
@@ -222,7 +222,7 @@ def _refuted(trials: Evaluator, bracket: Bracket | None, above: list[float]) -> 
         if trials.is_refuted(value):
             if below is None:
                 return value
-            return bisected(trials.is_refuted, below, value, trials.tolerance, left=trials.expect).bad
+            return bisected(trials.is_refuted, below, value, trials.tolerance, remaining=trials.expect).bad
         below = value
     return None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Protocol
 
-from orchestration.basics.by_kind import ByKind
+from orchestration.basics.registry import Registry
 
 if TYPE_CHECKING:
     from orchestration.basics.simulator import Floats
@@ -40,7 +40,7 @@ class KnownLayout(Protocol):
         """What moves in space; None where the system is told in axes that the page does not know."""
 
 
-LAYOUTS: ByKind[KnownLayout] = ByKind()
+LAYOUTS: Registry[KnownLayout] = Registry()
 """Rooms above enter theirs"""
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from orchestration.basics import scratch
-from orchestration.basics.interrupt import interrupts_held_back
+from orchestration.basics.interrupt import deferred_interrupts
 from orchestration.engines.engine import Engine
 from orchestration.engines.room import Left, left_in
 from orchestration.processes import subprocesses
@@ -51,7 +51,7 @@ def flown(
     """As `simulation.flown`, which has found out what is `meant` and when it `started`."""
     room = scratch.temporary()
     try:
-        with interrupts_held_back() as interrupt:
+        with deferred_interrupts() as interrupt:
             order = Order(asked=meant.asked, course=course, engine=engine, level=_MESSAGES.getEffectiveLevel())
             with Child(
                 subprocesses.command("orchestration.runs.apart_process", room.path),
@@ -60,7 +60,7 @@ def flown(
 
                 def begin() -> None:
                     child.allow(time_limit)
-                    interrupt.tell(child.interrupt)
+                    interrupt.forward(child.interrupt)
 
                 heard = _Heard(recorder, progress, begin)
                 why = heard.all_of(child, order)

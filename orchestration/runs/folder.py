@@ -99,7 +99,7 @@ def _beside(new: Path, place: Path) -> Path:
 def _clear(parent: Path) -> None:
     """Finish what the dead were about to do: put in place what was complete, remove the rest."""
     hidden = {path: match for path in parent.glob(".*") if (match := _HIDDEN.fullmatch(path.name))}
-    for path in scratch.dead(path for path, match in hidden.items() if match["kind"] == "new"):
+    for path in scratch.abandoned(path for path, match in hidden.items() if match["kind"] == "new"):
         place, old = parent / hidden[path]["name"], path.with_suffix(".old")
         if old.exists() and not place.exists():
             os.replace(path, place)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal, TypedDict
 import numpy as np
 import numpy.typing as npt
 
-from orchestration.basics.extras import explained
+from orchestration.basics.extras import explains_missing
 from orchestration.basics.simulator import Floats
 from orchestration.recording import frames
 from orchestration.recording.recording import About, Event, Recording
@@ -165,7 +165,7 @@ class Result:
 
         return figures_of([self, *beside], which or None, window=window, style=style)
 
-    @explained
+    @explains_missing
     def to_pandas(self, what: Literal["signals", "events"] = "signals") -> "pd.DataFrame":
         """The signals as a table indexed by `time` [s], or the events; units are in its `attrs["units"]`, by column.
 
@@ -179,7 +179,7 @@ class Result:
 
         return csv_files.write(self.recording, self.about, Path(folder))
 
-    @explained
+    @explains_missing
     def to_mat(self, path: str | Path) -> Path:
         """Write the run as the structure `run` of a MAT-file, as `quadcosim export --format mat` does; its path.
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from orchestration.basics.errors import UsageError
-from orchestration.basics.interrupt import Interrupt, interrupts_held_back
+from orchestration.basics.interrupt import Interrupt, deferred_interrupts
 from orchestration.basics.simulator import Floats
 from orchestration.engines import initial
 from orchestration.engines.condition import program
@@ -242,7 +242,7 @@ def prepared(
     meant = held_to_fmus(asked, announce) if meant is None else meant
     system, models, parameters = meant.system, meant.models, meant.parameters
     streams = Streams(system.seed, system.streams)
-    with interrupts_held_back() as interrupt, ExitStack() as stack:
+    with deferred_interrupts() as interrupt, ExitStack() as stack:
         instances = {name: stack.enter_context(load(path, name)) for name, path in meant.paths.items()}
         with in_its_own_words(asked):
             timetable = Timetable(system, streams, fixed_steps(system, models))

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
-from orchestration.basics.by_kind import ByKind
+from orchestration.basics.registry import Registry
 
 if TYPE_CHECKING:
     from orchestration.basics.bisection import Range
@@ -40,7 +40,7 @@ class KnownLoop(Protocol):
         """The spectral radius over a quantity; None for one that the loop is not known over. Raises `UsageError`."""
 
 
-LOOPS: ByKind[KnownLoop] = ByKind()
+LOOPS: Registry[KnownLoop] = Registry()
 """Rooms above enter theirs"""
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestration.basics.extras import explained
+from orchestration.basics.extras import explains_missing
 from orchestration.basics.simulator import Floats
 
 SAMPLES = (*range(32), 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024)
@@ -41,7 +41,7 @@ class StateSpace:
         sizes = f"{len(self.inputs)} inputs, {len(self.A)} states, {len(self.outputs)} outputs"
         return f"<StateSpace: {sizes}, every {self.dt:g} s>"
 
-    @explained
+    @explains_missing
     def to_control(self) -> Any:
         """The same as a `StateSpace` of python-control, whose names have underlines for dots.
 

@@ -7,7 +7,7 @@ from collections.abc import Container, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from orchestration.basics.identity import OfSame
+from orchestration.basics.identity import IdentityCache
 from orchestration.building.inputs import Files, tables_of
 from orchestration.results.own_metrics import OwnMetric
 from orchestration.studies.study import Study
@@ -50,7 +50,7 @@ def _listed(parts: Iterable[str]) -> str:
     return f"[{', '.join(parts)}]"
 
 
-@OfSame
+@IdentityCache
 def _texts_shared(
     connections: Sequence[Connection],
     sources: Mapping[str, Source],
@@ -79,7 +79,7 @@ def _texts_shared(
     return {key: _json(value) for key, value in parts.items()}
 
 
-@OfSame
+@IdentityCache
 def _text_of_component(name: str, component: Component, hashes: Mapping[str, str], starts: Mapping[str, float]) -> str:
     content = {
         **_values_of(component),

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.basics.errors import UsageError
-from orchestration.basics.extras import explained
+from orchestration.basics.extras import explains_missing
 from orchestration.basics.interrupt import Interrupted
-from orchestration.basics.progress import CountHeard, of_runs
-from orchestration.basics.terminal import Count, say
+from orchestration.basics.progress import CountProgress, runs_reporter
+from orchestration.basics.terminal import Count, inform
 from orchestration.building.inputs import Files
 from orchestration.engines.engine import Engine
 from orchestration.engines.wiring import checked
@@ -45,7 +45,7 @@ _TOLD = 3
 """failed runs that are announced one by one"""
 
 
-@explained
+@explains_missing
 def sweep(
     study: Study,
     *,
@@ -56,8 +56,8 @@ def sweep(
     retry_failed: bool = False,
     engine: EngineChoice = "auto",
     time_limit: float | None = None,
-    progress: CountHeard = "bar",
-    announce: Announce | None = say,
+    progress: CountProgress = "bar",
+    announce: Announce | None = inform,
 ) -> Swept:
     """Fly the runs of a study that its store does not have, writing each row as it comes.
 
@@ -84,7 +84,7 @@ def sweep(
         study = replace(study, metrics=all_sourced(metrics))
     study, files, how, follows = ready(study, engine)
     path = store.store_path(study.name, folder)
-    with of_runs(progress) as hear, store.open_for_writing(path, study.judged) as opened:
+    with runs_reporter(progress) as hear, store.open_for_writing(path, study.judged) as opened:
         _describe(opened, study, files)
         missing = _missing(opened, study, retry_failed)
         counted = _Counted(len(study.points), opened, hear, announce)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from orchestration.basics.extras import explained
+from orchestration.basics.extras import explains_missing
 from orchestration.results import html
 from orchestration.studies.store import open_for_reading
 from orchestration.studies.study import Study
@@ -53,7 +53,7 @@ class Swept:
         rows = [(outcome, str(count), "runs") for outcome, count in outcomes.most_common()]
         return html.card("A study", None, None, self._counts(), rows)
 
-    @explained
+    @explains_missing
     def plot(self, metric: str | None = None) -> "Figures":
         """The figures of a metric over the axes, by default of the first that varies; a notebook shows them.
 
@@ -66,7 +66,7 @@ class Swept:
         made, _ = study_figures(self.study, self.path, metric, SCREEN)
         return Figures(made, SCREEN)
 
-    @explained
+    @explains_missing
     def to_pandas(self) -> "pd.DataFrame":
         """A row for each run: axes, metrics, seed, status; units are in its `attrs["units"]`, by column."""
         from orchestration.studies.table import frame, units_in
@@ -75,7 +75,7 @@ class Swept:
         table.attrs["units"] = units_in(self.path)
         return table
 
-    @explained
+    @explains_missing
     def to_xarray(self) -> "xr.Dataset":
         """The metrics over the axes, with units as attributes; raises `UsageError` if some axis is sampled."""
         from orchestration.studies.table import dataset

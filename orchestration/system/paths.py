@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.basics.errors import UsageError, did_you_mean
-from orchestration.basics.records import like
+from orchestration.basics.records import replaced
 from orchestration.system.component import Component
 from orchestration.system.computers import Arrivals, Computer, Network
 from orchestration.system.connection import Connection
@@ -54,7 +54,7 @@ def changed(system: System, changes: Mapping[str, Any]) -> System:
                 place, sources[name], _in_place(sources[name], _by_parameter(sources[name], keys))
             )
     if _only_numbers(grouped, top):
-        return like(system, components=components, **top)
+        return replaced(system, components=components, **top)
     result: System = _replaced(
         "",
         system,
@@ -222,7 +222,7 @@ def _with_parts(place: str, of: Computer | Network, keys: Mapping[str, Any]) -> 
 
 def _component(place: str, component: Component, keys: Mapping[str, Any]) -> Component:
     if _are_parameters(keys) and all(type(value) is float for value in keys.values()):
-        return like(component, **_by_parameter(component, keys))
+        return replaced(component, **_by_parameter(component, keys))
     sampling = {key.partition(".")[2]: value for key, value in keys.items() if key.startswith("sampling.")}
     rest = {key: value for key, value in _by_parameter(component, keys).items() if "." not in key}
     if sampling:

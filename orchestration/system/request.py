@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Protocol, TypeVar, runtime_checkable
 
 from orchestration.basics.bisection import Range
 from orchestration.basics.errors import UsageError
-from orchestration.basics.records import called
+from orchestration.basics.records import described_as
 from orchestration.system.component import Parameter
 from orchestration.system.model import System
 
@@ -18,7 +18,7 @@ Values = Mapping[str, Parameter]
 """By target, as axes of studies name them"""
 
 
-@called("a System or a Scenario")
+@described_as("a System or a Scenario")
 @runtime_checkable
 class Request(Protocol):
     """What can be asked to run."""
@@ -89,7 +89,7 @@ class Start:
     values: Values
 
 
-@called("an ensemble of starts")
+@described_as("an ensemble of starts")
 @runtime_checkable
 class Ensemble(Protocol):
     """Initial states, of which more leave the first ones as they are."""
@@ -109,7 +109,7 @@ class Ensemble(Protocol):
         """In the order of their indices."""
 
 
-@called("a Vehicle")
+@described_as("a Vehicle")
 @runtime_checkable
 class Craft(Protocol):
     """What a plant is made of, and what its controllers are told of it."""
@@ -122,7 +122,7 @@ class Craft(Protocol):
         """The parameters of the plant and of the controller of this name or path, by target."""
 
 
-@called("a Scenario")
+@described_as("a Scenario")
 @runtime_checkable
 class ControlLoop(Request, Protocol):
     """A request that knows its plant from its controller: what controllers can be compared and tuned on."""

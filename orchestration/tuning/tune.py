@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from orchestration.basics.errors import UsageError
-from orchestration.basics.extras import explained, needs
-from orchestration.basics.progress import ShareHeard, of_share
-from orchestration.basics.terminal import say
+from orchestration.basics.extras import explains_missing, needs
+from orchestration.basics.progress import ShareProgress, share_reporter
+from orchestration.basics.terminal import inform
 from orchestration.building.inputs import Files
 from orchestration.results import html
 from orchestration.system.following import followed
@@ -57,7 +57,7 @@ class Tuned:
         ]
         return html.card("A tuning", None, None, f"{len(self.searches)} searches", rows)
 
-    @explained
+    @explains_missing
     def to_pandas(self) -> "pd.DataFrame":
         """A row for each search: period [s], seed, tuned values, cost, and what else is known of its outcome."""
         import pandas as pd
@@ -81,8 +81,8 @@ def tune(
     workers: int = 1,
     engine: EngineChoice = "auto",
     command: str = "quadcosim.tune",
-    progress: ShareHeard = "bar",
-    announce: Callable[[str], None] | None = say,
+    progress: ShareProgress = "bar",
+    announce: Callable[[str], None] | None = inform,
 ) -> Tuned:
     """Tune the parameters of a controller, by runs or by exact expectations.
 
@@ -103,7 +103,7 @@ def tune(
         raise UsageError("--workers and --engine: expected none; a tuning by expect flies nothing")
     else:
         exact = dataclasses.replace(tuning, base=alone(tuning.base, "auto")[0])
-        with of_share(progress, "searching") as hear:
+        with share_reporter(progress, "searching") as hear:
             find = functools.partial(search_exactly, exact)
             done = searched(exact, exact.files(), folder, find, ExactFound, progress=hear, announce=announce)
     return Tuned(searches=tuple(done), written=tuple(write(tuning, done, Path(out), command)))
@@ -114,7 +114,7 @@ def _flown(
     folder: Path,
     workers: int,
     engine: EngineChoice,
-    progress: ShareHeard,
+    progress: ShareProgress,
     announce: Callable[[str], None],
 ) -> list[Found]:
     """What the searches of a tuning by runs find."""
@@ -125,7 +125,7 @@ def _flown(
         announce(str(how))
     if follows := followed(asked.origin, files.models_of(asked.origin)):
         announce(f"follows {follows}")
-    with of_share(progress, "searching") as hear, RunEvaluator(files, workers, how.engine) as pool:
+    with share_reporter(progress, "searching") as hear, RunEvaluator(files, workers, how.engine) as pool:
         fly = functools.partial(pool.fly_all, in_lanes=how.in_lanes, on_gpu=how.on_gpu)
 
         def find(period: float, seed: int, heard: Callable[[float], None]) -> Found:

@@ -25,7 +25,7 @@ def main(own_folder: Path) -> None:
     tempfile.tempdir = str(own_folder)  # and no other if it is full
 
     def orphaned() -> None:
-        for folder in scratch.dead(iter([own_folder.parent])):
+        for folder in scratch.abandoned(iter([own_folder.parent])):
             shutil.rmtree(folder, ignore_errors=True)
 
     # An FMU must not be blamed for an interrupt.

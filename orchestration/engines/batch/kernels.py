@@ -14,7 +14,7 @@ from fmu_kit.compiler.pack.lanes import MAIN, Lanes, compiled_lanes
 from fmu_kit.compiler.pack.lanes import lanes_here as lanes_of_fmus
 from fmu_kit.compiler.runtime import FOLDER
 from orchestration.basics.errors import QuadcosimError, UsageError
-from orchestration.basics.libraries import kept
+from orchestration.basics.libraries import cached_library
 from orchestration.engines.loop import INSTANTS
 from orchestration.engines.structures import HEADER, expect_same_sizes, shared
 from orchestration.fmi.model import Model
@@ -71,7 +71,7 @@ def _sources_in(path: Path, changed: int) -> Mapping[str, bytes]:
 @functools.lru_cache(maxsize=64)
 def _compiled(sources: tuple[tuple[str, bytes], ...], lanes: int) -> Kernel:
     how = (OPTIONS, FOR_THIS_PROCESSOR, lanes)
-    path = kept("lanes", dict(sources), how, lambda: compiled_lanes(dict(sources), lanes))
+    path = cached_library("lanes", dict(sources), how, lambda: compiled_lanes(dict(sources), lanes))
     return Kernel(Lanes(path), path)
 
 
@@ -82,7 +82,7 @@ def batch(sizes: str, expressions: str, lanes: int) -> Any:
     sources |= {"sizes.h": sizes.encode(), "expressions.h": expressions.encode()}
     options = (*FOR_THIS_PROCESSOR, f"-DQUADCOSIM_LANES={lanes}", "-Wno-psabi")
     compile_ = lambda: compiled_here(sources, "batch.c", options=options)  # noqa: E731
-    library = ctypes.CDLL(str(kept("batch", sources, (OPTIONS, options), compile_)))
+    library = ctypes.CDLL(str(cached_library("batch", sources, (OPTIONS, options), compile_)))
     expect_same_sizes(library, shared(lanes))
     for name in ("run", "clear", "free_all"):
         getattr(library, name).argtypes = (ctypes.c_void_p,)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from orchestration.basics.identity import OfSame
+from orchestration.basics.identity import IdentityCache
 from orchestration.engines import initial
 from orchestration.engines.batch.code import Written, written
 from orchestration.engines.batch.kernels import Kernel, batch, component, lanes_here
@@ -47,7 +47,7 @@ def outline(system: System) -> Hashable:
     return components, others, system.optional, system.criterion
 
 
-@OfSame
+@IdentityCache
 def _outline_between(
     connections: Sequence[Connection],
     sources: Mapping[str, Source],

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.basics.errors import QuadcosimError
-from orchestration.basics.libraries import kept
+from orchestration.basics.libraries import cached_library
 
 OPTIONS = ("--std=c++20", "--fmad=false", "--device-as-default-execution-space", "--ptxas-options=-v")
 _HEADERS = {
@@ -70,7 +70,7 @@ def compiled(text: str, architecture: str) -> bytes:
     Raises `QuadcosimError` without NVRTC, saying what to install.
     """
     make = lambda: image(text, architecture).content  # noqa: E731
-    return kept("cuda", {"flights.cu": text.encode()}, (OPTIONS, architecture, _version()), make).read_bytes()
+    return cached_library("cuda", {"flights.cu": text.encode()}, (OPTIONS, architecture, _version()), make).read_bytes()
 
 
 def image(text: str, architecture: str) -> Image:

@@ -1,4 +1,4 @@
-"""What is said where a package of an extra is missing, and when."""
+"""The error for a missing optional package, and when it is raised."""
 
 import sys
 from collections.abc import Callable
@@ -30,7 +30,7 @@ def without(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
         ("cma", "studies", lambda: tuning.tune(None, out="out")),  # type: ignore[arg-type]
     ],
 )
-def test_what_is_missing_is_said_before_anything_is_done(
+def test_a_missing_package_is_reported_before_anything_is_done(
     package: str, extra: str, command: Callable[[], Any], without: Callable[[str], None], tmp_path: Path
 ) -> None:
     without(package)
@@ -38,7 +38,7 @@ def test_what_is_missing_is_said_before_anything_is_done(
         command()
 
 
-def test_with_its_packages_a_function_is_as_it_was() -> None:
+def test_with_its_packages_a_function_is_unchanged() -> None:
     @needs("json")
     def doubled(value: int) -> int:
         """Twice a value."""

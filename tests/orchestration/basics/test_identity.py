@@ -1,31 +1,31 @@
-"""What is found once of objects that many have in common."""
+"""Results cached by the identity of their arguments."""
 
 from orchestration.basics import identity
-from orchestration.basics.identity import OfSame
+from orchestration.basics.identity import IdentityCache
 
 
-def test_it_is_found_once_of_the_same_objects_and_anew_of_equal_ones() -> None:
-    asked: list[list[int]] = []
+def test_a_result_is_computed_once_for_the_same_objects_and_again_for_equal_ones() -> None:
+    calls: list[list[int]] = []
 
-    @OfSame
+    @IdentityCache
     def total(numbers: list[int], more: list[int]) -> int:
-        asked.append(numbers)
+        calls.append(numbers)
         return sum(numbers) + sum(more)
 
     first, second, more = [1, 2], [1, 2], [3]
     assert [total(first, more), total(first, more), total(second, more), total(first, more)] == [6, 6, 6, 6]
-    assert [each is first for each in asked] == [True, False]
+    assert [each is first for each in calls] == [True, False]
 
 
-def test_objects_that_are_gone_are_never_taken_for_those_in_their_place() -> None:
-    @OfSame
+def test_deleted_objects_are_never_mistaken_for_new_ones_at_their_address() -> None:
+    @IdentityCache
     def content(of: list[int]) -> int:
         return of[0]
 
     assert [content([i]) for i in range(3 * identity.MOST)] == [*range(3 * identity.MOST)]
 
 
-def test_of_many_objects_no_more_are_held_than_it_says() -> None:
+def test_no_more_objects_are_kept_alive_than_the_limit() -> None:
     class Held:
         alive = 0
 
@@ -35,7 +35,7 @@ def test_of_many_objects_no_more_are_held_than_it_says() -> None:
         def __del__(self) -> None:
             Held.alive -= 1
 
-    @OfSame
+    @IdentityCache
     def nothing(of: Held) -> None:
         pass
 

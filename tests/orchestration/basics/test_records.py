@@ -7,7 +7,7 @@ import pytest
 
 from orchestration.basics.attribute_docs import attribute_docs
 from orchestration.basics.errors import UsageError
-from orchestration.basics.records import like
+from orchestration.basics.records import replaced
 from orchestration.basics.typed_tables import docs_of_keys, fields_of, parsed
 from orchestration.quadrotor.timing import TIMING_KEYS
 from orchestration.studies.axes import Axis
@@ -21,8 +21,8 @@ from tests.commands import Main
 
 
 def test_a_whole_number_of_numpy_stays_one_and_a_float_stays_a_float() -> None:
-    given = {"count": np.int64(3), "share": np.float64(3.0), "on": np.bool_(True), "name": "x"}
-    kept = Component(fmu="tank.fmu", step=0.1, parameters=given).parameters
+    values = {"count": np.int64(3), "share": np.float64(3.0), "on": np.bool_(True), "name": "x"}
+    kept = Component(fmu="tank.fmu", step=0.1, parameters=values).parameters
     assert {name: (value, type(value)) for name, value in kept.items()} == {
         "count": (3, int), "share": (3.0, float), "on": (True, bool), "name": ("x", str),
     }  # fmt: skip
@@ -30,19 +30,19 @@ def test_a_whole_number_of_numpy_stays_one_and_a_float_stays_a_float() -> None:
 
 
 @pytest.mark.parametrize("value", [2**63, -(2**63) - 1])
-def test_a_whole_number_beyond_64_bits_is_no_parameter(value: int) -> None:
+def test_a_whole_number_beyond_64_bits_is_refused_as_a_parameter(value: int) -> None:
     with pytest.raises(UsageError, match=r"^parameters\.n: expected a whole number of at most 64 bits$"):
         Component(fmu="tank.fmu", step=0.1, parameters={"n": value})
 
 
-def test_what_stands_below_a_field_is_read_without_importing_it() -> None:
-    said = attribute_docs("orchestration.system.sampling", "Sampling")
-    assert said["offset"] == ("The time of the first instant [s], in its own time.", "0.0")
-    assert said["period"].default == ""
+def test_docstrings_of_fields_are_read_without_importing_the_module() -> None:
+    docs = attribute_docs("orchestration.system.sampling", "Sampling")
+    assert docs["offset"] == ("The time of the first instant [s], in its own time.", "0.0")
+    assert docs["period"].default == ""
     assert attribute_docs("orchestration.system.sampling", "Nobody") == {}
 
 
-def test_a_table_has_the_keys_of_its_record_and_says_of_them_what_the_record_does() -> None:
+def test_a_table_has_the_keys_and_docstrings_of_its_record() -> None:
     assert [*fields_of(SamplingTable)] == [*attribute_docs("orchestration.system.sampling", "Sampling"), "on"]
     assert {"from", "to", "name"} <= fields_of(ConnectionTable).keys()
     assert not {"start", "end", "stated"} & fields_of(ConnectionTable).keys()
@@ -51,18 +51,18 @@ def test_a_table_has_the_keys_of_its_record_and_says_of_them_what_the_record_doe
     assert period["description"] == attribute_docs("orchestration.system.sampling", "Sampling")["period"].text
 
 
-def test_the_flags_of_a_flight_say_what_the_record_of_its_timing_says(main: Main) -> None:
+def test_the_help_of_a_flight_s_flags_is_the_docstrings_of_its_timing_record(main: Main) -> None:
     shown = letters(main("run", "--help").stdout)
     for key in TIMING_KEYS:
-        said = attribute_docs("orchestration.quadrotor.timing", "Timing")[key].text
-        assert letters(said)[:15] in shown, key
+        text = attribute_docs("orchestration.quadrotor.timing", "Timing")[key].text
+        assert letters(text)[:15] in shown, key
 
 
 def letters(text: str) -> str:
     return "".join(filter(str.isalnum, text))
 
 
-def test_what_is_wrong_with_a_record_within_another_is_at_its_place() -> None:
+def test_an_error_in_a_nested_record_names_its_place() -> None:
     with pytest.raises(UsageError, match=r"^components\.a = 3: expected a value made by Component\(…\)$"):
         System(stop_time=1.0, components={"a": 3})  # type: ignore[dict-item]
     with pytest.raises(UsageError, match=r"^sampling = \{'period': 1.0\}: expected a value made by Sampling\(…\)$"):
@@ -86,9 +86,9 @@ def test_a_key_has_one_name_and_no_schema_has_another() -> None:
     assert parsed({"seed": 3}, DesignTable).design_seed == 3
 
 
-def test_a_record_like_another_is_what_a_new_one_would_be() -> None:
+def test_a_replaced_record_equals_a_new_one() -> None:
     first = System(stop_time=1.0, components={"a": Component(fmu="a.fmu", step=0.1)})
-    assert first.fmus == {"a": "a.fmu"}  # found from its values, and kept
-    moved = like(first, components={"a": like(first.components["a"], fmu="b.fmu")})
+    assert first.fmus == {"a": "a.fmu"}  # computed from its values and cached
+    moved = replaced(first, components={"a": replaced(first.components["a"], fmu="b.fmu")})
     assert moved == System(stop_time=1.0, components={"a": Component(fmu="b.fmu", step=0.1)})
     assert moved.fmus == {"a": "b.fmu"}

@@ -1,4 +1,4 @@
-"""What a killed process leaves in the folder for temporary files is gone when the next one has started."""
+"""Temporary folders of killed processes are removed when the next process starts."""
 
 import errno
 import subprocess
@@ -43,7 +43,7 @@ def start(fmu: Path) -> subprocess.Popen[str]:
     return process
 
 
-def test_fmus_unpacked_by_the_dead_are_cleared_and_those_of_the_living_are_not(
+def test_fmus_unpacked_by_killed_processes_are_removed_and_those_of_running_ones_are_not(
     built: dict[str, Path], temporary: Path
 ) -> None:
     with start(built["QuadrotorPlant"]) as killed:
@@ -68,15 +68,15 @@ def test_others_cannot_enter_it(temporary: Path) -> None:
     folder.remove()
 
 
-def test_no_room_to_unpack_is_told_with_the_place(
+def test_no_space_to_unpack_is_reported_with_the_folder(
     built: dict[str, Path], temporary: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(*_: object, **__: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(fmpy, "extract", full)
-    with pytest.raises(QuadcosimError) as told:
+    with pytest.raises(QuadcosimError) as raised:
         Fmi2Instance(built["QuadrotorPlant"], "plant")
-    said = f"cannot be unpacked in {temporary}, which TMPDIR names: No space left on device"
-    assert str(told.value) == f"{built['QuadrotorPlant']}: {said}"
+    expected = f"cannot be unpacked in {temporary}, which TMPDIR names: No space left on device"
+    assert str(raised.value) == f"{built['QuadrotorPlant']}: {expected}"
     assert not list(temporary.iterdir())

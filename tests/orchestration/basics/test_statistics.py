@@ -1,4 +1,4 @@
-"""Intervals of shares, against the equation that defines them and the coverage that they promise."""
+"""Intervals of shares, against the equation that defines them and the coverage that they state."""
 
 import math
 from statistics import NormalDist
@@ -33,7 +33,7 @@ def test_published_values() -> None:
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9, 0.97])
-def test_the_interval_covers_the_share_about_as_often_as_it_says(share: float) -> None:
+def test_the_interval_covers_the_share_about_as_often_as_stated(share: float) -> None:
     trials = 200
     covered = sum(
         math.comb(trials, k) * share**k * (1.0 - share) ** (trials - k)
@@ -43,8 +43,8 @@ def test_the_interval_covers_the_share_about_as_often_as_it_says(share: float) -
     assert 0.93 < covered < 0.98
 
 
-def test_a_share_is_refuted_where_so_few_are_seen_too_rarely() -> None:
-    """Of 29 with a share of 0.9, at most 23 are seen with probability 0.064, at most 22 with 0.022."""
+def test_a_share_is_refuted_if_so_few_successes_are_too_unlikely() -> None:
+    """Of 29 with a share of 0.9, at most 23 succeed with probability 0.064, at most 22 with 0.022."""
     assert not refutes(23, 29, 0.9, 0.95)
     assert refutes(22, 29, 0.9, 0.95)
     assert refutes(23, 29, 0.9, 0.93)
@@ -78,12 +78,12 @@ def test_few_values_bound_nothing_and_many_cover_what_they_should() -> None:
 @pytest.mark.parametrize(
     ("seen", "trials", "level"), [(1, 0, 0.9), (3, 2, 0.9), (-1, 2, 0.9), (1, 2, 0.0), (1, 2, 1.0)]
 )
-def test_numbers_that_cannot_be_are_told(seen: int, trials: int, level: float) -> None:
+def test_invalid_numbers_are_refused(seen: int, trials: int, level: float) -> None:
     with pytest.raises(UsageError, match="expected"):
         wilson(seen, trials, level)
 
 
-def test_what_holds_again_beyond_its_first_end_does_not_move_it() -> None:
+def test_values_that_hold_again_beyond_the_first_end_do_not_move_it() -> None:
     assert first_end([0.1, 0.2, 0.3], [True, False, True]) == 0.1
     assert first_end([0.1, 0.2], [True, True]) == 0.2
     assert first_end([0.1, 0.2], [False, True]) is None

@@ -1,4 +1,4 @@
-"""What long work says of itself: a bar on a terminal, and where none can be drawn a line now and then."""
+"""Progress of long work: a bar on a terminal, occasional lines where none can be drawn."""
 
 import io
 import sys
@@ -18,7 +18,7 @@ class Terminal(io.StringIO):
 
 @pytest.fixture
 def wait(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
-    """Lets the time pass that the lines are counted by."""
+    """Advances the clock of the progress lines."""
     now = [100.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
 
@@ -29,20 +29,20 @@ def wait(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
 
 
 @pytest.mark.parametrize("kind", ["pipe", "dumb terminal"])
-def test_where_no_bar_can_be_drawn_a_line_comes_now_and_then_with_the_time_left(
+def test_where_no_bar_can_be_drawn_occasional_lines_show_the_time_left(
     kind: str, wait: Callable[[float], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    heard = io.StringIO() if kind == "pipe" else Terminal()
-    monkeypatch.setattr(sys, "stderr", heard)
+    output = io.StringIO() if kind == "pipe" else Terminal()
+    monkeypatch.setattr(sys, "stderr", output)
     monkeypatch.setenv("TERM", "dumb")
     with progress_bar("flying") as progress:
         for percent in range(101):
             wait(SPARSE / 40)
             progress(percent / 100)
-    assert heard.getvalue().splitlines() == ["flying: 39%, 16 s left", "flying: 79%, 5 s left"]
+    assert output.getvalue().splitlines() == ["flying: 39%, 16 s left", "flying: 79%, 5 s left"]
 
 
-def test_runs_are_counted_on_such_lines_too(
+def test_occasional_lines_count_runs_too(
     wait: Callable[[float], None], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with runs_bar() as progress:
@@ -52,7 +52,7 @@ def test_runs_are_counted_on_such_lines_too(
     assert capsys.readouterr().err.splitlines() == ["1 of 50 runs, 10 min left", "3 of 50 runs, 6 min left"]
 
 
-def test_short_work_says_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+def test_short_work_prints_nothing(capsys: pytest.CaptureFixture[str]) -> None:
     with progress_bar("flying") as progress:
         progress(0.5)
         progress(1.0)
@@ -60,11 +60,11 @@ def test_short_work_says_nothing(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_on_a_terminal_there_is_a_bar_without_colours_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    heard = Terminal()
-    monkeypatch.setattr(sys, "stderr", heard)
+    output = Terminal()
+    monkeypatch.setattr(sys, "stderr", output)
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv("NO_COLOR", "1")
     with progress_bar("flying") as progress:
         progress(0.5)
-    assert "50%" in heard.getvalue()
+    assert "50%" in output.getvalue()
     assert terminal._draws()

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 import typer.main
 
-from orchestration.basics.terminal import listen
+from orchestration.basics.terminal import configure
 from orchestration.command.answer import Answer
 from orchestration.command.cli import app
 from tests.commands import Main
@@ -37,7 +37,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder of its own; afterwards nothing listens to the files of a test any more."""
     monkeypatch.chdir(tmp_path)
     yield tmp_path
-    listen(logging.INFO, None)
+    configure(logging.INFO, None)
 
 
 @pytest.mark.parametrize("command", COMMANDS)

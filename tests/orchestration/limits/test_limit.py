@@ -112,7 +112,7 @@ def test_an_island_of_failure_within_the_bracket_is_seen_by_the_finer_steps() ->
 def test_how_many_values_are_left_is_a_bound_that_comes_down(edge: float, tolerance: float, parts: int) -> None:
     bounds: list[int] = []
     values = [0.0, 1.0, 2.0, 3.0, 5.0, 8.0, 11.0]
-    first_failure(lambda value: value > edge, values, tolerance, parts=parts, left=bounds.append)
+    first_failure(lambda value: value > edge, values, tolerance, parts=parts, remaining=bounds.append)
     assert all(bound >= really for bound, really in zip(reversed(bounds), range(len(bounds))))
     assert bounds == sorted(bounds, reverse=True)
     assert bounds[0] < len(values) + parts + 22  # halvings of the widest step to the finest tolerance

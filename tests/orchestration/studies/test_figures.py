@@ -12,7 +12,7 @@ import pytest
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
-from orchestration.basics.by_kind import ByKind
+from orchestration.basics.registry import Registry
 from orchestration.basics.statistics import wilson
 from orchestration.figures import cells
 from orchestration.figures.style import SCREEN
@@ -322,7 +322,7 @@ def test_a_limit_that_linear_theory_does_not_have_is_drawn_without_the_radius(tm
 def test_where_no_loop_is_known_no_process_is_started_for_its_radius(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(limit_figure, "LOOPS", ByKind[Any]())
+    monkeypatch.setattr(limit_figure, "LOOPS", Registry[Any]())
     monkeypatch.setattr(limit_figure, "computed", lambda *_: pytest.fail("it computes"))
     assert draw_limit(short(), limit("period"), tmp_path, PNG) == [tmp_path / "limit_period.png"]
 
