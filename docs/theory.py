@@ -12,7 +12,8 @@ from fmu_kit.trajectory import Trajectory
 from orchestration.building.inputs import files_of
 from orchestration.exact.expect import expected_of
 from orchestration.exact.loops import Loops
-from orchestration.flight.hover_loop import HoverLoop, at_hover
+from orchestration.flight.hover import at_hover
+from orchestration.flight.hover_loop import HoverLoop
 from orchestration.flight.local_limit import local_limit
 from orchestration.quadrotor import wiring
 from orchestration.quadrotor.fmu_choice import FmuChoice

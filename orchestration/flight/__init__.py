@@ -1,4 +1,4 @@
-"""What is drawn and judged as a flight of the quadrotor, entered in the tables of the rooms below."""
+"""Figures, layouts and linear analysis of flights of the quadrotor, registered in the tables of the rooms below."""
 
 from __future__ import annotations
 

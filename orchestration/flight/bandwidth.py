@@ -1,4 +1,4 @@
-"""The bandwidth of the attitude loop of a controller, by which those of any structure are put side by side."""
+"""The bandwidth of the attitude loop of a controller, by which controllers of any structure are compared."""
 
 import math
 from typing import cast
@@ -6,7 +6,7 @@ from typing import cast
 import numpy as np
 
 from orchestration.building import fmus
-from orchestration.flight.hover_loop import at_hover
+from orchestration.flight.hover import at_hover
 from orchestration.fmi.model import read_model
 from orchestration.fmi.reuse import Instances
 from orchestration.quadrotor import wiring
@@ -16,15 +16,15 @@ from orchestration.system.model import System
 from orchestration.system.request import ControlLoop
 
 PERIOD = 1e-3
-"""[s] between samples while it is asked; a redesign for longer ones has other gains by design"""
+"""[s] between samples while it is measured; a redesign for longer ones has other gains by design"""
 RANGE, FIRST = (0.1, 1000.0), 20.0
-"""[rad/s] in which it is looked for, and where first"""
+"""[rad/s] of the search, and its initial value"""
 ACCURACY = 1e-3
 """of the gain"""
 AMPLITUDE = 1e-4
 """of roll [rad]"""
 CYCLES = 6
-"""of the oscillation; the second half of them counts"""
+"""of the oscillation; the second half is evaluated"""
 _ROLL, _SCALAR, _RATE = (
     wiring.MEASUREMENT.index(name) for name in ("quaternion.x", "quaternion.w", "angular_velocity.x")
 )
@@ -32,11 +32,11 @@ _TORQUE = wiring.COMMAND.index("torque.x")
 
 
 def crossover(loop: ControlLoop) -> float:
-    """Where the open attitude loop, from roll through the controller and 1/(J s²) back, has the gain one [rad/s].
+    """The frequency [rad/s] at which the open attitude loop, from roll through the controller and 1/(J s²), has gain 1.
 
-    The controller is shown a small oscillation of roll about hover, all else at rest, and its torque about x is what
-    follows it: so it is that of the FMU, whatever its law and its memory. J is the plant's. `math.inf` or 0 where the
-    gain does not pass one within `RANGE`.
+    It is measured on the FMU, for any law and memory: the controller receives a small oscillation of roll about hover,
+    all else at rest, and its torque about x is recorded. J is the plant's. `math.inf` or 0 if the gain does not cross
+    one within `RANGE`.
     """
     scenario = cast(Scenario, loop)
     inertia, fleet = _inertia(scenario), Instances()
@@ -51,7 +51,7 @@ def crossover(loop: ControlLoop) -> float:
 
 
 def response(hover: System, frequency: float, fleet: Instances) -> float:
-    """By how much the torque about x answers to an oscillation of roll at hover [N.m/rad]; `frequency` in rad/s."""
+    """The gain from an oscillation of roll at hover to the torque about x [N.m/rad]; `frequency` in rad/s."""
     count = max(40, math.ceil(2.0 * math.pi * CYCLES / frequency / PERIOD))
     times = PERIOD * np.arange(count)
     torque, command = np.empty(count), np.zeros(len(wiring.COMMAND))
@@ -71,7 +71,7 @@ def response(hover: System, frequency: float, fleet: Instances) -> float:
             controller.step(float(t), PERIOD)
             read()
             torque[k] = command[_TORQUE]
-    late = times >= times[-1] / 2.0  # what began with the oscillation has died out
+    late = times >= times[-1] / 2.0  # transients have died out
     phase = frequency * times[late]
     shapes = np.column_stack([np.sin(phase), np.cos(phase), np.ones(len(phase)), times[late]])
     (a, b, *_), *_ = np.linalg.lstsq(shapes, torque[late], rcond=None)

@@ -1,4 +1,4 @@
-"""Thrust and torques as applied, with what happened when, and where the plant's limits bite."""
+"""Thrust and torques as applied, with marks for events and for active limits of the plant."""
 
 from collections.abc import Sequence
 
@@ -18,26 +18,26 @@ NAMES = dict(zip(COMMAND, ("thrust", "torque x", "torque y", "torque z"), strict
 UNITS = dict(zip(COMMAND, ("N", "N.m", "N.m", "N.m"), strict=True))
 COLUMNS = tuple(f"plant.{name}" for name in COMMAND)
 MOST_MARKS = 150
-"""of one kind that are apart in a window"""
+"""of one kind that can be told apart in a window"""
 AT_LIMIT = "a limit of the plant is active"
 
 
 def commands(runs: Sequence[Run], style: Style) -> Figure:
     """The whole run, and a window of it: by default the first second. In a narrow figure the window alone, if any."""
     end = max(float(run.rows[-1, 0]) for run in runs)
-    told = runs[0].window
-    zoom = told or (0.0, min(1.0, end))
-    spans: list[Window] = [(0.0, end), zoom] if style.is_wide else [told or (0.0, end)]
+    window = runs[0].window
+    zoom = window or (0.0, min(1.0, end))
+    spans: list[Window] = [(0.0, end), zoom] if style.is_wide else [window or (0.0, end)]
     figure = style.figure(3.0 + 10.5 * len(COMMAND))
     rows = figure.subplots(len(COMMAND), len(spans), sharex="col", squeeze=False, width_ratios=(1.0, 1.3)[: len(spans)])
     for row, name in zip(rows, COMMAND, strict=True):
         for panel, span in zip(row, spans, strict=True):
-            is_zoom = panel is not row[0] or (len(spans) == 1 and told is not None)
+            is_zoom = panel is not row[0] or (len(spans) == 1 and window is not None)
             _draw(panel, runs, name, span, style, clips=not is_zoom)
             if is_zoom and len(runs) == 1:
                 mark_events(panel, runs[0], span)
         row[0].set_ylabel(quantity(NAMES[name], UNITS[name]))
-        if len(spans) > 1 and told is not None:
+        if len(spans) > 1 and window is not None:
             row[0].axvspan(*zoom, color=GREY, alpha=0.15, linewidth=0.0)
     for panel in rows[-1]:
         panel.set_xlabel(TIME)
@@ -61,7 +61,7 @@ def _draw(panel: Axes, runs: Sequence[Run], name: str, span: Window, style: Styl
         lines.append((t[inside], values[inside]) if inside.any() else (t, values))
     panel.set_xlim(span)
     low, high = min(float(y.min()) for _, y in lines), max(float(y.max()) for _, y in lines)
-    room = (high - low) or 1.0  # below for what happened, above for what was lost
+    room = (high - low) or 1.0  # below for samples and arrivals, above for losses
     panel.set_ylim(low - (0.1 if clips else 0.25) * room, high + 0.15 * room)
     if not (clips and clip_peaks(panel, lines, UNITS[name], style)):
         _mark_limits(panel, runs, name)
@@ -69,7 +69,7 @@ def _draw(panel: Axes, runs: Sequence[Run], name: str, span: Window, style: Styl
 
 
 def _mark_limits(panel: Axes, runs: Sequence[Run], name: str) -> None:
-    """A line at each limit that the command comes near, in an axis that is made to show it."""
+    """A line at each limit within the range of the axis."""
     bottom, top = panel.get_ylim()
     for run in runs:
         most = run.parameters.get("plant.thrust_max" if name == COMMAND[0] else "plant.torque_max", np.inf)
@@ -79,7 +79,7 @@ def _mark_limits(panel: Axes, runs: Sequence[Run], name: str) -> None:
 
 
 def _mark_saturation(panel: Axes, runs: Sequence[Run], name: str) -> None:
-    """Shade the time at which a limit changes the command."""
+    """Shade the time during which a limit alters the command."""
     for run in runs:
         t = run.signals["time"]
         active = saturated(run.signals, run.parameters)[name]
@@ -91,7 +91,7 @@ def _mark_saturation(panel: Axes, runs: Sequence[Run], name: str) -> None:
 
 
 def mark_events(axes: Axes, run: Run, span: Window) -> None:
-    """Ticks along the lower and upper edge for what happened in the window; where too much did, for what was lost."""
+    """Marks along the lower and upper edge for the events in the window; for losses only where there are too many."""
     for kind, what, marker, color, height, label in (
         ("sampled", "measurement", "|", GREY, 0.04, "sampled"),
         ("arrived", "command", "^", GREEN, 0.11, "command arrives"),
@@ -109,10 +109,10 @@ def mark_events(axes: Axes, run: Run, span: Window) -> None:
 
 
 def _legend(figure: Figure, panels: Sequence[Axes]) -> None:
-    """Each thing once, below."""
-    found: dict[str, Artist] = {}
+    """One legend below the panels, each label once."""
+    handles: dict[str, Artist] = {}
     for panel in panels:
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
-            found.setdefault(label, handle)
-    if found:
-        figure.legend([*found.values()], [*found], loc="outside lower center", ncols=len(found))
+            handles.setdefault(label, handle)
+    if handles:
+        figure.legend([*handles.values()], [*handles], loc="outside lower center", ncols=len(handles))

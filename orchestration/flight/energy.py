@@ -16,7 +16,7 @@ COLUMN = f"controller.{ENERGY}"
 
 
 def energy(runs: Sequence[Run], style: Style) -> Figure | None:
-    """L (33) at the samples; None if no controller has one, or none has sampled."""
+    """L (33) at the samples; None if no controller has this variable, or none has sampled."""
     with_energy = [run for run in runs if COLUMN in run and _sampled(run).any()]
     if not with_energy:
         return None
@@ -37,5 +37,5 @@ def energy(runs: Sequence[Run], style: Style) -> Figure | None:
 
 
 def _sampled(run: Run) -> npt.NDArray[np.bool_]:
-    """Which of the rows that are seen are sampling instants."""
+    """Mask of the visible rows that are sampling instants."""
     return np.isin(np.round(run.time * 1e9), np.round(run.instants("sampled") * 1e9))

@@ -25,7 +25,7 @@ class Error:
     name: str
     unit: str
     of: Callable[[Run], Floats | None]
-    """shape (n, 3); None: the controller does not tell"""
+    """shape (n, 3); None: not an output of the controller"""
 
 
 def errors(runs: Sequence[Run], style: Style) -> Figure:
@@ -46,9 +46,9 @@ def errors(runs: Sequence[Run], style: Style) -> Figure:
 
 
 def components_of_errors(runs: Sequence[Run], style: Style) -> Figure:
-    """x, y and z of each error; of several runs a panel for each of them."""
+    """x, y and z of each error; with several runs a panel for each component."""
     if len(runs) > 1:
-        return _laid_over(runs, style)
+        return _overlaid(runs, style)
     figure, panels = _panels(runs, style)
     for i, (panel, error) in enumerate(panels):
         draw_components(panel, runs[0], error, style)
@@ -58,7 +58,7 @@ def components_of_errors(runs: Sequence[Run], style: Style) -> Figure:
 
 
 def draw_components(panel: Axes, run: Run, error: Error, style: Style, *, clips: bool = True) -> None:
-    """x, y and z of an error that the run tells."""
+    """x, y and z of an error that the run has."""
     values = error.of(run)
     assert values is not None
     for k, (axis, color, dashes) in enumerate(AXES):
@@ -69,60 +69,60 @@ def draw_components(panel: Axes, run: Run, error: Error, style: Style, *, clips:
         clip_peaks(panel, [(run.time, values[:, k]) for k in range(3)], error.unit, style)
 
 
-def _laid_over(runs: Sequence[Run], style: Style) -> Figure:
+def _overlaid(runs: Sequence[Run], style: Style) -> Figure:
     """A row for each error, a column for each component, a line for each run."""
-    found = _known(runs)
-    figure = style.figure(2.0 + 11.0 * len(found))
-    rows = figure.subplots(len(found), 3, sharex=True, squeeze=False)
-    for i, (row, error) in enumerate(zip(rows, found, strict=True)):
+    available = _available_errors(runs)
+    figure = style.figure(2.0 + 11.0 * len(available))
+    rows = figure.subplots(len(available), 3, sharex=True, squeeze=False)
+    for i, (row, error) in enumerate(zip(rows, available, strict=True)):
         for k, panel in enumerate(row):
             drawn = [(run, values[:, k]) for run in runs if (values := error.of(run)) is not None]
             for run, values in drawn:
                 panel.plot(run.time, values, color=run.color, linestyle=run.dashes, label=run.name)
             see(panel, runs)
             panel.set_ylabel(wrapped(quantity(f"{error.name} {'xyz'[k]}", error.unit), 18))
-            if i == len(found) - 1:
+            if i == len(available) - 1:
                 panel.set_xlabel(TIME)
     legend_of_runs(figure, runs, style)
     return figure
 
 
 def _panels(runs: Sequence[Run], style: Style) -> tuple[Figure, list[tuple[Axes, Error]]]:
-    """A panel for each error that there is; legend and title are there."""
-    found = _known(runs)
-    columns = 2 if style.is_wide and len(found) > 1 else 1
-    rows = -(-len(found) // columns)
+    """A figure with legend and title, and a panel for each available error."""
+    available = _available_errors(runs)
+    columns = 2 if style.is_wide and len(available) > 1 else 1
+    rows = -(-len(available) // columns)
     figure = style.figure(3.0 + 14.0 * rows)
     panels = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
-    for panel in panels[len(found) :]:
+    for panel in panels[len(available) :]:
         panel.set_visible(False)
-    for panel in panels[max(0, len(found) - columns) : len(found)]:
+    for panel in panels[max(0, len(available) - columns) : len(available)]:
         panel.set_xlabel(TIME)
     if style.has_titles and title(runs):
         figure.suptitle(title(runs))
     legend_of_runs(figure, runs, style)
-    return figure, list(zip(panels, found))
+    return figure, list(zip(panels, available))
 
 
-def _known(runs: Sequence[Run]) -> list[Error]:
+def _available_errors(runs: Sequence[Run]) -> list[Error]:
     return [error for error in ERRORS if any(error.of(run) is not None for run in runs)]
 
 
-def _position(run: Run) -> Floats | None:
-    flown = run.stacked([f"plant.{name}" for name in POSITION])
-    return flown - desired(run.signals)[run.seen]
+def _position_error(run: Run) -> Floats | None:
+    position = run.stacked([f"plant.{name}" for name in POSITION])
+    return position - desired(run.signals)[run.seen]
 
 
-def _told(name: str) -> Callable[[Run], Floats | None]:
+def _output_of_controller(name: str) -> Callable[[Run], Floats | None]:
     columns = [f"controller.{component}" for component in components(name)]
     return lambda run: run.stacked(columns) if run.has(columns) else None
 
 
 ERRORS = (
-    Error(name="position error", unit="m", of=_position),
-    Error(name="velocity error", unit="m/s", of=_told("velocity_error")),
-    Error(name="attitude error", unit="1", of=_told("attitude_error")),
-    Error(name="angular velocity error", unit="rad/s", of=_told("angular_velocity_error")),
+    Error(name="position error", unit="m", of=_position_error),
+    Error(name="velocity error", unit="m/s", of=_output_of_controller("velocity_error")),
+    Error(name="attitude error", unit="1", of=_output_of_controller("attitude_error")),
+    Error(name="angular velocity error", unit="rad/s", of=_output_of_controller("angular_velocity_error")),
 )
 """P̃, Ṽ, q̃ and Ω̃"""
 DRAWN = tuple(

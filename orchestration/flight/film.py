@@ -1,4 +1,4 @@
-"""A flight that moves, as GIF or MP4."""
+"""Animations of flights, as GIF or MP4."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,17 +20,17 @@ from orchestration.quadrotor.wiring import COMMAND, POSITION, POSITION_REFERENCE
 RATE = 20
 """[pictures/s]"""
 MOST = 240
-"""pictures: a longer flight goes by faster"""
+"""pictures: a longer flight is shown faster"""
 DPI = 100.0
 TRAIL = 2.0
 """[s] of the path that is drawn thick"""
 SIZE = 0.06
-"""Half the length of an arm, of the longest side of what is seen: much larger than it is"""
+"""Half the length of an arm as a share of the longest side of the view: much larger than in reality"""
 
 PLACE, ATTITUDE = ([f"plant.{name}" for name in names] for names in (POSITION, QUATERNION))
 THRUST = f"plant.{COMMAND[0]}"
 COLUMNS = frozenset((*PLACE, *ATTITUDE, THRUST, *POSITION_REFERENCE))
-"""That a run needs to be filmed"""
+"""Columns that a film needs"""
 _CIRCLE = np.linspace(0.0, 2.0 * np.pi, 25)
 _ROTORS = [
     np.column_stack([fore + 0.55 * np.cos(_CIRCLE), side + 0.55 * np.sin(_CIRCLE), np.zeros(len(_CIRCLE))])
@@ -40,9 +40,9 @@ _ARMS = [np.array([[1.0, side, 0.0], [-1.0, -side, 0.0]]) for side in (1, -1)]
 
 
 def writer(path: Path) -> AbstractMovieWriter:
-    """What writes a film in the format of its ending.
+    """A writer for the format of the ending.
 
-    Raises `UsageError` for another ending, or one that nothing on this machine writes.
+    Raises `UsageError` for another ending, or for one without a writer on this machine.
     """
     if path.suffix == ".gif":
         return PillowWriter(fps=RATE)
@@ -54,8 +54,8 @@ def writer(path: Path) -> AbstractMovieWriter:
 
 
 def film(runs: Sequence[Run], path: Path, style: Style, progress: Share = lambda share: None) -> Path:
-    """Write runs that fly at the same time, each with its trail; the path. Raises `UsageError` as `writer` does."""
-    chosen = writer(path)
+    """Write an animation of runs, each with its trail; its path. Raises `UsageError` as `writer` does."""
+    movie = writer(path)
     start, end = min(run.span[0] for run in runs), max(run.span[1] for run in runs)
     count = max(2, min(MOST, round(RATE * (end - start))))
     times = np.linspace(start, end, count)
@@ -69,30 +69,30 @@ def film(runs: Sequence[Run], path: Path, style: Style, progress: Share = lambda
         title = figure.suptitle("0.00 s")
         fill(figure, axes)
         size = SIZE * max(float(np.ptp(limits)) for limits in (axes.get_xlim(), axes.get_ylim(), axes.get_zlim()))
-        craft = [_Craft.on(axes, run, BLUE if len(runs) == 1 else run.color, size) for run in runs]
-        with chosen.saving(figure, str(path), DPI):
+        vehicles = [_Vehicle.on(axes, run, BLUE if len(runs) == 1 else run.color, size) for run in runs]
+        with movie.saving(figure, str(path), DPI):
             for place, now in enumerate(times, start=1):
                 title.set_text(f"{now:.2f} s" + ("" if abs(pace - 1.0) < 0.1 else f", {pace:.2g} times as fast"))
-                for one in craft:
-                    one.move(float(now))
-                chosen.grab_frame()
+                for vehicle in vehicles:
+                    vehicle.move(float(now))
+                movie.grab_frame()
                 progress(place / count)
     return path
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Craft:
-    """A vehicle, its trail, its thrust and where it should be, as lines that are moved."""
+class _Vehicle:
+    """A vehicle, its trail, thrust and reference, as lines that are moved."""
 
     run: Run
     size: float
     lines: dict[str, Any]
     outlines: Sequence[Any]
     most: float
-    """thrust of the run [N]"""
+    """largest thrust of the run [N]"""
 
     @classmethod
-    def on(cls, axes: Any, run: Run, color: str, size: float) -> "_Craft":
+    def on(cls, axes: Any, run: Run, color: str, size: float) -> "_Vehicle":
         def line(**how: Any) -> Any:
             return axes.plot([], [], [], **{"color": color, "zorder": 5, **how})[0]
 
@@ -107,7 +107,7 @@ class _Craft:
         )  # fmt: skip
 
     def move(self, now: float) -> None:
-        """To where it is at a time [s]; at its end if that is before."""
+        """Move it to its place at a time [s], or at the end of its run."""
         t = self.run.signals["time"]
         now = min(now, float(t[-1]))
         place, turned = self._at(PLACE, now), _rotation(self._at(ATTITUDE, now))

@@ -1,4 +1,4 @@
-"""The panels of a flight on the page of a report, and how the vehicle moves in space."""
+"""The panels of a flight in a report, and the scene of its vehicle in space."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
@@ -19,7 +19,7 @@ from orchestration.report.model import Line, Panel, Scene
 from orchestration.system.model import System
 
 POSITION_ERROR = "position error"
-"""A column that is computed: ‖P - P_d‖ [m]"""
+"""A computed column: ‖P - P_d‖ [m]"""
 ANGLES = ("roll", "pitch", "yaw")
 """Columns that the page computes from the quaternion [deg]"""
 DESIRED_ANGLES = tuple(f"{angle} of the reference" for angle in ANGLES)
@@ -33,27 +33,27 @@ def _of_plant(names: Sequence[str]) -> tuple[str, ...]:
 
 PLACE, ATTITUDE = _of_plant(POSITION), _of_plant(QUATERNION)
 DESIRED = tuple(f"controller.{name}" for name in components("desired_quaternion", "xyzw"))
-"""Q_d as of the last sample, of controllers that say it"""
+"""Q_d as of the last sample, of controllers with this output"""
 THRUST = f"plant.{COMMAND[0]}"
 
 
 class FlightLayout:
-    """Of runs with the columns of a quadrotor."""
+    """The layout of runs with the columns of a quadrotor."""
 
     compact = (*_of_plant((*POSITION, *QUATERNION, *ANGULAR_VELOCITY, *COMMAND)), *DESIRED)
     logarithmic = (POSITION_ERROR,)
 
     def fits(self, columns: Collection[str]) -> bool:
-        """Whether a vehicle moves and turns."""
+        """Whether position and attitude of a vehicle are among the columns."""
         return {*PLACE, *ATTITUDE} <= {*columns}
 
     def computed(self, signals: Mapping[str, Floats]) -> dict[str, Floats]:
         """The position error, where there is a reference."""
-        return {POSITION_ERROR: position_error(signals)} if _aims(signals) else {}
+        return {POSITION_ERROR: position_error(signals)} if _has_reference(signals) else {}
 
     def panels(self, columns: Collection[str]) -> tuple[Panel, ...]:
-        """Errors, position, attitude, commands and rates; velocity and energy for whoever opens them."""
-        aims, told = _aims(columns), {*DESIRED} <= {*columns}
+        """Errors, position, attitude, commands and rates; velocity and energy, closed at first."""
+        has_reference, has_desired_attitude = _has_reference(columns), {*DESIRED} <= {*columns}
         panels = [
             Panel(
                 title="position error",
@@ -66,7 +66,7 @@ class FlightLayout:
                 unit="m",
                 lines=(
                     *_vector(PLACE, "xyz"),
-                    *(_vector(POSITION_REFERENCE, OF_REFERENCE, reference=True) if aims else ()),
+                    *(_vector(POSITION_REFERENCE, OF_REFERENCE, reference=True) if has_reference else ()),
                 ),
             ),
             Panel(
@@ -74,7 +74,11 @@ class FlightLayout:
                 unit="°",
                 lines=(
                     *_vector(ANGLES, ANGLES),
-                    *(_vector(DESIRED_ANGLES, DESIRED_ANGLES, held=True, reference=True) if told else ()),
+                    *(
+                        _vector(DESIRED_ANGLES, DESIRED_ANGLES, held=True, reference=True)
+                        if has_desired_attitude
+                        else ()
+                    ),
                 ),
             ),
             Panel(title="thrust", unit="N", lines=(Line(column=THRUST, label="thrust", held=True),)),
@@ -86,23 +90,25 @@ class FlightLayout:
                 logarithmic=True, shown=False,
             ),
         ]  # fmt: skip
-        known = {*columns, *ANGLES, *DESIRED_ANGLES, *([POSITION_ERROR] if aims else [])}
+        known = {*columns, *ANGLES, *DESIRED_ANGLES, *([POSITION_ERROR] if has_reference else [])}
         return tuple(panel for panel in panels if all(line.column in known for line in panel.lines))
 
     def scene(self, columns: Collection[str], system: System | None) -> Scene | None:
-        """The vehicle, and what it follows."""
-        given = {} if system is None else system.components["plant"].parameters
+        """The vehicle and its reference."""
+        parameters = {} if system is None else system.components["plant"].parameters
         return Scene(
             position=(PLACE[0], PLACE[1], PLACE[2]),
             quaternion=(ATTITUDE[0], ATTITUDE[1], ATTITUDE[2], ATTITUDE[3]),
-            reference=(POSITION_REFERENCE[0], POSITION_REFERENCE[1], POSITION_REFERENCE[2]) if _aims(columns) else None,
+            reference=(POSITION_REFERENCE[0], POSITION_REFERENCE[1], POSITION_REFERENCE[2])
+            if _has_reference(columns)
+            else None,
             desired=(DESIRED[0], DESIRED[1], DESIRED[2], DESIRED[3]) if {*DESIRED} <= {*columns} else None,
             thrust=THRUST if THRUST in columns else None,
-            is_enu=given.get("frame") in ("enu", Frame.ENU) or given.get("frame_index") == Frame.ENU,
+            is_enu=parameters.get("frame") in ("enu", Frame.ENU) or parameters.get("frame_index") == Frame.ENU,
         )
 
 
-def _aims(columns: Collection[str]) -> bool:
+def _has_reference(columns: Collection[str]) -> bool:
     return all(name in columns for name in POSITION_REFERENCE)
 
 

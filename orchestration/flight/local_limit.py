@@ -6,7 +6,9 @@ from typing import cast
 
 from orchestration.basics.bisection import Range, first_failure
 from orchestration.basics.errors import UsageError
-from orchestration.flight.hover_loop import HoverLoop, NotSmooth, at_edge, at_hover
+from orchestration.flight.hover import at_edge, at_hover
+from orchestration.flight.hover_loop import HoverLoop
+from orchestration.flight.plant_step import NotSmooth
 from orchestration.quadrotor.quantities import range_of
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.requests.ranges import Varied
@@ -19,20 +21,20 @@ from orchestration.system.request import Request
 
 HOVER = "spectral radius of the sampled loop about hover, by differences through saved states"
 HOVER_ACCURACY = 1e-3
-"""of the limit, relative: what the differences leave"""
+"""relative accuracy of the limit with these differences"""
 KNOWN = ("period", "delay")
-"""Quantities that the loop about hover is for"""
+"""Quantities for which the loop about hover applies"""
 
 
 class AboutHover:
     """The loop of a `Scenario` about hover."""
 
     def at_rest(self, request: Request) -> System:
-        """The system that hovers as a scenario would."""
+        """The system of a scenario at hover."""
         return at_hover(cast(Scenario, request))
 
     def local_limits(self, varied: Varied, span: Range) -> Local:
-        """The local limit of a quantity: of the loop about hover where that is for it, else as of any system."""
+        """The local limit of a quantity: of the loop about hover where that applies, else as for any system."""
         scenario = cast(Scenario, varied.request)
         if varied.of in ("jitter", "loss"):
             return Local(reason=f"linear theory has no local limit of {varied.of}")
@@ -47,7 +49,7 @@ class AboutHover:
         return _without_hover_loop(scenario, varied, span, why)
 
     def radius_over(self, request: Request, of: str) -> Callable[[float], float] | None:
-        """The spectral radius over a period or delay [s]; raises `UsageError` where hover has no linear loop."""
+        """The spectral radius over a period or delay [s]; raises `UsageError` if there is no linear loop at hover."""
         if of not in KNOWN:
             return None
         scenario = cast(Scenario, request)
@@ -76,7 +78,7 @@ def radius(loop: HoverLoop, scenario: Scenario, of: str, value: float) -> float:
 def about_hover(scenario: Scenario, of: str) -> Local:
     """The local limits of the quadrotor in period or delay, inside its boundary layer and just outside of it.
 
-    Raises `UsageError` for a scenario whose loop about hover cannot be had.
+    Raises `UsageError` for a scenario without a linear loop about hover.
     """
     if scenario.timing.hold != "zero":
         raise UsageError("the loop about hover is for zero-order hold only")
@@ -93,7 +95,7 @@ def about_hover(scenario: Scenario, of: str) -> Local:
 
 
 def _without_hover_loop(scenario: Scenario, varied: Varied, span: Range, why: str) -> Local:
-    """The quadrotor as any other system, and why."""
+    """The local limit of the quadrotor as of any other system, with the reason `why`."""
     try:
         hover = at_hover(scenario)
     except UsageError as error:

@@ -1,4 +1,4 @@
-"""The delays that a scenario's loop about hover stands: exactly where they are constant, by bounds where they vary."""
+"""The delays that a scenario's loop about hover tolerates: exact for constant ones, bounds for varying ones."""
 
 from dataclasses import dataclass
 
@@ -12,23 +12,23 @@ from orchestration.system.distribution import lowest
 
 @dataclass(frozen=True, kw_only=True)
 class Margin:
-    """All in seconds, of what is small about hover."""
+    """Delay margins of the linear loop about hover, all in seconds."""
 
     period: float
     delay: float
-    """that every command has, the least where it varies"""
+    """of every command, the smallest if it varies"""
     delay_limit: float | None
-    """the largest constant delay, exactly; None: none that is looked for is too much, or the least is"""
+    """the largest constant delay, exact; None: every delay of the range is stable, or none"""
     certain_jitter: float
-    """what may come to the delay, otherwise for each command, without any sequence making the loop unstable"""
+    """addition to the delay, different for each command, with which no sequence makes the loop unstable"""
     breaking_jitter: float | None
-    """the least that was found to be too much; None: no sequence that was tried makes the loop unstable"""
+    """the smallest addition found that can make it unstable; None: no sequence that was tried does"""
     breaking_sequence: tuple[float, ...]
-    """of the shares of it that do, in turn"""
+    """the shares of it, in turn, that do"""
 
 
 def margin_of(scenario: Scenario) -> Margin:
-    """The margin of a scenario; raises `UsageError` where its loop about hover cannot be had."""
+    """The margin of a scenario; raises `UsageError` if it has no linear loop about hover."""
     timing = scenario.timing
     if timing.hold != "zero" or timing.order != "gauss-seidel":
         raise UsageError("margin: expected hold zero and order gauss-seidel; the bounds are for no other")

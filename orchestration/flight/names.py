@@ -1,4 +1,4 @@
-"""Names by which a flight is known elsewhere."""
+"""Names of a flight that other rooms use."""
 
 from orchestration.quadrotor.wiring import COMMAND, POSITION, POSITION_REFERENCE
 
@@ -6,4 +6,4 @@ KIND = "flight"
 """That of a `Scenario`"""
 FIGURES = ("path", "errors", "components", "commands", "energy", "phase", "spectrum")
 NEEDED = frozenset((*POSITION_REFERENCE, *(f"plant.{name}" for name in (*POSITION, *COMMAND))))
-"""Columns that make a flight of a run of any system"""
+"""Columns by which a run of any system gets the figures of a flight"""

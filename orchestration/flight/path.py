@@ -21,13 +21,13 @@ from orchestration.quadrotor.nominal_model import frame_of
 from orchestration.quadrotor.wiring import POSITION, POSITION_REFERENCE
 
 ROUNDS = 4
-"""until nothing moves by more than a hair"""
+"""iterations of the layout, after which changes are invisible"""
 LEAST = 0.45
-"""of the longest side: so long at least is each side of the box"""
+"""shortest side of the box as a share of the longest"""
 
 
 def path(runs: Sequence[Run], style: Style) -> Figure:
-    """Where it flew and where it should have, a metre being as long along each axis, up being up."""
+    """The path of the vehicle and its reference, with equal scales of the axes and up upwards."""
     figure, axes = stage(runs, style)
     if style.has_titles:
         figure.suptitle(title(runs))
@@ -53,9 +53,9 @@ def stage(runs: Sequence[Run], style: Style) -> tuple[Figure, Any]:
 
 
 def fill(figure: Figure, axes: Any) -> float:
-    """Draw in space as large as there is room between title and legend; the height that is left over, in pixels.
+    """Enlarge the axes to the room between title and legend; returns the height that is left over, in pixels.
 
-    The labels of three-dimensional axes do not grow with them, so that it takes a few rounds.
+    The labels of three-dimensional axes do not scale with them, so this iterates.
     """
     width, height = (float(side) for side in figure.get_size_inches() * figure.dpi)
     figure.draw_without_rendering()
@@ -78,7 +78,7 @@ def fill(figure: Figure, axes: Any) -> float:
 
 
 def extent(axes: Any) -> Bbox:
-    """Of the box with all that is in it and the labels of its axes, in pixels."""
+    """The extent of the box with its content and the labels of its axes, in pixels."""
     corners = np.array([*itertools.product(axes.get_xlim(), axes.get_ylim(), axes.get_zlim())])
     projected = np.column_stack([corners, np.ones(len(corners))]) @ axes.get_proj().T
     labels = [axis.get_tightbbox() for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
@@ -87,17 +87,17 @@ def extent(axes: Any) -> Bbox:
 
 
 def draw_in_space(axes: Any, runs: Sequence[Run], style: Style) -> None:
-    """The same on three-dimensional axes that are there."""
-    flown = [run.stacked([f"plant.{name}" for name in POSITION]) for run in runs]
-    wanted = [run.stacked(POSITION_REFERENCE) for run in runs]
-    for i, points in enumerate(wanted):
-        if not any(np.array_equal(points, other) for other in wanted[:i]):
+    """Draw paths and references on existing three-dimensional axes."""
+    paths = [run.stacked([f"plant.{name}" for name in POSITION]) for run in runs]
+    references = [run.stacked(POSITION_REFERENCE) for run in runs]
+    for i, points in enumerate(references):
+        if not any(np.array_equal(points, other) for other in references[:i]):
             rests = not np.ptp(points, axis=0).any()
             axes.plot(
                 *(points[:1] if rests else points).T, "D" if rests else "-", color=ORANGE,
                 linewidth=3.5 * style.line, alpha=0.6, zorder=1, label="reference" if i == 0 else None,
             )  # fmt: skip
-    for run, points in zip(runs, flown, strict=True):
+    for run, points in zip(runs, paths, strict=True):
         alone = len(runs) == 1
         color = BLUE if alone else run.color
         axes.plot(*points.T, color=color, linestyle=run.dashes, label="flown" if alone else None, zorder=2)
@@ -107,14 +107,14 @@ def draw_in_space(axes: Any, runs: Sequence[Run], style: Style) -> None:
                 markerfacecolor="white" if what == "start" else color,
             )  # fmt: skip
     is_enu = frame_of(runs[0].parameters, "plant") == Frame.ENU
-    _equal(axes, np.concatenate([*flown, *wanted]), is_enu=is_enu, is_wide=style.is_wide)
+    _equal(axes, np.concatenate([*paths, *references]), is_enu=is_enu, is_wide=style.is_wide)
     names = ("east", "north", "up") if is_enu else ("north", "east", "down")
     axes.set(**{f"{axis}label": f"{axis}, {name} [m]" for axis, name in zip("xyz", names, strict=True)})
     axes.view_init(elev=24, azim=-50)
 
 
 def _equal(axes: Any, points: Floats, *, is_enu: bool, is_wide: bool) -> None:
-    """Equal scales in a box that holds all points; x to the viewer's right, up up."""
+    """Equal scales in a box that holds all points; x to the viewer's right, up upwards."""
     points = points[np.isfinite(points).all(axis=1)]
     low, high = points.min(axis=0), points.max(axis=0)
     middle, size = 0.5 * (low + high), 1.08 * (high - low)

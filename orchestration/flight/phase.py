@@ -18,17 +18,17 @@ DRAWN = (*ERROR, *RATE)
 
 
 def phase(runs: Sequence[Run], style: Style) -> Figure | None:
-    """x, y and z by themselves, as of the samples; None if no controller tells its errors."""
-    told = [run for run in runs if run.has(DRAWN)]
-    if not told:
+    """A panel each for x, y and z, as of the samples; None if no controller has its errors as outputs."""
+    with_errors = [run for run in runs if run.has(DRAWN)]
+    if not with_errors:
         return None
     columns = 3 if style.is_wide else 1
     figure = style.figure(24.0 if columns == 3 else 48.0)
     panels = figure.subplots(3 // columns, columns, squeeze=False).ravel()
     for k, (panel, axis) in enumerate(zip(panels, "xyz", strict=True)):
-        for run in told:
+        for run in with_errors:
             _draw(panel, run, run[ERROR[k]], run[RATE[k]], alone=len(runs) == 1)
-        _draw_surfaces(panel, told)
+        _draw_surfaces(panel, with_errors)
         panel.set(xlabel=quantity(f"position error {axis}", "m"), ylabel=quantity(f"velocity error {axis}", "m/s"))
     handles, names = panels[0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside lower center", ncols=len(names))
@@ -49,7 +49,7 @@ def _draw(panel: Axes, run: Run, error: Floats, rate: Floats, *, alone: bool) ->
 
 
 def _draw_surfaces(panel: Axes, runs: Sequence[Run]) -> None:
-    """s = 0 of each law that has one, over what is seen."""
+    """The surface s = 0 of each law that has one, over the visible range."""
     panel.margins(0.06)
     seen, rates = panel.get_xlim(), panel.get_ylim()
     panel.set(xlim=seen, ylim=rates)

@@ -1,4 +1,4 @@
-"""What a controller and a plant need to be wired to each other, under the names and with the units of the wiring."""
+"""The variables that a controller and a plant need to be connected, with the names and units of the wiring."""
 
 from collections.abc import Iterable, Iterator
 

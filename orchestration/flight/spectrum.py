@@ -1,4 +1,4 @@
-"""The spectrum of the command: how its power is spread over frequencies, beside the rate at which it is sampled."""
+"""The power spectrum of the command, with its sampling rate."""
 
 from collections.abc import Sequence
 
@@ -15,22 +15,22 @@ from orchestration.figures.ticks import plain
 from orchestration.flight.commands import COLUMNS
 
 SEGMENTS = 8
-"""Of the run, before they overlap by half"""
+"""of the run, before they overlap by half"""
 ROUNDING = 1e-18
-"""of the largest density: what is below is not of the signal"""
+"""of the largest density: below it is rounding, not signal"""
 FEWEST = 64
-"""Values that a segment has at least"""
+"""values in a segment"""
 
 
 def spectrum(runs: Sequence[Run], style: Style) -> Figure | None:
-    """Power spectral densities of thrust and torques as applied; None of less than `FEWEST` steps of the plant."""
-    found = [(run, *of) for run in runs if (of := _command(run)) is not None]
-    if not found:
+    """Power spectral densities of thrust and torques as applied; None for less than `FEWEST` steps of the plant."""
+    with_command = [(run, *of) for run in runs if (of := _command(run)) is not None]
+    if not with_command:
         return None
     columns = 2 if style.is_wide else 1
     figure = style.figure(25.0 if columns == 2 else 42.0)
     thrust, torque = figure.subplots(2 // columns, columns, squeeze=False).ravel()
-    for run, step, command in found:
+    for run, step, command in with_command:
         color, dashes = (BLUE, "-") if len(runs) == 1 else (run.color, run.dashes)
         frequency, densities = welch(command, step)
         thrust.plot(frequency, positive(densities[:, 0]), color=color, linestyle=dashes)
@@ -81,7 +81,7 @@ def welch(values: Floats, step: float) -> tuple[Floats, Floats]:
 
 
 def _command(run: Run) -> tuple[float, Floats] | None:
-    """The step of the plant [s] and what it was given at each, shape (n, 4), of all rows in the window."""
+    """The step of the plant [s] and its command at each, shape (n, 4), for all rows in the window."""
     step = run.system.components["plant"].step
     if step is None:
         return None
@@ -97,7 +97,7 @@ def _command(run: Run) -> tuple[float, Floats] | None:
 
 
 def _mark_rates(panel: Axes, runs: Sequence[Run], style: Style) -> None:
-    """The rate at which the controller samples, and half of it, beyond which it cannot see."""
+    """Mark the sampling rate of the controller and its Nyquist frequency."""
     for run in runs:
         sampling = run.system.components["controller"].sampling
         if sampling is None:

@@ -8,7 +8,7 @@ import pytest
 
 import quadcosim
 from orchestration.basics.documents import read_toml
-from orchestration.flight.hover_loop import at_hover
+from orchestration.flight.hover import at_hover
 from orchestration.fmi.reuse import Instances
 from orchestration.quadrotor.fmu_choice import FmuChoice
 from orchestration.stability.monodromy import growth_of_loop

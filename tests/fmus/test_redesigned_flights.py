@@ -8,7 +8,8 @@ import pytest
 import quadcosim
 from orchestration.basics.errors import UsageError
 from orchestration.building import fmus
-from orchestration.flight.hover_loop import HoverLoop, at_hover
+from orchestration.flight.hover import at_hover
+from orchestration.flight.hover_loop import HoverLoop
 from orchestration.fmi.reuse import Instances
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.scenario_file import scenario_from_tables

@@ -7,7 +7,8 @@ import pytest
 import quadcosim
 from fmu_kit.bundle import Target
 from orchestration.building.models import MODELS
-from orchestration.flight.hover_loop import HoverLoop, at_hover
+from orchestration.flight.hover import at_hover
+from orchestration.flight.hover_loop import HoverLoop
 from orchestration.fmi.reuse import Instances
 from orchestration.stability.monodromy import growth_of_loop
 from orchestration.system.model import System

@@ -10,7 +10,8 @@ import pytest
 from orchestration.comparison.cells import CellSummary, Median, Share
 from orchestration.comparison.run import agree
 from orchestration.flight.bandwidth import crossover
-from orchestration.flight.hover_loop import COORDINATES, _controller_at_hover, _located, hover_of
+from orchestration.flight.hover import COORDINATES, hover_of
+from orchestration.flight.hover_loop import controller_at_hover, located
 from orchestration.fmi.reuse import Instances
 from quadcosim import FmuChoice, Scenario
 from tests.commands import Main
@@ -171,7 +172,7 @@ PLANT = FmuChoice(fmu="native/QuadrotorPlant")
 def test_at_the_bandwidth_the_open_loop_of_roll_has_the_gain_one() -> None:
     """By the derivatives of the command about hover, where the law has no memory: (k_Omega s + k_q) / (J s^2)."""
     scenario = Scenario(controller=LAW, plant=PLANT).with_changes(timing={"period": 1e-3})
-    _, feedback = _controller_at_hover(_located(hover_of(scenario)), Instances())
+    _, feedback = controller_at_hover(located(hover_of(scenario)), Instances())
     stiffness = -0.5 * feedback[1, COORDINATES.index("quaternion.x")]
     damping = -feedback[1, COORDINATES.index("angular_velocity.x")]
     found = crossover(scenario)

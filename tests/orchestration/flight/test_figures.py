@@ -90,7 +90,7 @@ def test_signals_of_any_fmus_have_their_descriptions_and_units(tank: Result) -> 
 
 def test_up_is_up_and_axes_have_their_names_in_both_conventions() -> None:
     still = {f"plant.{name}": 0.0 for name in ("initial.quaternion.x", "initial.quaternion.y", "initial.quaternion.z")}
-    flown = {
+    results = {
         frame: quadcosim.run(
             native(stop_time=0.2).with_changes(
                 parameters={"plant.frame": frame, "controller.frame": frame, "plant.initial.quaternion.w": 1.0, **still}
@@ -98,7 +98,7 @@ def test_up_is_up_and_axes_have_their_names_in_both_conventions() -> None:
         )
         for frame in ("ned", "enu")
     }
-    (ned,), (enu,) = (draw(result, ["path"])["path"].axes for result in flown.values())
+    (ned,), (enu,) = (draw(result, ["path"])["path"].axes for result in results.values())
     for axes, names in ((ned, ("north", "east", "down")), (enu, ("east", "north", "up"))):
         labels = (axes.get_xlabel(), axes.get_ylabel(), axes.get_zlabel())  # type: ignore[attr-defined]
         assert labels == tuple(f"{axis}, {name} [m]" for axis, name in zip("xyz", names, strict=True))
@@ -135,8 +135,8 @@ def test_a_legend_tells_what_differs_between_runs(flight: Result, slow: Result) 
     assert labels_of_runs([flight, heavy], ["a", "b"]) == ["mass 1 kg", "mass 1.2 kg"]
     assert labels_of_runs([flight, flight], ["a", "b"]) == ["a", "b"]
     for name, figure in draw([flight, slow]).items():
-        told = [[text.get_text() for text in legend.get_texts()][-2:] for legend in figure.legends]
-        assert ["period 10 ms", "period 30 ms"] in told, name
+        texts = [[text.get_text() for text in legend.get_texts()][-2:] for legend in figure.legends]
+        assert ["period 10 ms", "period 30 ms"] in texts, name
 
 
 def test_runs_of_different_systems_are_not_laid_over_each_other(flight: Result, tank: Result) -> None:

@@ -43,7 +43,7 @@ def test_a_rotation_turns_the_axes_of_the_body_as_its_quaternion_says() -> None:
     assert turned @ [0.0, 1.0, 0.0] == pytest.approx([-1.0, 0.0, 0.0])
 
 
-def test_what_cannot_be_filmed_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, main: Main) -> None:
+def test_what_cannot_be_filmed_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, main: Main) -> None:
     monkeypatch.setattr(FFMpegWriter, "isAvailable", classmethod(lambda cls: False))
     with pytest.raises(UsageError, match=r"film = a.mp4: expected ffmpeg on this machine; .gif needs nothing"):
         filming.writer(Path("a.mp4"))

@@ -20,7 +20,8 @@ from orchestration.basics.simulator import Floats
 from orchestration.basics.statistics import wilson
 from orchestration.exact.mean_square import MeanSquareLimit
 from orchestration.flight import local_limit as local
-from orchestration.flight.hover_loop import COORDINATES, HoverLoop, hover_of
+from orchestration.flight.hover import COORDINATES, hover_of
+from orchestration.flight.hover_loop import HoverLoop
 from orchestration.flight.local_limit import local_limit
 from orchestration.fmi.reuse import Instances
 from orchestration.limits import limit as limits
@@ -306,7 +307,7 @@ def test_motors_that_rise_otherwise_than_they_fall_have_no_local_limit() -> None
     found = local_limits(Varied(request=scenario, of="period"), range_of(scenario))
     assert (found.limit, found.method) == (None, None)
     assert found.reason == (
-        "no local limit: the plant answers to a rise otherwise than to a fall, so hover has no linear loop"
+        "no local limit: the plant responds differently to a rise and to a fall, so hover has no linear loop"
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import quadcosim
-from orchestration.flight.hover_loop import hover_of
+from orchestration.flight.hover import hover_of
 from orchestration.quadrotor.signals import DRAG, choice_of
 from orchestration.quadrotor.translation import paths_of
 from orchestration.runs.result import Result

@@ -12,7 +12,8 @@ import pytest
 
 from orchestration.basics.bisection import Range
 from orchestration.building import fmus
-from orchestration.flight.hover_loop import HoverLoop, at_hover
+from orchestration.flight.hover import at_hover
+from orchestration.flight.hover_loop import HoverLoop
 from orchestration.fmi.reuse import Instances
 from orchestration.requests.ranges import Varied
 from orchestration.stability import local_limit as local
