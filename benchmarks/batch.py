@@ -27,8 +27,8 @@ from orchestration.engines.wiring import checked
 from orchestration.fmi.model import read_model
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
-from orchestration.runs.in_lanes import fly, located
-from orchestration.runs.simulation import prepared
+from orchestration.runs.many_runs import located, run_many
+from orchestration.runs.prepared import prepared
 from orchestration.schedule.schedule_cache import ScheduleCache, timing
 from orchestration.studies.axes import Axis
 from orchestration.studies.study import Study
@@ -119,7 +119,7 @@ def from_arrays(period: float, runs: int) -> tuple[float, float]:
     begin = time.process_time()
     batches.run(given)
     between = time.process_time()
-    fly(flight, {"plant.initial.position.x": places})
+    run_many(flight, {"plant.initial.position.x": places})
     return between - begin, time.process_time() - between
 
 

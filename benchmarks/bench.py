@@ -27,7 +27,7 @@ from orchestration.quadrotor import wiring
 from orchestration.quadrotor.fmu_choice import FmuChoice
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
-from orchestration.runs.simulation import prepared
+from orchestration.runs.prepared import prepared
 from orchestration.schedule.cursor import Cursor
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import Timetable

@@ -15,8 +15,8 @@ from dataclasses import replace
 
 from orchestration.engines.batch.batches import Batches
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.runs.in_lanes import located
-from orchestration.runs.simulation import prepared
+from orchestration.runs.many_runs import located
+from orchestration.runs.prepared import prepared
 from orchestration.system.computers import Computer, Task
 from orchestration.system.distribution import Distribution
 from orchestration.system.model import System

@@ -13,7 +13,7 @@ from orchestration.building.fmus import native_twin
 from orchestration.engines.engine import Engine
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
-from orchestration.runs.simulation import prepared
+from orchestration.runs.prepared import prepared
 
 REPETITIONS = 9
 CASES = {

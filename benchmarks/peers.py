@@ -18,7 +18,7 @@ from orchestration.interop.catalogue import TOOLS, Tool
 from orchestration.interop.flights import Flights
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
-from orchestration.runs.simulation import prepared
+from orchestration.runs.prepared import prepared
 from orchestration.system.model import System
 
 STEP = 0.01

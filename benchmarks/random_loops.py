@@ -17,7 +17,7 @@ import numpy as np
 from orchestration.basics.errors import UsageError
 from orchestration.building import fmus
 from orchestration.exact.expect import Expected, expect
-from orchestration.runs.in_lanes import fly
+from orchestration.runs.many_runs import run_many
 from orchestration.system.component import Component
 from orchestration.system.connection import Connection
 from orchestration.system.model import System
@@ -126,7 +126,7 @@ def apart(system: System, found: Expected, runs: int) -> dict[str, tuple[float, 
     """By objective the mean over runs, its standard error, and what was expected."""
     later = f"(time > {SETTLED} * stop_time) / (1 - {SETTLED})"
     counted = {name: f"mean(({_averaged(text)}) * {later})" for name, text in system.objectives.items()}
-    flown = fly(
+    flown = run_many(
         fmus.native_twins(dataclasses.replace(system, objectives=counted)),
         {"seed": np.arange(runs)},
         outputs=list(found.objectives),

@@ -60,9 +60,11 @@ if TYPE_CHECKING:
     from orchestration.quadrotor.timing import Timing
     from orchestration.quadrotor.vehicle import Vehicle, load_vehicle
     from orchestration.report.writing import report
-    from orchestration.runs.in_lanes import Flights, fly
-    from orchestration.runs.meant import RunInterrupted, RunLost
-    from orchestration.runs.pause import fly_until, resume
+    from orchestration.runs.many_runs import Flights
+    from orchestration.runs.many_runs import run_many as fly
+    from orchestration.runs.outcome import RunInterrupted, RunLost
+    from orchestration.runs.pause import resume
+    from orchestration.runs.pause import run_until as fly_until
     from orchestration.runs.result import Result
     from orchestration.runs.run_directory import load_run, save_run
     from orchestration.runs.scheduling import Scheduled, schedule
@@ -131,8 +133,8 @@ _HOMES = {
     "read_model": "orchestration.fmi.model",
     "Model": "orchestration.fmi.model",
     # many runs
-    "fly": "orchestration.runs.in_lanes",
-    "Flights": "orchestration.runs.in_lanes",
+    "fly": "orchestration.runs.many_runs",
+    "Flights": "orchestration.runs.many_runs",
     "limit": "orchestration.limits.limit",
     "Limit": "orchestration.limits.limit",
     "expect": "orchestration.exact.expect",
@@ -166,10 +168,16 @@ _HOMES = {
     "QuadcosimError": "orchestration.basics.errors",
     "UsageError": "orchestration.basics.errors",
     "SimulatorError": "orchestration.basics.errors",
-    "RunInterrupted": "orchestration.runs.meant",
-    "RunLost": "orchestration.runs.meant",
+    "RunInterrupted": "orchestration.runs.outcome",
+    "RunLost": "orchestration.runs.outcome",
 }
-_OTHERWISE = {"limit": "find", "check_certificate": "check", "margin_region": "region"}
+_OTHERWISE = {
+    "limit": "find",
+    "check_certificate": "check",
+    "margin_region": "region",
+    "fly": "run_many",
+    "fly_until": "run_until",
+}
 """Names that go by another one at home"""
 
 __all__ = [

@@ -219,12 +219,12 @@ def run(
             from orchestration.runs import pause
 
             chosen = request_from(scenario, flags, timing)
-            result = pause.fly_until(chosen, pause_at, out, figures=figures, **how)
+            result = pause.run_until(chosen, pause_at, out, figures=figures, **how)
         elif out is not None:
-            from orchestration.runs.run_directory import keep_flight
+            from orchestration.runs.run_directory import keep_run
 
             chosen = request_from(scenario, flags, timing)
-            result = keep_flight(out, lambda to: fly(chosen, recorder=to, **how), figures=figures)
+            result = keep_run(out, lambda to: fly(chosen, recorder=to, **how), figures=figures)
         else:
             result = fly(request_from(scenario, flags, timing), **how)
     if result is None:
@@ -232,7 +232,7 @@ def run(
         return Answer(document={"paused_in": out}, lines=[])
     for warning in result.warnings:
         warn(warning)
-    exact.say_if_endless(result.asked)
+    exact.say_if_endless(result.request)
     if follows := result.provenance["follows"]:
         inform(f"follows {follows}")
     if out is not None:

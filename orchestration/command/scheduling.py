@@ -54,7 +54,7 @@ def schedule(
     from orchestration.system.paths import changed
     from orchestration.system.request import system_meant
 
-    request = scheduling.asked_until(system, until)
+    request = scheduling.request_until(system, until)
     found = scheduling.schedule(changed(system_meant(request), assigned("set", changes)))
     if out is not None:
         inform(str(_drawn(found, out, start, end)))

@@ -17,7 +17,7 @@ from orchestration.comparison.design import Comparison
 from orchestration.comparison.outcome import Outcome, concluded, write
 from orchestration.engines.wiring import checked
 from orchestration.results import html
-from orchestration.runs.run_directory import keep_flight
+from orchestration.runs.run_directory import keep_run
 from orchestration.runs.simulation import run as fly
 from orchestration.studies.store import store_path
 from orchestration.studies.sweep import sweep
@@ -161,7 +161,7 @@ def flight(comparison: Comparison, index: int, start: int, out: Path, *, engine:
         raise UsageError(f"--start {start}: expected a number from 0 to {len(runs) - 1}")
     comparison, files, how = _ready(comparison, [runs[start]], engine)
     request = comparison.request(runs[start], files.starts_of(comparison.study.origin))
-    keep_flight(out, lambda to: fly(request, recorder=to, engine=how.engine))
+    keep_run(out, lambda to: fly(request, recorder=to, engine=how.engine))
 
 
 def _ready(comparison: Comparison, indices: Sequence[int], engine: EngineChoice) -> tuple[Comparison, Files, Chosen]:

@@ -12,7 +12,7 @@ from orchestration.basics.simulator import Floats
 from orchestration.exact.linear import Components
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.reuse import Instances
-from orchestration.runs.simulation import prepared
+from orchestration.runs.prepared import prepared
 from orchestration.stability.linear_loop import AtRest, watching
 from orchestration.stability.linearised_component import Tangent
 from orchestration.stability.operating_point import deterministic

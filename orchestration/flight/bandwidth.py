@@ -11,7 +11,7 @@ from orchestration.fmi.model import read_model
 from orchestration.fmi.reuse import Instances
 from orchestration.quadrotor import wiring
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.runs.simulation import prepared
+from orchestration.runs.prepared import prepared
 from orchestration.system.model import System
 from orchestration.system.request import ControlLoop
 

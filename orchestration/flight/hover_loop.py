@@ -19,7 +19,7 @@ from orchestration.fmi.instance import Instance
 from orchestration.fmi.reuse import Instances
 from orchestration.quadrotor import wiring
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.runs.simulation import prepared
+from orchestration.runs.prepared import prepared
 
 _COMMANDS = len(wiring.COMMAND)
 _FORGOTTEN = 1e-9

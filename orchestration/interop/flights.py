@@ -22,7 +22,7 @@ from orchestration.processes import subprocesses
 from orchestration.processes.child import Child
 from orchestration.requests.ssp import writing
 from orchestration.requests.ssp.carried import Part, carried, wholly_carried
-from orchestration.runs.simulation import prepared
+from orchestration.runs.prepared import prepared
 from orchestration.system.component import Parameter
 from orchestration.system.model import System
 from orchestration.system.paths import changed

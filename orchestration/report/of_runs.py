@@ -95,7 +95,7 @@ def _bars(system: System, blobs: Blobs) -> Bars | None:
 def _settings(result: Result) -> dict[str, Setting]:
     """What its file says, in words."""
     found: dict[str, Setting] = {}
-    waiting: list[tuple[str, Any]] = [("", tables_in(result.asked.to_toml()))]
+    waiting: list[tuple[str, Any]] = [("", tables_in(result.request.to_toml()))]
     while waiting:
         place, value = waiting.pop(0)
         if isinstance(value, Mapping):

@@ -1,1 +1,1 @@
-"""From a request to a result, its directory and its figures."""
+"""Runs of requests, their results, and the directories and figures of results."""

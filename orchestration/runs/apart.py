@@ -1,4 +1,4 @@
-"""A run in a process of its own: however that ends, the run ends in words, and what it had recorded stays."""
+"""A run in a separate process: however that process ends, the error is reported and the recorded rows are kept."""
 
 import logging
 import time
@@ -14,7 +14,8 @@ from orchestration.processes import subprocesses
 from orchestration.processes.child import Child, Died
 from orchestration.processes.limits import UNLIMITED
 from orchestration.recording.recording import Chunk, Recorder
-from orchestration.runs.meant import Course, Flown, Meant, Progress, RunLost, result_of
+from orchestration.runs.outcome import Course, Progress, RunLost, RunOutcome, result_of
+from orchestration.runs.resolved import ResolvedRequest
 from orchestration.runs.result import Result
 from orchestration.schedule.happened import Happened
 from orchestration.schedule.streams import Streams
@@ -23,22 +24,22 @@ from orchestration.system.times import NANOSECONDS
 
 _MESSAGES = logging.getLogger("quadcosim")
 _PATIENCE = 5.0
-"""[s] for a process that has said its last word"""
+"""[s] in which the process must end after its last message"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Order:
-    """What the process is to do."""
+    """What the process is to run."""
 
-    asked: Request
+    request: Request
     course: Course
     engine: Engine | None
     level: int
-    """of the messages that are heard"""
+    """of the log messages that are passed on"""
 
 
-def flown(
-    meant: Meant,
+def simulate(
+    resolved: ResolvedRequest,
     course: Course,
     recorder: Recorder,
     *,
@@ -48,53 +49,53 @@ def flown(
     memory_limit: float,
     started: float,
 ) -> Result | None:
-    """As `simulation.flown`, which has found out what is `meant` and when it `started`."""
+    """As `simulation.simulate`, of a request that is `resolved`; `started` is the time at which that began."""
     room = scratch.temporary()
     try:
         with deferred_interrupts() as interrupt:
-            order = Order(asked=meant.asked, course=course, engine=engine, level=_MESSAGES.getEffectiveLevel())
+            order = Order(request=resolved.request, course=course, engine=engine, level=_MESSAGES.getEffectiveLevel())
             with Child(
                 subprocesses.command("orchestration.runs.apart_process", room.path),
                 limits=replace(UNLIMITED, memory=memory_limit),
             ) as child:
 
-                def begin() -> None:
+                def apply_limits() -> None:
                     child.allow(time_limit)
                     interrupt.forward(child.interrupt)
 
-                heard = _Heard(recorder, progress, begin)
-                why = heard.all_of(child, order)
-            found = heard.flown
-            if found is None:
-                raise _lost(meant, heard, room.path, why or "ended", started)
-            if why is not None:
-                found = replace(found, warnings=(*found.warnings, f"after the run, its process {why}"))
-            if not heard.over:
+                receiver = _Receiver(recorder, progress, apply_limits)
+                ending = receiver.receive_all(child, order)
+            outcome = receiver.run_outcome
+            if outcome is None:
+                raise _lost(resolved, receiver, room.path, ending or "ended", started)
+            if ending is not None:
+                outcome = replace(outcome, warnings=(*outcome.warnings, f"after the run, its process {ending}"))
+            if not receiver.is_over:
                 return None
-            return result_of(meant, found, recorder, time.perf_counter() - started, interrupt.requested)
+            return result_of(resolved, outcome, recorder, time.perf_counter() - started, interrupt.requested)
     finally:
         room.remove()
 
 
-class _Heard:
-    """What the process says, passed on to who is to hear it."""
+class _Receiver:
+    """Receives the messages of the process; each is handled by the method of its name."""
 
-    def __init__(self, recorder: Recorder, progress: Progress | None, begun: Callable[[], None]) -> None:
-        """`begun`: it is at the run itself. What it loads before is not limited in time, and hears of no Ctrl-C."""
-        self.flown: Flown | None = None
-        self.over = False
-        """whether the run is"""
-        self.doing = ""
-        """what the process is at"""
+    def __init__(self, recorder: Recorder, progress: Progress | None, on_start: Callable[[], None]) -> None:
+        """`on_start` is called when the run begins: loading before it has no time limit and takes no Ctrl-C."""
+        self.run_outcome: RunOutcome | None = None
+        self.is_over = False
+        """whether the run is over"""
+        self.activity = ""
+        """what the process is doing"""
         self.components: Sequence[str] = ()
-        """whose FMUs may be called at that"""
+        """whose FMUs may be called meanwhile"""
         self.columns: tuple[str, ...] = ()
         self.recorded_until = -1.0
         """[s]"""
-        self.recorder, self._progress, self._begun = recorder, progress, begun
+        self.recorder, self._progress, self._on_start = recorder, progress, on_start
 
-    def all_of(self, child: Child, order: Order) -> str | None:
-        """All that comes of an order; how the process ended if that was before its last word."""
+    def receive_all(self, child: Child, order: Order) -> str | None:
+        """Send an order and handle all messages; how the process ended if that was before its last message."""
         try:
             child.say(order)
             while True:
@@ -126,51 +127,54 @@ class _Heard:
     def message(self, level: int, text: str) -> None:
         _MESSAGES.log(level, "%s", text)
 
-    def stage(self, doing: str, components: Sequence[str]) -> None:
-        if not self.doing:
-            self._begun()
-        self.doing, self.components = doing, components
+    def stage(self, activity: str, components: Sequence[str]) -> None:
+        if not self.activity:
+            self._on_start()
+        self.activity, self.components = activity, components
 
-    def come_to(self, over: bool, flown: Flown) -> None:
-        self.over, self.flown = over, flown
+    def outcome(self, is_over: bool, run_outcome: RunOutcome) -> None:
+        self.is_over, self.run_outcome = is_over, run_outcome
 
     def error(self, error: BaseException) -> None:
         raise error
 
 
-def _lost(meant: Meant, heard: _Heard, room: Path, why: str, started: float) -> RunLost:
-    """What is left of a run whose process has ended without a last word."""
-    doing, called = heard.doing, [name for name in heard.components if name in meant.foreign]
-    left = left_in(room, heard.columns)
+def _lost(resolved: ResolvedRequest, receiver: _Receiver, room: Path, ending: str, started: float) -> RunLost:
+    """The error, with all that was recorded, for a run whose process ended before its last message."""
+    activity, called = receiver.activity, [name for name in receiver.components if name in resolved.foreign]
+    left = left_in(room, receiver.columns)
     if left is not None:
         if left.calling is not None:
-            doing, called = "in a call of", [list(meant.system.components)[left.calling]]
-        elif len(left.rows) or heard.recorded_until >= 0.0:
+            activity, called = "in a call of", [list(resolved.system.components)[left.calling]]
+        elif len(left.rows) or receiver.recorded_until >= 0.0:
             called = []
-        if len(left.rows) and left.rows[-1, 0] > heard.recorded_until:
-            heard.take(_chunk(meant, heard, left))
-    end = heard.recorded_until
-    who = [f"{name} ({meant.models[name].name})" for name in called]
-    which = "" if not who else f", {doing} {who[0]}" if len(who) == 1 else f", {doing} one of {', '.join(who)}"
+        if len(left.rows) and left.rows[-1, 0] > receiver.recorded_until:
+            receiver.take(_chunk(resolved, receiver, left))
+    end = receiver.recorded_until
+    fmus = [f"{name} ({resolved.models[name].name})" for name in called]
+    where = (
+        "" if not fmus else f", {activity} {fmus[0]}" if len(fmus) == 1 else f", {activity} one of {', '.join(fmus)}"
+    )
     if end < 0.0:
-        return RunLost(f"the process of the run {why}{which}")
-    text = f"the process of the run {why}{which}, after t = {end:g} s of {meant.system.stop_time:g} s"
-    found = Flown(
+        return RunLost(f"the process of the run {ending}{where}")
+    text = f"the process of the run {ending}{where}, after t = {end:g} s of {resolved.system.stop_time:g} s"
+    outcome = RunOutcome(
         end=end, steps=0 if left is None else left.steps, divergence=None, divergence_time=None, termination=None,
         interrupted_at=end,
         provenance={"engine": "python" if left is None else "compiled"}, warnings=(text,),
     )  # fmt: skip
-    return RunLost(text, result_of(meant, found, heard.recorder, time.perf_counter() - started, interrupted=False))
+    wall_time = time.perf_counter() - started
+    return RunLost(text, result_of(resolved, outcome, receiver.recorder, wall_time, interrupted=False))
 
 
-def _chunk(meant: Meant, heard: _Heard, left: Left) -> Chunk:
-    """Rows and events that the compiled loop has not handed over, with what sources say."""
-    rows, system, columns = left.rows, meant.system, heard.columns
-    for name, values in meant.sources(Streams(system.seed, system.streams)).items():
+def _chunk(resolved: ResolvedRequest, receiver: _Receiver, left: Left) -> Chunk:
+    """Rows and events that the compiled loop has not handed over, with the values of sources filled in."""
+    rows, system, columns = left.rows, resolved.system, receiver.columns
+    for name, values in resolved.sources(Streams(system.seed, system.streams)).items():
         places = [columns.index(signal) for signal in system.sources[name].signals(name)]
         rows[:, places] = values.over(rows[:, 0])
     happened = Happened(system)
-    if heard.recorded_until >= 0.0:
-        happened.hand_over(round(heard.recorded_until * NANOSECONDS))
+    if receiver.recorded_until >= 0.0:
+        happened.hand_over(round(receiver.recorded_until * NANOSECONDS))
     events = happened.with_messages(left.events, round(float(rows[-1, 0]) * NANOSECONDS))
     return Chunk(columns=columns, rows=rows, events=events)

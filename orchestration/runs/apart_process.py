@@ -1,7 +1,4 @@
-"""The process of a run.
-
-`python -m orchestration.runs.apart_process ROOM` takes one order, and says what comes of it.
-"""
+"""The process of a run: `python -m orchestration.runs.apart_process ROOM` receives one order and reports the run."""
 
 import logging
 import signal
@@ -17,76 +14,77 @@ from orchestration.fmi.instances import open_instance
 from orchestration.processes.channel import Parent, sayable
 from orchestration.recording.recording import About, Chunk, InMemory, Recording
 from orchestration.runs.apart import Order
-from orchestration.runs.simulation import looked_after, prepared
+from orchestration.runs.prepared import prepared, progress_restoring_folder
 
 _MESSAGES = logging.getLogger("quadcosim")
 
 
-class _Said(logging.Handler):
-    """Says what is said in this process, and takes what it records, where the run is waited for."""
+class _Reporter(logging.Handler):
+    """Reports log messages and recorded chunks of this process to the process that waits for the run."""
 
     def __init__(self, parent: Parent) -> None:
         super().__init__()
         self._parent = parent
         self.is_over = False
-        """whether it has been said what has come of the run"""
+        """whether the outcome of the run has been reported"""
 
-    def say(self, name: str, *content: Any) -> None:
-        """One frame, by the name of what hears it."""
+    def report(self, name: str, *content: Any) -> None:
+        """Send one message, by the name of the method that handles it."""
         self._parent.say((name, *content))
 
     def emit(self, record: logging.LogRecord) -> None:
         """As any handler."""
-        self.say("message", record.levelno, record.getMessage())
+        self.report("message", record.levelno, record.getMessage())
 
     def describe(self, about: About) -> None:
         """As `Recorder`."""
-        self.say("describe", {name: dict(known) for name, known in about.items()})
+        self.report("describe", {name: dict(known) for name, known in about.items()})
 
     def begin(self, columns: tuple[str, ...]) -> None:
         """As `Recorder`."""
-        self.say("begin", columns)
+        self.report("begin", columns)
 
     def take(self, chunk: Chunk) -> None:
         """As `Recorder`."""
-        self.say("take", chunk)
+        self.report("take", chunk)
 
     def finish(self) -> Recording:
-        """As `Recorder`; the rows are not here."""
+        """As `Recorder`; the rows are not kept here."""
         return InMemory()
 
     @contextmanager
     def load(self, path: Path, instance_name: str) -> Iterator[Instance]:
-        """An instance, as any loader gives it."""
-        self.say("stage", "loading", [instance_name])
+        """As `Loader`."""
+        self.report("stage", "loading", [instance_name])
         with open_instance(path, instance_name) as instance:
             yield instance
 
 
 def main(room: Path) -> None:
-    """Fly what is ordered."""
+    """Run what is ordered."""
     parent = Parent(interrupt=signal.default_int_handler)
     order: Order = parent.hear()
-    said = _Said(parent)
-    _MESSAGES.handlers[:] = [said]
+    reporter = _Reporter(parent)
+    _MESSAGES.handlers[:] = [reporter]
     _MESSAGES.setLevel(order.level)
     try:
-        _fly(order, said, room)
+        _simulate(order, reporter, room)
     except BaseException as error:
-        if not said.is_over:
-            said.say("error", sayable(error))
-    said.say("end")
+        if not reporter.is_over:
+            reporter.report("error", sayable(error))
+    reporter.report("end")
 
 
-def _fly(order: Order, said: _Said, room: Path) -> None:
-    """What comes of the run is said before any instance is freed."""
+def _simulate(order: Order, reporter: _Reporter, room: Path) -> None:
+    """Run, and report the outcome before any instance is freed."""
     with prepared(
-        order.asked, recorder=said, engine=order.engine, load=said.load, room=Shared(room)
+        order.request, recorder=reporter, engine=order.engine, load=reporter.load, room=Shared(room)
     ) as simulation:  # fmt: skip
-        said.say("stage", "initialising", list(simulation.instances))
-        over = order.course(simulation, looked_after(simulation, lambda share: said.say("share", share)))
-        said.say("come_to", over, simulation.flown())
-        said.is_over = True
+        reporter.report("stage", "initialising", list(simulation.instances))
+        progress = progress_restoring_folder(simulation, lambda share: reporter.report("share", share))
+        is_over = order.course(simulation, progress)
+        reporter.report("outcome", is_over, simulation.outcome())
+        reporter.is_over = True
 
 
 if __name__ == "__main__":

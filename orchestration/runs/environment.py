@@ -1,4 +1,4 @@
-"""A simulation as an environment of Gymnasium, which the extra `gym` brings."""
+"""A simulation as an environment of Gymnasium, which the extra `gym` installs."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -12,38 +12,38 @@ from orchestration.requests.request import Asked
 from orchestration.runs.stepping import Simulation
 
 Reward = Callable[[Mapping[str, float]], float]
-"""Of all columns of a run as they are after a step, by name: `Simulation.values`"""
-Starts = Callable[[np.random.Generator], Mapping[str, Any]]
-"""Values by path that an episode begins with"""
+"""Computed from the values of all columns after a step, by name: `Simulation.values`"""
+InitialValues = Callable[[np.random.Generator], Mapping[str, Any]]
+"""Draws the values by path that an episode begins with"""
 
 
 class Environment(gymnasium.Env[Floats, Floats]):  # type: ignore[misc]
-    """A system, or a scenario, for learning: an action is the command of a component, an observation what it measures.
+    """A system, or a scenario, for learning: an action is a command of a component, an observation its measurement.
 
-    An episode is a run. It is terminated where that diverges or an FMU ends it, truncated at its stop time; `info` has
-    the `metrics` then. Each episode has a seed of its own for noise, loss and jitter, drawn from that of `reset`.
+    An episode is a run. It is terminated where that diverges or an FMU ends it, truncated at its stop time; `info` then
+    has the `metrics`. Each episode has its own seed for noise, loss and jitter, drawn from that of `reset`.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as Gymnasium has it
 
     def __init__(
         self,
-        asked: Asked,
+        request: Asked,
         reward: Reward,
         *,
         low: Any,
         high: Any,
         component: str | None = None,
-        starts: Starts | None = None,
+        starts: InitialValues | None = None,
     ) -> None:
         """`low` and `high` bound each number of an action, in the units of the component's outputs.
 
-        `reward` makes a number of all columns of the run after a step; a run that has ended before its time has those
-        of its last instant. `starts` draws what an episode begins with, by path as axes of studies name it.
-        `component` is the one that is replaced; without it, the only sampled one. Raises `UsageError` as `Simulation`.
+        `reward` computes a number from the values of all columns after a step; those of the last instant for a run that
+        has ended early. `starts` draws the values that an episode begins with, by path as axes of studies name them.
+        `component` is the one that is replaced; default: the only sampled one. Raises `UsageError` as `Simulation`.
         """
-        self.simulation = Simulation(asked, component)
-        """What it steps: the names of observations and actions, and the result of an episode that is over."""
+        self.simulation = Simulation(request, component)
+        """The simulation that it steps: names of observations and actions, and the result of a finished episode."""
         self._reward, self._starts = reward, starts
         count = len(self.simulation.commanded)
         try:
@@ -66,7 +66,7 @@ class Environment(gymnasium.Env[Floats, Floats]):  # type: ignore[misc]
         return self.simulation.reset(own, {**values, **(options or {})}), {}
 
     def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
-        """Go on to the next sample: what it measures, the reward, whether it is terminated or truncated, and `info`."""
+        """Go on to the next sample; returns observation, reward, whether terminated or truncated, and `info`."""
         observation = self.simulation.step(action)
         reward, info = float(self._reward(self.simulation.values)), {}
         terminated = truncated = False

@@ -1,4 +1,4 @@
-"""A folder of results is written beside its place and takes it whole, so that a killed process leaves none half."""
+"""Writes a folder of results beside its place and renames it when complete: a killed process leaves no partial one."""
 
 import os
 import re
@@ -14,28 +14,28 @@ from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.basics.scratch import Scratch
 
 _HIDDEN = re.compile(r"\.(?P<name>.+)\.(?P<mark>[0-9a-f]{12})\.(?P<kind>new|old)", re.DOTALL)
-"""`new`: being written; `old`: on its way out, for the new one with the same mark, which is complete."""
+"""`new`: being written; `old`: being replaced by the new one with the same mark, which is complete."""
 
 
 @dataclass(kw_only=True)
 class NewFolder:
-    """What is written into `path` will be at `place` when the block is over."""
+    """A folder that is written at `path` and moved to `place` when complete."""
 
     path: Path
     place: Path
     precious: bool = False
-    """If it cannot be completed or put in its place, it is kept beside that."""
+    """If it cannot be completed or moved to its place, it is kept beside that."""
     replaces: bool = True
-    """Else it is kept beside what is there."""
+    """If not, it is kept beside an existing folder."""
 
 
 @contextmanager
 def new_folder(place: Path, replaceable: Callable[[Path], bool], expected: str) -> Iterator[NewFolder]:
-    """A folder that takes its `place` when all went well, and vanishes if not, unless it is `precious`.
+    """A folder that is moved to its `place` on success and removed on failure, unless it is `precious`.
 
-    What the dead have left in the parent is cleared. Raises `UsageError` at once if there is something at
-    `place` that is not `replaceable`, with what was `expected`, or if nothing can be written there;
-    `QuadcosimError` where a precious one is kept.
+    Remains of ended processes in the parent are cleaned up. Raises `UsageError` at once if `place` holds something
+    that is not `replaceable`, stating what was `expected`, or if nothing can be written there; `QuadcosimError`
+    stating where a precious one is kept.
     """
     _expect_place(place, replaceable, expected)
     mark = secrets.token_hex(6)
@@ -58,7 +58,7 @@ def new_folder(place: Path, replaceable: Callable[[Path], bool], expected: str) 
             raise QuadcosimError(f"{error}; what was written is in {_beside(partial.path, place)}") from error
         raise
     finally:
-        partial.remove()  # nothing is there any more if all went well
+        partial.remove()  # does nothing after success
 
 
 def _expect_place(place: Path, replaceable: Callable[[Path], bool], expected: str) -> None:
@@ -74,7 +74,7 @@ def _is_free(place: Path) -> bool:
 
 
 def _exchange(new: Path, place: Path, old: Path) -> None:
-    """Put `new` in its place; `old` is where what was there goes on its way out."""
+    """Move `new` to its place; what was there moves to `old` and is removed."""
     if not place.exists():
         new.rename(place)
         return
@@ -88,7 +88,7 @@ def _exchange(new: Path, place: Path, old: Path) -> None:
 
 
 def _beside(new: Path, place: Path) -> Path:
-    """Put `new` at the first free name beside its place; that name."""
+    """Move `new` to the first free name beside its place; returns that."""
     number = 1
     while (beside := place.with_name(f"{place.name}.{number}")).exists():
         number += 1
@@ -97,7 +97,7 @@ def _beside(new: Path, place: Path) -> Path:
 
 
 def _clear(parent: Path) -> None:
-    """Finish what the dead were about to do: put in place what was complete, remove the rest."""
+    """Finish what ended processes have begun: move complete folders to their place, remove the rest."""
     hidden = {path: match for path in parent.glob(".*") if (match := _HIDDEN.fullmatch(path.name))}
     for path in scratch.abandoned(path for path, match in hidden.items() if match["kind"] == "new"):
         place, old = parent / hidden[path]["name"], path.with_suffix(".old")

@@ -1,4 +1,4 @@
-"""The outcome of a run."""
+"""The result of a run."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -28,66 +28,66 @@ if TYPE_CHECKING:
 
 
 class Origin(TypedDict):
-    """Which FMU a component was."""
+    """The FMU of a component."""
 
     model: str
     """The name of its model."""
     guid: str
-    """What tells one build of it from another."""
+    """Identifies the build."""
     path: str
-    """Where it was."""
+    """Its file."""
 
 
 class Provenance(TypedDict, total=False):
-    """What the numbers of a run came from."""
+    """Where the numbers of a run come from."""
 
     versions: dict[str, str]
-    """Of Python and of the packages that compute."""
+    """Of Python and of the packages that are used."""
     platform: str
     """The operating system and the processor."""
     fmus: dict[str, Origin]
     """By component."""
     engine: str
-    """What stepped the FMUs, `compiled` or `python`; the numbers are the same."""
+    """The engine, `compiled` or `python`; the numbers are the same."""
     follows: str
-    """What was followed, and by whom; empty where nothing was."""
+    """Which component follows which reference, as text; empty where none does."""
     wall_time: float
-    """What the run took [s]."""
+    """The duration of the run [s]."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Result:
-    """One run: what was asked, what was recorded, what it came to.
+    """One run: its request, its recording and its metrics.
 
-    A run that diverged is a result too: `divergence` says what diverged, and objectives have no value then. So is one
-    that an FMU has ended: `termination` says which. In a notebook a result shows its metrics.
+    A run that diverged has a result too: `divergence` states what diverged, and objectives have no value. So has one
+    that an FMU ended: `termination` states which. In a notebook a result shows its metrics.
     """
 
-    asked: Request
+    request: Request
     """What was run, as the user wrote it: a `Scenario` or a `System`."""
     system: System
-    """The system that it means; of a system that was run, the same with the objectives that its FMUs allow."""
+    """The system of the request, with the objectives that its FMUs have the variables for."""
     recording: Recording
-    """Rows and events in chunks, for runs that are too long to hold at once; `rows` and `events` have them whole."""
+    """Rows and events in chunks, for runs that do not fit into memory; `rows` and `events` have all of them."""
     metrics: Metrics
-    """What the run came to: `outcome`, `good`, `horizon` [s], the objectives by name, `diverged`, `divergence_time` [s]
-    and `steps`. None is a metric without a value."""
+    """The results of the run: `outcome`, `good`, `horizon` [s], the objectives by name, `diverged`, `divergence_time`
+    [s] and `steps`. None is a metric without a value."""
     units: Mapping[str, str]
     """The units of those metrics that have one, by name, as FMI writes them (`N.m`)."""
     described: Mapping[str, Described]
     """The unit and the description of each recorded column, by name, as its FMU gives them."""
     parameters: Mapping[str, float]
-    """The numeric parameters of all components as they were flown, by COMPONENT.NAME, in the units of their FMUs."""
+    """The numeric parameters of all components in the run, by COMPONENT.NAME, in the units of their FMUs."""
     divergence: str | None
-    """What diverged, in words; None if nothing did."""
+    """What diverged, as text; None if nothing did."""
     termination: str | None
-    """Which FMU has ended the run, and how; None if none did."""
+    """Which FMU ended the run, and how; None if none did."""
     interrupted_at: float | None
-    """The time [s] at which Ctrl-C ended the run; None if it went on to its end."""
+    """The time [s] at which Ctrl-C ended the run; None if it did not."""
     provenance: Provenance
-    """What the numbers came from: versions of the software, the GUID of each FMU, the engine, the wall time [s]."""
+    """Where the numbers come from: versions of the software, the GUID of each FMU, the engine, the wall time [s]."""
     warnings: tuple[str, ...] = ()
-    """What may not be meant, and what the FMUs warned of, a sentence each."""
+    """Warnings of likely mistakes in the request, and those of the FMUs, a sentence each."""
 
     def __repr__(self) -> str:
         outcome = self.metrics["outcome"] or "run"
@@ -98,7 +98,7 @@ class Result:
         good = self.metrics["good"]
         named = [name for name in self.metrics if name not in ("outcome", "good")]
         return html.card(
-            f"A {self.asked.kind}",
+            f"A {self.request.kind}",
             str(self.metrics["outcome"] or "") or None,
             good if isinstance(good, bool) else None,
             f"{self.end:g} s in {len(self.recording)} rows of {len(self.columns)} columns"
@@ -113,7 +113,7 @@ class Result:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """The names of what every row has: `time`, then COMPONENT.NAME, then the signals of the sources."""
+        """The names of all columns: `time`, then COMPONENT.NAME, then the signals of the sources."""
         return self.recording.columns
 
     @cached_property
@@ -123,12 +123,12 @@ class Result:
 
     @cached_property
     def events(self) -> tuple[Event, ...]:
-        """All that happened to messages, jobs of tasks and frames of networks, in order of time."""
+        """All events of messages, jobs of tasks and frames of networks, in order of time."""
         return tuple(event for chunk in self.recording.chunks(("time",)) for event in chunk.events)
 
     @property
     def about(self) -> About:
-        """What is known of each column, in words: its `unit` and its `description`, where it has them."""
+        """The `unit` and the `description` of each column, where it has them."""
         return {name: one.as_words() for name, one in self.described.items()}
 
     @property
@@ -153,15 +153,15 @@ class Result:
         window: tuple[float, float] | None = None,
         style: Literal["screen", "paper", "slides"] = "screen",
     ) -> "Figures":
-        """Figures of the run, all that there are unless some are named; a notebook shows what is returned.
+        """Figures of the run; default: all. A notebook shows what is returned.
 
         Of a flight `which` is among path, errors, components, commands, energy, phase and spectrum, of any other system
-        it is signals. Runs `beside` it are laid over it. `window` is the span of time [s] that is seen, `style` how
-        large and in what type: `quadcosim plot` has the same. The figures are those of matplotlib, by name.
+        it is signals. Runs `beside` it are overlaid. `window` is the span of time [s] that is shown, `style` sets sizes
+        and fonts, as in `quadcosim plot`. The figures are those of matplotlib, by name.
 
-        Raises `UsageError` for a figure that there is not, and for runs of different systems.
+        Raises `UsageError` for an unknown figure, and for runs of different systems.
         """
-        from orchestration.runs.draw import figures_of  # with it comes matplotlib
+        from orchestration.runs.draw import figures_of  # not before: loads matplotlib
 
         return figures_of([self, *beside], which or None, window=window, style=style)
 
@@ -174,14 +174,14 @@ class Result:
         return frames.events(self.recording) if what == "events" else frames.signals(self.recording, self.about)
 
     def to_csv(self, folder: str | Path) -> list[Path]:
-        """Write `signals.csv` and `events.csv` into a folder, with units in the heads of the columns; their paths."""
-        from orchestration.recording import csv_files  # with it comes pyarrow
+        """Write `signals.csv` and `events.csv` into a folder, with units in the column heads; returns their paths."""
+        from orchestration.recording import csv_files  # not before: loads pyarrow
 
         return csv_files.write(self.recording, self.about, Path(folder))
 
     @explains_missing
     def to_mat(self, path: str | Path) -> Path:
-        """Write the run as the structure `run` of a MAT-file, as `quadcosim export --format mat` does; its path.
+        """Write the run as the structure `run` of a MAT-file, as `quadcosim export --format mat` does; returns it.
 
         Raises `QuadcosimError` where SciPy is not installed.
         """
@@ -189,6 +189,6 @@ class Result:
 
 
 def rows_of(time: Floats, events: tuple[Event, ...], kind: str, what: str | None = None) -> npt.NDArray[np.bool_]:
-    """At which of the recorded times [s] there is an event of a kind, and of that (`what`) if it is given."""
+    """At which of the recorded times [s] there is an event of a kind, and of `what` if it is given; shape of `time`."""
     instants = [event.time for event in events if event.kind == kind and what in (None, event.what)]
     return np.isin(np.round(time * 1e9).astype(np.int64), np.array(instants, dtype=np.int64))

@@ -1,4 +1,4 @@
-"""A run's directory: there when it is whole, so that a killed run leaves none that looks it."""
+"""The directory of a run. It appears when complete: a killed run leaves none that looks complete."""
 
 import hashlib
 import json
@@ -17,7 +17,7 @@ from orchestration.recording.tables import ToFolder
 from orchestration.requests.request import load_request
 from orchestration.results.column_info import Described
 from orchestration.runs.folder import NewFolder, new_folder
-from orchestration.runs.meant import RunInterrupted, RunLost
+from orchestration.runs.outcome import RunInterrupted, RunLost
 from orchestration.runs.result import Provenance, Result
 from orchestration.system.request import system_meant
 
@@ -27,7 +27,7 @@ CHECKSUMS = "checksums"
 """in the provenance, of all files of a run"""
 _CHECKED = (SIGNALS, EVENTS, METRICS, SCENARIO)
 MAT = "run.mat"
-"""of a run that has been exported so"""
+"""of a run that has been exported to it"""
 STATE = "paused.npz"
 """of a run that has been paused"""
 
@@ -44,7 +44,7 @@ def save_run(result: Result, folder: str | Path, *, figures: bool = True) -> Pat
 
 
 def _write(result: Result, folder: Path, *, figures: bool) -> None:
-    """All that is in the directory of a run but its recording."""
+    """Write all files of the directory of a run but its recording."""
     notes = {
         **result.provenance,
         "units": dict(result.units),
@@ -56,18 +56,18 @@ def _write(result: Result, folder: Path, *, figures: bool) -> None:
         "warnings": list(result.warnings),
     }
     (folder / METRICS).write_text(json.dumps(result.metrics, indent=2) + "\n", encoding="utf-8")
-    (folder / SCENARIO).write_text(result.asked.to_toml(), encoding="utf-8")
+    (folder / SCENARIO).write_text(result.request.to_toml(), encoding="utf-8")
     notes[CHECKSUMS] = _checksums(folder, notes)
     (folder / PROVENANCE).write_text(json.dumps(notes, indent=2) + "\n", encoding="utf-8")
     if figures:
         from orchestration.figures import style
-        from orchestration.runs import draw  # with it comes matplotlib, which takes longer than a short run
+        from orchestration.runs import draw  # not before: loads matplotlib, which takes longer than a short run
 
-        style.save(draw.draw(result, view_of(result.asked.kind, result.recording.columns).first), folder)
+        style.save(draw.draw(result, view_of(result.request.kind, result.recording.columns).first), folder)
 
 
 def load_run(folder: str | Path) -> Result:
-    """Read the directory of a run; raises `UsageError` if it is none, or a file of it is not as it was written."""
+    """Read the directory of a run; raises `UsageError` if it is none, or if a file in it has changed."""
     folder = Path(folder)
     missing = [name for name in (*_CHECKED, PROVENANCE) if not (folder / name).is_file()]
     if missing:
@@ -78,21 +78,21 @@ def load_run(folder: str | Path) -> Result:
     )  # fmt: skip
     checksums = notes.pop(CHECKSUMS)
     recording = tables.InFolder(folder)
-    asked = load_request(folder / SCENARIO)
-    system = system_meant(asked)
+    request = load_request(folder / SCENARIO)
+    system = system_meant(request)
     missing = [name for name in columns_of(system) if name not in recording.columns]
     if missing:
         raise UsageError(f"{folder / SIGNALS}: no column {', '.join(missing)}; expected those of a run")
     if not len(recording):
         raise UsageError(f"{folder}: expected the directory of a run; it has no rows")
-    for _ in recording.chunks():  # what is damaged is to be known now
+    for _ in recording.chunks():  # damage is found now
         pass
     metrics = _object(folder / METRICS, diverged=(bool,), divergence_time=_NUMBER)
-    for name, found in _checksums(folder, notes).items():  # what only disagrees with the rest, too
-        if checksums.get(name) != found:
+    for name, checksum in _checksums(folder, notes).items():  # a file may be intact and of another run
+        if checksums.get(name) != checksum:
             raise UsageError(f"{folder / name}: has been changed since the run; expected it as it was written")
     return Result(
-        asked=asked,
+        request=request,
         system=system,
         recording=recording,
         metrics=metrics,
@@ -108,13 +108,13 @@ def load_run(folder: str | Path) -> Result:
 
 
 def _checksums(folder: Path, notes: Mapping[str, object]) -> dict[str, str]:
-    """Of every file of a run, by its name; of that of its provenance, of the other notes in it."""
-    found = {name: _checksum(folder / name) for name in _CHECKED}
-    return {**found, PROVENANCE: hashlib.sha256(json.dumps(notes).encode()).hexdigest()}
+    """The checksums of all files of a run, by name; that of the provenance covers the other notes in it."""
+    checksums = {name: _checksum(folder / name) for name in _CHECKED}
+    return {**checksums, PROVENANCE: hashlib.sha256(json.dumps(notes).encode()).hexdigest()}
 
 
 def _checksum(path: Path) -> str:
-    """SHA-256 of a file that may be larger than the memory."""
+    """SHA-256 of a file, which may be larger than the memory."""
     digest = hashlib.sha256()
     with path.open("rb") as file:
         while block := file.read(1 << 20):
@@ -126,7 +126,7 @@ _TEXT, _NUMBER = (str, type(None)), (int, float, type(None))
 
 
 def _object(path: Path, **types: tuple[type, ...]) -> dict[str, Any]:
-    """The object in a JSON file, whose values by these names have one of these types; raises `UsageError`."""
+    """The object in a JSON file; raises `UsageError` unless the values by these names have one of these types."""
     content = read_json(path, "JSON file")
     if not isinstance(content, dict):
         raise UsageError(f"{path}: expected an object")
@@ -136,25 +136,25 @@ def _object(path: Path, **types: tuple[type, ...]) -> dict[str, Any]:
     return content
 
 
-def keep_flight(
+def keep_run(
     folder: str | Path,
-    fly: Callable[[ToFolder], Result | None],
+    simulate: Callable[[ToFolder], Result | None],
     *,
     figures: bool = True,
     replaces: Container[str] = (METRICS,),
 ) -> Result | None:
-    """Fly, and write the directory of the run, whose place is made sure of before; the result.
+    """Run, and write the directory of the run, whose place is checked before; returns the result.
 
-    `fly` is given what records in the new directory as the flight goes on; if it comes to no result, it has
-    written there what is to be kept. The directory takes the place of an earlier one that has a file of
-    `replaces`. If that cannot be after all, it is kept beside `folder`, and `QuadcosimError` says where. After
-    Ctrl-C, or if its process has ended, what was recorded is kept too, but not in place of anything: `RunInterrupted`
-    or `RunLost` says where. Raises `UsageError` if `folder` holds something else or cannot be written.
+    `simulate` receives a recorder that writes into the new directory; if it returns None, it has written there what is
+    to be kept. The directory replaces an earlier one that has a file of `replaces`. If it cannot, it is kept beside
+    `folder`, and `QuadcosimError` states where. After Ctrl-C, or if the process of the run has ended, what was recorded
+    is kept too, but replaces nothing: `RunInterrupted` or `RunLost` states where. Raises `UsageError` if `folder` holds
+    something else or cannot be written.
     """
     ended: RunInterrupted | RunLost | None = None
     with run_folder(Path(folder), replaces) as new:
         try:
-            result = fly(ToFolder(new.path))
+            result = simulate(ToFolder(new.path))
         except (RunInterrupted, RunLost) as stop:
             if stop.result is None:
                 raise
@@ -170,7 +170,7 @@ def keep_flight(
 
 
 def run_folder(folder: Path, replaces: Container[str] = ()) -> AbstractContextManager[NewFolder]:
-    """A new folder of a run that takes the place of `folder` if that has a file of `replaces` and no unknown one."""
+    """A new folder of a run, which replaces `folder` if that has a file of `replaces` and no unknown file."""
     kinds = {METRICS: "an earlier run", STATE: "a paused run"}
     allowed = [text for name, text in kinds.items() if name in replaces]
     expected = ", or that of ".join(["a new or empty directory", *allowed]) + " with nothing else in it" * bool(allowed)

@@ -1,4 +1,4 @@
-"""What tells runs from each other, in a few words: the settings that differ between their scenarios."""
+"""Labels of runs: the settings that differ between their scenarios."""
 
 import sys
 from collections.abc import Mapping, Sequence
@@ -7,7 +7,7 @@ from typing import Any
 
 from orchestration.results import quantities
 from orchestration.results.quantities import Quantity
-from orchestration.runs.ran import Ran
+from orchestration.runs.run_like import RunLike
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -15,12 +15,12 @@ else:
     import tomli as tomllib
 
 MOST = 3
-"""settings that a name tells"""
+"""settings in a label"""
 _ABSENT = object()
 
 
-def labels_of_runs(results: Sequence[Ran], otherwise: Sequence[str]) -> list[str]:
-    """A name for each run, as in "period 10 ms, κ 0"; the names `otherwise` where settings do not tell them apart."""
+def labels_of_runs(results: Sequence[RunLike], otherwise: Sequence[str]) -> list[str]:
+    """A label for each run, as in "period 10 ms, κ 0"; those of `otherwise` where settings do not distinguish them."""
     settings = [_settings(result) for result in results]
     paths = [path for path in dict.fromkeys(path for one in settings for path in one) if _differs(path, settings)]
     named = {path: quantities.setting(path, [one.get(path) for one in settings]) for path in paths}
@@ -30,17 +30,17 @@ def labels_of_runs(results: Sequence[Ran], otherwise: Sequence[str]) -> list[str
     return list(otherwise)
 
 
-def _settings(result: Ran) -> dict[str, Any]:
-    """Of its scenario or system file by path, and the parameters that it was flown with."""
-    written = dict(_flat(tomllib.loads(result.asked.to_toml())))
+def _settings(result: RunLike) -> dict[str, Any]:
+    """The settings of its scenario or system file by path, and the parameters that it ran with."""
+    written = dict(_flat(tomllib.loads(result.request.to_toml())))
     return {**result.parameters, **written}
 
 
 def _flat(table: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
-    found: list[tuple[str, Any]] = []
+    settings: list[tuple[str, Any]] = []
     for key, value in table.items():
-        found += _flat(value, f"{prefix}{key}.") if isinstance(value, Mapping) else [(f"{prefix}{key}", value)]
-    return found
+        settings += _flat(value, f"{prefix}{key}.") if isinstance(value, Mapping) else [(f"{prefix}{key}", value)]
+    return settings
 
 
 def _differs(path: str, settings: Sequence[Mapping[str, Any]]) -> bool:
@@ -49,7 +49,7 @@ def _differs(path: str, settings: Sequence[Mapping[str, Any]]) -> bool:
 
 
 def _follows(path: str) -> bool:
-    """Whether the master sets it from something else."""
+    """Whether the master derives it from other settings."""
     return path.endswith((".sample_period", ".sample_offset"))
 
 

@@ -1,4 +1,4 @@
-"""The computers and networks of a system by themselves: no FMU is loaded, and none has to be there."""
+"""The schedule of the computers and networks of a system; no FMU is loaded, and none needs to exist."""
 
 import os
 from collections.abc import Mapping
@@ -20,21 +20,21 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Scheduled:
-    """What becomes of the tasks and messages of a system, up to a time."""
+    """The jobs of the tasks and the frames of the messages of a system, up to a time."""
 
     until: float
-    """Up to when [s]."""
+    """The end of the schedule [s]."""
     tasks: Mapping[str, Responses]
     """By COMPUTER.TASK."""
     messages: Mapping[str, Responses]
     """By NETWORK.MESSAGE."""
     busy: Mapping[str, float]
-    """The share of the time that a computer was at work, switches included, or a link carried a frame."""
+    """The share of the time in which a computer was busy, switches included, or a link carried a frame."""
     timeline: Timeline
     """All jobs and frames, in nanoseconds."""
 
     def plot(self, window: tuple[float, float] | None = None, style: str = "screen") -> "Figures":
-        """Its Gantt chart, over a `window` of time [s], else over as much from the start as can be told apart."""
+        """Its Gantt chart, over a `window` of time [s]; default: from the start, as long as jobs can be told apart."""
         from orchestration.figures import gantt
         from orchestration.figures.gallery import Figures
         from orchestration.figures.style import style_named
@@ -44,32 +44,36 @@ class Scheduled:
             return Figures({"schedule": gantt.draw(self.timeline, chosen, window)}, chosen)
 
 
-def schedule(asked: Asked, until: float | None = None) -> Scheduled:
-    """What becomes of the tasks and messages of a system up to a time, or else up to its `stop_time`.
+def schedule(request: Asked, until: float | None = None) -> Scheduled:
+    """Schedule the tasks and messages of a system up to a time; default: its `stop_time`.
 
-    It may be given by the path of its file, or as a dictionary of what stands there; its FMUs need not be there.
+    `request` may also be the path of a file or a dictionary with the content of one; its FMUs need not exist.
 
     Raises `UsageError` for a system without computers and networks.
     """
-    system = system_meant(asked_until(asked, until))
+    system = system_meant(request_until(request, until))
     if not (system.computers or system.networks):
         raise UsageError("computers: none, and no networks: expected at least one of them to schedule")
     timeline = timeline_of(system)
-    found = responses_of(system, timeline)
+    responses = responses_of(system, timeline)
     return Scheduled(
-        until=timeline.stop / 1e9, tasks=found.tasks, messages=found.messages, busy=found.busy, timeline=timeline
+        until=timeline.stop / 1e9,
+        tasks=responses.tasks,
+        messages=responses.messages,
+        busy=responses.busy,
+        timeline=timeline,
     )
 
 
-def asked_until(asked: Asked, until: float | None) -> Request:
-    """What is asked for, up to a time: a file that is only for this needs no end of its own."""
+def request_until(request: Asked, until: float | None) -> Request:
+    """A request with this stop time; a file that is used for this only need not have one."""
     if until is None:
-        return asked_for(asked)
-    if isinstance(asked, (str, os.PathLike)) and Path(asked).suffix.lower() not in SSP_ENDINGS:
-        path = Path(asked)
+        return asked_for(request)
+    if isinstance(request, (str, os.PathLike)) and Path(request).suffix.lower() not in SSP_ENDINGS:
+        path = Path(request)
         tables = read_toml(path, "system or scenario file")
         if SSP not in tables:
             return request_from_tables({**tables, "stop_time": until}, path.parent)
-    if isinstance(asked, Mapping):
-        return asked_for({**asked, "stop_time": until})
-    return replace(system_meant(asked_for(asked)), stop_time=until)
+    if isinstance(request, Mapping):
+        return asked_for({**request, "stop_time": until})
+    return replace(system_meant(asked_for(request)), stop_time=until)

@@ -1,4 +1,4 @@
-"""A run that goes on from sample to sample, with the caller's code in the place of one of its components."""
+"""A run that is stepped from sample to sample, with the caller's code in place of one component."""
 
 import math
 import threading
@@ -18,20 +18,20 @@ from orchestration.fmi.instance import Instance
 from orchestration.fmi.reuse import Instances
 from orchestration.recording.recording import InMemory
 from orchestration.requests.request import Asked, asked_for
-from orchestration.runs.in_place import InPlace, Left
-from orchestration.runs.meant import Flown, result_of
-from orchestration.runs.replaced import replaced
+from orchestration.runs.outcome import RunOutcome, result_of
+from orchestration.runs.prepared import PreparedRun, prepared
+from orchestration.runs.replacement import replace_component
 from orchestration.runs.result import Result
-from orchestration.runs.simulation import PreparedRun, prepared
+from orchestration.runs.substitute import Abandoned, Substitute
 from orchestration.schedule.streams import Streams
 from orchestration.system.times import NANOSECONDS
 
 
 class Simulation:
-    """A system, or a scenario, whose run stops wherever one of its components is to be stepped: that is your code.
+    """A run of a system, or a scenario, in which your code takes the place of one component.
 
-    Each time it hands out what the component's inputs are then, late, lost and noisy as the system has it, and goes on
-    with what you say that its outputs are::
+    The run stops wherever that component is to be stepped, returns its inputs (late, lost and noisy as in the system),
+    and goes on with the outputs that your code computes::
 
         with quadcosim.Simulation(Scenario()) as simulation:
             measurement = simulation.reset(seed=1)
@@ -40,63 +40,62 @@ class Simulation:
             print(simulation.result.metrics)
 
     The component's own FMU computes its outputs at initialisation, with its parameters, and is not called after. All
-    else is the run that it is with that FMU, by the same engine, to the bit.
+    else is as in the run with that FMU, by the same engine, to the bit.
     """
 
-    def __init__(self, asked: Asked, component: str | None = None) -> None:
-        """`component` is the one that is replaced; without it, the only sampled one.
+    def __init__(self, request: Asked, component: str | None = None) -> None:
+        """`component` is the one that is replaced; default: the only sampled one.
 
-        Raises `UsageError` for a system that cannot run, and for a component that there is not or that has a clock of
-        its own.
+        Raises `UsageError` for a system that cannot run, and for a component that does not exist or has its own clock.
         """
-        self._replaced = one = replaced(asked_for(asked), component)
-        self.component = one.component
+        self._replacement = replacement = replace_component(asked_for(request), component)
+        self.component = replacement.component
         """The name of the component that is replaced."""
-        self.measured = one.measured
-        """What it is told, in the order of a measurement: its inputs that are connected, or fed by a source."""
-        self.commanded = one.commanded
-        """What it says, in the order of a command: its outputs that are connected."""
+        self.measured = replacement.measured
+        """The names in a measurement, in order: its inputs that are connected or fed by a source."""
+        self.commanded = replacement.commanded
+        """The names in a command, in order: its outputs that are connected."""
         self._instances = Instances()
         self._thread: threading.Thread | None = None
         self._run: PreparedRun | None = None
-        self._flown: Flown | None = None
+        self._outcome: RunOutcome | None = None
         self._result: Result | None = None
 
     # -- a run -----------------------------------------------------------------------------------------------------
 
     def reset(self, seed: int | None = None, values: Mapping[str, Any] | None = None) -> Floats:
-        """Begin a run, and give the first measurement, shape (number of `measured`,).
+        """Begin a run and return the first measurement, shape (number of `measured`,).
 
-        `seed` is that of all random numbers, without it the one of the system; `values` are other values by path, as
-        axes of studies name them. Raises `UsageError` for what cannot be, `SimulatorError` if an FMU refuses it.
+        `seed` is that of all random numbers; default: the one of the system. `values` are other values by path, as
+        axes of studies name them. Raises `UsageError` for invalid values, `SimulatorError` if an FMU refuses them.
         """
-        self._leave()
-        self._meant = self._replaced.held({**(values or {}), **({} if seed is None else {"seed": seed})})
-        self._said: SimpleQueue[BaseException | None] = SimpleQueue()
-        self._answers: SimpleQueue[bool] = SimpleQueue()
-        self._flown, self._result, self._run = None, None, None
+        self._abandon()
+        self._resolved = self._replacement.resolve({**(values or {}), **({} if seed is None else {"seed": seed})})
+        self._reports: SimpleQueue[BaseException | None] = SimpleQueue()
+        self._replies: SimpleQueue[bool] = SimpleQueue()
+        self._outcome, self._result, self._run = None, None, None
         self._recorder, self._started = InMemory(), time.perf_counter()
-        self._sources = self._meant.sources(Streams(self._meant.system.seed, self._meant.system.streams))
-        self._thread = threading.Thread(target=self._fly, name="quadcosim run", daemon=True)
+        self._sources = self._resolved.sources(Streams(self._resolved.system.seed, self._resolved.system.streams))
+        self._thread = threading.Thread(target=self._simulate, name="quadcosim run", daemon=True)
         self._thread.start()
-        return self._heard()
+        return self._next_measurement()
 
     def step(self, command: Any) -> Floats:
-        """Go on with a command, and give the next measurement; at the end of the run, what would be measured then.
+        """Go on with a command and return the next measurement; at the end of the run, what would be measured then.
 
-        `command` is an array of the number of `commanded`, or their values by name. Raises `UsageError` for another,
-        and where no run is under way.
+        `command` is an array with one number for each of `commanded`, or their values by name. Raises `UsageError` for
+        anything else, and where no run is under way.
         """
         if self._thread is None:
             raise UsageError("step: no run is under way; expected reset before it")
-        self._place.command[:] = self._read(command)
-        self._answers.put(True)
-        return self._heard()
+        self._substitute.command[:] = self._read(command)
+        self._replies.put(True)
+        return self._next_measurement()
 
     @property
     def is_over(self) -> bool:
-        """Whether the run is: at its end, diverged, or ended by an FMU."""
-        return self._flown is not None
+        """Whether the run is over: at its end, diverged, or ended by an FMU."""
+        return self._outcome is not None
 
     @property
     def time(self) -> float:
@@ -105,29 +104,29 @@ class Simulation:
 
     @property
     def values(self) -> dict[str, float]:
-        """What all columns of the run are now, by name, and what its sources say; commands are those before this."""
+        """The values of all columns and sources now, by name; commands are the last ones before now."""
         master, t = self._under_way.master, self.time
         board = {column: float(master.board.row[place]) for column, place in master.board.place.items()}
         sources = {
             signal: float(value)
             for name, each in self._sources.items()
-            for signal, value in zip(self._meant.system.sources[name].signals(name), each.at(t))
+            for signal, value in zip(self._resolved.system.sources[name].signals(name), each.at(t))
         }
         return {**board, "time": t, **sources}
 
     @property
     def result(self) -> Result:
-        """The run that is over, as `run` gives it; raises `UsageError` before."""
-        if self._flown is None:
+        """The result of the run, as `run` returns it; raises `UsageError` before the run is over."""
+        if self._outcome is None:
             raise UsageError("result: the run is not over; expected it after the last step")
         if self._result is None:
             wall_time = time.perf_counter() - self._started
-            self._result = result_of(self._meant, self._flown, self._recorder, wall_time, interrupted=False)
+            self._result = result_of(self._resolved, self._outcome, self._recorder, wall_time, interrupted=False)
         return self._result
 
     def close(self) -> None:
-        """Leave the run where it is, and free the FMUs."""
-        self._leave()
+        """Abandon the run and free the FMUs."""
+        self._abandon()
         self._instances.close()
 
     def __enter__(self) -> "Simulation":
@@ -140,62 +139,62 @@ class Simulation:
 
     # -- the thread of the run -------------------------------------------------------------------------------------
 
-    def _fly(self) -> None:
-        """The whole run; what comes of it is said where it is waited for."""
+    def _simulate(self) -> None:
+        """The whole run; its outcome is reported to the thread that waits for it."""
         error: BaseException | None = None
         try:
             with prepared(
-                self._meant.asked, load=self._load, recorder=self._recorder, meant=self._meant
+                self._resolved.request, load=self._load, recorder=self._recorder, resolved=self._resolved
             ) as self._run:  # fmt: skip
                 self._run.master.initialise()
-                self._place.begin()
+                self._substitute.begin()
                 self._run.master.run()
                 self._measure_end(self._run)
-                self._flown = self._run.flown()
-        except BaseException as raised:  # whatever it is, it is raised where the run is waited for
+                self._outcome = self._run.outcome()
+        except BaseException as raised:  # raised again in the thread that waits for the run
             error = raised
-        self._said.put(error)
+        self._reports.put(error)
 
     @contextmanager
     def _load(self, path: Path, instance_name: str) -> Iterator[Instance]:
-        """An instance of a component, or what stands in its place."""
+        """An instance of a component, or its substitute."""
         with self._instances.load(path, instance_name) as instance:
             if instance_name == self.component:
-                self._place = InPlace(instance, self.measured, self.commanded, self._ask)
-                yield self._place
+                self._substitute = Substitute(instance, self.measured, self.commanded, self._await_command)
+                yield self._substitute
             else:
                 yield instance
 
-    def _ask(self) -> None:
-        """Wait for a command; raises `Left` if there will be none."""
-        self._said.put(None)
-        if not self._answers.get():
-            raise Left
+    def _await_command(self) -> None:
+        """Wait for a command; raises `Abandoned` if there will be none."""
+        self._reports.put(None)
+        if not self._replies.get():
+            raise Abandoned
 
     def _measure_end(self, run: PreparedRun) -> None:
-        """What the component would be told at the end of the run, where it is not asked."""
-        for x, channel in zip(self._meant.system.connections, run.master.channels):
+        """Deliver the measurement at the end of the run, where the component is not stepped."""
+        for x, channel in zip(self._resolved.system.connections, run.master.channels):
             if x.receiver == self.component:
                 channel.pass_on()
 
-    # -- where it is waited for ------------------------------------------------------------------------------------
+    # -- the thread that waits for it ------------------------------------------------------------------------------
 
-    def _heard(self) -> Floats:
-        """The next measurement; raises what has ended the run if that is an error."""
+    def _next_measurement(self) -> Floats:
+        """Wait for the next measurement; raises the error that ended the run, if one did."""
         assert self._thread is not None
-        error = self._said.get()
-        if error is not None or self._flown is not None:
+        error = self._reports.get()
+        if error is not None or self._outcome is not None:
             self._thread.join()
             self._thread = None
         if error is not None:
             raise error
-        measurement: Floats = self._place.measurement.copy()
+        measurement: Floats = self._substitute.measurement.copy()
         return measurement
 
-    def _leave(self) -> None:
-        """End the run that is under way, if any is."""
+    def _abandon(self) -> None:
+        """End the run that is under way, if there is one."""
         if self._thread is not None:
-            self._answers.put(False)
+            self._replies.put(False)
             self._thread.join()
             self._thread = None
 
@@ -206,7 +205,7 @@ class Simulation:
         return self._run
 
     def _read(self, command: Any) -> Floats:
-        """A command as numbers in their order; raises `UsageError` for what is none."""
+        """A command as numbers in order; raises `UsageError` for an invalid one."""
         names = self.commanded
         if isinstance(command, Mapping):
             for name in (*command, *names):
@@ -214,7 +213,7 @@ class Simulation:
                     raise UsageError(f"command: {name}: expected values of {', '.join(names)}")
             command = [command[name] for name in names]
         values: Floats = np.zeros((0, 0))
-        with suppress(TypeError, ValueError):  # of numpy's, for what is no array of numbers
+        with suppress(TypeError, ValueError):  # of numpy, for what is no array of numbers
             values = np.asarray(command, dtype=np.float64)
         if values.shape != (len(names),):
             raise UsageError(f"command: expected {len(names)} numbers: {', '.join(names)}")

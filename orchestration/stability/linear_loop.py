@@ -24,8 +24,8 @@ from orchestration.fmi.instance import Instance, Loader
 from orchestration.fmi.model import Model
 from orchestration.fmi.reuse import Instances
 from orchestration.recording.recording import Chunk, InMemory
-from orchestration.runs.meant import held_to
-from orchestration.runs.simulation import PreparedRun, prepared
+from orchestration.runs.prepared import PreparedRun, prepared
+from orchestration.runs.resolved import resolve_with_models
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import Timetable
 from orchestration.stability.linear_simulator import Linear, Opened
@@ -127,8 +127,8 @@ def at_rest(
     delay = max((exact_nanoseconds(highest(x.delay)) for x in calm.connections), default=Fraction(0))
     begin = latest_offset(calm) + (math.ceil(delay / period) + HELD) * period
     calm = replace(calm, stop_time=float(begin + (SETTLED + 2) * period) / NANOSECONDS)
-    meant = None if models is None else held_to(calm, models)
-    with prepared(calm, load=watching(instances), meant=meant) as simulation:
+    resolved = None if models is None else resolve_with_models(calm, models)
+    with prepared(calm, load=watching(instances), resolved=resolved) as simulation:
         _expect_states(simulation)
         _come_to_rest(simulation, begin, period)
         yield AtRest(

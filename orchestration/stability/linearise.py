@@ -7,7 +7,7 @@ import numpy as np
 from orchestration.basics.errors import UsageError
 from orchestration.fmi.reuse import Instances
 from orchestration.requests.request import Asked, asked_for
-from orchestration.runs.replaced import component_named
+from orchestration.runs.replacement import component_named
 from orchestration.stability.known_loops import rested
 from orchestration.stability.linear_loop import AtRest, at_rest, map_of
 from orchestration.stability.linear_simulator import Opened

@@ -21,7 +21,7 @@ from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats, Transfer
 from orchestration.fmi.instance import Instance, Loader
 from orchestration.fmi.reuse import Instances
-from orchestration.runs.simulation import prepared
+from orchestration.runs.prepared import prepared
 from orchestration.stability.operating_point import (
     common_period,
     deterministic,

@@ -14,8 +14,8 @@ from orchestration.fmi.instance import Instance
 from orchestration.fmi.model import read_model
 from orchestration.fmi.reuse import Instances
 from orchestration.results.own_metrics import OwnMetric
+from orchestration.runs.prepared import prepared
 from orchestration.runs.result import Result
-from orchestration.runs.simulation import prepared
 from orchestration.system.files_read import files_read
 from orchestration.system.model import System
 from orchestration.workers.row import Row

@@ -229,7 +229,7 @@ def test_the_seed_decides_the_random_numbers(main: Main) -> None:
 def test_flags_go_before_the_scenario_file(main: Main, here: Path) -> None:
     (here / "s.toml").write_text("stop_time = 0.2\n[timing]\nperiod = 0.02\ndelay = 0.004\n[plant]\nmass = 1.1\n")
     main("run", "s.toml", "--period", "0.01", "--out", "out", "--no-figures")
-    scenario = load_run(here / "out").asked
+    scenario = load_run(here / "out").request
     assert isinstance(scenario, Scenario)
     assert (scenario.stop_time, scenario.timing) == (0.2, Timing(period=0.01, delay=0.004))
     assert scenario.plant.parameters == {"mass": 1.1}

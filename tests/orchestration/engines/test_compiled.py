@@ -29,10 +29,10 @@ from orchestration.fmi.model import read_model
 from orchestration.fmi.native import NativeInstance, bounds_of
 from orchestration.recording.recording import InMemory
 from orchestration.runs import simulation
-from orchestration.runs.meant import RunInterrupted
-from orchestration.runs.pause import fly_until, resume
+from orchestration.runs.outcome import RunInterrupted
+from orchestration.runs.pause import resume, run_until
+from orchestration.runs.prepared import prepared
 from orchestration.runs.result import Result
-from orchestration.runs.simulation import prepared
 from orchestration.schedule import cursor
 from orchestration.system.component import Component
 from orchestration.system.connection import Connection
@@ -317,7 +317,7 @@ def test_examples_run_the_same(path: Path) -> None:
 @pytest.mark.parametrize(("first", "then"), [("python", "compiled"), ("compiled", "python"), ("compiled", "compiled")])
 def test_a_run_that_one_engine_pauses_another_ends(first: Any, then: Any, fmu: Path, tmp_path: Path) -> None:
     system = of(LOOP, fmu)
-    assert fly_until(system, 0.4, tmp_path / "paused", engine=first, figures=False) is None
+    assert run_until(system, 0.4, tmp_path / "paused", engine=first, figures=False) is None
     assert_the_same(resume(tmp_path / "paused", engine=then), ran(system, "python"))
 
 

@@ -39,7 +39,7 @@ def flight() -> Result:
 
 @pytest.fixture(scope="module")
 def slow(flight: Result) -> Result:
-    return quadcosim.run(flight.asked.with_changes(timing={"period": 0.03}))  # type: ignore[attr-defined]
+    return quadcosim.run(flight.request.with_changes(timing={"period": 0.03}))  # type: ignore[attr-defined]
 
 
 @pytest.fixture(scope="module")
@@ -107,12 +107,12 @@ def test_up_is_up_and_axes_have_their_names_in_both_conventions() -> None:
 
 
 def test_a_system_with_the_variables_of_a_quadrotor_is_drawn_as_a_flight_also_over_one(flight: Result) -> None:
-    system = quadcosim.run(flight.asked.as_system())
+    system = quadcosim.run(flight.request.as_system())
     assert set(draw(system)) == set(draw([flight, system])) == set(FLIGHT)
 
 
 def test_signals_of_any_system_share_a_panel_by_unit_and_none_is_left_out(flight: Result) -> None:
-    whole = flight.asked.as_system()
+    whole = flight.request.as_system()
     bare = replace(whole, sources={}, objectives={}, optional=(), criterion=Criterion(), operating_point={})
     result = quadcosim.run(replace(bare, stop_time=0.05))
     figure = draw(result)["signals"]
@@ -130,7 +130,7 @@ def test_signals_of_any_system_share_a_panel_by_unit_and_none_is_left_out(flight
 
 
 def test_a_legend_tells_what_differs_between_runs(flight: Result, slow: Result) -> None:
-    heavy = replace(flight, asked=flight.asked.with_changes(parameters={"plant.mass": 1.2}))  # type: ignore[attr-defined]
+    heavy = replace(flight, request=flight.request.with_changes(parameters={"plant.mass": 1.2}))  # type: ignore[attr-defined]
     assert labels_of_runs([flight, slow], ["a", "b"]) == ["period 10 ms", "period 30 ms"]
     assert labels_of_runs([flight, heavy], ["a", "b"]) == ["mass 1 kg", "mass 1.2 kg"]
     assert labels_of_runs([flight, flight], ["a", "b"]) == ["a", "b"]

@@ -19,8 +19,8 @@ from orchestration.fmi import instances, slaves
 from orchestration.fmi.isolated import IsolatedInstance
 from orchestration.fmi.native import NativeInstance
 from orchestration.processes import subprocesses
+from orchestration.runs.prepared import prepared
 from orchestration.runs.result import Result
-from orchestration.runs.simulation import prepared
 from orchestration.system.component import Component
 from orchestration.system.connection import Connection
 from orchestration.system.model import System
@@ -389,9 +389,9 @@ def test_what_an_fmu_prints_is_not_among_what_the_command_prints(load: str, tmp_
         from orchestration.fmi.banners import banners_to_stderr
         from orchestration.fmi.instances import open_here
         from orchestration.fmi.isolated import IsolatedInstance
-        from orchestration.runs.simulation import prepared
         from orchestration.system.component import Component
         from orchestration.system.model import System
+        from orchestration.runs.prepared import prepared
 
         system = System(stop_time=0.1, components={{"it": Component(fmu=sys.argv[1], step=0.01)}})
         print("before")

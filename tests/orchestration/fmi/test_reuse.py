@@ -10,7 +10,7 @@ from orchestration.fmi.native import NativeInstance
 from orchestration.fmi.repeatability import Repeatability
 from orchestration.fmi.reuse import Instances
 from orchestration.processes.child import Child, Ending
-from orchestration.runs.simulation import prepared
+from orchestration.runs.prepared import prepared
 from orchestration.system.component import Parameter
 from tests.orchestration.fmi.small import needs_compiler, nothing_known, small
 from tests.orchestration.fmi.test_foreign_fmus import alone, ran

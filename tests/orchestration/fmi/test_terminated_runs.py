@@ -14,9 +14,9 @@ from orchestration.fmi import instances
 from orchestration.fmi.isolated import IsolatedInstance
 from orchestration.fmi.repeatability import Repeatability
 from orchestration.fmi.reuse import Instances
+from orchestration.runs.prepared import prepared
 from orchestration.runs.result import Result
 from orchestration.runs.run_directory import load_run, save_run
-from orchestration.runs.simulation import prepared
 from orchestration.system.component import Component
 from orchestration.system.connection import Connection
 from orchestration.system.criterion import Criterion
@@ -140,7 +140,7 @@ def test_it_is_kept_and_told(tmp_path: Path, main: Main) -> None:
     assert again.termination == result.termination
     assert again.metrics == json.loads((tmp_path / "kept" / "metrics.json").read_text()) == result.metrics
     assert "terminated: it (Small)" in repr(result._repr_html_())
-    (tmp_path / "system.toml").write_text(result.asked.to_toml(), encoding="utf-8")
+    (tmp_path / "system.toml").write_text(result.request.to_toml(), encoding="utf-8")
     assert "terminated: it (Small): fmi2DoStep: ends the run at 0.05 s" in main("run", tmp_path / "system.toml").stdout
 
 

@@ -31,7 +31,7 @@ from orchestration.limits.limit import find
 from orchestration.quadrotor.fmu_choice import FmuChoice, Record
 from orchestration.quadrotor.wiring import COMMAND
 from orchestration.requests.ranges import Varied
-from orchestration.runs.simulation import prepared
+from orchestration.runs.prepared import prepared
 from orchestration.stability.known_loops import Local
 from orchestration.stability.local_limit import local_limits
 from orchestration.system.distribution import lowest

@@ -23,7 +23,7 @@ from orchestration.quadrotor.fmu_choice import FmuChoice, Record
 from orchestration.quadrotor.measures import desired
 from orchestration.quadrotor.signals import ReferenceChoice
 from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT, POSITION_REFERENCE, REFERENCE
-from orchestration.runs.simulation import prepared
+from orchestration.runs.prepared import prepared
 from quadcosim import Result, RunInterrupted, Scenario, SimulatorError, Timing, UsageError
 from tests.native import native
 

@@ -12,8 +12,8 @@ from orchestration.flight.names import FIGURES as FLIGHT
 from orchestration.recording.recording import InMemory, thinned
 from orchestration.runs import draw as drawn
 from orchestration.runs.draw import draw
-from orchestration.runs.pause import fly_until, resume
-from orchestration.runs.run_directory import keep_flight
+from orchestration.runs.pause import resume, run_until
+from orchestration.runs.run_directory import keep_run
 from quadcosim import Result, Timing, load_run
 from tests.native import native
 
@@ -43,7 +43,7 @@ def expect_equal(found: Result, whole: Result) -> None:
 
 
 def test_what_is_on_disk_is_what_was_flown_chunk_by_chunk(whole: Result, tmp_path: Path) -> None:
-    keep_flight(tmp_path / "run", lambda to: quadcosim.run(SCENARIO, recorder=to), figures=False)
+    keep_run(tmp_path / "run", lambda to: quadcosim.run(SCENARIO, recorder=to), figures=False)
     groups = pq.ParquetFile(tmp_path / "run" / "signals.parquet").metadata
     sizes = [groups.row_group(i).num_rows for i in range(groups.num_row_groups)]
     assert sizes[:-1] == [64] * (len(whole.rows) // 64)
@@ -71,7 +71,7 @@ def test_a_sample_at_the_last_row_of_a_chunk_is_in_that_chunk_and_counts_once(
 def test_many_events_make_a_chunk_whole_too(whole: Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("orchestration.engines.backlog.ROWS", 10**6)
     monkeypatch.setattr("orchestration.engines.backlog.EVENTS", 20)
-    keep_flight(tmp_path / "run", lambda to: quadcosim.run(SCENARIO, recorder=to), figures=False)
+    keep_run(tmp_path / "run", lambda to: quadcosim.run(SCENARIO, recorder=to), figures=False)
     found = load_run(tmp_path / "run")
     sizes = [len(chunk.events) for chunk in found.recording.chunks()]
     assert len(sizes) > 5
@@ -88,14 +88,14 @@ def test_rows_are_on_disk_before_the_flight_is_over(tmp_path: Path) -> None:
         sizes.append((hidden / "signals.parquet").stat().st_size)
 
     scenario = SCENARIO.with_changes(stop_time=1.5)
-    keep_flight(tmp_path / "run", lambda to: quadcosim.run(scenario, recorder=to, progress=look), figures=False)
+    keep_run(tmp_path / "run", lambda to: quadcosim.run(scenario, recorder=to, progress=look), figures=False)
     assert sizes == sorted(sizes)
     assert len(set(sizes[:-1])) > 1
 
 
 @pytest.mark.parametrize("at", [0.01, 0.2, 0.4])
 def test_a_pause_between_chunks_changes_nothing(at: float, whole: Result, tmp_path: Path) -> None:
-    fly_until(SCENARIO, at, tmp_path / "paused")
+    run_until(SCENARIO, at, tmp_path / "paused")
     expect_equal(resume(tmp_path / "paused", tmp_path / "done", figures=False), whole)
     expect_equal(resume(tmp_path / "paused"), whole)
 

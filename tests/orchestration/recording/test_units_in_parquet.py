@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import quadcosim
-from orchestration.runs.run_directory import keep_flight
+from orchestration.runs.run_directory import keep_run
 from quadcosim import Result, save_run
 from tests.native import NATIVE
 
@@ -30,7 +30,7 @@ def test_a_run_that_is_saved_and_one_written_as_it_flies_say_the_units_of_their_
     result: Result, tmp_path: Path
 ) -> None:
     saved = save_run(result, tmp_path / "saved", figures=False)
-    keep_flight(tmp_path / "flown", lambda to: quadcosim.run(SHORT, recorder=to), figures=False)
+    keep_run(tmp_path / "flown", lambda to: quadcosim.run(SHORT, recorder=to), figures=False)
     for folder in (saved, tmp_path / "flown"):
         columns = said(folder / "signals.parquet")
         assert columns["time"][b"unit"] == b"s"

@@ -15,8 +15,8 @@ import pytest
 
 from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.processes import subprocesses
-from orchestration.runs.meant import RunLost
-from orchestration.runs.pause import fly_until, resume
+from orchestration.runs.outcome import RunLost
+from orchestration.runs.pause import resume, run_until
 from orchestration.runs.run_directory import load_run
 from orchestration.runs.simulation import run
 from orchestration.system.component import Component
@@ -242,7 +242,7 @@ def test_ctrl_c_ends_the_run_at_an_instant_and_keeps_its_rows(tmp_path: Path) ->
 def test_a_run_is_paused_and_resumed_in_processes_of_their_own(tmp_path: Path) -> None:
     system = beside(small(tmp_path), small(tmp_path))
     whole = run(system, in_process=True)
-    assert fly_until(system, 0.05, tmp_path / "paused", figures=False) is None
+    assert run_until(system, 0.05, tmp_path / "paused", figures=False) is None
     result = resume(tmp_path / "paused")
     assert np.array_equal(result.rows, whole.rows)
     assert result.events == whole.events

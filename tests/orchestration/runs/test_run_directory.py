@@ -24,7 +24,7 @@ from orchestration.figures.views import VIEWS
 from orchestration.flight.names import FIGURES as FLIGHT
 from orchestration.recording.recording import Chunk, Events, InMemory, Recorder
 from orchestration.runs import draw as drawing
-from orchestration.runs.run_directory import keep_flight
+from orchestration.runs.run_directory import keep_run
 from quadcosim import (  # fmt: skip
     QuadcosimError,
     Result,
@@ -91,7 +91,7 @@ def test_a_run_read_back_is_the_run_written(result: Result, folder: Path) -> Non
     assert again.rows.tobytes() == result.rows.tobytes()
     assert again.events == result.events
     assert again.metrics == result.metrics
-    assert again.asked == result.asked
+    assert again.request == result.request
     assert again.provenance == result.provenance
     assert (again.divergence, again.warnings) == (result.divergence, result.warnings)
 
@@ -339,9 +339,9 @@ def test_a_directory_that_cannot_be_is_refused_before_the_flight(folder: Path) -
     folder.parent.mkdir()
     (folder.parent / "file").write_text("years of work")
     with pytest.raises(UsageError, match="expected a directory that can be written"):
-        keep_flight(folder.parent / "file" / "run", never)
+        keep_run(folder.parent / "file" / "run", never)
     with pytest.raises(UsageError, match="expected a new or empty directory, or that of an earlier run"):
-        keep_flight(folder.parent, never)
+        keep_run(folder.parent, never)
     assert [path.name for path in folder.parent.iterdir()] == ["file"]
 
 
@@ -350,10 +350,10 @@ def test_a_flight_whose_place_is_taken_meanwhile_is_kept_beside(result: Result, 
         folder.mkdir()
         (folder / "thesis.tex").write_text("years of work")
         folder.with_name("run.1").mkdir()
-        return quadcosim.run(result.asked, recorder=recorder)
+        return quadcosim.run(result.request, recorder=recorder)
 
     with pytest.raises(QuadcosimError, match=r"expected a new .*; what was written is in .*run\.2$"):
-        keep_flight(folder, fly, figures=False)
+        keep_run(folder, fly, figures=False)
     assert contents(folder) == {"thesis.tex": b"years of work"}
     assert load_run(folder.with_name("run.2")).rows.tobytes() == result.rows.tobytes()
     assert {path.name for path in folder.parent.iterdir()} == {"run", "run.1", "run.2"}
@@ -367,7 +367,7 @@ def test_a_flight_that_cannot_be_written_whole_is_kept_beside(
 
     monkeypatch.setattr(drawing, "draw", fail)
     with pytest.raises(QuadcosimError, match=r"no space left on device; what was written is in .*run\.1$"):
-        keep_flight(folder, lambda to: quadcosim.run(result.asked, recorder=to))
+        keep_run(folder, lambda to: quadcosim.run(result.request, recorder=to))
     assert load_run(folder.with_name("run.1")).rows.tobytes() == result.rows.tobytes()
 
 
@@ -383,9 +383,7 @@ def test_what_was_recorded_before_an_interruption_is_kept_but_replaces_nothing(
         os.kill(os.getpid(), signal.SIGINT)
 
     with pytest.raises(RunInterrupted, match=r"^at t = [0-2]\.\d+ s of 3 s; what was recorded is in ") as stop:
-        keep_flight(
-            folder, lambda to: quadcosim.run(native(stop_time=3.0), recorder=to, progress=progress), figures=False
-        )
+        keep_run(folder, lambda to: quadcosim.run(native(stop_time=3.0), recorder=to, progress=progress), figures=False)
     assert str(stop.value).endswith(str(place))
     kept = load_run(place)
     assert kept.interrupted_at == kept.signals["time"][-1] == kept.metrics["horizon"]
@@ -472,7 +470,7 @@ def test_a_file_that_was_edited_is_named(result: Result, folder: Path, name: str
 
 @pytest.mark.parametrize("name", ["signals.parquet", "events.parquet"])
 def test_the_recording_of_another_run_is_refused_by_name(result: Result, folder: Path, name: str) -> None:
-    other = quadcosim.run(dataclasses.replace(cast(Scenario, result.asked), seed=5))
+    other = quadcosim.run(dataclasses.replace(cast(Scenario, result.request), seed=5))
     save_run(result, folder, figures=False)
     save_run(other, folder.with_name("other"), figures=False)
     (folder / name).write_bytes((folder.with_name("other") / name).read_bytes())

@@ -12,7 +12,7 @@ from orchestration.building import fmus
 from orchestration.engines.batch.batches import Batches
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
-from orchestration.runs.in_lanes import located as with_files
+from orchestration.runs.many_runs import located as with_files
 from orchestration.schedule import schedule_cache
 from orchestration.system.component import Component
 from orchestration.system.connection import Connection

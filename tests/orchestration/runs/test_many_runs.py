@@ -11,7 +11,7 @@ from orchestration.basics.errors import QuadcosimError
 from orchestration.engines.batch import shape
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
-from orchestration.runs.in_lanes import located
+from orchestration.runs.many_runs import located
 from orchestration.system.component import Component
 from orchestration.system.model import System
 from tests.native import NATIVE

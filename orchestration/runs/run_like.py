@@ -1,4 +1,4 @@
-"""What labels and figures need to know of a run."""
+"""What labels and figures need of a run."""
 
 from collections.abc import Mapping
 from typing import Protocol
@@ -10,16 +10,16 @@ from orchestration.system.model import System
 from orchestration.system.request import Request
 
 
-class Ran(Protocol):
-    """A run, as `Result` has it."""
+class RunLike(Protocol):
+    """A run, with the fields of `Result` that are drawn."""
 
     @property
-    def asked(self) -> Request:
+    def request(self) -> Request:
         """What was run."""
 
     @property
     def system(self) -> System:
-        """What that means."""
+        """The system of the request."""
 
     @property
     def recording(self) -> Recording:
@@ -27,11 +27,11 @@ class Ran(Protocol):
 
     @property
     def metrics(self) -> Metrics:
-        """What it came to."""
+        """Its metrics."""
 
     @property
     def described(self) -> Mapping[str, Described]:
-        """What is known of each column."""
+        """The unit and the description of each column."""
 
     @property
     def parameters(self) -> Mapping[str, float]:
@@ -43,7 +43,7 @@ class Ran(Protocol):
 
     @property
     def termination(self) -> str | None:
-        """Which FMU has ended it; None if none did."""
+        """Which FMU ended it; None if none did."""
 
     @property
     def interrupted_at(self) -> float | None:

@@ -1,4 +1,4 @@
-"""A system one of whose components is code of the caller's: which one, what it is told, and what it says."""
+"""A system in which the caller's code replaces one component: which one, its inputs, and its outputs."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -9,7 +9,7 @@ from orchestration.basics.errors import UsageError, expected_name
 from orchestration.building import fmus
 from orchestration.engines.wiring import checked
 from orchestration.fmi.model import Model, read_model
-from orchestration.runs.meant import Meant
+from orchestration.runs.resolved import ResolvedRequest
 from orchestration.system.model import System
 from orchestration.system.paths import changed
 from orchestration.system.request import Request, in_its_own_words
@@ -17,38 +17,38 @@ from orchestration.system.variable_names import component_of, variable_of
 
 
 @dataclass(frozen=True, kw_only=True)
-class Replaced:
-    """A request, and the component of its system that is replaced."""
+class Replacement:
+    """A request, and the component of its system that the caller's code replaces."""
 
-    asked: Request
+    request: Request
     component: str
     system: System
     paths: Mapping[str, Path]
     models: Mapping[str, Model]
-    """of the replaced component without what its FMU would say after initialisation"""
+    """of the replaced component without the variables that have no value after initialisation"""
     measured: tuple[str, ...]
-    """its inputs that are connected, or fed by a source"""
+    """its inputs that are connected or fed by a source"""
     commanded: tuple[str, ...]
     """its outputs that are connected"""
 
-    def held(self, values: Mapping[str, Any]) -> Meant:
-        """A run of it with other values by target, held to its FMUs; raises `UsageError` for what cannot be."""
-        with in_its_own_words(self.asked):
-            paths = {path: value for target, value in values.items() for path in self.asked.paths_of(target)}
+    def resolve(self, values: Mapping[str, Any]) -> ResolvedRequest:
+        """Resolve it with other values by target; raises `UsageError` for values that are invalid."""
+        with in_its_own_words(self.request):
+            paths = {path: value for target, value in values.items() for path in self.request.paths_of(target)}
             system = changed(self.system, paths) if paths else self.system
             if system.fmus != self.system.fmus:
                 raise UsageError("values: expected those of a run of the same FMUs; others are another Simulation")
-            found = checked(system, self.models)
-        return Meant(
-            asked=self.asked, system=found.system, paths=self.paths, models=self.models, parameters=found.parameters,
-            units=found.units, follows=found.follows,
+            fits = checked(system, self.models)
+        return ResolvedRequest(
+            request=self.request, system=fits.system, paths=self.paths, models=self.models, parameters=fits.parameters,
+            units=fits.units, follows=fits.follows,
         )  # fmt: skip
 
 
-def replaced(asked: Request, component: str | None) -> Replaced:
-    """A request with a component replaced, None: the only sampled one; raises `UsageError` where that cannot be."""
-    with in_its_own_words(asked):
-        system = asked.as_system()
+def replace_component(request: Request, component: str | None) -> Replacement:
+    """Replace a component of a request; None: the only sampled one. Raises `UsageError` if it cannot be replaced."""
+    with in_its_own_words(request):
+        system = request.as_system()
         name = component_named(system, component, "to replace")
         _expect_no_clock(system, name)
         measured, commanded = _ends(system, name)
@@ -56,13 +56,14 @@ def replaced(asked: Request, component: str | None) -> Replaced:
         paths = fmus.of_components(system.fmus)
         models = {each: read_model(path) for each, path in paths.items()}
     models[name] = _initialising(models[name], commanded)
-    return Replaced(
-        asked=asked, component=name, system=whole, paths=paths, models=models, measured=measured, commanded=commanded
+    return Replacement(
+        request=request, component=name, system=whole, paths=paths, models=models, measured=measured,
+        commanded=commanded,
     )  # fmt: skip
 
 
 def component_named(system: System, component: str | None, to: str) -> str:
-    """The component that somebody named `to` do something with it, None: the only sampled one; raises `UsageError`."""
+    """A component by name, None: the only sampled one; raises `UsageError` stating what it is needed for (`to`)."""
     sampled = [name for name, each in system.components.items() if each.sampling is not None]
     if component is None:
         if len(sampled) != 1:
@@ -81,7 +82,7 @@ def _expect_no_clock(system: System, component: str) -> None:
 
 
 def _ends(system: System, component: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """The inputs of a component that anything feeds, and its outputs that are connected, in the order of the system."""
+    """The inputs of a component that are fed, and its outputs that are connected, in the order of the system."""
     fed = [end for x in system.connections for end in x.end] + [end for s in system.sources.values() for end in s.to]
     read = dict.fromkeys(start for x in system.connections for start in x.start)
     inputs, outputs = (tuple(variable_of(e) for e in ends if component_of(e) == component) for ends in (fed, read))
@@ -91,6 +92,6 @@ def _ends(system: System, component: str) -> tuple[tuple[str, ...], tuple[str, .
 
 
 def _initialising(model: Model, outputs: Sequence[str]) -> Model:
-    """What is known of a component whose FMU says nothing after initialisation but for some outputs."""
+    """The model of a component whose FMU is used for initialisation only: inputs, parameters and some outputs."""
     kept = {name: v for name, v in model.variables.items() if v.causality in ("input", "parameter") or name in outputs}
     return replace(model, variables=kept)

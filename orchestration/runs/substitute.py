@@ -1,4 +1,4 @@
-"""What stands in the place of a component whose outputs somebody else says."""
+"""The instance that takes the place of a component whose outputs the caller computes."""
 
 from collections.abc import Callable, Sequence
 
@@ -9,20 +9,20 @@ from orchestration.fmi.instance import Instance
 from orchestration.fmi.values import Value
 
 
-class Left(BaseException):
-    """Whoever is asked for the outputs says no more."""
+class Abandoned(BaseException):
+    """The caller computes no more outputs: the run is to be left where it is."""
 
 
-class InPlace(Instance):
-    """An instance that takes part in initialisation, and is not called after: what it is told then, others answer."""
+class Substitute(Instance):
+    """Initialises with the FMU of the component and does not call it after: the caller computes its outputs."""
 
     def __init__(
-        self, instance: Instance, measured: Sequence[str], commanded: Sequence[str], ask: Callable[[], None]
+        self, instance: Instance, measured: Sequence[str], commanded: Sequence[str], await_command: Callable[[], None]
     ) -> None:
-        """`ask` is called where it is to be stepped: `measurement` is then there, and `command` is there after it."""
-        self._instance, self._ask = instance, ask
+        """`await_command` is called at each step: `measurement` is up to date then, and it fills in `command`."""
+        self._instance, self._await_command = instance, await_command
         self._measured, self._commanded = list(measured), list(commanded)
-        self._has_begun = self._is_asked = False
+        self._has_begun = self._has_command = False
         self.path, self.name, self.model = instance.path, instance.name, instance.model
         self.measurement: Floats = np.zeros(len(measured))
         self.command: Floats = np.zeros(len(commanded))
@@ -34,7 +34,7 @@ class InPlace(Instance):
         return self._instance.warnings
 
     def begin(self) -> None:
-        """From here on its steps are asked for; before, it is stepped to its first sample without one."""
+        """From here on the caller computes each step; before, the FMU is stepped to its first sample."""
         self._has_begun = True
 
     def set(self, name: str, value: Value) -> None:
@@ -46,7 +46,7 @@ class InPlace(Instance):
         self._instance.set_tolerance(tolerance)
 
     def get(self, name: str) -> Value:
-        """As any instance; after initialisation what it was then."""
+        """As any instance; after initialisation the value of then."""
         return self._instance.get(name)
 
     def reset(self) -> None:
@@ -58,11 +58,11 @@ class InPlace(Instance):
         self._instance.close()
 
     def reader(self, names: Sequence[str], into: Floats) -> Transfer:
-        """As any instance; of what was said once it was."""
+        """As any instance; once there is a command, of the command."""
         read, places = self._instance.reader(names, into), [self._commanded.index(name) for name in names]
 
         def transfer() -> None:
-            if self._is_asked:
+            if self._has_command:
                 into[:] = self.command[places]
             else:
                 read()
@@ -89,17 +89,17 @@ class InPlace(Instance):
         self._instance.exit_initialization()
 
     def step(self, t: float, h: float) -> None:
-        """Ask for the outputs."""
+        """Wait for the outputs of the caller."""
         if not self._has_begun:
             self._instance.step(t, h)
             return
-        self._is_asked = True
-        self._ask()
+        self._has_command = True
+        self._await_command()
 
     def save(self) -> bytes:
-        """It has no state that is known."""
+        """Not supported: the state of the caller's code is unknown."""
         raise NotImplementedError
 
     def restore(self, state: bytes) -> None:
-        """It has no state that is known."""
+        """Not supported: the state of the caller's code is unknown."""
         raise NotImplementedError

@@ -1,4 +1,4 @@
-"""Many runs of one system from arrays into arrays: in lanes where those can be had, alone where not."""
+"""Many runs of one system from arrays into arrays: in SIMD lanes where available, else one by one."""
 
 import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -32,15 +32,15 @@ _NOTES = logging.getLogger("quadcosim")
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Flights(Mapping[str, Floats]):
-    """What many runs came to, as arrays by name: `flights["position_rmse"]` has a value for each run."""
+    """The results of many runs as arrays by name: `flights["position_rmse"]` has a value for each run."""
 
     arrays: Mapping[str, Floats]
     """By name: of an output shape (runs,), NaN where it has no value; of `time` and what was recorded shape
     (runs, rows), NaN after the last row of a run that has fewer."""
     engine: str
-    """What flew them: `batch`, which is lanes, or else `compiled` or `python`; the numbers are the same."""
+    """The engine of the runs: `batch`, which is SIMD lanes, `compiled` or `python`; the numbers are the same."""
     reason: str | None
-    """Why they were not flown in lanes, in a line; None: they were."""
+    """Why they did not run in lanes, in a line; None: they did."""
     units: Mapping[str, str]
     """The units of the outputs that have one, by name, as FMI writes them (`N.m`)."""
 
@@ -53,7 +53,7 @@ class Flights(Mapping[str, Floats]):
         return iter(self.arrays)
 
     def __len__(self) -> int:
-        """How many arrays there are."""
+        """The number of arrays."""
         return len(self.arrays)
 
     def __repr__(self) -> str:
@@ -61,48 +61,48 @@ class Flights(Mapping[str, Floats]):
         return f"<Flights: {count} runs by {self.engine}; {', '.join(self.arrays)}>"
 
 
-def fly(
-    asked: Asked, values: Mapping[str, Any], *, outputs: Sequence[str] | None = None, record: Sequence[str] = ()
+def run_many(
+    request: Asked, values: Mapping[str, Any], *, outputs: Sequence[str] | None = None, record: Sequence[str] = ()
 ) -> Flights:
-    """Fly many runs of a system, or a scenario, from arrays into arrays, without a store or a result for each.
+    """Run a system, or a scenario, many times, from arrays into arrays, without a store or a result for each run.
 
     `values` are arrays of shape (runs,) by path, as axes of a study name them (`plant.initial.position.x`,
     `timing.period`, `seed`), or one value for all runs. `outputs` are names of objectives, or of `good`, `horizon` [s],
-    `diverged`, `divergence_time` [s] and `steps`; without it, all of them. `record` are columns whose rows are kept,
-    with their `time` [s]. All arrays are of float64; truths are 0.0 and 1.0.
+    `diverged`, `divergence_time` [s] and `steps`; default: all of them. `record` are columns whose rows are kept, with
+    their `time` [s]. All arrays are of float64; truth values are 0.0 and 1.0.
 
-    It flies native FMUs as lanes of vector registers where this machine has a C compiler and the FMUs have code for
-    lanes, else each run as `run` does. Raises `UsageError` for a path, an output or a column that there is not, arrays
-    of different lengths and values that cannot be; and what `run` raises for a run that cannot be flown, saying which.
+    Native FMUs run in lanes of vector registers where this machine has a C compiler and the FMUs have code for lanes,
+    else each run is one of `run`. Raises `UsageError` for a path, an output or a column that does not exist, arrays of
+    different lengths and invalid values; and what `run` raises for a run that fails, naming it.
     """
-    request = asked_for(asked)
-    with in_its_own_words(request):
-        system = located(request.as_system())
+    loaded = asked_for(request)
+    with in_its_own_words(loaded):
+        system = located(loaded.as_system())
         models = {name: read_model(Path(component.fmu)) for name, component in system.components.items()}
         check(system, models)
         system = heard(system, models)
         fits = checked(_recording(system, models, record), models)
         names = _outputs(fits.system, outputs)
-        given = columns(request, fits.system, models, values)
+        runs = columns(loaded, fits.system, models, values)
         reason = _reason_unavailable(fits.system, models)
-        table = _Table(given.count, names, record)
-        for flown in _alone(given, range(given.count), record) if reason else _in_lanes(given, fits.parameters, record):
-            table.put(flown)
+        table = _Table(runs.count, names, record)
+        for row in _one_by_one(runs, range(runs.count), record) if reason else _in_lanes(runs, fits.parameters, record):
+            table.put(row)
     engine = table.engine if reason else BATCH
-    _NOTES.debug("%d runs by the engine %s%s", given.count, engine, f": {reason}" if reason else "")
+    _NOTES.debug("%d runs by the engine %s%s", runs.count, engine, f": {reason}" if reason else "")
     known = {"time": "s", "horizon": "s", "divergence_time": "s", **fits.units}
     units = {name: known[name] for name in table.arrays if name in known}
     return Flights(arrays=table.arrays, engine=engine, reason=reason, units=units)
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Flown:
-    """What one run came to, for as long as it takes to note it."""
+class _RunRow:
+    """The results of one run, on their way into the table."""
 
     place: int
     metrics: Metrics
     rows: Sequence[Floats]
-    """the time, then what is recorded"""
+    """the time, then the recorded columns"""
     engine: str = BATCH
 
 
@@ -120,44 +120,44 @@ class _Table:
         """All of them by name."""
         return {**self._outputs, **dict(zip(self._recorded, self._rows))}
 
-    def put(self, flown: _Flown) -> None:
-        """Note a run."""
-        self.engine = flown.engine
+    def put(self, run: _RunRow) -> None:
+        """Add a run."""
+        self.engine = run.engine
         for name, column in self._outputs.items():
-            value = flown.metrics[name]
-            column[flown.place] = np.nan if value is None else float(value)
+            value = run.metrics[name]
+            column[run.place] = np.nan if value is None else float(value)
         if self._recorded:
-            longer = len(flown.rows[0]) - self._rows.shape[2]
+            longer = len(run.rows[0]) - self._rows.shape[2]
             if longer > 0:
                 self._rows = np.pad(self._rows, ((0, 0), (0, 0), (0, longer)), constant_values=np.nan)
-            self._rows[:, flown.place, : len(flown.rows[0])] = flown.rows
+            self._rows[:, run.place, : len(run.rows[0])] = run.rows
 
 
-def _in_lanes(given: Columns, parameters: Mapping[str, float], record: Sequence[str]) -> Iterator[_Flown]:
-    """All runs, in lanes but for those that are to be flown alone; `parameters` are those of all components."""
-    places = {name: i for i, name in enumerate(_of_components(given.system, record), 1)}
-    for place, summary, rows in Batches().each(given.systems, list(places) if record else None, given.parameters):
+def _in_lanes(runs: Columns, parameters: Mapping[str, float], record: Sequence[str]) -> Iterator[_RunRow]:
+    """All runs, in lanes but for those that must run alone; `parameters` are those of all components."""
+    places = {name: i for i, name in enumerate(_of_components(runs.system, record), 1)}
+    for place, summary, rows in Batches().each(runs.systems, list(places) if record else None, runs.parameters):
         if len(rows) == MOST_ROWS:
             raise UsageError(f"record: run {place} has more than {MOST_ROWS} rows; expected runs of fewer")
         if summary is None:
-            yield from _alone(given, [place], record)
+            yield from _one_by_one(runs, [place], record)
             continue
         signals = {"time": rows[:, 0], **{name: rows[:, i] for name, i in places.items()}} if record else {}
         if record and len(places) < len(record):
-            numbers = {**parameters, **{name: float(column[place]) for name, column in given.parameters.items()}}
-            signals |= source_signals(given.systems[place], numbers, signals["time"])
-        yield _Flown(place=place, metrics=summary.metrics, rows=_rows(signals, record))
+            numbers = {**parameters, **{name: float(column[place]) for name, column in runs.parameters.items()}}
+            signals |= source_signals(runs.systems[place], numbers, signals["time"])
+        yield _RunRow(place=place, metrics=summary.metrics, rows=_rows(signals, record))
 
 
-def _alone(given: Columns, places: Iterable[int], record: Sequence[str]) -> Iterator[_Flown]:
-    """Runs one by one, as `run` flies them."""
+def _one_by_one(runs: Columns, places: Iterable[int], record: Sequence[str]) -> Iterator[_RunRow]:
+    """Runs one by one, by `run`."""
     for place in places:
         try:
-            result = run(given.alone(place))
+            result = run(runs.alone(place))
         except QuadcosimError as error:
             raise type(error)(f"run {place}: {error}") from error
         rows = _rows(result.signals, record)
-        yield _Flown(place=place, metrics=result.metrics, rows=rows, engine=result.provenance["engine"])
+        yield _RunRow(place=place, metrics=result.metrics, rows=rows, engine=result.provenance["engine"])
 
 
 def _rows(signals: Mapping[str, Floats], record: Sequence[str]) -> list[Floats]:
@@ -165,12 +165,12 @@ def _rows(signals: Mapping[str, Floats], record: Sequence[str]) -> list[Floats]:
 
 
 def _of_components(system: System, record: Sequence[str]) -> list[str]:
-    """What is recorded that is of components: lanes have no other."""
+    """The recorded columns of components: lanes have no others."""
     return [name for name in record if component_of(name) in system.components]
 
 
 def located(system: System) -> System:
-    """With its FMUs as files: native twins where they can be built, else those that it names."""
+    """The system with the paths of its FMUs: native twins where they can be built, else those that it names."""
     try:
         twins = fmus.native_twins(system)
         paths = fmus.of_components(twins.fmus)
@@ -182,12 +182,12 @@ def located(system: System) -> System:
 
 
 def _recording(system: System, models: Mapping[str, Model], record: Sequence[str]) -> System:
-    """The system that records these columns too; raises `UsageError` for one that cannot be recorded."""
-    there, usual = {"time", *columns_of(system)}, recorded(system, models)
+    """The system, recording these columns too; raises `UsageError` for one that cannot be recorded."""
+    known, usual = {"time", *columns_of(system)}, recorded(system, models)
     components = dict(system.components)
     for column in record:
         name, variable = component_of(column), variable_of(column)
-        if column in there or variable in usual.get(name, ()):
+        if column in known or variable in usual.get(name, ()):
             continue
         if name not in components:
             listed = [*components, *system.sources]
@@ -197,17 +197,17 @@ def _recording(system: System, models: Mapping[str, Model], record: Sequence[str
     return replace(system, components=components)
 
 
-def _outputs(system: System, asked: Sequence[str] | None) -> tuple[str, ...]:
-    """The names of numbers that a run comes to; raises `UsageError` for one that there is not."""
-    there = [name for name in (*system.objectives, *system.optional, *FIXED) if name != "outcome"]
-    for name in asked or ():
-        if name not in there:
-            raise UsageError(f"outputs: {name}: {expected_name(name, there)}")
-    return tuple(dict.fromkeys(there if asked is None else asked))
+def _outputs(system: System, names: Sequence[str] | None) -> tuple[str, ...]:
+    """The names of the results of a run; default: all. Raises `UsageError` for an unknown one."""
+    known = [name for name in (*system.objectives, *system.optional, *FIXED) if name != "outcome"]
+    for name in names or ():
+        if name not in known:
+            raise UsageError(f"outputs: {name}: {expected_name(name, known)}")
+    return tuple(dict.fromkeys(known if names is None else names))
 
 
 def _reason_unavailable(system: System, models: Mapping[str, Model]) -> str | None:
-    """Why a system that its FMUs fit cannot be flown in lanes here, in a line; None: it can be."""
+    """Why a system that its FMUs fit cannot run in lanes here, in a line; None: it can."""
     try:
         expect_lanes(system, models)
     except QuadcosimError as error:

@@ -1,0 +1,88 @@
+"""The outcome of a run, in whichever process it ran, and the result made of it and the recording."""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from orchestration.basics.errors import QuadcosimError
+from orchestration.basics.interrupt import Interrupted
+from orchestration.engines.job_numbers import job_numbers
+from orchestration.recording.recording import Recorder
+from orchestration.results import objectives
+from orchestration.results.column_info import described
+from orchestration.runs.resolved import ResolvedRequest
+from orchestration.runs.result import Provenance, Result
+
+_NOTES = logging.getLogger("quadcosim")
+
+Progress = Callable[[float], None]
+"""Receives the share of the run that is done."""
+Course = Callable[[Any, Progress | None], bool]
+"""Steps a `PreparedRun`; returns whether the run is over. For a run in another process it is pickled."""
+
+
+class RunInterrupted(Interrupted):
+    """A run has ended at the first instant after Ctrl-C, with this `result` so far."""
+
+    def __init__(self, text: str, result: Result) -> None:
+        super().__init__(text)
+        self.result = result
+
+
+class RunLost(QuadcosimError):
+    """The process of a run ended before the run did; the text states how and when."""
+
+    def __init__(self, text: str, result: Result | None = None) -> None:
+        super().__init__(text)
+        self.result = result
+        """What was recorded; None if nothing was."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunOutcome:
+    """How a run ended, beside what was recorded."""
+
+    end: float
+    """the time of the last row [s]"""
+    steps: int
+    divergence: str | None
+    divergence_time: float | None
+    termination: str | None
+    interrupted_at: float | None
+    provenance: Provenance
+    warnings: tuple[str, ...]
+
+
+def result_of(
+    resolved: ResolvedRequest, outcome: RunOutcome, recorder: Recorder, wall_time: float, interrupted: bool
+) -> Result:
+    """The result of a run, with its metrics; raises `RunInterrupted` with it if it was `interrupted`."""
+    recording = recorder.finish()
+    numbers = {**resolved.parameters, **job_numbers(resolved.system)}
+    result = Result(
+        request=resolved.request,
+        system=resolved.system,
+        recording=recording,
+        metrics=objectives.compute(
+            resolved.system,
+            lambda: objectives.spans(resolved.system, recording, numbers, outcome.end),
+            end=outcome.end,
+            divergence_time=outcome.divergence_time,
+            steps=outcome.steps,
+            terminated=outcome.termination is not None,
+        ),
+        units=resolved.units,
+        described=described(resolved.system, resolved.models, recording.columns),
+        parameters=resolved.parameters,
+        divergence=outcome.divergence,
+        termination=outcome.termination,
+        interrupted_at=outcome.interrupted_at,
+        provenance={**outcome.provenance, "follows": resolved.follows, "wall_time": wall_time},
+        warnings=(*resolved.request.warnings(resolved.parameters), *outcome.warnings),
+    )
+    engine = outcome.provenance["engine"]
+    _NOTES.debug("%d steps to t = %g s by the %s loop in %.3f s", outcome.steps, outcome.end, engine, wall_time)
+    if interrupted:
+        raise RunInterrupted(f"at t = {outcome.end:g} s of {resolved.system.stop_time:g} s", result)
+    return result

@@ -1,0 +1,74 @@
+"""A request resolved against its FMUs before it is run: the system, and what the FMUs declare of it."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from orchestration.basics.errors import UsageError
+from orchestration.building import fmus
+from orchestration.engines.sources import Values
+from orchestration.engines.wiring import checked, signals_of, source_values
+from orchestration.fmi.model import Model, read_model
+from orchestration.results.column_info import Described, described
+from orchestration.schedule.streams import Streams
+from orchestration.system.model import System
+from orchestration.system.request import Request, in_its_own_words
+
+Announce = Callable[[str], None]
+"""Receives a line for each thing that is done before the run begins."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResolvedRequest:
+    """A request whose system has been checked against its FMUs."""
+
+    request: Request
+    """as the user wrote it"""
+    system: System
+    """the system that it describes"""
+    paths: Mapping[str, Path]
+    """of the FMUs, by component"""
+    models: Mapping[str, Model]
+    parameters: Mapping[str, float]
+    """all numeric parameters of all components, as COMPONENT.NAME"""
+    units: Mapping[str, str]
+    """of the metrics"""
+    follows: str
+    """which component follows which reference, as text; empty where none does"""
+
+    @property
+    def foreign(self) -> list[str]:
+        """Components whose FMUs are not built on this project's kit."""
+        return [name for name, model in self.models.items() if not model.is_of_this_kit]
+
+    @property
+    def described(self) -> dict[str, Described]:
+        """The unit and the description of each column."""
+        return described(self.system, self.models, ("time", *signals_of(self.system, self.models)))
+
+    def sources(self, streams: Streams) -> dict[str, Values]:
+        """The values of the sources in a run, by name."""
+        return {name: source_values(self.system, name, self.parameters, streams) for name in self.system.sources}
+
+
+def resolve(request: Request, announce: Announce | None = None) -> ResolvedRequest:
+    """Find the FMUs of a request, build them if need be, and check its system against them.
+
+    Raises `UsageError` for what the FMUs do not have.
+    """
+    with in_its_own_words(request):
+        system = request.as_system()
+        if not system.components:
+            raise UsageError("components = none: expected at least one to run; computers and networks alone have none")
+        paths = fmus.of_components(system.fmus, announce)
+    return resolve_with_models(request, {name: read_model(path) for name, path in paths.items()})
+
+
+def resolve_with_models(request: Request, models: Mapping[str, Model]) -> ResolvedRequest:
+    """As `resolve`, with FMUs whose models have been read."""
+    with in_its_own_words(request):
+        fits = checked(request.as_system(), models)
+    return ResolvedRequest(
+        request=request, system=fits.system, paths={name: model.path for name, model in models.items()}, models=models,
+        parameters=fits.parameters, units=fits.units, follows=fits.follows,
+    )  # fmt: skip
