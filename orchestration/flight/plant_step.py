@@ -15,8 +15,8 @@ from orchestration.fmi.instance import Instance
 from orchestration.fmi.reuse import Instances
 from orchestration.quadrotor import wiring
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.runs.meant import held_to_fmus
-from orchestration.runs.simulation import set_parameters
+from orchestration.runs.prepared import set_parameters
+from orchestration.runs.resolved import resolve
 
 INSTANT = 1e-12
 """[s]; shorter spans count as zero"""
@@ -43,7 +43,7 @@ class PlantStep:
 
     def __init__(self, hover: Scenario, fleet: Instances, trim: Floats) -> None:
         self._fleet, self._trim = fleet, trim
-        self._plant = held_to_fmus(hover).system.components["plant"]
+        self._plant = resolve(hover).system.components["plant"]
         self.interval = hover.timing.plant_interval
         self._lags = True  # until the differences show otherwise
         self._at_hover = at_hover = self._saved({}, trim)
