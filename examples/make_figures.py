@@ -155,7 +155,7 @@ def distributed_servo() -> Figure:
         varied = changed(system, {f"components.controller.{key}": period for key in PERIOD})
         loops = Loops(files_of(system).models)
         for i, delay in enumerate(delays.tolist()):
-            found = loops.solved(changed(varied, {"connections.command.delay": delay}))
+            found = loops.solve(changed(varied, {"connections.command.delay": delay}))
             radius[i, j] = found.loop.radius
             cost[i, j] = sum(found.means.values()) if found.means is not None else NO_END
     figure = Figure(figsize=(7.0, 4.2))

@@ -19,7 +19,7 @@ from orchestration.certificates.family import Family
 from orchestration.certificates.parts import Loop, loop_of
 from orchestration.certificates.repeated import least_repeated
 from orchestration.certificates.timeline import DELAY, JITTER, LOSS, Timeline, Varying
-from orchestration.exact.shared import by_itself
+from orchestration.exact.scheduled import without_scheduler
 from orchestration.fmi.foreign import computed
 from orchestration.fmi.reuse import Instances
 from orchestration.requests.ranges import paths_in
@@ -105,7 +105,7 @@ def measured(request: Request) -> Loop:
 def _measured(request: Request) -> Loop:
     instances = Instances()
     try:
-        with in_its_own_words(request), at_rest(by_itself(rested(request)), instances) as rest:
+        with in_its_own_words(request), at_rest(without_scheduler(rested(request)), instances) as rest:
             return loop_of(rest)
     finally:
         instances.close()

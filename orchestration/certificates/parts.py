@@ -12,7 +12,7 @@ from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
 from orchestration.schedule.plan import Plan
 from orchestration.stability.linear_loop import AtRest
-from orchestration.stability.matrices import Matrices, in_continuous_time, minds_its_step, of_samples, told_by_outputs
+from orchestration.stability.matrices import Matrices, depends_on_step, in_continuous_time, of_samples, told_by_outputs
 from orchestration.stability.operating_point import true_period
 from orchestration.system.connection import Connection
 from orchestration.system.model import System
@@ -71,7 +71,7 @@ def loop_of(rest: AtRest) -> Loop:
             found = of_samples(tangent, component.sampling.period)
             components[name] = told_by_outputs(found, found.A)
             varies = rest.simulation.instances[name].model.varies_step
-            if not varies or minds_its_step(tangent, component.sampling.period):
+            if not varies or depends_on_step(tangent, component.sampling.period):
                 minds.add(name)
         else:
             assert component.step is not None

@@ -46,11 +46,11 @@ def expect(
 def say_if_endless(request: "Request", systems: "Sequence[System] | None" = None, files: "Files | None" = None) -> None:
     """Warn where averages over such runs mean nothing."""
     from orchestration.building.inputs import files_of
-    from orchestration.exact.endless import endless
+    from orchestration.exact.infinite_means import infinite_means_warning
     from orchestration.system.request import system_meant
 
     systems = [system_meant(request)] if systems is None else systems
-    text = endless(request, systems, files_of(systems[0]) if files is None else files)
+    text = infinite_means_warning(request, systems, files_of(systems[0]) if files is None else files)
     if text is not None:
         warn(text)
 

@@ -1,4 +1,4 @@
-"""The effects of a loop as a run simulates it: noise held, steps of components, means over the rows of the run."""
+"""The effects of events in a simulated loop: held noise, steps of components, means over the rows of the run."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
-from orchestration.exact.clockwork import ATTOSECONDS, Link, Task
 from orchestration.exact.effects import LoopEffects, Places
 from orchestration.exact.flows import Flows
 from orchestration.exact.linear import Components, Continuous
+from orchestration.exact.links import ATTOSECONDS, Link, Task
 from orchestration.exact.objectives import Mean
 from orchestration.exact.pieces import Piece
 from orchestration.schedule.plan import Plan
@@ -22,22 +22,24 @@ from orchestration.system.variable_names import component_of
 
 
 class SimulatedEffects(LoopEffects):
-    """The loop as it is simulated: all components in continuous time are stepped to each instant."""
+    """The simulated loop: all components in continuous time are stepped to each instant."""
 
     holds_wires = True
 
-    def __init__(self, system: System, components: Components, tasks: Sequence[str], *, one: bool = False) -> None:
-        """Of noise, each value is held for the period of its source."""
+    def __init__(
+        self, system: System, components: Components, tasks: Sequence[str], *, with_means: bool = False
+    ) -> None:
+        """Each value of noise is held for the period of its source."""
         self.noise = [name for name, source in system.sources.items() if source.noise]
-        super().__init__(system, components, tasks, one=one)
+        super().__init__(system, components, tasks, with_means=with_means)
         self._plan = Plan(system)
         self._flows = {
-            name: Flows(*_held(part)) for name, part in self.continuous.items() if part.unfit is None
+            name: Flows(*_with_held_inputs(part)) for name, part in self.continuous.items() if part.unfit is None
         }  # fmt: skip
         self._means: Sequence[Mean] = ()
         self._maps: dict[int, tuple[Floats, Floats]] = {}
 
-    def _add_places(self, places: Places) -> None:
+    def _add_more_places(self, places: Places) -> None:
         for name, part in self.continuous.items():
             places.add("output", name, len(part.outputs))
         for name in self.noise:
@@ -45,40 +47,40 @@ class SimulatedEffects(LoopEffects):
 
     @property
     def grids(self) -> list[Fraction]:
-        """The periods [s] of the points that a run has by itself: first those of noise, in their order, then steps."""
+        """The periods [s] of noise, in their order, followed by those of steps."""
         periods = [_seconds(self.system.sources[name].period or 0.0) for name in self.noise]
         return periods + sorted({_seconds(self.system.components[name].step or 0.0) for name in self.continuous})
 
     def charge(self, means: Sequence[Mean]) -> None:
-        """As `LoopEffects`: by the trapezoid from row to row, exactly where all signals are held."""
+        """As `LoopEffects`: by the trapezoidal rule from row to row, exactly where all signals are held."""
         self._means, self.costs = means, len(means)
 
     # -- rows over the state -------------------------------------------------------------------------------------
 
-    def _output_of_continuous(self, name: str, j: int) -> Floats:
-        return self.one("output", name, j)
+    def _continuous_output_row(self, name: str, j: int) -> Floats:
+        return self.row("output", name, j)
 
-    def _of_source(self, name: str) -> Floats:
+    def _source_row(self, name: str) -> Floats:
         source = component_of(name)
         if source in self.noise:
-            return self.one("noise", source, self.system.sources[source].signals(source).index(name))
+            return self.row("noise", source, self.system.sources[source].signals(source).index(name))
         return np.zeros(self.size)
 
-    def input(self, end: str) -> Floats:
+    def input_row(self, end: str) -> Floats:
         """As `LoopEffects`, with noise."""
         for name in self.noise:
             if end in self.system.sources[name].to:
-                return self.one("noise", name, self.system.sources[name].to.index(end))
-        return super().input(end)
+                return self.row("noise", name, self.system.sources[name].to.index(end))
+        return super().input_row(end)
 
     def _is_held(self, signal: str) -> bool:
-        """Whether a run knows that a signal is constant, or on a line, from row to row."""
+        """Whether a signal is constant or linear from row to row."""
         owner = component_of(signal)
-        return owner in self.sampled_parts or signal in self.fed or owner in self.system.sources
+        return owner in self.sampled_parts or signal in self.fed_by or owner in self.system.sources
 
-    # -- what happens --------------------------------------------------------------------------------------------
+    # -- events ---------------------------------------------------------------------------------------------------
 
-    def passed(self, piece: Piece, duration: int) -> Piece:
+    def advance(self, piece: Piece, duration: int) -> Piece:
         """As `Effects`."""
         if duration not in self._maps:
             self._maps[duration] = self._step(duration / ATTOSECONDS)
@@ -87,11 +89,11 @@ class SimulatedEffects(LoopEffects):
         whole[: self.size, : self.size] = change
         return piece.charged(costs, 1.0).mapped(whole)
 
-    def ticked(self, piece: Piece, tick: int) -> Piece:
-        """As `Effects`: noise has new values at its points."""
-        if tick >= len(self.noise):
+    def tick(self, piece: Piece, grid: int) -> Piece:
+        """As `Effects`: noise is drawn anew at its points."""
+        if grid >= len(self.noise):
             return piece
-        source, place = self.system.sources[self.noise[tick]], self.places("noise", self.noise[tick])
+        source, place = self.system.sources[self.noise[grid]], self.places("noise", self.noise[grid])
         change, covariance = np.eye(len(piece.Z)), np.zeros_like(piece.W)
         change[place] = 0.0
         variance = float(source.noise or 0.0) / float(source.period or 1.0)
@@ -99,13 +101,13 @@ class SimulatedEffects(LoopEffects):
         return piece.mapped(change, covariance)
 
     def _step(self, h: float) -> tuple[Floats, Floats]:
-        """The state after a step of all, and the costs of it."""
+        """The map of the state over a step of all components, and its costs."""
         now = np.eye(self.size)
         for name in self._plan.continuous:
             part = self.continuous[name]
             for wire in self._wires_into(name, ahead=True):
-                now = self._carried(now, wire)
-            inputs = np.array([self.input(f"{name}.{end}") for end in part.inputs]).reshape(-1, self.size) @ now
+                now = self._transfer(now, wire)
+            inputs = np.array([self.input_row(f"{name}.{end}") for end in part.inputs]).reshape(-1, self.size) @ now
             by_state, by_input = self._derivatives(name, part, h)
             moved = by_state @ now[self.places("state", name)] + by_input @ inputs
             now = now.copy()
@@ -117,11 +119,11 @@ class SimulatedEffects(LoopEffects):
         costs = self._trapezoid(now, h)
         for name in self._plan.continuous:
             for wire in self._wires_into(name, ahead=False):
-                now = self._carried(now, wire)
+                now = self._transfer(now, wire)
         return now, costs
 
     def _derivatives(self, name: str, part: Continuous, h: float) -> tuple[Floats, Floats]:
-        """Of the outputs after a step and of the state then, by the state before and by the inputs."""
+        """Derivatives of the outputs and the state after a step, by the state before and by the inputs."""
         if part.unfit is not None:
             assert part.step is not None
             return part.step(h)
@@ -130,7 +132,7 @@ class SimulatedEffects(LoopEffects):
         return np.vstack([part.C @ after, after]), np.vstack([part.C @ moved + part.D, moved])
 
     def _wires_into(self, name: str, *, ahead: bool) -> list[int]:
-        """Those that pass on what their senders are stepped to, or what they were before."""
+        """The wires into a component whose values are those after the step of their sender (`ahead`), or before it."""
         order, found = self._plan.continuous, []
         for i in self._plan.wires:
             x = self.system.connections[i]
@@ -139,19 +141,19 @@ class SimulatedEffects(LoopEffects):
                 found.append(i)
         return found
 
-    def _carried(self, now: Floats, wire: int) -> Floats:
+    def _transfer(self, now: Floats, wire: int) -> Floats:
         x = self.system.connections[wire]
         now = now.copy()
-        now[self.places("received", x.name)] = np.array([x.scale * self._sent(start) for start in x.start]) @ now
+        now[self.places("received", x.name)] = np.array([x.scale * self._message_row(start) for start in x.start]) @ now
         return now
 
     def _trapezoid(self, after: Floats, h: float) -> Floats:
         found: Floats = np.zeros((self.costs, self.size, self.size))
         for k, mean in enumerate(self._means):
-            starts = np.array([self.signal(name) for name in mean.signals])
+            starts = np.array([self.signal_row(name) for name in mean.signals])
             ends = np.array(
                 [
-                    start if name in self.fed and self._is_wired(name) else start @ after
+                    start if name in self.fed_by and self._is_wired(name) else start @ after
                     for name, start in zip(mean.signals, starts)
                 ]
             )
@@ -160,15 +162,15 @@ class SimulatedEffects(LoopEffects):
                 points = ((starts, 1.0 / 6.0), (middles, 4.0 / 6.0), (ends, 1.0 / 6.0))
             else:
                 points = ((starts, 0.5), (ends, 0.5))  # type: ignore[assignment]
-            found[k] = sum(h * weight * self.form(mean, rows) for rows, weight in points)
+            found[k] = sum(h * weight * self.quadratic_form(mean, rows) for rows, weight in points)
         return found
 
     def _is_wired(self, end: str) -> bool:
-        return self.fed[end][0].name in self.wires
+        return self.fed_by[end][0].name in self.wires
 
 
-def _held(part: Continuous) -> tuple[Floats, Floats, Floats]:
-    """A component with its inputs held, as one system."""
+def _with_held_inputs(part: Continuous) -> tuple[Floats, Floats, Floats]:
+    """The matrices of a component with its inputs as constant states."""
     n, m = part.B.shape
     F: Floats = np.zeros((n + m, n + m))
     F[:n, :n], F[:n, n:] = part.A, part.B
@@ -180,13 +182,11 @@ def _seconds(seconds: float) -> Fraction:
 
 
 def expect_rows(system: System, tasks: Sequence[Task], links: Sequence[Link]) -> None:
-    """Raise `UsageError` for what happens at rows at which some component in continuous time is not stepped."""
+    """Raise `UsageError` for events between the steps of a component in continuous time."""
     continuous = [name for name, one in system.components.items() if one.sampling is None]
     steps = {_seconds(system.components[name].step or 0.0) for name in continuous}
     if len(steps) > 1:
-        raise UsageError(
-            f"--as-simulated: {', '.join(continuous)} have different steps: expected one, at whose points all have rows"
-        )
+        raise UsageError(f"--as-simulated: {', '.join(continuous)} have different steps: expected one step")
     if not steps:
         return
     (step,) = steps
@@ -211,11 +211,11 @@ def expect_rows(system: System, tasks: Sequence[Task], links: Sequence[Link]) ->
         if i in plan.wires:
             continue
         sender = tasks[link.sender] if link.sender is not None else None
-        punctual = sender is None or (sender.jitter.is_certain and on_grid_all(sender.period, *sender.offsets))
-        lateness = [Fraction(link.delay + each, ATTOSECONDS) for each in link.behind if each is not None]
-        on_grid = punctual and link.late.is_certain and on_grid_all(*link.posts, *lateness)
+        sends_on_grid = sender is None or (sender.jitter.is_certain and on_grid_all(sender.period, *sender.offsets))
+        lateness = [Fraction(link.delay + each, ATTOSECONDS) for each in link.transit_times if each is not None]
+        on_grid = sends_on_grid and link.delay_jitter.is_certain and on_grid_all(*link.send_offsets, *lateness)
         read_later = system.components[system.connections[i].receiver].sampling is not None and not link.is_measured
         if not on_grid and (not single or read_later):
             raise UsageError(f"--as-simulated: {link.name} arrives between the steps of {', '.join(continuous)}")
-        if link.is_read_ahead and Fraction(link.longest, ATTOSECONDS) % step:
+        if link.is_read_ahead and Fraction(link.longest_delay, ATTOSECONDS) % step:
             raise UsageError(f"--as-simulated: {link.name} is measured between the steps of {', '.join(continuous)}")

@@ -1,7 +1,7 @@
-"""What a linear system becomes in a time, and what that costs: exponentials and their integrals, by doubling.
+"""The flow of a linear system over a time, with its costs: exponentials and their integrals, by doubling.
 
-Van Loan's block exponential has e^(-At) in it, which overflows where a plant is stiff; here a short time is taken by
-the series, and doubled: what decays only decays.
+Van Loan's block exponential contains e^(-At), which overflows for stiff plants; here the series over a short time is
+doubled, in which decaying terms only decay.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 from orchestration.basics.simulator import Floats
 
 SHORT = 0.25
-"""of the norm of F h: for so long the series is taken"""
+"""norm of F h up to which the series is used"""
 TERMS = 18
-"""of the series: the next one is below rounding, for the covariance, whose rate is twice that of the state, too"""
+"""of the series: the next one is below rounding, also for the covariance, whose rate is twice that of the state"""
 
 
 @dataclass(frozen=True)
@@ -25,13 +25,13 @@ class Flow:
     """z' = F z + w over a time, w white of covariance R, and the integrals of z'Q z for some Q."""
 
     change: Floats
-    """e^(Ft) - I: of what is slow, digits are kept that e^(Ft) has not"""
+    """e^(Ft) - I, which keeps digits of slow modes that e^(Ft) loses"""
     covariance: Floats
-    """of what the noise has added"""
+    """of the noise added"""
     costs: Floats
-    """M, shape (costs, n, n): the integral of each z'Q z is z(0)'M z(0) and …"""
+    """M, shape (costs, n, n): the integral of each z'Q z is z(0)'M z(0) plus `extra`"""
     extra: Floats
-    """… this, shape (costs,), by the noise in between"""
+    """shape (costs,): due to the noise"""
 
     @functools.cached_property
     def matrix(self) -> Floats:
@@ -40,7 +40,7 @@ class Flow:
         return found
 
     def doubled(self) -> Flow:
-        """Over twice the time."""
+        """The flow over twice the time."""
         change, matrix = self.change, self.matrix
         return Flow(
             change=2.0 * change + change @ change,
@@ -51,7 +51,7 @@ class Flow:
 
 
 class Flows:
-    """The flows of one system over any times, each made once."""
+    """The flows of one system over any times, each computed once."""
 
     def __init__(self, F: Floats, R: Floats, Q: Floats) -> None:
         """`F` and `R` of shape (n, n), `Q` of shape (costs, n, n)."""
@@ -74,15 +74,15 @@ class Flows:
         F, Q = self._F * h, self._Q
         change, term = np.zeros_like(F), np.eye(len(F))
         covariance, grown = np.zeros_like(F), self._R * h
-        costs, asked = np.zeros_like(Q), Q * h
+        costs, summand = np.zeros_like(Q), Q * h
         extra = np.zeros(len(Q))
         for k in range(1, TERMS + 1):
             term = F @ term / k
             change = change + term
-            covariance, costs = covariance + grown, costs + asked
+            covariance, costs = covariance + grown, costs + summand
             extra = extra + _traces(Q, grown) * h / (k + 1)
             grown = (F @ grown + grown @ F.T) / (k + 1)
-            asked = (F.T @ asked + asked @ F) / (k + 1)
+            summand = (F.T @ summand + summand @ F) / (k + 1)
         return Flow(change, covariance, costs, extra)
 
 

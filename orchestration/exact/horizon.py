@@ -1,4 +1,4 @@
-"""What a linear loop costs from where it begins to a given time: its moments go from cut to cut of its clock."""
+"""The expected costs of a linear loop from its initial state to a given time: moments from cut to cut of its chain."""
 
 from __future__ import annotations
 
@@ -7,32 +7,33 @@ from collections.abc import Iterable
 import numpy as np
 
 from orchestration.basics.simulator import Floats
-from orchestration.exact.clockwork import Clockwork, Mode
+from orchestration.exact.branch import Mode
 from orchestration.exact.pieces import Piece
+from orchestration.exact.timing_chain import TimingChain
 
 Moments = dict[Mode, Floats]
-"""E[z z'] where a mode is, 0 elsewhere, by mode; one number of z is 1: in its row are means, its square is how likely
-the mode is"""
+"""By mode: E[z z'] restricted to that mode; one number of z is 1: its row has the means, its square is the probability
+of the mode"""
 
 
-def costs_until(clock: Clockwork, start: Floats, one: int, end: int) -> Floats:
+def costs_until(chain: TimingChain, start: Floats, one: int, end: int) -> Floats:
     """The expected costs, shape (costs,), from the state `start` at 0 to `end` [attoseconds].
 
-    Of the state, number `one` is 1. They are not finite where the moments have grown beyond all numbers.
+    Number `one` of the state is the constant 1. The costs are not finite where the moments overflow.
     """
     with np.errstate(over="ignore", invalid="ignore"):
-        moments, costs = _after(np.outer(start, start), clock.begun(end), one)
+        moments, costs = _after(np.outer(start, start), chain.initial_passages(end), one)
         known: dict[tuple[int, Mode], list[tuple[Mode, float, Piece]]] = {}
-        count, k = len(clock.cuts), 0
-        while clock.cut(k) < end:
+        count, k = len(chain.cuts), 0
+        while chain.cut_time(k) < end:
             i, turns = k % count, k // count
-            is_last = clock.cut(k + 1) > end
+            is_last = chain.cut_time(k + 1) > end
             later: Moments = {}
             for mode, before in moments.items():
                 if is_last:
-                    known[i, mode] = list(clock.onward(i, mode, end - turns * clock.whole))
+                    known[i, mode] = list(chain.passages_from(i, mode, end - turns * chain.length))
                 elif (i, mode) not in known:
-                    known[i, mode] = list(clock.onward(i, mode))
+                    known[i, mode] = list(chain.passages_from(i, mode))
                 reached, cost = _after(before, known[i, mode], one)
                 costs = costs + cost
                 for then, part in reached.items():
@@ -41,11 +42,11 @@ def costs_until(clock: Clockwork, start: Floats, one: int, end: int) -> Floats:
     return costs
 
 
-def _after(before: Floats, ways: Iterable[tuple[Mode, float, Piece]], one: int) -> tuple[Moments, Floats]:
-    """The moments by mode to which a mode may lead, and the costs on the way."""
+def _after(before: Floats, passages: Iterable[tuple[Mode, float, Piece]], one: int) -> tuple[Moments, Floats]:
+    """The moments by mode after passages from one mode, and the costs of these."""
     reached: Moments = {}
     costs: Floats = np.zeros(1)
-    for mode, probability, piece in ways:
+    for mode, probability, piece in passages:
         costs = costs + probability * (np.einsum("kij,ij->k", piece.M, before) + before[one, one] * piece.c)
         part = probability * (piece.Z @ before @ piece.Z.T + before[one, one] * piece.W)
         reached[mode] = reached[mode] + part if mode in reached else part

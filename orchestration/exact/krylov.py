@@ -1,4 +1,4 @@
-"""The largest eigenvalue of a linear map, and the solution of x = L x + b, from what the map makes of vectors."""
+"""The largest eigenvalue of a linear map, and the solution of x = L x + b, from images of vectors."""
 
 from __future__ import annotations
 
@@ -12,56 +12,58 @@ from orchestration.basics.simulator import Floats
 Map = Callable[[Floats], Floats]
 
 SIZE, TURNS = 100, 20
-"""vectors of a basis, and how often it is begun anew"""
+"""vectors of a basis, and the number of restarts"""
 EIGENVALUE, RESIDUAL = 1e-12, 1e-13
-"""relative: what is left when it is found"""
+"""relative: residuals at convergence"""
 ENOUGH = 1e-10
-"""likewise, where rounding lets it become no smaller"""
+"""likewise, where rounding prevents smaller ones"""
 
 
-def largest(of: Map, start: Floats) -> float:
-    """The spectral radius of a map that keeps a cone, from inside of that; raises `UsageError` where none is found.
+def spectral_radius_of(of: Map, start: Floats) -> float:
+    """The spectral radius of a map that preserves a cone, from a start inside it; raises `UsageError` if not converged.
 
-    It is an eigenvalue, and its eigenvector is in the cone: of what a basis tells the one with the largest real part.
+    It is an eigenvalue with an eigenvector in the cone: the one with the largest real part in each basis.
     """
-    vector, radius, rest = start, 0.0, np.inf
+    vector, radius, residual = start, 0.0, np.inf
     for _ in range(TURNS):
-        basis, small, beside = _basis(of, vector)
+        basis, small, outside = _basis(of, vector)
         values, vectors = np.linalg.eig(small)
         first = int(np.argmax(values.real))
         radius, share = float(values[first].real), np.real(vectors[:, first])
-        rest = beside * float(np.abs(share[-1])) / max(radius * float(np.linalg.norm(share)), 1e-300)
-        if rest <= EIGENVALUE or radius <= 0.0:
+        residual = outside * float(np.abs(share[-1])) / max(radius * float(np.linalg.norm(share)), 1e-300)
+        if residual <= EIGENVALUE or radius <= 0.0:
             return max(radius, 0.0)
         vector = share @ basis
-    if rest > ENOUGH:
-        raise UsageError(f"the spectral radius of moments, about {radius:.6g}, is not told from others: too close")
+    if residual > ENOUGH:
+        raise UsageError(
+            f"the spectral radius of moments, about {radius:.6g}, does not converge: other eigenvalues are too close"
+        )
     return radius
 
 
-def solved(of: Map, b: Floats) -> Floats:
-    """x = L x + b, by GMRES; raises `UsageError` where it is not found."""
+def solve_fixed_point(of: Map, b: Floats) -> Floats:
+    """Solve x = L x + b by GMRES; raises `UsageError` if it does not converge."""
     size = float(np.linalg.norm(b))
-    found: Floats = np.zeros_like(b)
-    left = b
+    solution: Floats = np.zeros_like(b)
+    residual = b
     for _ in range(TURNS):
-        norm = float(np.linalg.norm(left))
-        if norm <= RESIDUAL * max(size, float(np.linalg.norm(found))):
-            return found
-        basis, small, beside = _basis(of, left)
+        norm = float(np.linalg.norm(residual))
+        if norm <= RESIDUAL * max(size, float(np.linalg.norm(solution))):
+            return solution
+        basis, small, outside = _basis(of, residual)
         count = len(small)
         system = np.vstack([np.eye(count) - small, np.zeros(count)])
-        system[-1, -1] = -beside
+        system[-1, -1] = -outside
         shares = np.linalg.lstsq(system, np.append(norm, np.zeros(count)), rcond=None)[0]
-        found = found + shares @ basis
-        left = b + of(found) - found
-    if float(np.linalg.norm(left)) > ENOUGH * max(size, float(np.linalg.norm(found))):
-        raise UsageError("the second moments that stay are not found: they grow too close to without end")
-    return found
+        solution = solution + shares @ basis
+        residual = b + of(solution) - solution
+    if float(np.linalg.norm(residual)) > ENOUGH * max(size, float(np.linalg.norm(solution))):
+        raise UsageError("the stationary second moments do not converge: the mean-square radius is too close to 1")
+    return solution
 
 
 def _basis(of: Map, start: Floats) -> tuple[Floats, Floats, float]:
-    """By Arnoldi: an orthonormal basis in rows, the map in it, and what it leads out of it by."""
+    """By Arnoldi: an orthonormal basis in rows, the map in it, and the norm of the part outside of it."""
     rows = [start / np.linalg.norm(start)]
     count = min(SIZE, len(start))
     small: Floats = np.zeros((count + 1, count))
@@ -73,8 +75,8 @@ def _basis(of: Map, start: Floats) -> tuple[Floats, Floats, float]:
             shares = known @ image
             small[: k + 1, k] += shares
             image = image - shares @ known
-        small[k + 1, k] = beside = float(np.linalg.norm(image))
-        if k + 1 == count or beside <= 1e-15 * size:
-            return known, small[: k + 1, : k + 1], beside
-        rows.append(image / beside)
+        small[k + 1, k] = outside = float(np.linalg.norm(image))
+        if k + 1 == count or outside <= 1e-15 * size:
+            return known, small[: k + 1, : k + 1], outside
+        rows.append(image / outside)
     raise AssertionError

@@ -1,4 +1,4 @@
-"""Components as linear ones about the point where they rest: what a loop is put together from."""
+"""Linear components about the point where they rest, of which a loop consists."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from orchestration.basics.simulator import Floats
 from orchestration.stability.matrices import Matrices
 
 Derivatives = Callable[[float], tuple[Floats, Floats]]
-"""Of the outputs after a step of a length [s] and, below, of the state then: by the state before, and by the inputs"""
+"""Of a step length [s]: the derivatives of the outputs and, below, the state after it, by the state before and by the
+inputs"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,17 +18,17 @@ class Continuous(Matrices):
     """x' = A x + B u, y = C x + D u."""
 
     step: Derivatives | None = None
-    """as it is stepped, where that is not what the matrices say"""
+    """the step of the simulated component, where that differs from the matrices"""
     unfit: str | None = None
-    """why the matrices do not say what it does; None: they do"""
+    """why the matrices do not describe the component; None: they do"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Sampled(Matrices):
     """At each sample y = C x + D u, and then x becomes A x + B u."""
 
-    minds_step: bool = False
-    """whether a sample does something else where the next one comes at another time"""
+    depends_on_step: bool = False
+    """whether a sample depends on the time to the next one"""
 
 
 Components = dict[str, Continuous | Sampled]

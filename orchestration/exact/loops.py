@@ -1,4 +1,4 @@
-"""Linear loops from their FMUs, each taken apart once, and what follows from their timing."""
+"""Linear loops from their FMUs, each linearised once, solved under any timing."""
 
 from __future__ import annotations
 
@@ -15,17 +15,18 @@ import numpy as np
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
 from orchestration.exact.as_simulated import SimulatedEffects, expect_rows
-from orchestration.exact.clockwork import ATTOSECONDS, Clockwork, Link, Task
-from orchestration.exact.components import Measured
-from orchestration.exact.effects import LoopEffects, TrueEffects
+from orchestration.exact.components import ComponentIdentifier
+from orchestration.exact.effects import ContinuousEffects, LoopEffects
 from orchestration.exact.horizon import costs_until
+from orchestration.exact.initial_state import InitialState, initial_state_of
 from orchestration.exact.linear import Components, Continuous, Sampled
+from orchestration.exact.links import ATTOSECONDS, Link, Task
 from orchestration.exact.moments import JumpLinear
-from orchestration.exact.repeating import foretold
-from orchestration.exact.shared import by_itself
-from orchestration.exact.start import Start, start_of
+from orchestration.exact.objective_means import ObjectiveMeans
+from orchestration.exact.repeating import periodic_schedule
+from orchestration.exact.scheduled import without_scheduler
 from orchestration.exact.timing import links_of, tasks_of
-from orchestration.exact.wanted import Wanted
+from orchestration.exact.timing_chain import TimingChain
 from orchestration.expressions.syntax import Call
 from orchestration.fmi.model import Model
 from orchestration.fmi.reuse import Instances
@@ -44,27 +45,27 @@ T = TypeVar("T")
 ORDERS = (1, 2, 4, 8, 16, 32)
 """of Gauss's rule, tried in turn until the next one changes nothing"""
 AGREE = 1e-10
-"""of a figure: what may differ from order to order"""
+"""of a result: the difference allowed from order to order"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Linear:
-    """The components of a system about its rest, and its objectives there."""
+    """The components of a system expand_about its rest, and its objectives there."""
 
     parts: Components
-    how: Mapping[str, str]
-    """each is known"""
+    methods: Mapping[str, str]
+    """by which each is identified"""
     accuracy: float
-    """of what the least known of them answers, relative"""
-    wanted: Wanted
+    """of the responses of the least accurately identified one, relative"""
+    objectives: ObjectiveMeans
     noise: Mapping[str, float]
     """the intensities of white noise, by input"""
-    start: Start | None = None
-    """where the system begins, if that was asked for"""
+    initial: InitialState | None = None
+    """None: not requested"""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Solved:
+class Solution:
     """A loop under its timing."""
 
     linear: Linear
@@ -72,180 +73,195 @@ class Solved:
     period: float
     """[s]"""
     means: Mapping[Call, float] | None
-    """None: the second moments have no end"""
-    apart: float
-    """what the last doubling of the nodes has changed, relative"""
+    """None: the second moments are unbounded"""
+    difference: float
+    """change by the last doubling of the nodes, relative"""
     order: int | None
-    """of Gauss's rule; None: all random times are listed"""
+    """of Gauss's rule; None: all random times are enumerated"""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Until:
-    """A loop from where it begins to a given time, as `Solved`."""
+class HorizonMeans:
+    """The means of a loop from its initial state to a given time, as `Solution`."""
 
     means: Mapping[Call, float]
     """over that time"""
-    apart: float
+    difference: float
     order: int | None
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Finest(Generic[T]):
-    found: tuple[T, Floats]
-    """an answer, and the numbers of it that were compared"""
+class _Converged(Generic[T]):
+    result: T
+    numbers: Floats
+    """of the result, that were compared"""
     period: float
-    apart: float
+    difference: float
     order: int | None
 
 
 class Loops:
-    """Takes systems apart, those that differ in nothing but delays, losses and jitter once.
+    """Linearises and solves systems; those that differ in delays, losses and jitter alone are linearised once.
 
-    Models are by what systems call their FMUs.
+    Models are by the names of FMUs in systems.
     """
 
     def __init__(self, models: Mapping[str, Model], *, simulated: bool = False) -> None:
         self.simulated = simulated
         self._models = models
         self._known: dict[str, Linear] = {}
-        self._measured = Measured()
+        self._identifier = ComponentIdentifier()
 
     @cached_property
     def _instances(self) -> Instances:
-        """FMUs in the process that computes, kept from system to system."""
+        """FMUs in the computing process, kept from system to system."""
         return Instances()
 
-    def linear(self, system: System, *, begins: System | None = None) -> Linear:
+    def linear(self, system: System, *, initial: System | None = None) -> Linear:
         """The components and objectives of a system; raises `UsageError` for one that is not linear about a rest.
 
-        With where `begins` does by itself, if that is given.
+        With the initial state of the system `initial`, if given.
         """
-        system, begins = by_itself(system), None if begins is None else by_itself(begins)
-        key = json.dumps([tables_of(_unhurried(x)) for x in (system, begins) if x], default=str, sort_keys=True)
+        system, initial = without_scheduler(system), None if initial is None else without_scheduler(initial)
+        key = json.dumps(
+            [tables_of(_without_random_timing(x)) for x in (system, initial) if x], default=str, sort_keys=True
+        )
         if key not in self._known:
-            self._known[key] = self._taken_apart(system, begins)
+            self._known[key] = self._linearised(system, initial)
         return self._known[key]
 
-    def _taken_apart(self, system: System, begins: System | None) -> Linear:
-        noise = _white(system, simulated=self.simulated)
+    def _linearised(self, system: System, initial: System | None) -> Linear:
+        noise = _white_noise(system, simulated=self.simulated)
         models = {name: self._models[component.fmu] for name, component in system.components.items()}
-        wanted, start = Wanted(system, models), None
-        beside = Beside(moved=tuple(noise), seen=wanted.seen)
+        objectives, initial_state = ObjectiveMeans(system, models), None
+        beside = Beside(moved=tuple(noise), seen=objectives.outputs)
         with at_rest(system, self._instances, beside=beside, models=models) as loop:
-            wanted.about(loop)
-            known = self._measured.of(loop)
+            objectives.expand_about(loop)
+            known = self._identifier.of(loop)
             parts = {name: one.part for name, one in known.items()}
-            if begins is not None:
+            if initial is not None:
                 tangents = {name: one.tangent for name, one in known.items()}
-                start = start_of(begins, loop, parts, tangents, self._instances)
-        how = {name: one.how for name, one in known.items()}
+                initial_state = initial_state_of(initial, loop, parts, tangents, self._instances)
+        methods = {name: one.method for name, one in known.items()}
         accuracy = max((one.accuracy for one in known.values()), default=0.0)
         for name, part in parts.items():
             if isinstance(part, Continuous) and part.unfit is not None and not self.simulated:
                 raise UsageError(
                     f"{name} is no linear system in continuous time: {part.unfit}; expected --as-simulated"
                 )
-        return Linear(parts=parts, how=how, accuracy=accuracy, wanted=wanted, noise=noise, start=start)
+        return Linear(
+            parts=parts, methods=methods, accuracy=accuracy, objectives=objectives, noise=noise, initial=initial_state
+        )  # fmt: skip
 
     def radius(self, system: System, *, agree: float) -> float:
-        """The mean-square radius alone, as `solved` has it."""
+        """The mean-square radius alone, as `solve` has it."""
         system = changed(system, system.operating_point)
         linear = self.linear(system)
 
-        def answer(clock: Clockwork) -> tuple[float, Floats]:
-            radius = JumpLinear(*clock.stages()).radius
+        def answer(chain: TimingChain) -> tuple[float, Floats]:
+            radius = JumpLinear(*chain.stages()).radius
             return radius, np.array([radius])
 
         effects = self._effects(system, linear, ())
-        return self._finest(self._timing(system, linear, effects), effects, answer, agree).found[0]
+        return self._refined(self._tasks_and_links(system, linear, effects), effects, answer, agree).result
 
-    def solved(self, system: System) -> Solved:
-        """A system by finer and finer rules, until they agree; raises `UsageError` where there is too much of it."""
+    def solve(self, system: System) -> Solution:
+        """Solve a system by finer and finer rules, until they agree; raises `UsageError` where it is too large."""
         system = changed(system, system.operating_point)
         linear = self.linear(system)
-        used = [call for call, mean in linear.wanted.means.items() if np.any(mean.Q)]
+        used = [call for call, mean in linear.objectives.means.items() if np.any(mean.Q)]
 
-        def answer(clock: Clockwork) -> tuple[JumpLinear, Floats]:
-            loop = JumpLinear(*clock.stages())
-            costs = loop.costs() / float(clock.period) if loop.radius < 1.0 else np.full(len(used), math.inf)
+        def answer(chain: TimingChain) -> tuple[JumpLinear, Floats]:
+            loop = JumpLinear(*chain.stages())
+            costs = loop.costs() / float(chain.period) if loop.radius < 1.0 else np.full(len(used), math.inf)
             return loop, np.array([loop.radius, *costs])
 
         effects = self._effects(system, linear, used)
-        finest = self._finest(self._timing(system, linear, effects), effects, answer, AGREE)
-        (loop, (_, *costs)) = finest.found
+        converged = self._refined(self._tasks_and_links(system, linear, effects), effects, answer, AGREE)
+        loop, (_, *costs) = converged.result, converged.numbers
         means = None
         if loop.radius < 1.0:
-            means = {call: mean.c for call, mean in linear.wanted.means.items()}
+            means = {call: mean.c for call, mean in linear.objectives.means.items()}
             means |= {call: means[call] + cost for call, cost in zip(used, costs)}
-        return Solved(
-            linear=linear, loop=loop, period=finest.period, means=means, apart=finest.apart, order=finest.order
+        return Solution(
+            linear=linear,
+            loop=loop,
+            period=converged.period,
+            means=means,
+            difference=converged.difference,
+            order=converged.order,
         )
 
-    def until(self, system: System, horizon: float) -> Until:
-        """The means of a system from where it begins to `horizon` [s], as `solved`."""
+    def solve_to(self, system: System, horizon: float) -> HorizonMeans:
+        """The means of a system from its initial state to `horizon` [s], as `solve`."""
         rests = changed(system, system.operating_point)
-        linear = self.linear(rests, begins=system)
-        used = [call for call, mean in linear.wanted.means.items() if np.any(mean.Q) or np.any(mean.g)]
-        effects = self._effects(rests, linear, used, one=True)
-        assert linear.start is not None
-        start, one = effects.begin(linear.start), effects.places("one", "").start
+        linear = self.linear(rests, initial=system)
+        used = [call for call, mean in linear.objectives.means.items() if np.any(mean.Q) or np.any(mean.g)]
+        effects = self._effects(rests, linear, used, with_means=True)
+        assert linear.initial is not None
+        start, constant = effects.initial_vector(linear.initial), effects.places("constant", "").start
         end = round(exact_nanoseconds(horizon) * (ATTOSECONDS // NANOSECONDS))
 
-        def answer(clock: Clockwork) -> tuple[None, Floats]:
-            return None, costs_until(clock, start, one, end) / (end / ATTOSECONDS) if used else np.zeros(0)
+        def answer(chain: TimingChain) -> tuple[None, Floats]:
+            return None, costs_until(chain, start, constant, end) / (end / ATTOSECONDS) if used else np.zeros(0)
 
-        finest = self._finest(self._timing(rests, linear, effects, horizon), effects, answer, AGREE)
-        means = {call: mean.c for call, mean in linear.wanted.means.items()}
-        means |= {call: means[call] + cost for call, cost in zip(used, finest.found[1].tolist())}
-        return Until(means=means, apart=finest.apart, order=finest.order)
+        converged = self._refined(self._tasks_and_links(rests, linear, effects, horizon), effects, answer, AGREE)
+        means = {call: mean.c for call, mean in linear.objectives.means.items()}
+        means |= {call: means[call] + cost for call, cost in zip(used, converged.numbers.tolist())}
+        return HorizonMeans(means=means, difference=converged.difference, order=converged.order)
 
-    def _finest(
+    def _refined(
         self,
         timing: tuple[Sequence[Task], Sequence[Link]],
         effects: LoopEffects,
-        answer: Callable[[Clockwork], tuple[T, Floats]],
+        answer: Callable[[TimingChain], tuple[T, Floats]],
         agree: float,
-    ) -> _Finest[T]:
-        """An answer, numbers of which may not change any more, by the least order of Gauss's rule that will do."""
+    ) -> _Converged[T]:
+        """An answer by the least order of Gauss's rule at which its numbers converge."""
         tasks, links = timing
-        by_rule = any(x.late.is_by_rule for x in links) or any(task.jitter.is_by_rule for task in tasks)
+        by_rule = any(x.delay_jitter.is_by_rule for x in links) or any(task.jitter.is_by_rule for task in tasks)
         found: list[tuple[T, Floats]] = []
-        apart, order, period = 0.0, ORDERS[0], 1.0
+        difference, order, period = 0.0, ORDERS[0], 1.0
         for next_order in ORDERS if by_rule else ORDERS[:1]:
             try:
-                clock = Clockwork(tasks, links, effects, order=next_order, grids=effects.grids)
-                one = answer(clock)
+                chain = TimingChain(tasks, links, effects, order=next_order, grids=effects.grids)
+                one = answer(chain)
             except UsageError:
                 if len(found) < 2:
                     raise
                 break
-            order, period = next_order, float(clock.period)
+            order, period = next_order, float(chain.period)
             found.append(one)
             if len(found) > 1:
-                apart = _apart(found[-2][1], found[-1][1])
-                if apart <= agree:
+                difference = _relative_difference(found[-2][1], found[-1][1])
+                if difference <= agree:
                     break
-        return _Finest(found=found[-1], period=period, apart=apart, order=order if by_rule else None)
+        return _Converged(
+            result=found[-1][0], numbers=found[-1][1], period=period, difference=difference,
+            order=order if by_rule else None,
+        )  # fmt: skip
 
-    def _effects(self, system: System, linear: Linear, used: Sequence[Call], *, one: bool = False) -> LoopEffects:
-        """Of which the costs are these means."""
+    def _effects(
+        self, system: System, linear: Linear, used: Sequence[Call], *, with_means: bool = False
+    ) -> LoopEffects:
+        """The effects, with these means as costs."""
         names = Plan(system).sampled
         effects: LoopEffects
         if self.simulated:
-            effects = SimulatedEffects(system, linear.parts, names, one=one)
+            effects = SimulatedEffects(system, linear.parts, names, with_means=with_means)
         else:
-            effects = TrueEffects(system, linear.parts, names, linear.noise, one=one)
-        effects.charge([linear.wanted.means[call] for call in used])
+            effects = ContinuousEffects(system, linear.parts, names, linear.noise, with_means=with_means)
+        effects.charge([linear.objectives.means[call] for call in used])
         return effects
 
-    def _timing(
+    def _tasks_and_links(
         self, system: System, linear: Linear, effects: LoopEffects, horizon: float | None = None
     ) -> tuple[Sequence[Task], Sequence[Link]]:
-        """When what happens, where the scheduler decides it too: again and again, or up to a `horizon` [s]."""
-        by_themselves = [task.period for task in tasks_of(system) if not is_foreseen(_sampling(system, task.name))]
+        """The tasks and links, those of a scheduler included: over its period, or up to a `horizon` [s]."""
+        unscheduled = [task.period for task in tasks_of(system) if not is_foreseen(_sampling(system, task.name))]
         steps = [link.step for link in links_of(system) if link.step is not None]
-        told = foretold(system, horizon=horizon, beside=[*by_themselves, *steps, *effects.grids])
-        tasks, links = tasks_of(system, told), links_of(system, told)
+        schedule = periodic_schedule(system, horizon=horizon, other_periods=[*unscheduled, *steps, *effects.grids])
+        tasks, links = tasks_of(system, schedule), links_of(system, schedule)
         expect_same_steps(system, tasks, linear.parts, repeating=horizon is None)
         if self.simulated:
             expect_rows(system, tasks, links)
@@ -253,37 +269,37 @@ class Loops:
 
 
 def expect_same_steps(system: System, tasks: Sequence[Task], parts: Components, *, repeating: bool = True) -> None:
-    """Raise `UsageError` for a task whose samples are irregular, and do what depends on when the next one is.
+    """Raise `UsageError` for a task with irregular samples that depend on the time to the next one.
 
-    They come again in the next period where that is `repeating`.
+    `repeating`: the last sample of a period is followed by the first of the next.
     """
     for task in tasks:
         part = parts[task.name]
-        if not (isinstance(part, Sampled) and part.minds_step):
+        if not (isinstance(part, Sampled) and part.depends_on_step):
             continue
         if not task.jitter.is_certain:
             raise UsageError(
-                f"components.{task.name}.sampling.jitter: what {task.name} does depends on how long it is to the next "
-                "sample; expected none"
+                f"components.{task.name}.sampling.jitter: the samples of {task.name} depend on the time to the "
+                "next one; expected none"
             )
         step = true_period(_sampling(system, task.name)) / NANOSECONDS
         ends = [*task.offsets, *(task.period + offset for offset in task.offsets[:1] if repeating)]
         if any(then - now != step for now, then in itertools.pairwise(ends)):
             raise UsageError(
-                f"components.{task.name}: what it does depends on how long it is to the next sample, which is not "
-                f"{float(step):g} s each time; expected nobody else to make it late"
+                f"components.{task.name}: its samples depend on the time to the next one, which is not always "
+                f"{float(step):g} s; expected no other task or message to delay it"
             )
 
 
 def _sampling(system: System, name: str) -> Sampling:
-    """Of a component that is sampled."""
+    """The sampling of a sampled component."""
     sampling = system.components[name].sampling
     assert sampling is not None
     return sampling
 
 
-def _unhurried(system: System) -> System:
-    """A system without what its timing leaves to chance, and how late it is."""
+def _without_random_timing(system: System) -> System:
+    """A system without delays, jitter and losses."""
     return replace(
         system,
         components={
@@ -297,8 +313,8 @@ def _unhurried(system: System) -> System:
     )
 
 
-def _white(system: System, *, simulated: bool) -> dict[str, float]:
-    """The intensities of white noise by input; raises `UsageError` for what drives a system otherwise."""
+def _white_noise(system: System, *, simulated: bool) -> dict[str, float]:
+    """The intensities of white noise by input; raises `UsageError` for any other random source."""
     found = {}
     for name, source in system.sources.items():
         if source.is_random and source.noise is None:
@@ -313,8 +329,8 @@ def _white(system: System, *, simulated: bool) -> dict[str, float]:
     return found
 
 
-def _apart(one: Floats, other: Floats) -> float:
-    """How far the numbers of two answers are from each other, relative."""
+def _relative_difference(one: Floats, other: Floats) -> float:
+    """The largest difference of two rows of numbers, relative."""
     finite = np.isfinite(one) & np.isfinite(other)
     one, other = one[finite], other[finite]
     return float((np.abs(one - other) / np.maximum(np.abs(other), 1e-300)).max(initial=0.0))

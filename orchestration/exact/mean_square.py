@@ -1,4 +1,4 @@
-"""Where a random quantity becomes so large that means of squares have no end."""
+"""The value of a random quantity from which on means of squares are infinite."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ AGREE = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class MeanSquareLimit:
-    """The limit, None where there is none, and why."""
+    """The limit; None: there is none, for a reason."""
 
     limit: float | None = None
     reason: str = ""
@@ -33,12 +33,12 @@ def mean_square_limit(varied: Varied, span: Range, models: Mapping[str, Model]) 
     try:
         system = rested(varied.request)
         by_fmu = {component.fmu: models[name] for name, component in system.components.items()}
-        return _first(system, varied.paths, span, Loops(by_fmu))
+        return _crossing(system, varied.paths, span, Loops(by_fmu))
     except (UsageError, SimulatorError) as error:
         return MeanSquareLimit(reason=f"no mean-square limit: {error}")
 
 
-def _first(system: System, paths: Sequence[str], span: Range, loops: Loops) -> MeanSquareLimit:
+def _crossing(system: System, paths: Sequence[str], span: Range, loops: Loops) -> MeanSquareLimit:
     def fails(value: float) -> bool:
         return loops.radius(changed(system, dict.fromkeys(paths, value)), agree=AGREE) >= 1.0
 
@@ -46,5 +46,5 @@ def _first(system: System, paths: Sequence[str], span: Range, loops: Loops) -> M
     if bracket is None:
         return MeanSquareLimit(reason="second moments are bounded throughout the range")
     if bracket.good is None:
-        return MeanSquareLimit(reason="second moments have no end throughout the range")
+        return MeanSquareLimit(reason="second moments grow without bound throughout the range")
     return MeanSquareLimit(limit=0.5 * (bracket.good + bracket.bad))

@@ -1,7 +1,8 @@
-"""Second moments of a jump-linear system: what they become in a period, where they stay, and what they cost.
+"""Second moments of a jump-linear system: their growth over a period, their stationary values, and the costs.
 
-The system has a mode, a Markov chain over modes that may differ from stage to stage of a period, and a state whose size
-may differ from mode to mode. A passage takes it from a mode to one of the next stage, with a probability, by a `Piece`.
+The mode of the system is a Markov chain, over modes that may differ from stage to stage of a period; the size of the
+state may differ from mode to mode. A passage leads from a mode to one of the next stage with a probability, by a
+`Piece`.
 """
 
 from __future__ import annotations
@@ -15,17 +16,17 @@ import numpy as np
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Booleans, Floats
-from orchestration.exact.krylov import SIZE, Map, largest, solved
+from orchestration.exact.krylov import SIZE, Map, solve_fixed_point, spectral_radius_of
 from orchestration.exact.pieces import Piece
 
 LARGEST = 100_000
-"""Numbers in the second moments of all modes together"""
+"""numbers in the second moments of all modes together"""
 LARGEST_FOURTH = 1e8
-"""Products in what a period makes of fourth moments"""
+"""products to propagate fourth moments over a period"""
 MOST_DOUBLINGS = 60
-"""of how many periods are summed up"""
+"""of the number of periods in a sum"""
 DENSE = 400
-"""Numbers of which an operator is made a matrix"""
+"""numbers up to which an operator is made a matrix"""
 
 
 @dataclass(frozen=True)
@@ -46,27 +47,27 @@ class JumpLinear:
 
     def __init__(self, stages: Sequence[Stage], sizes: Sequence[Sequence[int]]) -> None:
         """`sizes` are those of the state, by stage and by mode before the stage."""
-        self._stages, self._sizes = _recurrent(stages, sizes)
-        self._turn_to_fewest()
-        self._stages, self._sizes = _live(self._stages, self._sizes)
-        self._basis = _Symmetric(self._sizes[0])
+        self._stages, self._sizes = _without_transient_modes(stages, sizes)
+        self._begin_where_smallest()
+        self._stages, self._sizes = _without_unused_numbers(self._stages, self._sizes)
+        self._basis = _SymmetricBasis(self._sizes[0])
         self.numbers = self._basis.count
         """in the second moments where the period begins"""
         if self.numbers > LARGEST:
             raise UsageError(
                 f"{len(self._sizes[0])} modes with {self.numbers} second moments, more than {LARGEST}: "
-                "expected fewer messages on their way, or states"
+                "expected fewer messages in transit, or states"
             )
 
-    def _turn_to_fewest(self) -> None:
-        """The period begins where there is least to be solved for."""
+    def _begin_where_smallest(self) -> None:
+        """The period begins where there is least to be solve_fixed_point for."""
         counts = [sum(n * n for n in sizes) for sizes in self._sizes]
         first = counts.index(min(counts))
         self._stages = [*self._stages[first:], *self._stages[:first]]
         self._sizes = [*self._sizes[first:], *self._sizes[:first]]
 
     @functools.cached_property
-    def shares(self) -> list[Floats]:
+    def stationary_probabilities(self) -> list[Floats]:
         """The stationary probabilities of the modes, by stage."""
         count = len(self._sizes[0])
         chain: Floats = np.eye(count)
@@ -84,35 +85,35 @@ class JumpLinear:
             found[passage.end, passage.begin] += passage.probability
         return found
 
-    def _none(self, i: int) -> list[Floats]:
+    def _zero_moments(self, i: int) -> list[Floats]:
         return [np.zeros((n, n)) for n in self._sizes[i % len(self._sizes)]]
 
     @functools.cached_property
-    def _batches(self) -> list[_Batches]:
+    def _batched_stages(self) -> list[_BatchedStage]:
         return [
-            _Batches(
+            _BatchedStage(
                 [(p.begin, p.end, p.probability, p.piece.Z) for p in stage], self._sizes[(i + 1) % len(self._sizes)]
             )
             for i, stage in enumerate(self._stages)
         ]
 
-    def _turned(self, numbers: Floats) -> Floats:
-        """What a period makes of second moments, but for the noise."""
+    def _propagate(self, numbers: Floats) -> Floats:
+        """Second moments a period later, without noise."""
         now = self._basis.matrices(numbers)
-        for batches in self._batches:
+        for batches in self._batched_stages:
             now = batches.of(now)
         return self._basis.numbers(now)
 
     @functools.cached_property
     def radius(self) -> float:
-        """The mean-square radius: by how much second moments grow in a period."""
-        if self._certain is not None:
-            return _spectral_radius(self._certain) ** 2
-        return _radius(self._turned, self._basis)
+        """The mean-square radius: the growth factor of second moments over a period."""
+        if self._deterministic_map is not None:
+            return _spectral_radius(self._deterministic_map) ** 2
+        return _radius(self._propagate, self._basis)
 
     @functools.cached_property
-    def _certain(self) -> Floats | None:
-        """What a period makes of the state, where nothing is left to chance but noise; None: something is."""
+    def _deterministic_map(self) -> Floats | None:
+        """The map of the state over a period, where only noise is random; None: more is."""
         if any(len(stage) != 1 for stage in self._stages):
             return None
         found: Floats = np.eye(self._sizes[0][0])
@@ -121,27 +122,27 @@ class JumpLinear:
         return found
 
     def stationary(self) -> list[Floats]:
-        """The second moments that stay, by mode where the period begins; there are such where the radius is below 1."""
-        first = self._flown(self._none(0))[0]
-        if self._certain is not None:
-            return [_summed(self._certain, first[0])]
+        """The stationary second moments, by mode where the period begins; they exist where the radius is below 1."""
+        first = self._after_period(self._zero_moments(0))[0]
+        if self._deterministic_map is not None:
+            return [_geometric_sum(self._deterministic_map, first[0])]
         added = self._basis.numbers(first)
         if self.numbers > DENSE:
-            return self._basis.matrices(solved(self._turned, added))
-        operator = np.array([self._turned(unit) for unit in np.eye(self.numbers)]).T
+            return self._basis.matrices(solve_fixed_point(self._propagate, added))
+        operator = np.array([self._propagate(unit) for unit in np.eye(self.numbers)]).T
         return self._basis.matrices(np.linalg.solve(np.eye(self.numbers) - operator, added))
 
     def costs(self) -> Floats:
         """The stationary costs of a period, shape (costs,)."""
-        return self._flown(self.stationary())[1]
+        return self._after_period(self.stationary())[1]
 
-    def _flown(self, moments: Sequence[Floats]) -> tuple[list[Floats], Floats]:
-        """Second moments, by mode weighted by its probability, a period later, and the costs of that."""
+    def _after_period(self, moments: Sequence[Floats]) -> tuple[list[Floats], Floats]:
+        """Second moments, by mode weighted by its probability, a period later, and the costs of the period."""
         now, costs = list(moments), np.zeros(len(self._stages[0][0].piece.c))
         for i, stage in enumerate(self._stages):
-            later = self._none(i + 1)
+            later = self._zero_moments(i + 1)
             for p in stage:
-                piece, share = p.piece, self.shares[i][p.begin]
+                piece, share = p.piece, self.stationary_probabilities[i][p.begin]
                 costs += p.probability * (np.einsum("kij,ij->k", piece.M, now[p.begin]) + share * piece.c)
                 later[p.end] += p.probability * (piece.Z @ now[p.begin] @ piece.Z.T + share * piece.W)
             now = later
@@ -149,36 +150,37 @@ class JumpLinear:
 
     @functools.cached_property
     def fourth_moment_radius(self) -> float | None:
-        """By how much fourth moments grow in a period; None where there are too many of them to be told."""
-        if self._certain is not None:
-            return _spectral_radius(self._certain) ** 4
+        """The growth factor of fourth moments over a period; None where they are too many to compute."""
+        if self._deterministic_map is not None:
+            return _spectral_radius(self._deterministic_map) ** 4
         halves = [[n * (n + 1) // 2 for n in sizes] for sizes in self._sizes]
         work = sum(halves[i][p.begin] ** 3 for i, stage in enumerate(self._stages) for p in stage)
         if work > LARGEST_FOURTH:
             return None
         stages = [
-            _Batches(
-                [(p.begin, p.end, p.probability, _squared(p.piece.Z)) for p in stage], halves[(i + 1) % len(halves)]
+            _BatchedStage(
+                [(p.begin, p.end, p.probability, _symmetric_square(p.piece.Z)) for p in stage],
+                halves[(i + 1) % len(halves)],
             )
             for i, stage in enumerate(self._stages)
         ]
-        basis = _Symmetric(halves[0])
+        basis = _SymmetricBasis(halves[0])
 
-        def turned(numbers: Floats) -> Floats:
+        def propagate(numbers: Floats) -> Floats:
             now = basis.matrices(numbers)
             for batches in stages:
                 now = batches.of(now)
             return basis.numbers(now)
 
-        return _radius(turned, basis)
+        return _radius(propagate, basis)
 
 
 def _spectral_radius(matrix: Floats) -> float:
     return float(np.abs(np.linalg.eigvals(matrix)).max(initial=0.0))
 
 
-def _summed(turn: Floats, added: Floats) -> Floats:
-    """The sum of Φᵏ W Φᵏᵀ over all k, by doubling; the powers of Φ die out."""
+def _geometric_sum(turn: Floats, added: Floats) -> Floats:
+    """The sum of Φᵏ W Φᵏᵀ over all k, by doubling; the powers of Φ decay."""
     found = added
     for _ in range(MOST_DOUBLINGS):
         more = turn @ found @ turn.T
@@ -188,18 +190,20 @@ def _summed(turn: Floats, added: Floats) -> Floats:
     return found
 
 
-def _radius(turned: Map, basis: _Symmetric) -> float:
+def _radius(propagate: Map, basis: _SymmetricBasis) -> float:
     if basis.count > SIZE:
         try:
-            return largest(turned, basis.numbers([np.eye(n) for n in basis.sizes]))
+            return spectral_radius_of(propagate, basis.numbers([np.eye(n) for n in basis.sizes]))
         except UsageError:
             if basis.count > DENSE:
                 raise
-    return _spectral_radius(np.array([turned(unit) for unit in np.eye(basis.count)]).reshape(basis.count, basis.count))
+    return _spectral_radius(
+        np.array([propagate(unit) for unit in np.eye(basis.count)]).reshape(basis.count, basis.count)
+    )
 
 
-class _Batches:
-    """The passages of a stage, those at once whose matrices have one shape."""
+class _BatchedStage:
+    """The passages of a stage, batched by the shapes of their matrices."""
 
     def __init__(self, passages: Sequence[tuple[int, int, float, Floats]], sizes: Sequence[int]) -> None:
         self._sizes = sizes
@@ -214,17 +218,17 @@ class _Batches:
             self._parts.append((begins, weighted, np.array([Z.T for _, _, _, Z in listed]), ends.tolist(), first))
 
     def of(self, moments: Sequence[Floats]) -> list[Floats]:
-        """The moments after it."""
+        """The moments after the stage."""
         found: list[Floats] = [np.zeros((n, n)) for n in self._sizes]
-        for begins, weighted, turned, ends, first in self._parts:
-            each = weighted @ np.array([moments[begin] for begin in begins]) @ turned
+        for begins, weighted, transposed, ends, first in self._parts:
+            each = weighted @ np.array([moments[begin] for begin in begins]) @ transposed
             for end, summed in zip(ends, np.add.reduceat(each, first, axis=0)):
                 found[end] += summed
         return found
 
 
-class _Symmetric:
-    """Symmetric matrices of some sizes as one row of numbers: their upper triangles."""
+class _SymmetricBasis:
+    """Symmetric matrices of given sizes as one row of numbers: their upper triangles."""
 
     def __init__(self, sizes: Sequence[int]) -> None:
         self._triangles = [np.triu_indices(n) for n in sizes]
@@ -243,12 +247,12 @@ class _Symmetric:
         return found
 
     def numbers(self, matrices: Sequence[Floats]) -> Floats:
-        """And back."""
+        """The row of matrices."""
         return np.concatenate([each[rows, columns] for each, (rows, columns) in zip(matrices, self._triangles)])
 
 
-def _squared(Z: Floats) -> Floats:
-    """What Z makes of z z', as a matrix over the upper triangle of that: (i, j) by (k, m)."""
+def _symmetric_square(Z: Floats) -> Floats:
+    """The map z z' -> Z z z' Z' as a matrix over upper triangles: (i, j) by (k, m)."""
     (i, j), (k, m) = np.triu_indices(Z.shape[0]), np.triu_indices(Z.shape[1])
     found: Floats = Z[np.ix_(i, k)] * Z[np.ix_(j, m)]
     apart = k != m
@@ -256,8 +260,10 @@ def _squared(Z: Floats) -> Floats:
     return found
 
 
-def _recurrent(stages: Sequence[Stage], sizes: Sequence[Sequence[int]]) -> tuple[list[Stage], list[Sequence[int]]]:
-    """Without the modes that only a beginning has."""
+def _without_transient_modes(
+    stages: Sequence[Stage], sizes: Sequence[Sequence[int]]
+) -> tuple[list[Stage], list[Sequence[int]]]:
+    """The stages without transient modes."""
     count = len(sizes[0])
     reach = np.eye(count, dtype=bool)
     for i, stage in enumerate(stages):
@@ -269,13 +275,13 @@ def _recurrent(stages: Sequence[Stage], sizes: Sequence[Sequence[int]]) -> tuple
     for _ in range(max(1, math.ceil(math.log2(count + 1)))):
         closure = (closure.astype(int) @ closure.astype(int)) > 0
     stays = np.array([all(closure[m, k] for k in np.flatnonzero(closure[:, m])) for m in range(count)])
-    return _only(stages, sizes, [stays])
+    return _restricted(stages, sizes, [stays])
 
 
-def _only(
+def _restricted(
     stages: Sequence[Stage], sizes: Sequence[Sequence[int]], first: list[Booleans]
 ) -> tuple[list[Stage], list[Sequence[int]]]:
-    """Only the modes that are kept at first, and those that they lead to."""
+    """The stages with only the modes kept in the first, and those that they lead to."""
     kept = first
     for i, stage in enumerate(stages[:-1]):
         later = np.zeros(len(sizes[i + 1]), dtype=bool)
@@ -296,8 +302,10 @@ def _only(
     return found, [[n for n, keep in zip(stage, keeps) if keep] for stage, keeps in zip(sizes, kept)]
 
 
-def _live(stages: Sequence[Stage], sizes: Sequence[Sequence[int]]) -> tuple[list[Stage], list[Sequence[int]]]:
-    """Without those numbers of a state that nothing later depends on, not even themselves."""
+def _without_unused_numbers(
+    stages: Sequence[Stage], sizes: Sequence[Sequence[int]]
+) -> tuple[list[Stage], list[Sequence[int]]]:
+    """The stages without numbers of the state on which nothing later depends."""
     live = [[np.ones(n, dtype=bool) for n in stage] for stage in sizes]
     changed = True
     while changed:
@@ -315,12 +323,15 @@ def _live(stages: Sequence[Stage], sizes: Sequence[Sequence[int]]) -> tuple[list
     for i, stage in enumerate(stages):
         then = live[(i + 1) % len(stages)]
         found.append(
-            [Passage(p.begin, p.end, p.probability, _cut(p.piece, live[i][p.begin], then[p.end])) for p in stage]
+            [
+                Passage(p.begin, p.end, p.probability, _restricted_piece(p.piece, live[i][p.begin], then[p.end]))
+                for p in stage
+            ]
         )
     return found, [[int(keep.sum()) for keep in stage] for stage in live]
 
 
-def _cut(piece: Piece, before: Booleans, after: Booleans) -> Piece:
+def _restricted_piece(piece: Piece, before: Booleans, after: Booleans) -> Piece:
     return Piece(
         piece.Z[np.ix_(after, before)], piece.W[np.ix_(after, after)], piece.M[:, before][:, :, before], piece.c
     )

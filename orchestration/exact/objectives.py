@@ -28,7 +28,7 @@ from orchestration.expressions.syntax import (
 )
 
 STEP = 1.0
-"""of a signal: differences of a quadratic polynomial are exact for any"""
+"""of a signal: second differences of a quadratic polynomial are exact for any step"""
 NOT_QUADRATIC = 1e-9
 """of a value: what a quadratic polynomial may miss it by"""
 TRIALS = 12
@@ -36,7 +36,7 @@ TRIALS = 12
 
 @dataclass(frozen=True, kw_only=True)
 class Mean:
-    """The mean over time of c + g'y + y'Q y, y the deviations of some signals from where they rest."""
+    """The mean over time of c + g'y + y'Q y, y the deviations of some signals from rest."""
 
     signals: tuple[str, ...]
     c: float
@@ -45,40 +45,40 @@ class Mean:
 
 
 def means_of(node: Node) -> list[Call]:
-    """The means in an objective, `rms` as one of them; raises `UsageError` naming what else it is made of."""
+    """The means in an objective, `rms` included; raises `UsageError` naming any other reduction."""
     found = list(dict.fromkeys(reductions(node)))
     for call in found:
         if call.function not in ("mean", "rms"):
-            raise UsageError(_no_mean(f"{call.function}(…)"))
+            raise UsageError(_not_a_mean(f"{call.function}(…)"))
         if isinstance(call.arguments[0], Sampled):
             raise UsageError("over arrivals: expected a mean over time")
         if any(True for part in reductions(call.arguments[0])):
             raise UsageError("of other numbers of the run: expected a mean of signals")
     if not found:
-        raise UsageError(_no_mean(text(node)))
+        raise UsageError(_not_a_mean(text(node)))
     return found
 
 
-def _no_mean(written: str) -> str:
+def _not_a_mean(written: str) -> str:
     return f"{written}: expected mean(…) or rms(…), of which there are expectations"
 
 
-def whole(objectives: Mapping[str, str]) -> dict[str, Node]:
-    """Objectives by name, each with those that it names in it."""
+def inlined_objectives(objectives: Mapping[str, str]) -> dict[str, Node]:
+    """Objectives by name, with the objectives that they name inlined."""
     found: dict[str, Node] = {}
     for name, written in objectives.items():
         found[name] = inlined(parse(written), found)
     return found
 
 
-def squared(call: Call) -> Node:
-    """What is averaged."""
+def integrand(call: Call) -> Node:
+    """The expression that a mean averages."""
     inner = call.arguments[0]
     return inner if call.function == "mean" else Operation("*", (inner, inner))
 
 
-def value(node: Node, means: Mapping[Call, float], numbers: Mapping[str, float]) -> float:
-    """An objective by its means."""
+def evaluated(node: Node, means: Mapping[Call, float], numbers: Mapping[str, float]) -> float:
+    """An objective by the values of its means."""
     match node:
         case Number(number):
             return number
@@ -88,19 +88,19 @@ def value(node: Node, means: Mapping[Call, float], numbers: Mapping[str, float])
         case Name(name) if name in numbers:
             return numbers[name]
         case Operation(word, operands) | Call(word, operands) if word in OPERATORS:
-            return float(applied(word, *(value(operand, means, numbers) for operand in operands)))
+            return float(applied(word, *(evaluated(operand, means, numbers) for operand in operands)))
     raise UsageError(f"{text(node)} has a value at each instant; expected one number of the run")
 
 
 def quadratic(node: Node, rest: Mapping[str, float], numbers: Mapping[str, float]) -> Mean:
     """An expression about `rest` as a quadratic polynomial, by second differences, which are exact for one.
 
-    Raises `UsageError` for one that is none, and for what depends on time.
+    Raises `UsageError` for an expression that is none, or depends on time.
     """
     used = list(dict.fromkeys(names(node)))
     for name in (TIME, STOP_TIME):
         if name in used:
-            raise UsageError(f"depends on {name}: expected signals alone, whose mean stays")
+            raise UsageError(f"depends on {name}: expected signals alone, whose mean is stationary")
     signals = _signals(used, rest, numbers)
     fixed = [name for name in used if name in numbers]
     places = {name: i for i, name in enumerate([*signals, *fixed])}
@@ -132,7 +132,7 @@ def _signals(used: Sequence[str], rest: Mapping[str, float], numbers: Mapping[st
             continue
         parts = [name] if name in rest else [f"{name}.{axis}" for axis in "xyzw" if f"{name}.{axis}" in rest]
         if not parts:
-            raise UsageError(f"there is no {name} of which the linear loop knows")
+            raise UsageError(f"the linear loop has no {name}")
         found += parts
     return list(dict.fromkeys(found))
 

@@ -1,4 +1,4 @@
-"""A path through a stretch of time as a linear map: what it makes of the state, with what noise, at what cost."""
+"""A stretch of time as a linear map of the state, with noise and costs."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ class Piece:
 
     @staticmethod
     def start(size: int, costs: int) -> Piece:
-        """Nothing has happened yet."""
+        """The identity."""
         return Piece(np.eye(size), np.zeros((size, size)), np.zeros((costs, size, size)), np.zeros(costs))
 
     def flowed(self, flow: Flow) -> Piece:
-        """After a flow of the first numbers of the state; the others, messages on their way, stay."""
+        """After a flow of the first numbers of the state; the others, messages in transit, stay."""
         n = len(flow.change)
         head = self.Z[:n]
         Z, W = self.Z.copy(), self.W.copy()
@@ -41,12 +41,12 @@ class Piece:
         return Piece(Z, W, self.M + head.T @ flow.costs @ head, c)
 
     def mapped(self, change: Floats, covariance: Floats | None = None) -> Piece:
-        """After a linear map of the state, which may change how many numbers it has, and noise of a covariance."""
+        """After a linear map of the state, which may change its size, and noise of a covariance."""
         W = change @ self.W @ change.T
         return Piece(change @ self.Z, W if covariance is None else W + covariance, self.M, self.c)
 
     def charged(self, Q: Floats, weight: float) -> Piece:
-        """After `weight` times the costs z'Q z as the state is now, Q of its first numbers."""
+        """With `weight` times the costs z'Q z of the present state added, Q of its first numbers."""
         n = Q.shape[-1]
         head = self.Z[:n]
         return Piece(

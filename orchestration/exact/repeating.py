@@ -1,8 +1,8 @@
-"""What a scheduler does again and again, where nothing in that is left to chance.
+"""The periodic schedule of computers and networks whose timing is deterministic.
 
-The timetable is made as for a run and looked at in windows of the period of all that shares a processor or a network.
-Windows in which the same happens follow one another without end if nothing waits longer in one than in the one before,
-or if what does is the backlog of a task that no other gives way to.
+The timetable is made as for a run and compared in windows of the hyperperiod of all that shares a processor or a
+network. Equal windows repeat for ever if no backlog grows from one to the next, or only that of a task to which no
+other yields.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ from orchestration.computers.parts import (
     SWITCHING,
     WRITTEN,
 )
-from orchestration.exact.clockwork import together
-from orchestration.exact.foretold import NOTHING, Course, Foretold
-from orchestration.exact.shared import expect_certain, is_shared
+from orchestration.exact.links import hyperperiod
+from orchestration.exact.periodic_schedule import NO_SCHEDULE, PeriodicSchedule, ScheduleTrace
+from orchestration.exact.scheduled import expect_certain, is_scheduled
 from orchestration.system.distribution import highest
 from orchestration.system.model import System
 from orchestration.system.placement import carried, placed_messages, placed_tasks, released_by
@@ -44,22 +44,25 @@ from orchestration.system.sampling import is_foreseen
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds, nanoseconds
 
 MOST_JOBS = 200_000
-"""of all tasks and messages together that are gone through"""
+"""of all tasks and messages, that are simulated"""
 WINDOWS, MOST_WINDOWS = 12, 96
-"""that are looked at first, and at most"""
-_ARE_TIMES = (RELEASED, SKIPPED, QUEUED, SAMPLED, ARRIVES)
+"""that are compared at first, and at most"""
+_WITH_TIMES = (RELEASED, SKIPPED, QUEUED, SAMPLED, ARRIVES)
 """Kinds of notes whose last number is a time"""
 _WORK = (SWITCHING, STARTED, RESUMED)
 
 
-def foretold(system: System, *, horizon: float | None = None, beside: Sequence[Fraction] = ()) -> Foretold:
-    """What the scheduler of a system decides, of which nothing may be left to chance.
+def periodic_schedule(
+    system: System, *, horizon: float | None = None, other_periods: Sequence[Fraction] = ()
+) -> PeriodicSchedule:
+    """The schedule of the computers and networks of a system.
 
-    With a `horizon` [s] it is what happens from 0 to there, as of a period that is a multiple of those `beside` [s].
-    Raises `UsageError` for what is random in it, and for what does not come to repeat itself.
+    With a `horizon` [s] it is the events from 0 to there, as those of a period that is a multiple of `other_periods`
+    [s]. Raises `UsageError` for a random quantity that the scheduler depends on, and for a schedule that does not
+    become periodic.
     """
-    if not is_shared(system):
-        return NOTHING
+    if not is_scheduled(system):
+        return NO_SCHEDULE
     expect_certain(system)
     released = released_by(system)
     system = replace(
@@ -73,24 +76,24 @@ def foretold(system: System, *, horizon: float | None = None, beside: Sequence[F
     )
     if horizon is not None:
         end = nanoseconds(horizon)
-        whole = together(beside) if beside else exact_nanoseconds(horizon) / NANOSECONDS
+        whole = hyperperiod(other_periods) if other_periods else exact_nanoseconds(horizon) / NANOSECONDS
         period = math.ceil(exact_nanoseconds(horizon) / NANOSECONDS / whole) * whole
-        return Course(system, end).foretold(0, end, period) or NOTHING
-    begin, length = _common(_instants(system))
+        return ScheduleTrace(system, end).schedule_between(0, end, period) or NO_SCHEDULE
+    begin, length = _begin_and_hyperperiod(_instants(system))
     count = WINDOWS
     while True:
-        course = Course(system, begin + count * length)
-        windows = _Windows(course, begin, length, count)
-        found = windows.foretold()
+        trace = ScheduleTrace(system, begin + count * length)
+        windows = _Windows(trace, begin, length, count)
+        found = windows.schedule()
         if found is not None:
             return found
-        if count >= MOST_WINDOWS or 4 * course.jobs > MOST_JOBS:
-            raise UsageError(windows.why_not())
+        if count >= MOST_WINDOWS or 4 * trace.jobs > MOST_JOBS:
+            raise UsageError(windows.failure_text())
         count *= 2
 
 
 def _instants(system: System) -> list[tuple[Fraction, Fraction]]:
-    """The offset and the period [ns] of everything that comes by itself and shares something."""
+    """The offset and the period [ns] of everything periodic that shares a resource."""
     over, releases = carried(system), released_by(system)
     found = []
     for task in placed_tasks(system.computers):
@@ -109,64 +112,66 @@ def _instants(system: System) -> list[tuple[Fraction, Fraction]]:
     return grids + [(Fraction(0), cycle) for cycle in cycles]
 
 
-def _common(instants: Sequence[tuple[Fraction, Fraction]]) -> tuple[int, int]:
-    """By when all have begun, and the time after which they are due together again [ns], which divides that."""
+def _begin_and_hyperperiod(instants: Sequence[tuple[Fraction, Fraction]]) -> tuple[int, int]:
+    """A multiple of the hyperperiod by which all have begun, and the hyperperiod [ns]."""
     periods = [period for _, period in instants] or [Fraction(NANOSECONDS)]
-    length = together(periods).numerator  # of so many of them, where it is no whole number
+    length = hyperperiod(periods).numerator  # a multiple, where it is no whole number
     begin = math.ceil(max((offset for offset, _ in instants), default=Fraction(0)) / length) * length
     jobs = sum((begin + WINDOWS * length) / period for period in periods)
     if jobs > MOST_JOBS:
         raise UsageError(
-            f"computers and networks: {int(jobs)} jobs and messages until all have been due together for {WINDOWS} "
-            f"times, {length / NANOSECONDS:g} s each: more than {MOST_JOBS}; expected periods that have more in common"
+            f"computers and networks: {int(jobs)} jobs and messages in {WINDOWS} hyperperiods of "
+            f"{length / NANOSECONDS:g} s: more than {MOST_JOBS}; expected periods that have more in common"
         )
     return begin, length
 
 
 class _Windows:
-    """A course, from where all have begun cut into windows of one length."""
+    """A trace, cut into windows of one length from where all have begun."""
 
-    def __init__(self, course: Course, begin: int, length: int, count: int) -> None:
-        self._course, self._begin, self._length, self._count = course, begin, length, count
-        notes = course.notes[course.notes[:, 0] >= begin]
+    def __init__(self, trace: ScheduleTrace, begin: int, length: int, count: int) -> None:
+        self._trace, self._begin, self._length, self._count = trace, begin, length, count
+        notes = trace.notes[trace.notes[:, 0] >= begin]
         window = (notes[:, 0] - begin) // length
-        told, are_times = notes[:, [0, 1, 2, 4]], np.isin(notes[:, 1], _ARE_TIMES)
-        told[:, 0] -= window * length
-        told[are_times, 3] -= (window * length)[are_times]
-        told[notes[:, 1] == WRITTEN, 3] = 0
+        content, are_times = notes[:, [0, 1, 2, 4]], np.isin(notes[:, 1], _WITH_TIMES)
+        content[:, 0] -= window * length
+        content[are_times, 3] -= (window * length)[are_times]
+        content[notes[:, 1] == WRITTEN, 3] = 0
         ends = np.searchsorted(window, np.arange(count + 1))
         self._parts = [notes[begin:end] for begin, end in itertools.pairwise(ends.tolist())]
-        self._said = [told[begin:end].tobytes() for begin, end in itertools.pairwise(ends.tolist())]
+        self._contents = [content[begin:end].tobytes() for begin, end in itertools.pairwise(ends.tolist())]
 
-    def foretold(self) -> Foretold | None:
-        """What happens from some window on again and again; None where that is not known."""
+    def schedule(self) -> PeriodicSchedule | None:
+        """The schedule that repeats from some window on; None where none is proved to."""
         for turns in range(1, self._count // 4 + 1):
             alike = max(3 * turns, turns + 1 + math.ceil(self._longest / self._length))
             first = self._count - alike
-            if first < 0 or any(self._said[i] != self._said[i - turns] for i in range(first + turns, self._count)):
+            if first < 0 or any(
+                self._contents[i] != self._contents[i - turns] for i in range(first + turns, self._count)
+            ):
                 continue
-            if not self._goes_on(np.concatenate(self._parts[-turns:])):
+            if not self._repeats_for_ever(np.concatenate(self._parts[-turns:])):
                 continue
             begin, length = self._begin + first * self._length, turns * self._length
-            return self._course.foretold(begin, begin + length, Fraction(length, NANOSECONDS))
+            return self._trace.schedule_between(begin, begin + length, Fraction(length, NANOSECONDS))
         return None
 
     @property
     def _longest(self) -> int:
-        """That something may go on without a note [ns]: a job, a frame, what is on its way to release a task."""
-        arrivals = self._course.notes[self._course.notes[:, 1] == ARRIVES]
-        placed = placed_tasks(self._course.system.computers)
+        """The longest time without a note [ns] of a job, a frame, or a message that will release a task."""
+        arrivals = self._trace.notes[self._trace.notes[:, 1] == ARRIVES]
+        placed = placed_tasks(self._trace.system.computers)
         jobs = [nanoseconds(highest(each.task.execution) + each.computer.switch) for each in placed]
-        frames = [leg.length + of.pause for of in self._course.resources.parts.messages for leg in of.legs]
+        frames = [leg.length + of.pause for of in self._trace.resources.parts.messages for leg in of.legs]
         return max(int((arrivals[:, 4] - arrivals[:, 0]).max(initial=0)), *jobs, *frames, 0)
 
-    def _goes_on(self, notes: Integers) -> bool:
-        """Whether what happens in some windows that repeat goes on for ever.
+    def _repeats_for_ever(self, notes: Integers) -> bool:
+        """Whether the events of some equal windows repeat for ever.
 
-        As many jobs are over as were released: so all that waits is as it was. Of a task whose jobs pile up nothing
-        counts but its priority, which no other has.
+        As many jobs end as are released, so that every queue is as it was before. The jobs of a task may pile up if its
+        priority is fixed and its own alone.
         """
-        parts, count = self._course.resources.parts, _counted(notes)
+        parts, count = self._trace.resources.parts, _counter(notes)
         for i, task in enumerate(parts.tasks):
             over, works = count(FINISHED, i) + count(ABORTED, i), any(count(kind, i) for kind in _WORK)
             more, processor = count(RELEASED, i) - over, parts.processors[task.processor]
@@ -177,33 +182,33 @@ class _Windows:
         for c, carrier in enumerate(parts.carriers):
             if carrier.sender != NONE and count(SAMPLED, carrier.sender) != count(SENT, c):
                 return False
-        return all(count(QUEUED, m) == self._passed(notes, m) for m in range(len(parts.messages)))
+        return all(count(QUEUED, m) == self._received(notes, m) for m in range(len(parts.messages)))
 
-    def _passed(self, notes: Integers, message: int) -> int:
-        """How many frames were received."""
-        last = len(self._course.resources.parts.messages[message].legs) - 1
+    def _received(self, notes: Integers, message: int) -> int:
+        """How many frames of a message were received."""
+        last = len(self._trace.resources.parts.messages[message].legs) - 1
         return int(((notes[:, 1] == PASSED) & (notes[:, 2] == message) & (notes[:, 4] == last)).sum())
 
-    def why_not(self) -> str:
-        """What stands in the way, in a line."""
+    def failure_text(self) -> str:
+        """Why no schedule repeats, in one line."""
         half = np.concatenate(self._parts[-(self._count // 2) :])
-        count, seconds = _counted(half), self._count // 2 * self._length / NANOSECONDS
-        for i, place in enumerate(self._course.places):
+        count, seconds = _counter(half), self._count // 2 * self._length / NANOSECONDS
+        for i, place in enumerate(self._trace.places):
             more = count(RELEASED, i) - count(FINISHED, i) - count(ABORTED, i)
             if more > self._count // 4:
                 return (
                     f"{place}: falls behind by {more} jobs in {seconds:g} s, and makes others late; expected less load"
                 )
-        for m, place in enumerate(self._course.messages):
-            more = count(QUEUED, m) - self._passed(half, m)
+        for m, place in enumerate(self._trace.messages):
+            more = count(QUEUED, m) - self._received(half, m)
             if more > self._count // 4:
                 return f"{place}: falls behind by {more} messages in {seconds:g} s; expected less load"
         return (
-            f"computers and networks: what they do has not come to repeat itself after {self._count} times the "
-            f"{self._length / NANOSECONDS:g} s after which all are due together again"
+            f"computers and networks: their schedule does not repeat after {self._count} hyperperiods of "
+            f"{self._length / NANOSECONDS:g} s"
         )
 
 
-def _counted(notes: Integers) -> Callable[[int, int], int]:
-    """How many notes there are of a kind of a task, message or carrier."""
-    return lambda kind, whose: int(((notes[:, 1] == kind) & (notes[:, 2] == whose)).sum())
+def _counter(notes: Integers) -> Callable[[int, int], int]:
+    """A function that counts the notes of a kind of a task, message or carrier."""
+    return lambda kind, owner: int(((notes[:, 1] == kind) & (notes[:, 2] == owner)).sum())

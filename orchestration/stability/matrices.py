@@ -67,7 +67,7 @@ def in_continuous_time(tangent: Tangent, first: float, differs: float = BLURRED)
     return Matrices(inputs=tangent.inputs, outputs=tangent.outputs, A=A, B=B, C=C, D=D), unfit
 
 
-def minds_its_step(tangent: Tangent, period: float) -> bool:
+def depends_on_step(tangent: Tangent, period: float) -> bool:
     """Whether a sample does something else where the next one comes at another time."""
     usual, sooner = (np.hstack(tangent.derivatives(h)) for h in (period, 0.9 * period))
     return bool(np.abs(usual - sooner).max(initial=0.0) > BLURRED * np.abs(usual).max(initial=1.0))

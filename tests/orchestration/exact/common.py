@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from orchestration.exact.clockwork import Clockwork
-from orchestration.exact.effects import TrueEffects
+from orchestration.exact.effects import ContinuousEffects
 from orchestration.exact.linear import Components, Continuous, Sampled
 from orchestration.exact.moments import JumpLinear
 from orchestration.exact.objectives import Mean
 from orchestration.exact.timing import links_of, tasks_of
+from orchestration.exact.timing_chain import TimingChain
 from orchestration.system.component import Component
 from orchestration.system.connection import Connection
 from orchestration.system.model import System
@@ -79,7 +79,7 @@ def loop(
 ) -> JumpLinear:
     """Of which the cost is the sum of the squares of some signals."""
     tasks = tasks_of(system)
-    effects = TrueEffects(system, components, [task.name for task in tasks], noise)
+    effects = ContinuousEffects(system, components, [task.name for task in tasks], noise)
     count = len(signals)
     effects.charge([Mean(signals=signals, c=0.0, g=np.zeros(count), Q=np.eye(count))])
-    return JumpLinear(*Clockwork(tasks, links_of(system), effects, order=nodes).stages())
+    return JumpLinear(*TimingChain(tasks, links_of(system), effects, order=nodes).stages())

@@ -92,7 +92,7 @@ def test_objectives_may_be_made_of_means_and_of_signals_that_no_connection_carri
     assert found.objectives["inner"] is not None
     assert found.reasons == {
         "third": "servo.angle ** 3: expected a polynomial of signals of degree two at most",
-        "late": "depends on time: expected signals alone, whose mean stays",
+        "late": "depends on time: expected signals alone, whose mean is stationary",
     }
 
 
@@ -213,8 +213,10 @@ def test_what_is_nearly_linear_is_known_by_small_pulses_and_how_far() -> None:
 def test_a_task_that_minds_how_long_its_step_is_has_no_jitter() -> None:
     system = example("minimum_variance", {"components.controller.sampling.jitter": 0.1})
     none = np.zeros((0, 0))
-    minding = Sampled(inputs=(), outputs=(), A=none, B=none, C=none, D=none, minds_step=True)
-    with pytest.raises(UsageError, match=r"components\.controller\.sampling\.jitter: what controller does depends on"):
+    minding = Sampled(inputs=(), outputs=(), A=none, B=none, C=none, D=none, depends_on_step=True)
+    with pytest.raises(
+        UsageError, match=r"components\.controller\.sampling\.jitter: the samples of controller depend on"
+    ):
         expect_same_steps(system, tasks_of(system), {"controller": minding})
     regular = example("minimum_variance")
     expect_same_steps(regular, tasks_of(regular), {"controller": minding})

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from orchestration.basics.bisection import bisected
-from orchestration.exact import chances
+from orchestration.exact import random_times
 from orchestration.system.distribution import Distribution
 from tests.orchestration.exact.common import GAIN, SERVO_PERIOD, integrator, servo
 
@@ -49,7 +49,7 @@ def test_a_long_table_costs_what_its_values_do_one_by_one() -> None:
     values = tuple(0.0005 + 0.003 * (k / 60.0) ** 2 for k in range(61))
     by_rule = servo(nodes=10, delay=Distribution(values=values)).costs()[0]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(chances, "FEW", len(values))
+        patch.setattr(random_times, "FEW", len(values))
         one_by_one = servo(delay=Distribution(values=values)).costs()[0]
     assert by_rule == pytest.approx(one_by_one, rel=1e-11)
 

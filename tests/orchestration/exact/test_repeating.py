@@ -1,4 +1,4 @@
-"""What a timetable is said to do again and again it does for ever."""
+"""A schedule that is reported to repeat does so for ever."""
 
 from fractions import Fraction
 from itertools import count
@@ -7,8 +7,8 @@ from hypothesis import event, given, settings
 from hypothesis import strategies as st
 
 from orchestration.basics.errors import UsageError
-from orchestration.exact.foretold import Course
-from orchestration.exact.repeating import foretold
+from orchestration.exact.periodic_schedule import ScheduleTrace
+from orchestration.exact.repeating import periodic_schedule
 from orchestration.system.choices import NetworkKind
 from orchestration.system.component import Component
 from orchestration.system.computers import Computer, Message, Network, Task
@@ -61,13 +61,13 @@ def tasks_of_any(draw: st.DrawFn, number: int, component: str | None) -> Task:
 @given(timetables())
 def test_a_hundred_common_periods_later_the_same_happens(system: System) -> None:
     try:
-        told = foretold(system)
+        schedule = periodic_schedule(system)
     except UsageError as error:
         event(str(error).partition(": ")[2].partition(" by")[0][:40])
         return
     event("repeats itself")
-    length = int(told.period * 10**9)
+    length = int(schedule.period * 10**9)
     turns = 1 + LATER * 12_000_000 // length
-    course = Course(system, (turns + 12) * length)
-    assert course.foretold(turns * length, (turns + 1) * length, told.period) == told
-    assert told.period % Fraction(1, 1000) == 0
+    trace = ScheduleTrace(system, (turns + 12) * length)
+    assert trace.schedule_between(turns * length, (turns + 1) * length, schedule.period) == schedule
+    assert schedule.period % Fraction(1, 1000) == 0

@@ -10,7 +10,7 @@ from scipy.linalg import expm
 from orchestration.fmi.reuse import Instances
 from orchestration.stability.linear_loop import at_rest
 from orchestration.stability.linearised_component import Tangent
-from orchestration.stability.matrices import in_continuous_time, minds_its_step, of_samples, told_by_outputs
+from orchestration.stability.matrices import depends_on_step, in_continuous_time, of_samples, told_by_outputs
 from tests.examples.common import example
 
 
@@ -36,7 +36,7 @@ def test_a_law_without_memory_is_its_gains(tangents: dict[str, Tangent]) -> None
     found = of_samples(tangents["controller"], 0.05)
     assert pytest.approx(np.array([[-1.0, -1.0]]), abs=1e-9) == found.D
     assert found.A.shape == (0, 0)
-    assert not minds_its_step(tangents["controller"], 0.05)
+    assert not depends_on_step(tangents["controller"], 0.05)
 
 
 class Stepped:

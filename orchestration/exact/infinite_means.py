@@ -1,4 +1,4 @@
-"""Runs whose averages mean nothing: those of loops in which means of squares have no finite expectation."""
+"""A warning for runs of loops in which means of squares have no finite expectation: their averages mean nothing."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.building.inputs import Files
 from orchestration.exact.loops import Loops
-from orchestration.exact.objectives import means_of, whole
+from orchestration.exact.objectives import inlined_objectives, means_of
 from orchestration.fmi.foreign import computed
 from orchestration.fmi.model import Model
 from orchestration.stability.known_loops import LOOPS
@@ -17,16 +17,16 @@ from orchestration.system.model import System
 from orchestration.system.request import Request
 
 AGREE = 1e-3
-"""of a radius, from order to order: who only wants to know whether it is above 1 need not wait"""
+"""of a radius, from order to order: enough to know whether it is above 1"""
 MOST = 50
-"""systems that are looked at"""
+"""systems that are examined"""
 
 
-def endless(request: Request, systems: Sequence[System], files: Files) -> str | None:
-    """What a user should know of the averages of such runs, in a line; None: nothing, or nothing that is known.
+def infinite_means_warning(request: Request, systems: Sequence[System], files: Files) -> str | None:
+    """A warning about averages over runs of these systems, in one line; None: none is due, or the radius is unknown.
 
-    Of systems with something random and an objective that is a mean of squares; not of those of which more is known
-    than of any other, as they are not linear about where they fly.
+    Examined are systems with something random and an objective that is a mean of squares, unless their kind has a loop
+    of its own: those are not linear where they run.
     """
     if LOOPS.of(request.kind) is not None:
         return None
@@ -53,9 +53,9 @@ def endless(request: Request, systems: Sequence[System], files: Files) -> str | 
 
 
 def _averages(system: System) -> list[str]:
-    """The objectives that are made of means."""
+    """The objectives that consist of means."""
     found = []
-    for name, node in whole(system.objectives).items():
+    for name, node in inlined_objectives(system.objectives).items():
         try:
             means_of(node)
         except UsageError:
@@ -65,7 +65,7 @@ def _averages(system: System) -> list[str]:
 
 
 def radii_of(systems: Sequence[System], models: Mapping[str, Model]) -> list[float | None]:
-    """The mean-square radii of systems; None for one that is not linear about a rest, or too much."""
+    """The mean-square radii of systems; None for one that is not linear about a rest, or too large."""
     loops, found = Loops(models), list[float | None]()
     for system in systems:
         try:

@@ -1,4 +1,4 @@
-"""What is left to chance about a time, as values with probabilities: as they are, or by Gauss's rule for a density."""
+"""Random times as values with probabilities: as listed, or by Gauss's rule for a density."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from orchestration.basics.simulator import Floats
 Draw = tuple[int, float]
 """A value, and its probability"""
 Kinks = Callable[[int, int], Sequence[int]]
-"""The times strictly between two times at which what comes of an instant may bend"""
+"""The times strictly between two times at which costs may have a kink over the time of an event"""
 
 
 def no_kinks(low: int, high: int) -> Sequence[int]:
@@ -23,33 +23,33 @@ def no_kinks(low: int, high: int) -> Sequence[int]:
 
 
 @dataclass(frozen=True)
-class Chance:
-    """A random amount of time, in whole units of whoever uses it."""
+class RandomTime:
+    """A random amount of time, in whole units of the caller's choice."""
 
     values: tuple[int, ...] = (0,)
-    """all that there are, or the two ends of a density"""
+    """all values, or the two ends of a density"""
     probabilities: tuple[float, ...] = (1.0,)
     """of the values; empty for a density"""
     normal: tuple[float, float] | None = None
-    """mean and deviation of a density that is normal, cut to its ends; None: uniform"""
-    more: Chance | None = None
-    """another amount, independent, that comes on top"""
+    """mean and standard deviation of a normal density, truncated to its ends; None: uniform"""
+    added: RandomTime | None = None
+    """another, independent amount that is added"""
 
     @property
     def is_by_rule(self) -> bool:
-        """Whether there are more values than are gone through one by one."""
+        """Whether there are more values than are enumerated."""
         by_rule = not self.probabilities or len(self.values) > FEW
-        return by_rule or (self.more is not None and self.more.is_by_rule)
+        return by_rule or (self.added is not None and self.added.is_by_rule)
 
     @property
     def lowest(self) -> int:
         """The least value."""
-        return min(self.values) + (0 if self.more is None else self.more.lowest)
+        return min(self.values) + (0 if self.added is None else self.added.lowest)
 
     @property
     def highest(self) -> int:
         """The largest one."""
-        return max(self.values) + (0 if self.more is None else self.more.highest)
+        return max(self.values) + (0 if self.added is None else self.added.highest)
 
     @property
     def is_certain(self) -> bool:
@@ -59,18 +59,18 @@ class Chance:
     def draws(self, base: int, kinks: Kinks, order: int) -> list[Draw]:
         """The values, with probabilities.
 
-        Of a density, and of a long table, as many as the order has in each part between the `kinks` of `base` plus the
-        value: by these, integrals of what is smooth there are exact but for what falls faster than any power of it.
+        A density or a long table has `order` values in each part between the `kinks` of `base` plus the value: with
+        these, integrals of functions that are smooth there converge faster than any power of the order.
         """
-        if self.more is None:
-            return self._own(base, kinks, order)
+        if self.added is None:
+            return self._own_draws(base, kinks, order)
         found: dict[int, float] = {}
-        for value, p in self._own(base, no_kinks, order):
-            for further, q in self.more.draws(base + value, kinks, order):
+        for value, p in self._own_draws(base, no_kinks, order):
+            for further, q in self.added.draws(base + value, kinks, order):
                 found[value + further] = found.get(value + further, 0.0) + p * q
         return sorted(found.items())
 
-    def _own(self, base: int, kinks: Kinks, order: int) -> list[Draw]:
+    def _own_draws(self, base: int, kinks: Kinks, order: int) -> list[Draw]:
         low, high = min(self.values), max(self.values)
         if low == high:
             return [(low, 1.0)]
@@ -85,7 +85,7 @@ class Chance:
         return [(value, weight / total) for value, weight in found]
 
     def _rule(self, a: int, b: int, order: int) -> tuple[Sequence[float], Sequence[float]]:
-        """Nodes, as shares of the part from a to b, and their weights there."""
+        """Nodes, as fractions of the part from a to b, and their weights there."""
         if self.probabilities:
             last = b == max(self.values)
             inside = [(v, p) for v, p in zip(self.values, self.probabilities) if a <= v < b or (last and v == b)]
@@ -103,9 +103,9 @@ class Chance:
 
 
 FEW = 40
-"""values of a table that are gone through one by one"""
+"""values of a table that are enumerated"""
 FINE = 120
-"""nodes by which a density is known from which those of its own rule are made"""
+"""nodes that sample a density, from which those of its own rule are made"""
 
 
 @functools.lru_cache(maxsize=64)
@@ -116,9 +116,9 @@ def _legendre(order: int) -> tuple[Floats, Floats]:
 
 
 def gauss_of(values: Floats, weights: Floats, order: int) -> tuple[Sequence[float], Sequence[float]]:
-    """As few nodes, with weights, as give the same integrals of polynomials up to degree 2 order - 1.
+    """The fewest nodes, with weights, that give the same integrals of polynomials up to degree 2 order - 1.
 
-    By Lanczos: the nodes are the eigenvalues of what multiplication by the value is over the first polynomials.
+    By Lanczos: the nodes are the eigenvalues of the multiplication by the value, restricted to the first polynomials.
     """
     total = float(weights.sum())
     root = np.sqrt(weights / total)
@@ -126,10 +126,10 @@ def gauss_of(values: Floats, weights: Floats, order: int) -> tuple[Sequence[floa
     for _ in range(order):
         raised = values * basis[-1]
         diagonal.append(float(raised @ basis[-1]))
-        for each in (*basis, *basis):  # twice: what rounding leaves of the others
+        for each in (*basis, *basis):  # twice, against rounding
             raised = raised - (raised @ each) * each
         beside.append(float(np.linalg.norm(raised)))
-        if beside[-1] < ALONE:
+        if beside[-1] < VANISHING:
             break
         basis.append(raised / beside[-1])
     count = len(diagonal)
@@ -139,28 +139,28 @@ def gauss_of(values: Floats, weights: Floats, order: int) -> tuple[Sequence[floa
     return nodes.tolist(), (total * vectors[0] ** 2).tolist()
 
 
-ALONE = 1e-14
-"""of a polynomial that is none: there are no more values than nodes"""
+VANISHING = 1e-14
+"""norm of a vanishing polynomial: there are no more values than nodes"""
 
-CERTAIN = Chance()
+CERTAIN = RandomTime()
 """0"""
 
 
-def uniform(low: int, high: int) -> Chance:
-    """Any value between the two, each as likely."""
-    return Chance((low, high), ()) if high > low else Chance((low,))
+def uniform(low: int, high: int) -> RandomTime:
+    """Uniform between two values."""
+    return RandomTime((low, high), ()) if high > low else RandomTime((low,))
 
 
-def normal(mean: float, deviation: float, low: int, high: int) -> Chance:
-    """Normal, cut to the range."""
-    return Chance((low, high), (), (mean, deviation)) if high > low else Chance((low,))
+def normal(mean: float, deviation: float, low: int, high: int) -> RandomTime:
+    """Normal, truncated to a range."""
+    return RandomTime((low, high), (), (mean, deviation)) if high > low else RandomTime((low,))
 
 
-def table(values: Sequence[int], probabilities: Sequence[float]) -> Chance:
-    """These values."""
+def table(values: Sequence[int], probabilities: Sequence[float]) -> RandomTime:
+    """Listed values."""
     found: dict[int, float] = {}
     for value, p in zip(values, probabilities):
         if p > 0.0:
             found[value] = found.get(value, 0.0) + p
     listed = sorted(found)
-    return Chance(tuple(listed), tuple(found[value] for value in listed))
+    return RandomTime(tuple(listed), tuple(found[value] for value in listed))

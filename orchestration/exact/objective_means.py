@@ -1,11 +1,11 @@
-"""The objectives of a system of which there may be an expectation, and the signals that they are of."""
+"""The objectives of a system as means of quadratic polynomials of signals, as far as they are such."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 from orchestration.basics.errors import UsageError
-from orchestration.exact.objectives import Mean, means_of, quadratic, squared, value, whole
+from orchestration.exact.objectives import Mean, evaluated, inlined_objectives, integrand, means_of, quadratic
 from orchestration.expressions.syntax import Call, names
 from orchestration.fmi.model import Model
 from orchestration.stability.linear_loop import AtRest
@@ -15,12 +15,12 @@ from orchestration.system.source import Source
 from orchestration.system.variable_names import component_of, variable_of
 
 
-class Wanted:
-    """The objectives of a system, as far as there can be an expectation of them, and why not."""
+class ObjectiveMeans:
+    """The objectives of a system that have an expectation, and for the others the reasons why not."""
 
     def __init__(self, system: System, models: Mapping[str, Model]) -> None:
         self._system = system
-        self._nodes = whole(system.objectives)
+        self._nodes = inlined_objectives(system.objectives)
         self.calls: dict[str, list[Call]] = {}
         self.reasons: dict[str, str] = {}
         self.means: dict[Call, Mean] = {}
@@ -32,13 +32,14 @@ class Wanted:
                 self.reasons[name] = str(error)
         used = {part for calls in self.calls.values() for call in calls for part in names(call)}
         self._signals = dict.fromkeys(signal for part in sorted(used) for signal in _signals_of(part, models))
-        self.seen = tuple(
+        self.outputs = tuple(
             signal for signal in self._signals
             if models[component_of(signal)].variables[variable_of(signal)].causality != "input"
         )  # fmt: skip
+        """signals of objectives that are no inputs"""
 
-    def about(self, loop: AtRest) -> None:
-        """The means as polynomials about the point where the loop rests."""
+    def expand_about(self, loop: AtRest) -> None:
+        """Expand the means as polynomials about the point where the loop rests."""
         for name, state in loop.begun.items():
             loop.simulation.instances[name].restore(state)
         rest = {
@@ -46,30 +47,30 @@ class Wanted:
             for signal in self._signals
         }
         for name, source in self._system.sources.items():
-            rest |= _at_rest(name, source)
+            rest |= _constant_signals(name, source)
         self._numbers = loop.simulation.parameters
         for name, calls in [*self.calls.items()]:
             try:
                 for call in calls:
                     if call not in self.means:
-                        self.means[call] = quadratic(squared(call), rest, self._numbers)
+                        self.means[call] = quadratic(integrand(call), rest, self._numbers)
             except UsageError as error:
                 self.reasons[name] = str(error)
                 del self.calls[name]
 
     def values(self, means: Mapping[Call, float]) -> dict[str, float | None]:
-        """All objectives in the order of the system, by their means."""
+        """All objectives in the order of the system, by the values of their means; None: see `reasons`."""
         found: dict[str, float | None] = dict.fromkeys(self._nodes)
         for name in self.calls:
             try:
-                found[name] = value(self._nodes[name], means, self._numbers)
+                found[name] = evaluated(self._nodes[name], means, self._numbers)
             except UsageError as error:
                 self.reasons[name] = str(error)
         return found
 
 
-def _at_rest(name: str, source: Source) -> dict[str, float]:
-    """The signals of a source that stays where it is, whatever its noise does; none of any other."""
+def _constant_signals(name: str, source: Source) -> dict[str, float]:
+    """The signals of a source that is constant but for noise; none of any other."""
     if source.signal == AT_REST:
         places = {f"position.{axis}": source.scale * source.parameters.get(axis, 0.0) for axis in "xyz"}
         return {each: places.get(".".join(each.split(".")[-2:]), 0.0) for each in source.signals(name)}

@@ -1,4 +1,4 @@
-"""Where a scheduler decides when what happens, and nothing in that is left to chance, expectations are exact too."""
+"""Expectations of systems with computers and networks of deterministic timing."""
 
 import math
 from dataclasses import replace
@@ -11,7 +11,7 @@ from orchestration.basics.errors import UsageError
 from orchestration.exact.expect import expect
 from orchestration.exact.linear import Components, Sampled
 from orchestration.exact.loops import expect_same_steps
-from orchestration.exact.repeating import foretold
+from orchestration.exact.repeating import periodic_schedule
 from orchestration.exact.timing import tasks_of
 from orchestration.system.computers import Arrivals, Computer, Message, Network, Task
 from orchestration.system.criterion import Criterion
@@ -133,9 +133,9 @@ def test_over_a_horizon_it_is_what_a_run_prints(
 
     task = {"period": 0.006, "execution": 0.001, "priority": 2, **keys}
     system = begun(on_a_computer("distributed_servo", computer, network, **task))
-    flown = run(system).metrics["J"]
-    assert expect(system, as_simulated=True, horizon=0.05).objectives["J"] == pytest.approx(flown, rel=1e-9)
-    assert flown != pytest.approx(run(begun(example("distributed_servo", {DELAY: 0.0}))).metrics["J"], rel=1e-3)
+    printed = run(system).metrics["J"]
+    assert expect(system, as_simulated=True, horizon=0.05).objectives["J"] == pytest.approx(printed, rel=1e-9)
+    assert printed != pytest.approx(run(begun(example("distributed_servo", {DELAY: 0.0}))).metrics["J"], rel=1e-3)
 
 
 def test_a_stationary_mean_is_what_means_over_long_horizons_come_to() -> None:
@@ -176,8 +176,8 @@ def test_with_less_to_do_all_three_die_out_as_they_do_in_a_run() -> None:
         system = changed(servos, {"computers.node.scheduling": scheduling})
         found = expect(system, as_simulated=True, horizon=0.2)
         assert found.mean_square_radius < 1.0
-        flown = run(replace(system, stop_time=0.2)).metrics
-        assert found.objectives == pytest.approx({name: flown[name] for name in servos.objectives}, rel=1e-9)
+        printed = run(replace(system, stop_time=0.2)).metrics
+        assert found.objectives == pytest.approx({name: printed[name] for name in servos.objectives}, rel=1e-9)
 
 
 # -- what is refused ---------------------------------------------------------------------------------------------
@@ -227,19 +227,21 @@ def test_what_leaves_the_timetable_to_chance_is_refused_by_name(place: str, valu
 
 def test_periods_that_have_nothing_in_common_are_refused() -> None:
     load = Computer(tasks={"load": Task(period=0.0070001, execution=0.001, priority=2)})
-    with pytest.raises(UsageError, match=r"until all have been due together for 12 times, 420\.006 s each"):
+    with pytest.raises(UsageError, match=r"jobs and messages in 12 hyperperiods of 420\.006 s"):
         expect(on_a_computer("distributed_servo", load, period=0.006, execution=0.001))
 
 
 def test_a_task_that_minds_how_long_its_step_is_has_to_sample_regularly() -> None:
     none = np.zeros((0, 0))
-    parts: Components = {"controller": Sampled(inputs=(), outputs=(), A=none, B=none, C=none, D=none, minds_step=True)}
+    parts: Components = {
+        "controller": Sampled(inputs=(), outputs=(), A=none, B=none, C=none, D=none, depends_on_step=True)
+    }
     for load, fits in ((0.0, True), (0.001, False)):
         computer = Computer(tasks={"load": Task(period=0.004, execution=load)})
         system = on_a_computer("distributed_servo", computer, period=0.006, execution=0.001, priority=2)
-        tasks = tasks_of(system, foretold(system))
+        tasks = tasks_of(system, periodic_schedule(system))
         if fits:
             expect_same_steps(system, tasks, parts)
         else:
-            with pytest.raises(UsageError, match=r"which is not 0\.006 s each time; expected nobody else"):
+            with pytest.raises(UsageError, match=r"which is not always 0\.006 s; expected no other task"):
                 expect_same_steps(system, tasks, parts)

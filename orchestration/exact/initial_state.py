@@ -1,4 +1,4 @@
-"""Where a system begins, about where it rests."""
+"""The initial state of a system, as deviations from rest."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from orchestration.system.paths import changed
 
 
 @dataclass(frozen=True, kw_only=True)
-class Start:
+class InitialState:
     """Deviations from rest after the first exchange, which is never lost, late or noisy."""
 
     states: Mapping[str, Floats]
@@ -32,12 +32,12 @@ class Start:
     """by connection"""
 
 
-def start_of(
+def initial_state_of(
     system: System, loop: AtRest, parts: Components, tangents: Mapping[str, Tangent], instances: Instances
-) -> Start:
-    """Where `system` begins by itself, as the components `parts` of its loop at rest know it.
+) -> InitialState:
+    """The initial state of `system`, in the coordinates of the components `parts` of its loop at rest.
 
-    Raises `UsageError` where that is not near enough to be linear.
+    Raises `UsageError` where it is outside of the linear range.
     """
     _expect_same_sources(system)
     calm = deterministic(replace(system, operating_point={}))
@@ -48,18 +48,18 @@ def start_of(
     with prepared(replace(calm, components=prompt), load=watching(instances)) as run:
         run.master.initialise()
         if run.master.divergence is not None:
-            raise UsageError(f"it does not begin: {run.master.divergence}")
+            raise UsageError(f"it diverges at its initialisation: {run.master.divergence}")
         saved = {name: instance.save() for name, instance in run.instances.items()}
         outputs = {name: _outputs(run.instances[name], part.outputs) for name, part in parts.items()}
         received = [channel.received.copy() for channel in run.master.channels]
     for name, state in loop.begun.items():
         loop.simulation.instances[name].restore(state)
     rest = {name: _outputs(loop.simulation.instances[name], part.outputs) for name, part in parts.items()}
-    told = [channel.received for channel in loop.simulation.master.channels]
-    return Start(
+    received_at_rest = [channel.received for channel in loop.simulation.master.channels]
+    return InitialState(
         states={name: tangents[name].coordinates_of(saved[name], 0.0) for name in parts},
         outputs={name: outputs[name] - rest[name] for name in parts},
-        received={x.name: now - then for x, now, then in zip(system.connections, received, told)},
+        received={x.name: now - then for x, now, then in zip(system.connections, received, received_at_rest)},
     )
 
 
@@ -68,11 +68,11 @@ def _outputs(instance: Instance, names: tuple[str, ...]) -> Floats:
 
 
 def _expect_same_sources(system: System) -> None:
-    """Raise `UsageError` for what goes on driving the system away from where it rests."""
+    """Raise `UsageError` for a source that drives the system away from rest."""
     at_rest = changed(system, system.operating_point)
     for name, source in system.sources.items():
         if not source.is_held or source.constant != at_rest.sources[name].constant:
             raise UsageError(
-                f"sources.{name}: expected noise, or a constant that is the same at the operating point: a horizon has "
-                "initial conditions, and nothing else that the loop does not rest at"
+                f"sources.{name}: expected noise, or a constant that is the same at the operating point: over a "
+                "horizon only initial conditions differ from it"
             )

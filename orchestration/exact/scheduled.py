@@ -1,4 +1,4 @@
-"""Systems in which a scheduler decides when something happens, and what of that is left to chance."""
+"""Systems with a scheduler, of computers, networks or sampling on arrival; and the randomness of their schedule."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from orchestration.system.placement import carried, placed_messages, placed_task
 from orchestration.system.sampling import Sampling, is_foreseen
 
 
-def is_shared(system: System) -> bool:
-    """Whether a scheduler decides when something of a system happens."""
+def is_scheduled(system: System) -> bool:
+    """Whether a scheduler decides on times of events of a system."""
     samplings = (one.sampling for one in system.components.values())
     on_arrivals = any(each is not None and is_foreseen(each) for each in samplings)
     return bool(system.computers or system.networks) or on_arrivals
 
 
-def by_itself(system: System) -> System:
-    """The same components and connections, each component sampled by itself, and no message late."""
-    if not is_shared(system):
+def without_scheduler(system: System) -> System:
+    """The same components and connections, each component sampled periodically, without computers and networks."""
+    if not is_scheduled(system):
         return system
     components = {
         name: one
@@ -29,40 +29,40 @@ def by_itself(system: System) -> System:
         else replace(one, sampling=Sampling(period=one.sampling.period, clock_ratio=one.sampling.clock_ratio))
         for name, one in system.components.items()
     }
-    there = ("computers.", "networks.")
+    prefixes = ("computers.", "networks.")
     return replace(
         system, components=components, computers={}, networks={},
-        streams={name: number for name, number in system.streams.items() if not name.startswith(there)},
-        operating_point={path: value for path, value in system.operating_point.items() if not path.startswith(there)},
+        streams={name: number for name, number in system.streams.items() if not name.startswith(prefixes)},
+        operating_point={path: x for path, x in system.operating_point.items() if not path.startswith(prefixes)},
     )  # fmt: skip
 
 
 def expect_certain(system: System) -> None:
-    """Raise `UsageError` for what is random in what the scheduler decides."""
-    for place, what in _left_to_chance(system):
+    """Raise `UsageError` for a random quantity that the scheduler depends on."""
+    for place, what in _random_quantities(system):
         raise UsageError(
-            f"{place}: {what}, and how late the others are depends on all before; expected one value (the mean, or the "
-            "largest), or an average over runs (quadcosim sweep)"
+            f"{place}: {what}, and the lateness of the others depends on its history; expected one value (the "
+            "mean, or the largest), or an average over runs (quadcosim sweep)"
         )
 
 
-def _left_to_chance(system: System) -> Iterator[tuple[str, str]]:
-    """Places of what is not the same each time, and how it comes about."""
-    drawn = "not the same for each job"
+def _random_quantities(system: System) -> Iterator[tuple[str, str]]:
+    """Their places in the system file, and in what way they are random."""
+    drawn = "random from job to job"
     for task in placed_tasks(system.computers):
         if task.task.arrivals is not None:
-            yield f"{task.place}.arrivals", "they come by chance"
+            yield f"{task.place}.arrivals", "random"
         if _varies(task.task.execution):
             yield f"{task.place}.execution", drawn
         if _varies(task.task.jitter, is_largest=True):
             yield f"{task.place}.jitter", drawn
     for message in placed_messages(system.networks):
         if message.message.arrivals is not None:
-            yield f"{message.place}.arrivals", "they come by chance"
+            yield f"{message.place}.arrivals", "random"
         if _varies(message.message.jitter, is_largest=True):
-            yield f"{message.place}.jitter", "not the same for each message"
+            yield f"{message.place}.jitter", "random from message to message"
         if message.network.error > 0.0:
-            yield f"networks.{message.network_name}.error", "frames are sent again by chance"
+            yield f"networks.{message.network_name}.error", "frames are repeated at random"
     over, releases = carried(system), released_by(system)
     for x in system.connections:
         sampling = system.components[x.sender].sampling
@@ -71,11 +71,11 @@ def _left_to_chance(system: System) -> Iterator[tuple[str, str]]:
         if x.name not in releases:
             continue
         if _varies(x.delay):
-            yield f"connections.{x.name}.delay", "not the same for each message that releases a task"
+            yield f"connections.{x.name}.delay", "random, of messages that release a task"
         if _varies(x.delay_jitter, is_largest=True):
-            yield f"connections.{x.name}.delay_jitter", "not the same for each message that releases a task"
+            yield f"connections.{x.name}.delay_jitter", "random, of messages that release a task"
         if _varies(x.loss) or (not isinstance(x.loss, Distribution) and 0.0 < x.loss < 1.0):
-            yield f"connections.{x.name}.loss", "not the same for each message that releases a task"
+            yield f"connections.{x.name}.loss", "random, of messages that release a task"
 
 
 def _varies(of: Varying, *, is_largest: bool = False) -> bool:
