@@ -28,8 +28,8 @@ def computed(fmus: Iterable[Path], function: Callable[..., T], *arguments: objec
     command = subprocesses.command("orchestration.fmi.foreign_process")
     try:
         with Child(command, limits=replace(UNLIMITED, memory=Limits.memory)) as child:
-            child.say((function, arguments))
-            result, error = child.hear()
+            child.send((function, arguments))
+            result, error = child.receive()
     except Died as death:
         raise LostError(f"the process of the FMUs {death}") from None
     if error is not None:

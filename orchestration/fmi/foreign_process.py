@@ -12,12 +12,12 @@ def main() -> None:
     parent = Parent()
     result = error = None
     try:
-        function, arguments = parent.hear()
+        function, arguments = parent.receive()
         result = function(*arguments)
         _expect_passable(result, f"the result of {getattr(function, '__name__', function)}")
     except Exception as raised:
         error, result = _passable(raised), None
-    parent.say((result, error))
+    parent.send((result, error))
 
 
 def _passable(error: Exception) -> Exception:

@@ -134,8 +134,8 @@ class IsolatedInstance(Instance):
             raise SimulatorError(f"{self.name}: the FMU has failed and is not called again")
         commands, self._waiting = [*self._waiting, *commands], []
         try:
-            self._child.say(commands)
-            result, error, self.failed, self.warnings = self._child.hear()
+            self._child.send(commands)
+            result, error, self.failed, self.warnings = self._child.receive()
         except Died as death:
             self.failed = True
             raise SimulatorError(f"{self.name} ({self.model.name}): its process {death}") from None

@@ -14,7 +14,7 @@ from orchestration.basics.simulator import Floats, Transfer
 from orchestration.fmi.instances import open_here
 from orchestration.fmi.isolated import Command
 from orchestration.fmi.native import NativeInstance
-from orchestration.processes.channel import Parent, sayable
+from orchestration.processes.channel import Parent, picklable
 
 
 class _Served:
@@ -65,9 +65,9 @@ def main(path: Path, name: str) -> None:
         try:
             result = served.answer(commands)
         except Exception as raised:
-            error = sayable(raised)
+            error = picklable(raised)
         instance = served.instance
-        parent.say((result, error, instance is None or instance.failed, [] if instance is None else instance.warnings))
+        parent.send((result, error, instance is None or instance.failed, [] if instance is None else instance.warnings))
     if served.instance is not None:
         served.instance.close()
 

@@ -87,7 +87,7 @@ def _shown(content: str, path: Path) -> Repeatability:
         with tempfile.TemporaryDirectory(prefix="quadcosim-", ignore_cleanup_errors=True) as folder:
             command = subprocesses.command("orchestration.fmi.repeatability_process", path.absolute(), manner)
             with Child(command, environment=subprocesses.environment(TMPDIR=folder), limits=Limits()) as child:
-                ending = child.heard_by(shown.update)
+                ending = child.receive_all(shown.update)
         if ending.reached is not None:
             return Repeatability()
         if shown.pop("fresh", False):

@@ -199,4 +199,4 @@ def _within(variable: Variable, value: float) -> float:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), sys.argv[2], Parent().say)
+    main(Path(sys.argv[1]), sys.argv[2], Parent().send)

@@ -102,7 +102,7 @@ class Flights:
         (folder / "job.json").write_text(job.to_json(), encoding="utf-8")
         ending = self._started(tool.command(folder / "job.json", folder / "rows.npy"), folder).ending()
         if ending.code != 0:
-            raise QuadcosimError(f"{tool.name}: {ending.said or ending.described.removeprefix('ended with ')}")
+            raise QuadcosimError(f"{tool.name}: {ending.last_line or ending.description.removeprefix('ended with ')}")
         return np.asarray(np.load(folder / "rows.npy"))
 
     def _started(self, command: Sequence[str], folder: Path) -> Child:
@@ -113,7 +113,7 @@ class Flights:
                 command,
                 environment=subprocesses.environment(**dict.fromkeys(_TEMPORARY, str(folder))),
                 folder=folder,  # not this process's: fmpy changes that while it loads an FMU, in another thread
-                talks=False,
+                communicates=False,
             )
             self._flying.append(child)
         return child

@@ -50,6 +50,6 @@ def readings(ssp: Path, given: Carried) -> Iterator[Reading]:
             except importlib.metadata.PackageNotFoundError:
                 continue
             command = tool.command(job.folder / "job.json", job.folder / "rows.npy")
-            ending = Child(command, folder=job.folder, talks=False).ending(PATIENCE)
-            refusal = None if ending.code == 0 else ending.said or ending.described
+            ending = Child(command, folder=job.folder, communicates=False).ending(PATIENCE)
+            refusal = None if ending.code == 0 else ending.last_line or ending.description
             yield Reading(master=f"{name.removesuffix(', SSP')} {versions[tool.packages[0]]}", refusal=refusal)

@@ -1,1 +1,1 @@
-"""Child processes: what they and this one say to each other, how they are limited, and how their end is told."""
+"""Child processes: messages to and from them, their limits, and how they ended."""

@@ -1,4 +1,4 @@
-"""What a process and the one that started it say to each other: frames, over the child's standard streams."""
+"""Messages between a process and its parent: pickled frames over the child's standard streams."""
 
 import math
 import os
@@ -12,21 +12,21 @@ from typing import IO, Any
 
 _HEADER = struct.Struct("<Q")
 _POLL = 0.5
-"""[s] between two looks at whether the parent lives"""
+"""[s] between two checks whether the parent lives"""
 
 
 class LongError(EOFError):
-    """A frame is longer than it may be."""
+    """A frame is longer than allowed."""
 
 
-def framed(content: object) -> bytes:
-    """As a frame; raises what `pickle` does for what cannot be one."""
+def to_frame(content: object) -> bytes:
+    """`content` as a frame; raises what `pickle` raises."""
     data = pickle.dumps(content, pickle.HIGHEST_PROTOCOL)
     return _HEADER.pack(len(data)) + data
 
 
-def sayable(error: BaseException) -> BaseException:
-    """An error as a frame takes it: itself, or its name and its words where it cannot be pickled or read again."""
+def picklable(error: BaseException) -> BaseException:
+    """The error itself, or a `RuntimeError` with its name and text if it cannot be pickled and unpickled."""
     try:
         pickle.loads(pickle.dumps(error))
     except Exception:
@@ -34,37 +34,37 @@ def sayable(error: BaseException) -> BaseException:
     return error
 
 
-def send(stream: IO[bytes], frame: bytes) -> None:
-    """To who receives it; raises `OSError` if nobody reads, `ValueError` if the stream is closed."""
+def write_frame(stream: IO[bytes], frame: bytes) -> None:
+    """Write a frame; raises `OSError` if the other end is closed, `ValueError` if the stream is."""
     stream.write(frame)
     stream.flush()
 
 
-def receive(stream: IO[bytes], most: float = math.inf) -> Any:
-    """What the next frame says; raises `EOFError` if there is none, or if what comes is none that can be understood.
+def read_frame(stream: IO[bytes], limit: float = math.inf) -> Any:
+    """The content of the next frame; raises `EOFError` if there is none or it is not a valid frame.
 
-    Raises `LongError`, before it is read, if it has more than `most` bytes.
+    Raises `LongError`, before it is read, if it has more than `limit` bytes.
     """
     try:
         (length,) = _HEADER.unpack(stream.read(_HEADER.size))
-        if length > most:
+        if length > limit:
             raise LongError
         return pickle.loads(stream.read(length))
     except EOFError:
         raise
-    except Exception as error:  # what is cut off, or written by somebody else, may raise anything
+    except Exception as error:  # truncated or foreign bytes may raise anything
         raise EOFError from error
 
 
 class Parent:
-    """The process that started this one, as a `Child`: where that ends, this one ends, whatever it is doing then.
+    """The process that started this one as a `Child`; when it ends, this process ends, whatever it is doing.
 
-    From now on what is printed here goes to standard error, and who reads standard input finds nothing.
+    Redirects standard output to standard error, and standard input to the null device.
     """
 
-    def __init__(self, *, interrupt: Any = signal.SIG_IGN, orphaned: Callable[[], None] = lambda: None) -> None:
-        """`interrupt` is the handler of Ctrl-C, which nobody sends here but by the process; what was inherited is
-        none. `orphaned` is done first where the parent has ended.
+    def __init__(self, *, interrupt: Any = signal.SIG_IGN, on_orphaned: Callable[[], None] = lambda: None) -> None:
+        """`interrupt` is the handler of SIGINT, which reaches this process only if sent to its id: its session is its
+        own. `on_orphaned` is called before this process ends with its parent.
         """
         signal.signal(signal.SIGINT, interrupt)
         self._requests, self._answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
@@ -72,33 +72,33 @@ class Parent:
         os.dup2(nothing, 0)
         os.close(nothing)
         os.dup2(2, 1)
-        self._orphaned, self._leaving = orphaned, threading.Lock()
+        self._on_orphaned, self._leaving = on_orphaned, threading.Lock()
         threading.Thread(target=self._leave_after, args=(os.getppid(),), daemon=True).start()
 
-    def say(self, content: object) -> None:
-        """One frame; raises what `pickle` does for what cannot be one."""
-        frame = framed(content)
+    def send(self, content: object) -> None:
+        """Send one message; raises what `pickle` raises."""
+        frame = to_frame(content)
         try:
-            send(self._answers, frame)
-        except OSError:  # nobody listens
+            write_frame(self._answers, frame)
+        except OSError:  # the parent has closed its end
             self.leave()
 
-    def hear(self) -> Any:
-        """The next frame; raises `EOFError` if there is none any more."""
-        return receive(self._requests)
+    def receive(self) -> Any:
+        """The next message; raises `EOFError` if there are no more."""
+        return read_frame(self._requests)
 
     def __iter__(self) -> Iterator[Any]:
-        """All frames that come."""
+        """All messages, as they come."""
         while True:
             try:
-                yield self.hear()
+                yield self.receive()
             except EOFError:
                 return
 
     def leave(self) -> None:
-        """End this process, as its parent has ended."""
+        """End this process because its parent has ended."""
         self._leaving.acquire()
-        self._orphaned()
+        self._on_orphaned()
         os._exit(1)
 
     def _leave_after(self, parent: int) -> None:

@@ -1,4 +1,4 @@
-"""A process that this one starts, talks to, limits and ends, with all that it has started."""
+"""A child process: started, limited and ended with all its descendants, with messages to and from it."""
 
 import contextlib
 import math
@@ -13,19 +13,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
-from orchestration.processes.channel import LongError, framed, receive, send
+from orchestration.processes.channel import LongError, read_frame, to_frame, write_frame
 from orchestration.processes.family import Family
 from orchestration.processes.limits import UNLIMITED, Limits
 from orchestration.processes.subprocesses import environment as usual_environment
 from orchestration.processes.watch import Watch
 
 _KEPT = 16_384
-"""Bytes of what the process prints that are kept, of the end"""
+"""Bytes kept of the end of the process's output"""
 _LONGEST = 64.0
-"""[MB] said at once by one whose output is limited, at most"""
+"""[MB] of one message from a process whose output is limited, at most"""
 _OUT_OF_PROCESSOR = "it takes more time of a processor than the system gives it (ulimit -t)"
 _PATIENCE = 60.0
-"""[s] for one that says no more, and so is about to end: why it did is asked for"""
+"""[s] to wait for the exit of a process that has closed its channel"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,16 +33,16 @@ class Ending:
     """How a process ended."""
 
     code: int | None
-    """Exit code, as the operating system gives it; None: it was stopped"""
+    """Exit code of the operating system; None: it was stopped"""
     reached: str | None = None
-    """The limit that it was stopped at, in words"""
+    """The limit at which it was stopped, in words"""
     out_of_time: bool = False
     """Whether that is a limit of time"""
-    said: str = ""
-    """The last line of what it printed, if that is kept"""
+    last_line: str = ""
+    """of its output, if that is kept"""
 
     @property
-    def described(self) -> str:
+    def description(self) -> str:
         """In words, after `the process`."""
         if self.code is None:
             return "does not answer" if self.reached is None else f"was stopped: {self.reached}"
@@ -59,15 +59,15 @@ class Died(Exception):
         self.ending = ending
 
     def __str__(self) -> str:
-        return self.ending.described
+        return self.ending.description
 
 
 class Child:
-    """A command in a process of its own, which ends with the block, when it is closed or no longer known.
+    """A command in a separate process, which ends with the block, when it is closed or garbage-collected.
 
-    It is a module that talks to its `Parent`; one that does not `talk` is but waited for, and what it prints to
-    standard output goes nowhere. Its session is its own: Ctrl-C is for this process. What it prints is kept if its
-    output is limited, or if it does not talk; else it goes where this process's errors go.
+    It is a module that exchanges messages with its `Parent`; one that does not `communicate` is only waited for, and
+    its standard output is discarded. It has its own session, so Ctrl-C reaches this process only. The end of its output
+    is kept if the output is limited or the child does not communicate; else it goes to this process's standard error.
     """
 
     def __init__(
@@ -77,17 +77,17 @@ class Child:
         environment: Mapping[str, str] | None = None,
         folder: Path | None = None,
         limits: Limits = UNLIMITED,
-        talks: bool = True,
+        communicates: bool = True,
     ) -> None:
-        """`folder` is the current one there."""
+        """`folder` is its working directory."""
         family = Family(limited=math.isfinite(limits.time))
-        keeps = not talks or math.isfinite(limits.output)
+        keeps = not communicates or math.isfinite(limits.output)
         self._process = process = subprocess.Popen(
             command,
             env={**(usual_environment() if environment is None else environment), **family.mark},
             cwd=folder,
-            stdin=subprocess.PIPE if talks else subprocess.DEVNULL,
-            stdout=subprocess.PIPE if talks else subprocess.DEVNULL,
+            stdin=subprocess.PIPE if communicates else subprocess.DEVNULL,
+            stdout=subprocess.PIPE if communicates else subprocess.DEVNULL,
             stderr=subprocess.PIPE if keeps else None,
             start_new_session=True,
         )
@@ -95,9 +95,9 @@ class Child:
         self.pid = process.pid
         self._is_limited = math.isfinite(limits.time)
         self._output = None if process.stderr is None else _Output(process.stderr)
-        self._longest = math.inf if math.isinf(limits.output) else _LONGEST * 1e6
+        self._longest_message = math.inf if math.isinf(limits.output) else _LONGEST * 1e6
         self._watch = Watch(process, family, limits, self._output)
-        self._end = weakref.finalize(self, _ended, process, family, self._watch)
+        self._end = weakref.finalize(self, _terminate, process, family, self._watch)
 
     @property
     def spent(self) -> float:
@@ -105,63 +105,63 @@ class Child:
         return self._watch.spent
 
     def allow(self, seconds: float | None) -> None:
-        """From now on it may take so much time, whatever it has taken; None: as much as it likes."""
+        """Limit its time from now on to `seconds`, whatever it has used; None: no limit."""
         self._watch.allow(seconds)
 
     def interrupt(self) -> None:
-        """As by Ctrl-C."""
+        """Send it the signal of Ctrl-C."""
         with contextlib.suppress(OSError):
             self._process.send_signal(signal.SIGINT if sys.platform != "win32" else signal.SIGTERM)
 
-    def say(self, content: object) -> None:
-        """One frame; raises `Died`, and what `pickle` does for what cannot be one."""
+    def send(self, content: object) -> None:
+        """Send one message; raises `Died`, and what `pickle` raises."""
         assert self._process.stdin is not None
-        frame = framed(content)
+        frame = to_frame(content)
         try:
-            send(self._process.stdin, frame)
+            write_frame(self._process.stdin, frame)
         except (OSError, ValueError):  # it has ended, or was closed by another thread
-            raise Died(self._last()) from None
+            raise Died(self._ending_now()) from None
 
-    def hear(self) -> Any:
-        """The next frame; raises `Died`."""
+    def receive(self) -> Any:
+        """The next message; raises `Died`."""
         assert self._process.stdout is not None
         try:
-            return receive(self._process.stdout, self._longest)
+            return read_frame(self._process.stdout, self._longest_message)
         except LongError:
             self.close()
-            self._watch.reached = self._watch.reached or f"it says more than {_LONGEST:g} MB at once"
-            raise Died(self._last()) from None
+            self._watch.reached = self._watch.reached or f"it sends more than {_LONGEST:g} MB at once"
+            raise Died(self._ending_now()) from None
         except EOFError:
-            raise Died(self._last()) from None
+            raise Died(self._ending_now()) from None
 
-    def heard_by(self, hear: Callable[[Any], None]) -> Ending:
-        """Pass on all frames; how it has ended then."""
+    def receive_all(self, handle: Callable[[Any], None]) -> Ending:
+        """Pass all messages to `handle`; returns how the process ended."""
         while True:
             try:
-                frame = self.hear()
+                message = self.receive()
             except Died as death:
                 return death.ending
-            hear(frame)
+            handle(message)
 
     def ending(self, patience: float | None = None) -> Ending:
-        """Wait for its end, [s] if there is to be one; how it has ended, or was ended then."""
+        """Wait for its end, at most `patience` [s], and then end it; returns how it ended."""
         code: int | None = None
         with contextlib.suppress(subprocess.TimeoutExpired):
             code = self._process.wait(patience)
         self.close()
-        said = "" if self._output is None else self._output.last_line()
-        reached = self._watch.reached or self._watch.said_too_much  # it may have ended before anybody looked
+        last_line = "" if self._output is None else self._output.last_line()
+        reached = self._watch.reached or self._watch.excess_output  # it may have ended between two checks
         if self._is_limited and sys.platform == "linux" and code == -signal.SIGXCPU:
             reached = reached or _OUT_OF_PROCESSOR
         return Ending(
             code=code if reached is None else None,
             reached=reached,
             out_of_time=self._watch.reached is not None and self._watch.out_of_time,
-            said=said,
+            last_line=last_line,
         )
 
     def close(self, patience: float = 0.0) -> None:
-        """End it, if it does not end itself in so many seconds when nobody asks it any more."""
+        """Close its input, and end it unless it ends within `patience` [s]."""
         if self._end.alive and patience > 0.0:
             assert self._process.stdin is not None
             with contextlib.suppress(OSError):
@@ -176,12 +176,12 @@ class Child:
     def __exit__(self, *exception: object) -> None:
         self.close()
 
-    def _last(self) -> Ending:
+    def _ending_now(self) -> Ending:
         return self.ending(None if self._is_limited else _PATIENCE)
 
 
 class _Output:
-    """What a process prints, read as it comes, of which only the end is kept."""
+    """The output of a process, read as it comes; only its end is kept."""
 
     def __init__(self, stream: IO[bytes]) -> None:
         self.count = 0
@@ -192,8 +192,8 @@ class _Output:
         self._reader.start()
 
     def last_line(self) -> str:
-        """Of all; empty if there is none."""
-        self._reader.join(timeout=1.0)  # no longer: who has escaped may hold the other end
+        """The last line of the output; empty if there is none."""
+        self._reader.join(timeout=1.0)  # no longer: an escaped process may hold the other end
         return (self._tail.decode("utf-8", "replace").strip().splitlines() or [""])[-1]
 
     def _read(self) -> None:
@@ -204,7 +204,7 @@ class _Output:
 
 
 def _signal(number: int) -> str:
-    """Its name, if it has one: those of real time have none."""
+    """The name of a signal; real-time signals have none."""
     try:
         return signal.Signals(number).name
     except ValueError:
@@ -212,22 +212,24 @@ def _signal(number: int) -> str:
 
 
 def _limit_processor_time(process: "subprocess.Popen[bytes]", limits: Limits) -> None:
-    """Let the system end it, and each process that it starts, where nobody watches any more: we may be killed too.
+    """Limit the processor time of it and its descendants by the system too, in case this process is killed.
 
-    A limit that there is (`ulimit -t`) holds for them, and is left a second before its end: by SIGXCPU, which tells.
+    An existing limit (`ulimit -t`) remains, with the soft limit a second below the hard one: SIGXCPU identifies it.
     """
     if sys.platform == "linux" and math.isfinite(limits.time):
         import resource
 
-        seconds = math.ceil(limits.time * (os.cpu_count() or 1)) + 1  # its threads may use all cores until time is up
-        there = [math.inf if one == resource.RLIM_INFINITY else one for one in resource.getrlimit(resource.RLIMIT_CPU)]
-        hard = int(min(seconds + 1, there[1]))
-        soft = int(max(1, min(seconds, there[0], hard - 1)))
+        seconds = math.ceil(limits.time * (os.cpu_count() or 1)) + 1  # its threads may use all cores
+        existing = [
+            math.inf if one == resource.RLIM_INFINITY else one for one in resource.getrlimit(resource.RLIMIT_CPU)
+        ]
+        hard = int(min(seconds + 1, existing[1]))
+        soft = int(max(1, min(seconds, existing[0], hard - 1)))
         with contextlib.suppress(ProcessLookupError):
             resource.prlimit(process.pid, resource.RLIMIT_CPU, (soft, hard))
 
 
-def _ended(process: "subprocess.Popen[bytes]", family: Family, watch: Watch) -> None:
+def _terminate(process: "subprocess.Popen[bytes]", family: Family, watch: Watch) -> None:
     watch.close()
     family.kill(process)
     process.wait()

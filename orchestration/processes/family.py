@@ -1,4 +1,4 @@
-"""A process with all that it starts, wherever that goes: known by a variable that children inherit (Linux)."""
+"""A process with all its descendants, identified by an environment variable that children inherit (Linux)."""
 
 import contextlib
 import os
@@ -13,29 +13,29 @@ from pathlib import Path
 from orchestration.processes.waiting import waits
 
 _MARK = "QUADCOSIM_FAMILY"
-"""Has the name of each family that a process is of, the outermost first"""
+"""Lists the names of the families that a process belongs to, outermost first"""
 _LIMITED = "L"
-"""At the end of the name of one that is limited in time"""
+"""Suffix of the name of a family that is limited in time"""
 _ROUNDS = 50
-"""How often what still lives is killed: it may go on to start processes meanwhile"""
+"""How often the remaining processes are killed: they may start others meanwhile"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Member:
-    """One process, as it is now."""
+    """The present state of one process."""
 
     limited: bool
-    """Whether its time is limited by itself, in a family within this one"""
+    """Whether it belongs to an inner family with its own time limit"""
     processor: float
-    """[s] that it has had of it"""
+    """[s] of processor time used"""
     waits: Mapping[int, float]
-    """[s] for which it could run and was not let to, by thread"""
+    """[s] for which it was runnable but not running, by thread"""
     memory: int
     """[byte] resident"""
 
 
 class Family:
-    """What will be started with `mark` in its environment."""
+    """The processes started with `mark` in their environment."""
 
     def __init__(self, *, limited: bool) -> None:
         name = uuid.uuid4().hex + (_LIMITED if limited else "")
@@ -43,25 +43,25 @@ class Family:
 
     @property
     def mark(self) -> dict[str, str]:
-        """The variable that makes a process one of the family."""
+        """The environment variable that makes a process a member."""
         return {_MARK: self._names}
 
     def members(self) -> dict[int, Member]:
-        """Those that live, by process; none where the system does not say."""
-        found = {}
+        """Living members by process id; empty where there is no /proc."""
+        members = {}
         for pid, inner in self._pids():
             with contextlib.suppress(OSError, ValueError, IndexError):  # it may end meanwhile
                 fields = Path(f"/proc/{pid}/stat").read_text(errors="replace").rpartition(")")[2].split()
-                found[pid] = Member(
+                members[pid] = Member(
                     limited=_LIMITED in inner,
                     processor=(int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK"),
                     waits=waits(pid),
                     memory=int(fields[21]) * os.sysconf("SC_PAGE_SIZE"),
                 )
-        return found
+        return members
 
     def kill(self, first: "subprocess.Popen[bytes]") -> None:
-        """End the process that was started `first`, and all others."""
+        """Kill the process that was started `first`, and all others."""
         if sys.platform == "win32":
             subprocess.run(["taskkill", "/T", "/F", "/PID", str(first.pid)], capture_output=True, check=False)
             return
@@ -76,11 +76,11 @@ class Family:
                     os.kill(pid, signal.SIGKILL)
 
     def _pids(self) -> Iterator[tuple[int, str]]:
-        """Processes of the family, and the names of those within it that each is of."""
+        """Process ids of the family, each with the names of its inner families."""
         mark = f"{_MARK}={self._names}".encode()
         for name in os.listdir("/proc") if os.path.isdir("/proc") else ():
             if name.isdigit():
                 with contextlib.suppress(OSError):
-                    _, found, rest = Path(f"/proc/{name}/environ").read_bytes().partition(mark)
-                    if found:
+                    _, match, rest = Path(f"/proc/{name}/environ").read_bytes().partition(mark)
+                    if match:
                         yield int(name), rest.partition(b"\0")[0].decode("ascii", "replace")

@@ -1,4 +1,4 @@
-"""What a process may take."""
+"""Resource limits of a process."""
 
 import math
 import sys
@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
-    """What a process that handles a foreign file may take."""
+    """Resource limits of a process that handles a foreign file."""
 
     time: float = 60.0
-    """[s] in which it computes or sleeps; not those in which it waits for a processor, which are known on Linux"""
+    """[s] in which it computes or sleeps; on Linux, time spent waiting for a processor does not count"""
     memory: float = 2000.0
-    """[MB] resident, of the process and what it starts together; enforced on Linux"""
+    """[MB] resident, of the process and its descendants together; enforced on Linux"""
     size: float = 1000.0
     """[MB] that an archive unpacks to, and that any one file may grow to"""
     output: float = 10.0
@@ -23,7 +23,7 @@ UNLIMITED = Limits(time=math.inf, memory=math.inf, size=math.inf, output=math.in
 
 
 def restrict(size: float) -> None:
-    """For the limited process itself: no file of more than `size` MB, and no core dump."""
+    """Allow this process no file of more than `size` MB, and no core dump."""
     if sys.platform == "win32":
         return
     import resource

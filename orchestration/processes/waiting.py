@@ -1,4 +1,4 @@
-"""How long a process has waited for a processor: on a busy machine that is no time of its own."""
+"""How long a process has waited for a processor, which does not count as time used by it."""
 
 import contextlib
 import os
@@ -9,18 +9,18 @@ _NANOSECONDS = 1e9
 
 
 def waits(process: int) -> dict[int, float]:
-    """Seconds for which it could run and was not let to, by thread that lives.
+    """Seconds for which each living thread of a process was runnable but not running.
 
-    None for a process that is gone, and where the system does not say (it does on Linux).
+    Empty for a process that has ended, and on systems other than Linux.
     """
-    found = {}
+    seconds = {}
     with contextlib.suppress(OSError):
         for thread in Path(f"/proc/{process}/task").iterdir():
             with contextlib.suppress(OSError, ValueError, IndexError):  # it may end meanwhile
-                found[int(thread.name)] = int((thread / "schedstat").read_text().split()[1]) / _NANOSECONDS
-    return found
+                seconds[int(thread.name)] = int((thread / "schedstat").read_text().split()[1]) / _NANOSECONDS
+    return seconds
 
 
 def own_clock() -> float:
-    """Seconds on a clock of this process that stands still while it waits for a processor."""
+    """Seconds on a clock of this process that stops while it waits for a processor."""
     return time.monotonic() - max(waits(os.getpid()).values(), default=0.0)

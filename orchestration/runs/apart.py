@@ -97,9 +97,9 @@ class _Receiver:
     def receive_all(self, child: Child, order: Order) -> str | None:
         """Send an order and handle all messages; how the process ended if that was before its last message."""
         try:
-            child.say(order)
+            child.send(order)
             while True:
-                name, *content = child.hear()
+                name, *content = child.receive()
                 if name == "end":
                     child.close(_PATIENCE)
                     return None

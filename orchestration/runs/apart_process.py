@@ -11,7 +11,7 @@ from typing import Any
 from orchestration.engines.room import Shared
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.instances import open_instance
-from orchestration.processes.channel import Parent, sayable
+from orchestration.processes.channel import Parent, picklable
 from orchestration.recording.recording import About, Chunk, InMemory, Recording
 from orchestration.runs.apart import Order
 from orchestration.runs.prepared import prepared, progress_restoring_folder
@@ -30,7 +30,7 @@ class _Reporter(logging.Handler):
 
     def report(self, name: str, *content: Any) -> None:
         """Send one message, by the name of the method that handles it."""
-        self._parent.say((name, *content))
+        self._parent.send((name, *content))
 
     def emit(self, record: logging.LogRecord) -> None:
         """As any handler."""
@@ -63,7 +63,7 @@ class _Reporter(logging.Handler):
 def main(room: Path) -> None:
     """Run what is ordered."""
     parent = Parent(interrupt=signal.default_int_handler)
-    order: Order = parent.hear()
+    order: Order = parent.receive()
     reporter = _Reporter(parent)
     _MESSAGES.handlers[:] = [reporter]
     _MESSAGES.setLevel(order.level)
@@ -71,7 +71,7 @@ def main(room: Path) -> None:
         _simulate(order, reporter, room)
     except BaseException as error:
         if not reporter.is_over:
-            reporter.report("error", sayable(error))
+            reporter.report("error", picklable(error))
     reporter.report("end")
 
 

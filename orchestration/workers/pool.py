@@ -72,15 +72,15 @@ class WorkerProcess:
     def ask(self, task: RunTask | Chunk) -> Any:
         """The answer to a task, or to many; raises `Died`, also at its time limit."""
         self._child.allow(task.time_limit)
-        self._child.say(task)
-        answer = self._child.hear()
+        self._child.send(task)
+        answer = self._child.receive()
         self._child.allow(None)
         return answer
 
     def ready(self) -> Ready:
         """What it says of itself once it has started; raises `Died`."""
-        self._child.say(sources())
-        answer = self._child.hear()
+        self._child.send(sources())
+        answer = self._child.receive()
         assert isinstance(answer, Ready)
         return answer
 

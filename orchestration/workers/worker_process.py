@@ -29,12 +29,12 @@ def main(own_folder: Path) -> None:
             shutil.rmtree(folder, ignore_errors=True)
 
     # An FMU must not be blamed for an interrupt.
-    parent = Parent(interrupt=signal.SIG_DFL, orphaned=orphaned)
-    told: Sources = parent.hear()
-    parent.say(Ready(versions=software(told.now()), machine=machine()))
+    parent = Parent(interrupt=signal.SIG_DFL, on_orphaned=orphaned)
+    told: Sources = parent.receive()
+    parent.send(Ready(versions=software(told.now()), machine=machine()))
     runner = Runner(machine())
     for task in parent:
-        parent.say(_fly(runner, task))
+        parent.send(_fly(runner, task))
     parent.leave()  # the coordinator ends a process otherwise
 
 

@@ -237,9 +237,9 @@ def test_an_error_of_the_validation_itself_is_no_finding(
     def fail(child: Child, hear: Callable[[Frame], None]) -> Ending:
         for frame in report:
             hear(frame)
-        return Ending(code=1, said="no such module")
+        return Ending(code=1, last_line="no such module")
 
-    monkeypatch.setattr(Child, "heard_by", fail)
+    monkeypatch.setattr(Child, "receive_all", fail)
     with pytest.raises(QuadcosimError, match=f"LowPass.fmu: it is the validation that failed: {words}"):
         validate(low_pass)
 
@@ -256,7 +256,7 @@ def test_whether_a_call_hangs_is_told_by_the_time_of_the_process(
         return Ending(code=None, reached="it is late", out_of_time=True)
 
     monkeypatch.setattr(Child, "spent", property(lambda child: next(times)))
-    monkeypatch.setattr(Child, "heard_by", out_of_time)
+    monkeypatch.setattr(Child, "receive_all", out_of_time)
     (found,) = validate(low_pass, limits=Limits(time=60.0))
     assert found.text == f"stopped in runs: it is late; {words}; the rest was not checked"
 

@@ -56,14 +56,14 @@ def _attempt(path: Path, limits: Limits, environment: Mapping[str, str]) -> Tria
         command = subprocesses.command("orchestration.checks.doctor.loading", path.resolve(), folder, limits.size)
         found: dict[str, Any] = {}
         with Child(command, environment=environment, limits=limits) as child:
-            ending = child.heard_by(found.update)
+            ending = child.receive_all(found.update)
     if isinstance(found.get("error"), OtherVersionError):
         raise found["error"]
     if "error" in found:
         raise UsageError(f"{path}: {found['error']}")
     if "fmu" not in found:
-        words = f": {ending.said}" if ending.said else ""
-        raise UsageError(f"{path}: could not be read, the process {ending.described}{words}")
+        words = f": {ending.last_line}" if ending.last_line else ""
+        raise UsageError(f"{path}: could not be read, the process {ending.description}{words}")
     fmu: Fmu = found["fmu"]
     if CO_SIMULATION not in fmu.kinds:
         return Trial(fmu=fmu, failure=f"not tried: it is for {' and '.join(KINDS[kind] for kind in fmu.kinds)} only")
@@ -75,8 +75,8 @@ def _failure(found: dict[str, Any], ending: Ending) -> str | None:
     if "failure" in found:
         return str(found["failure"])
     if ending.code is None:
-        return f"its process {ending.described}"
-    return None if "loads" in found and ending.code == 0 else f"took its process down: it {ending.described}"
+        return f"its process {ending.description}"
+    return None if "loads" in found and ending.code == 0 else f"took its process down: it {ending.description}"
 
 
 def main(path: Path, folder: Path, size_limit: float, say: Callable[[object], None]) -> None:
@@ -134,4 +134,4 @@ def _initialisation(slave: Any, fmu: Fmu) -> Iterator[tuple[str, Callable[[], ob
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), Path(sys.argv[2]), float(sys.argv[3]), Parent().say)
+    main(Path(sys.argv[1]), Path(sys.argv[2]), float(sys.argv[3]), Parent().send)

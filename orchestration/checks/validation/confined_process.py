@@ -82,4 +82,4 @@ def _run(probe: Probe, report: Report) -> None:
 
 if __name__ == "__main__":
     _path, _folder, _time, _size = sys.argv[1:]
-    main(Path(_path), Path(_folder), Limits(time=float(_time), size=float(_size)), Report(Parent().say))
+    main(Path(_path), Path(_folder), Limits(time=float(_time), size=float(_size)), Report(Parent().send))

@@ -30,10 +30,10 @@ def validate(path: str | Path, *, limits: Limits | None = None) -> list[Finding]
         )
         with Child(command, limits=limits) as child:
             told = Told(lambda: child.spent)
-            ending = child.heard_by(told.hear)
+            ending = child.receive_all(told.hear)
     silent = None if told.beaten is None else child.spent - told.beaten
     if told.error is not None or (told.rule is None and ending.code is not None):
-        raise QuadcosimError(f"{path}: it is the validation that failed: {told.error or ending.said}")
+        raise QuadcosimError(f"{path}: it is the validation that failed: {told.error or ending.last_line}")
     return [*told.findings, *_of_ending(told, ending, silent, limits)]
 
 
@@ -52,4 +52,4 @@ def _of_ending(told: Told, ending: Ending, silent: float | None, limits: Limits)
         return [Finding(PROCESS, text)]
     if ending.code == 0 and told.ended:
         return []
-    return [Finding(PROCESS, f"the process of the FMU {ending.described} {moment}")]
+    return [Finding(PROCESS, f"the process of the FMU {ending.description} {moment}")]

@@ -94,7 +94,7 @@ def test_it_is_shown_once_on_a_machine(tmp_path: Path, cache: Path, monkeypatch:
     path = made("BROKEN_RESET", tmp_path)
     first = repeatability.of(path)
     monkeypatch.setattr(repeatability, "_known", {})
-    monkeypatch.setattr(Child, "heard_by", lambda *_: pytest.fail("shown again"))
+    monkeypatch.setattr(Child, "receive_all", lambda *_: pytest.fail("shown again"))
     assert repeatability.of(path) == first
     (stored,) = cache.rglob("*.json")
     stored.write_text("damaged")
@@ -107,7 +107,7 @@ def test_what_could_not_be_tried_to_the_end_is_not_relied_on_nor_kept(
     tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stopped = Ending(code=None, reached="it takes longer than the limit of 60 s", out_of_time=True)
-    monkeypatch.setattr(Child, "heard_by", lambda *_: stopped)
+    monkeypatch.setattr(Child, "receive_all", lambda *_: stopped)
     assert repeatability.of(made("none", tmp_path)) == Repeatability(reset=False, second_instance=False)
     assert not list(cache.rglob("*.json"))
 

@@ -1,4 +1,4 @@
-"""A process says what it has to say, and is ended at its limits, with all that it started."""
+"""A child process exchanges messages, and is ended at its limits with all its descendants."""
 
 import dataclasses
 import os
@@ -57,7 +57,7 @@ def gone(pid: int) -> bool:
 def test_a_process_that_keeps_its_limits_ends_itself() -> None:
     ending = python("import sys; print('first'); print('last', file=sys.stderr); sys.exit(3)")
     assert (ending.code, ending.reached, ending.out_of_time) == (3, None, False)
-    assert ending.said in ("first", "last")
+    assert ending.last_line in ("first", "last")
 
 
 @pytest.mark.parametrize(
@@ -68,7 +68,7 @@ def test_a_process_that_keeps_its_limits_ends_itself() -> None:
             "while True: print('x' * 1000)", {"output": 0.5},
             "it writes more than the limit of 0.5 MB to its standard output and error",
         ),
-        (  # that ends before anybody looks
+        (  # ends before the first check
             "print('x' * 600_000)", {"output": 0.5},
             "it writes more than the limit of 0.5 MB to its standard output and error",
         ),
@@ -106,14 +106,14 @@ def test_no_file_may_grow_beyond_its_limit(tmp_path: Path) -> None:
     program = "import sys; from orchestration.processes.limits import restrict; restrict(1.0)\n" + (
         "with open(sys.argv[1], 'wb') as file: file.write(bytes(2_000_000))"
     )
-    assert "File too large" in python(program, tmp_path / "file").said
+    assert "File too large" in python(program, tmp_path / "file").last_line
 
 
 @linux_only
-def test_the_system_ends_a_process_that_nobody_watches_any_more() -> None:
+def test_the_system_limits_a_process_whose_parent_is_killed() -> None:
     program = "import resource, time; time.sleep(0.2); print(*resource.getrlimit(resource.RLIMIT_CPU))"
     seconds = 2 * (os.cpu_count() or 1) + 1
-    assert python(program, time=2.0).said == f"{seconds} {seconds + 1}"
+    assert python(program, time=2.0).last_line == f"{seconds} {seconds + 1}"
 
 
 UNDER_A_LIMIT = """
@@ -123,12 +123,12 @@ from orchestration.processes.limits import Limits
 resource.setrlimit(resource.RLIMIT_CPU, ({soft}, {hard}))
 with Child([sys.executable, "-c", sys.argv[1]], limits=Limits()) as child:
     ending = child.ending()
-print(ending.code, ending.reached, ending.said, sep="|")
+print(ending.code, ending.reached, ending.last_line, sep="|")
 """
 
 
 def under_a_limit(program: str, *, soft: int, hard: int) -> list[str]:
-    """Code, limit reached and last words of a program confined by a process with a limit of processor time."""
+    """Code, limit reached and last line of a program confined by a process with a limit of processor time."""
     command = [sys.executable, "-c", UNDER_A_LIMIT.format(soft=soft, hard=hard), f"{TALKS}\n{program}"]
     done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True)
     return done.stdout.strip().split("|")
@@ -136,13 +136,13 @@ def under_a_limit(program: str, *, soft: int, hard: int) -> list[str]:
 
 @linux_only
 @pytest.mark.parametrize(("soft", "hard", "left"), [(40, 40, "39 40"), (30, 50, "30 50")])
-def test_a_limit_of_processor_time_that_there_is_holds_for_a_confined_process(soft: int, hard: int, left: str) -> None:
+def test_an_existing_limit_of_processor_time_holds_for_a_confined_process(soft: int, hard: int, left: str) -> None:
     program = "import resource, time; time.sleep(0.2); print(*resource.getrlimit(resource.RLIMIT_CPU))"
     assert under_a_limit(program, soft=soft, hard=hard) == ["0", "None", left]
 
 
 @linux_only
-def test_a_process_ended_by_a_limit_of_processor_time_that_there_is_says_so() -> None:
+def test_a_process_ended_by_an_existing_limit_of_processor_time_is_reported_so() -> None:
     reached = "it takes more time of a processor than the system gives it (ulimit -t)"
     assert under_a_limit("while True: pass", soft=2, hard=2) == ["None", reached, ""]
 
@@ -156,8 +156,8 @@ print("done")
 """
 
 
-@pytest.mark.skipif(not Path("/proc/self/schedstat").exists(), reason="the system does not say who waits")
-def test_the_time_in_which_a_process_waits_for_a_processor_is_not_its_own() -> None:
+@pytest.mark.skipif(not Path("/proc/self/schedstat").exists(), reason="the system does not report waiting times")
+def test_time_spent_waiting_for_a_processor_does_not_count() -> None:
     core = min(os.sched_getaffinity(0))
     spin = f"import os\nos.sched_setaffinity(0, {{{core}}})\nwhile True: pass"
     with ExitStack() as stack:
@@ -168,114 +168,114 @@ def test_the_time_in_which_a_process_waits_for_a_processor_is_not_its_own() -> N
         started = time.monotonic()
         ending = python(BUSY, time=0.5)
         took = time.monotonic() - started
-    assert (ending.said, ending.reached) == ("done", None)
+    assert (ending.last_line, ending.reached) == ("done", None)
     assert took > 0.5, "expected it to have waited for longer than its limit"
 
 
-# -- what is said -----------------------------------------------------------------------------------------
+# -- messages ---------------------------------------------------------------------------------------------
 
-ANSWERS = "for asked in parent: parent.say(asked)"
+ECHO = "for message in parent: parent.send(message)"
 
 
 @pytest.fixture
 def child() -> Iterator[Callable[..., Child]]:
-    """Starts a program that talks."""
+    """Starts a program that communicates."""
     with ExitStack() as stack:
         yield lambda program, **limits: stack.enter_context(
             Child([sys.executable, "-c", f"{TALKS}\n{program}"], limits=dataclasses.replace(UNLIMITED, **limits))
         )
 
 
-def test_what_is_said_is_heard_whatever_is_printed_and_read_meanwhile(child: Callable[..., Child]) -> None:
-    one = child(f"import sys; print('printed', flush=True); sys.stdin.read()\n{ANSWERS}")
-    for said in ("a word", {"an": ["object"]}, b"x" * 1_000_000):
-        one.say(said)
-        assert one.hear() == said
+def test_messages_arrive_whatever_is_printed_and_read_meanwhile(child: Callable[..., Child]) -> None:
+    one = child(f"import sys; print('printed', flush=True); sys.stdin.read()\n{ECHO}")
+    for message in ("a word", {"an": ["object"]}, b"x" * 1_000_000):
+        one.send(message)
+        assert one.receive() == message
 
 
-def test_a_child_that_is_asked_no_more_ends_itself_if_there_is_patience(
+def test_a_child_whose_input_is_closed_ends_itself_if_there_is_patience(
     child: Callable[..., Child], tmp_path: Path
 ) -> None:
-    one = child(f"{ANSWERS}\nopen({str(tmp_path / 'ended')!r}, 'w')")
-    one.say(0)
-    assert one.hear() == 0
+    one = child(f"{ECHO}\nopen({str(tmp_path / 'ended')!r}, 'w')")
+    one.send(0)
+    assert one.receive() == 0
     one.close(PATIENCE)
     assert (tmp_path / "ended").exists()
 
 
 @pytest.mark.parametrize(
-    ("program", "told"),
+    ("program", "expected"),
     [
         ("import sys; sys.exit(3)", "ended with exit code 3"),
         ("import os; os.kill(os.getpid(), 11)", "ended by SIGSEGV"),
         pytest.param("import os; os.kill(os.getpid(), 40)", "ended by signal 40", marks=linux_only),
-        ("parent.say(Unknown())", "ended with exit code 0"),
+        ("parent.send(Unknown())", "ended with exit code 0"),
         ("import os; os.write(parent._answers.fileno(), b'not a frame, but as long')", "ended with exit code 0"),
         ("parent._answers.write(bytes([200, 0, 0, 0, 0, 0, 0, 0, 1]))", "ended with exit code 0"),
         ("import os, time; os.close(parent._answers.fileno()); time.sleep(600)", "does not answer"),
     ],
 )
-def test_how_a_child_dies_is_told_to_who_waits_for_its_answer(
-    program: str, told: str, child: Callable[..., Child], monkeypatch: pytest.MonkeyPatch
+def test_the_end_of_a_child_is_reported_to_a_waiting_receiver(
+    program: str, expected: str, child: Callable[..., Child], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    if told == "does not answer":
+    if expected == "does not answer":
         monkeypatch.setattr("orchestration.processes.child._PATIENCE", 0.1)
     one = child(f"class Unknown: pass\n{program}")
     with pytest.raises(Died) as death:
-        one.hear()
-    assert str(death.value) == told
+        one.receive()
+    assert str(death.value) == expected
     assert gone(one.pid)
 
 
-def test_what_is_said_to_a_child_that_another_thread_has_closed_is_told_as_its_death(
+def test_sending_to_a_child_closed_by_another_thread_reports_its_death(
     child: Callable[..., Child],
 ) -> None:
-    one = child(ANSWERS)
+    one = child(ECHO)
     one.close()
     with pytest.raises(Died, match=r"^ended by SIGKILL$"):
-        one.say(0)
+        one.send(0)
 
 
-def test_what_cannot_be_said_is_no_death(child: Callable[..., Child]) -> None:
-    one = child(ANSWERS)
+def test_a_message_that_cannot_be_pickled_does_not_end_the_child(child: Callable[..., Child]) -> None:
+    one = child(ECHO)
     with pytest.raises((pickle.PicklingError, AttributeError, TypeError)):
-        one.say(lambda: None)
-    one.say(0)
-    assert one.hear() == 0
+        one.send(lambda: None)
+    one.send(0)
+    assert one.receive() == 0
 
 
-def test_a_child_whose_output_is_limited_is_ended_before_it_is_heard_at_too_great_a_length(
+def test_a_child_whose_output_is_limited_is_ended_before_too_long_a_message_is_read(
     child: Callable[..., Child], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("orchestration.processes.child._LONGEST", 0.001)
     for limits in ({}, {"output": 1.0}):
-        one = child("parent.say(bytes(2000)); parent.hear()", **limits)
+        one = child("parent.send(bytes(2000)); parent.receive()", **limits)
         if not limits:
-            assert one.hear() == bytes(2000)
+            assert one.receive() == bytes(2000)
             continue
-        with pytest.raises(Died, match=r"^was stopped: it says more than 0.001 MB at once$"):
-            one.hear()
+        with pytest.raises(Died, match=r"^was stopped: it sends more than 0.001 MB at once$"):
+            one.receive()
         assert gone(one.pid)
 
 
-def test_a_limited_child_that_is_no_longer_known_ends() -> None:
-    one = Child([sys.executable, "-c", f"{TALKS}\n{ANSWERS}"], limits=Limits())
+def test_a_limited_child_that_is_garbage_collected_ends() -> None:
+    one = Child([sys.executable, "-c", f"{TALKS}\n{ECHO}"], limits=Limits())
     pid, known = one.pid, weakref.ref(one)
     del one
     assert known() is None
     assert gone(pid)
 
 
-def test_what_a_child_may_take_counts_from_when_it_is_allowed(child: Callable[..., Child]) -> None:
-    one = child("import time\nfor seconds in parent: time.sleep(seconds); parent.say(seconds)", memory=1e6)
-    one.say(1.5)
-    assert one.hear() == 1.5
+def test_an_allowance_of_time_counts_from_when_it_is_given(child: Callable[..., Child]) -> None:
+    one = child("import time\nfor seconds in parent: time.sleep(seconds); parent.send(seconds)", memory=1e6)
+    one.send(1.5)
+    assert one.receive() == 1.5
     one.allow(1.0)
-    one.say(0.0)
-    assert one.hear() == 0.0
-    one.say(600.0)
+    one.send(0.0)
+    assert one.receive() == 0.0
+    one.send(600.0)
     with pytest.raises(Died) as death:
-        one.hear()
+        one.receive()
     assert death.value.ending.reached == "it takes more than the time limit of 1 s"
 
 
@@ -283,28 +283,29 @@ NESTED = """
 import sys
 from orchestration.processes.child import Child
 from orchestration.processes.limits import Limits
-parent.hear()
-with Child([sys.executable, "-c", "import time; time.sleep(3.0)"], limits=Limits(time=60.0), talks=False) as inner:
+parent.receive()
+sleep = [sys.executable, "-c", "import time; time.sleep(3.0)"]
+with Child(sleep, limits=Limits(time=60.0), communicates=False) as inner:
     inner.ending()
-parent.say("done")
+parent.send("done")
 """
 
 
 @linux_only
-def test_the_time_of_a_process_with_a_limit_of_its_own_is_not_that_of_who_waits_for_it(
+def test_the_time_of_a_process_with_its_own_limit_does_not_count_for_the_one_waiting(
     child: Callable[..., Child],
 ) -> None:
     one = child(NESTED)
     one.allow(2.0)
-    one.say("begin")
-    assert one.hear() == "done"
+    one.send("begin")
+    assert one.receive() == "done"
 
 
 ORPHAN = f"""
 import os, sys
 from orchestration.processes.child import Child
-program = {TALKS!r} + "\\nimport os, time; parent.say(os.getpid()); time.sleep(600)"
-print(Child([sys.executable, "-c", program]).hear(), flush=True)
+program = {TALKS!r} + "\\nimport os, time; parent.send(os.getpid()); time.sleep(600)"
+print(Child([sys.executable, "-c", program]).receive(), flush=True)
 os.kill(os.getpid(), 9)
 """
 

@@ -1,4 +1,4 @@
-"""What counts of the time of a process: for a limit that it starts with, and for what it is allowed later."""
+"""Which time counts against a limit that a process starts with, and against a later allowance."""
 
 import subprocess
 import threading
@@ -12,21 +12,21 @@ from orchestration.processes.limits import UNLIMITED, Limits
 from orchestration.processes.watch import Watch
 from tests.patience import PATIENCE
 
-LOOKS = 4
+CHECKS = 4
 
 
 class Busy:
-    """A family whose threads have an hour of a processor from one look to the next."""
+    """A family whose threads use an hour of processor time between two checks."""
 
     def __init__(self) -> None:
-        self.looks = 0
+        self.checks = 0
         self.seen, self.killed = threading.Event(), threading.Event()
 
     def members(self) -> dict[int, Member]:
-        self.looks += 1
-        if self.looks > LOOKS:
+        self.checks += 1
+        if self.checks > CHECKS:
             self.seen.set()
-        return {1: Member(limited=False, processor=3600.0 * self.looks, waits={}, memory=0)}
+        return {1: Member(limited=False, processor=3600.0 * self.checks, waits={}, memory=0)}
 
     def kill(self, first: object) -> None:
         self.killed.set()
@@ -43,14 +43,14 @@ def watch(busy: Busy, limits: Limits) -> Watch:
     return Watch(process, cast(Family, busy), limits, None)
 
 
-def test_a_limit_is_one_of_elapsed_time_however_many_threads_compute_in_it(busy: Busy) -> None:
+def test_a_limit_is_of_elapsed_time_however_many_threads_compute(busy: Busy) -> None:
     one = watch(busy, Limits(time=600.0))
     assert busy.seen.wait(PATIENCE)
     one.close()
     assert one.reached is None
 
 
-def test_what_is_allowed_later_is_time_of_a_processor_of_all_threads(busy: Busy) -> None:
+def test_a_later_allowance_is_of_processor_time_of_all_threads(busy: Busy) -> None:
     one = watch(busy, UNLIMITED)
     one.allow(600.0)
     assert busy.killed.wait(PATIENCE)
