@@ -1,4 +1,4 @@
-"""Run FMUs under a realistic digital clock: fly a quadrotor's controller, or any system, and find what it stands.
+"""Run FMUs under a realistic digital clock, a quadrotor's controller or any system, and find which clock it tolerates.
 
 One run, here the paper's flight, sampled every 20 ms::
 
@@ -13,22 +13,22 @@ One run, here the paper's flight, sampled every 20 ms::
 
 Where to begin:
 
-- `run` takes a `Scenario` of the quadrotor, with its `Timing`, or a `System` of any FMUs, and gives a `Result`;
-- `load_scenario` and `load_system` read files of them, and the constructors refuse what the files refuse, in one line;
-- `fly` takes arrays of initial conditions, or of anything else, and gives arrays: many runs at once, without a store;
-- `limit` finds the largest period, delay, loss or anything else that is still good;
-- `expect` gives the expectation of means of squares exactly, of the loop about its operating point, without a run;
+- `run` takes a `Scenario` of the quadrotor, with its `Timing`, or a `System` of any FMUs, and returns a `Result`;
+- `load_scenario` and `load_system` read them from files; constructors reject invalid values as files do, in one line;
+- `fly` takes arrays of initial conditions, or of any other value, and returns arrays: many runs at once, not stored;
+- `limit` finds the largest period, delay, loss or other value that is still good;
+- `expect` computes expectations of mean squares exactly, of the loop about its operating point, without a run;
 - `margin` certifies how far a delay, a jitter or a run of losses may vary without making the linear loop unstable;
-- `schedule` says who has the computers and networks of a system when, and what theory says of it;
-- `linearise` cuts a loop open about its operating point, sampled, held and late as it is: two systems of matrices;
-- `sweep` flies a `Study` over axes, `compare` controllers against each other, `tune` searches for gains: what is there
-  is not flown again, and what they give becomes a table with `to_pandas`;
-- `Simulation` stops a run at each sample, for a controller or any other component that is code of yours;
+- `schedule` computes which task or message has each computer and network when, and bounds on response times;
+- `linearise` opens a loop about its operating point, sampled, held and delayed as it is: two state-space systems;
+- `sweep` runs a `Study` over axes, `compare` compares controllers, `tune` searches for gains: stored runs are not
+  repeated, and results become a table with `to_pandas`;
+- `Simulation` stops a run at each sample, where your code takes the place of a controller or any other component;
 - `report` writes one HTML file of runs, with a replay;
-- `read_model` says what an FMU has.
+- `read_model` reads the variables and properties of an FMU.
 
-All times are in seconds, all values in the units that the FMUs declare. What goes wrong is a `QuadcosimError`, of which
-`UsageError` is what cannot be carried out as it is written. Studies and tables need `pip install 'quadcosim[studies]'`.
+All times are in seconds, all values in the units that the FMUs declare. All errors are `QuadcosimError`s; a
+`UsageError` is an invalid request. Studies and tables need `pip install 'quadcosim[studies]'`.
 """
 
 from importlib import import_module
@@ -178,7 +178,7 @@ _OTHERWISE = {
     "fly": "run_many",
     "fly_until": "run_until",
 }
-"""Names that go by another one at home"""
+"""Names that differ in their modules"""
 
 __all__ = [
     "Arrivals",
@@ -258,7 +258,7 @@ __all__ = [
 if not TYPE_CHECKING:  # else every name would seem to be there, of type Any
 
     def __getattr__(name):
-        """Load what is asked for and no more: the command line answers `--help` without numpy."""
+        """Load only what is used: the command line answers `--help` without numpy."""
         if name not in _HOMES:
             raise AttributeError(f"module {__name__} has no attribute {name}")
         return getattr(import_module(_HOMES[name]), _OTHERWISE.get(name, name))

@@ -227,7 +227,7 @@ def fronts_of(
             )  # fmt: skip
         line = sorted((p.effort.value or 0.0, p.error.value or 0.0) for p in here if p.on_front)
         panel.plot(*np.transpose(line), color=GREY, linewidth=0.8, zorder=0)
-        panel.set_title(f"{axis.said(float(value))}, {here[0].starts} starts")
+        panel.set_title(f"{axis.text_of(float(value))}, {here[0].starts} starts")
         panel.set(xscale="log", yscale="log")
     for panel in panels:  # when all are drawn, for they share their axes
         plain(panel.xaxis)

@@ -62,7 +62,7 @@ def checked(system: System, models: Mapping[str, Model]) -> Checked:
         _expect_clock(name, component, models[name])
     parameters = _parameters(system, models)
     of_jobs = job_numbers(system)
-    system = objectives.known(system, signals_of(system, models), {*parameters, *of_jobs})
+    system = objectives.with_available_objectives(system, signals_of(system, models), {*parameters, *of_jobs})
     return Checked(system=system, parameters=parameters, units=units(system, models), follows=words)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from orchestration.basics.simulator import Floats
 from orchestration.figures.palette import CYCLE, DASHES
 from orchestration.recording.recording import Events, Recording
-from orchestration.results.column_info import Described
+from orchestration.results.column_info import ColumnInfo
 from orchestration.system.model import System
 
 Window: TypeAlias = tuple[float, float]
@@ -32,7 +32,7 @@ class Run:
     """as many rows as can be seen"""
     whole: Recording
     """all of them"""
-    described: Mapping[str, Described]
+    described: Mapping[str, ColumnInfo]
     """what is known of each column"""
     parameters: Mapping[str, float]
     """of all components, by COMPONENT.NAME"""

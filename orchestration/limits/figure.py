@@ -64,7 +64,7 @@ def _values(axes: Axes, found: Found, across: Quantity) -> None:
             color=GREY,
             linewidth=1.0,
             linestyle=":",
-            label=f"the criterion's bound, {Quantity(name='', unit=found.judged_unit).said(bound, DIGITS)}",
+            label=f"the criterion's bound, {Quantity(name='', unit=found.judged_unit).text_of(bound, DIGITS)}",
         )
     values = [one.measured or 0.0 for one in known]
     if min(values) > 0.0 and max(values) > 20.0 * min(values):
@@ -116,7 +116,7 @@ def _limits(axes: Axes, found: Found, across: Quantity) -> None:
     for limit, color, style, name in named:
         at = None if limit is None else limit * across.factor
         if limit is not None and at is not None and left <= at <= right:
-            axes.axvline(at, color=color, linestyle=style, label=f"{name}  {across.said(limit, DIGITS)}")
+            axes.axvline(at, color=color, linestyle=style, label=f"{name}  {across.text_of(limit, DIGITS)}")
     if found.large_signal_limit is not None:
         axes.axvspan(found.large_signal_limit * across.factor, right, color=RED, alpha=0.06, linewidth=0.0)
 
@@ -124,7 +124,7 @@ def _limits(axes: Axes, found: Found, across: Quantity) -> None:
 def _title(found: Found, across: Quantity) -> str:
     what, until = across.name, f", in runs of {found.horizon:g} s"
     if found.large_signal_limit is not None:
-        return f"Good up to {across.said(found.large_signal_limit, DIGITS)}: {what}{until}"
+        return f"Good up to {across.text_of(found.large_signal_limit, DIGITS)}: {what}{until}"
     first = found.tried[0]
     return f"{what}: {'good throughout' if is_good(first) else 'never good'}{until}"
 

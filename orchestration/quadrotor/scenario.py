@@ -219,7 +219,7 @@ class Scenario:
         for key in ("period", "delay"):
             if value := getattr(timing, key):
                 named = setting(f"timing.{key}", [value])
-                text = varying(value) if isinstance(value, Distribution) else named.said(value)
+                text = varying(value) if isinstance(value, Distribution) else named.text_of(value)
                 parts.append(f"{named.name} {text}")
         if timing.order != "gauss-seidel":
             parts.append("Jacobi")

@@ -1,4 +1,4 @@
-"""A recording as CSV: a head of names with their units in brackets, as in `plant.position.x [m]`, then numbers."""
+"""A recording as CSV: a head of names with units in brackets, as in `plant.position.x [m]`, then numbers."""
 
 from pathlib import Path
 from typing import Any
@@ -15,14 +15,14 @@ SIGNALS, EVENTS = "signals.csv", "events.csv"
 
 
 def write(recording: Recording, about: About, folder: Path) -> list[Path]:
-    """Write `signals.csv` and `events.csv` into a folder, chunk by chunk; their paths.
+    """Write `signals.csv` and `events.csv` into a folder, chunk by chunk; returns their paths.
 
-    Numbers have as many digits as it takes to read the same ones again.
+    Numbers have as many digits as are needed to read back the same values.
     """
     folder.mkdir(parents=True, exist_ok=True)
     written = [folder / SIGNALS, folder / EVENTS]
     units = [units_of(about), {"time": "s"}]
-    schemas = [_headed(schema, of) for schema, of in zip(tables.schemas(recording.columns), units)]
+    schemas = [_with_units(schema, of) for schema, of in zip(tables.schemas(recording.columns), units)]
     with csv.CSVWriter(written[0], schemas[0]) as signals, csv.CSVWriter(written[1], schemas[1]) as events:
         for chunk in recording.chunks():
             for writer, schema, table in zip((signals, events), schemas, tables.both(chunk)):
@@ -30,5 +30,5 @@ def write(recording: Recording, about: About, folder: Path) -> list[Path]:
     return written
 
 
-def _headed(schema: Any, units: dict[str, str]) -> Any:
+def _with_units(schema: Any, units: dict[str, str]) -> Any:
     return pa.schema([(in_brackets(field.name, units.get(field.name)), field.type) for field in schema])

@@ -1,4 +1,4 @@
-"""A recording as tables of pandas."""
+"""A recording as pandas tables."""
 
 from typing import TYPE_CHECKING
 
@@ -26,7 +26,7 @@ def signals(recording: Recording, about: About) -> "pd.DataFrame":
 
 
 def events(recording: Recording) -> "pd.DataFrame":
-    """A row for each event in order of time: `time` [s], `event`, `what` it happened to and `sample`, its index."""
+    """A row for each event in order of time: `time` [s], `event`, its object (`what`) and the index `sample`."""
     import pandas as pd
 
     table = pd.concat([_events(chunk.events) for chunk in recording.chunks(("time",))], ignore_index=True)
@@ -34,9 +34,9 @@ def events(recording: Recording) -> "pd.DataFrame":
     return table
 
 
-def _events(found: Events) -> "pd.DataFrame":
+def _events(events: Events) -> "pd.DataFrame":
     import pandas as pd
 
-    time, kind, what, sample = found.table.T
-    words, names = np.array(KINDS, dtype=object), np.array([*found.names], dtype=object)
+    time, kind, what, sample = events.table.T
+    words, names = np.array(KINDS, dtype=object), np.array([*events.names], dtype=object)
     return pd.DataFrame({"time": time / 1e9, "event": words[kind], "what": names[what], "sample": sample})

@@ -1,4 +1,4 @@
-"""Numbers with names and units as a MAT-file: structures whose fields are names that MATLAB takes."""
+"""MAT-files: structures whose fields are valid MATLAB names."""
 
 import re
 from collections.abc import Mapping
@@ -19,22 +19,22 @@ Struct = dict[str, Any]
 
 
 def write(path: Path, variables: Mapping[str, Any]) -> Path:
-    """Write variables by name, structures among them, as a MAT-file of version 5; its path.
+    """Write variables by name, which may be structures, as a MAT-file of version 5; returns its path.
 
-    What MATLAB has no word for is made up: None is NaN, a list of texts a cell array.
+    None becomes NaN, a list of texts a cell array.
     """
     from scipy.io import savemat
 
     path.parent.mkdir(parents=True, exist_ok=True)
-    savemat(path, {name: _kept(value) for name, value in variables.items()}, do_compression=True, long_field_names=True,
-            oned_as="column")  # fmt: skip
+    values = {name: _as_matlab(value) for name, value in variables.items()}
+    savemat(path, values, do_compression=True, long_field_names=True, oned_as="column")
     return path
 
 
 def nested(values: Mapping[str, Any]) -> Struct:
-    """Dotted names as structures in each other: `plant.position.x` is the field x of position of plant.
+    """Dotted names as nested structures: `plant.position.x` is the field x of position of plant.
 
-    Where a name goes on after one that has a value itself, as `mode.text` beside `mode`, it is one field: `mode_text`.
+    A name that continues one with a value, as `mode.text` beside `mode`, is one field: `mode_text`.
     """
     tree: Struct = {}
     for name, value in values.items():
@@ -48,7 +48,7 @@ def nested(values: Mapping[str, Any]) -> Struct:
 
 
 def flat(values: Mapping[str, Any]) -> Struct:
-    """Names as fields of one structure, `position_rmse`; dots are underlines."""
+    """Names as fields of one structure, `position_rmse`; dots become underscores."""
     fields: Struct = {}
     for name, value in values.items():
         fields[_free(valid(name), fields)] = value
@@ -56,7 +56,7 @@ def flat(values: Mapping[str, Any]) -> Struct:
 
 
 def valid(name: str) -> str:
-    """A name that MATLAB takes, as its makeValidName would make it: letters, digits and _, a letter first."""
+    """A valid MATLAB name, as by its makeValidName: letters, digits and _, a letter first."""
     word = re.sub(r"\W", "_", name, flags=re.ASCII)
     if not re.match(r"[A-Za-z]", word) or word in _KEYWORDS:
         word = f"x{word}"
@@ -64,18 +64,18 @@ def valid(name: str) -> str:
 
 
 def _free(name: str, taken: Mapping[str, Any]) -> str:
-    """The name, or the first of it with a number that is not taken."""
-    found, number = name, 1
-    while found in taken:
+    """The name, or the first one with a number that is not taken."""
+    free, number = name, 1
+    while free in taken:
         number += 1
-        found = f"{name[: LONGEST - 4]}_{number}"
-    return found
+        free = f"{name[: LONGEST - 4]}_{number}"
+    return free
 
 
-def _kept(value: Any) -> Any:
-    """As SciPy takes it for what MATLAB has."""
+def _as_matlab(value: Any) -> Any:
+    """The value in the form in which SciPy writes it as the matching MATLAB type."""
     if isinstance(value, Mapping):
-        return {name: _kept(one) for name, one in value.items()}
+        return {name: _as_matlab(one) for name, one in value.items()}
     if value is None:
         return np.nan
     if isinstance(value, (list, tuple)):

@@ -1,4 +1,4 @@
-"""What a flight leaves: its rows and events, handed over in chunks as it goes on."""
+"""The recording of a run: its rows and events, handed over in chunks while it runs."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,21 +10,21 @@ import numpy.typing as npt
 from orchestration.basics.simulator import Floats, Integers
 
 ROWS, EVENTS = 2**15, 2**18
-"""A chunk is whole as soon as it has so many rows or events, so that what is computed by chunks does not depend on
-where they are kept."""
+"""A chunk is complete with this many rows or events, so that what is computed by chunks does not depend on where they
+are stored."""
 BYTES = 2**27
-"""Or so many bytes of rows, where a row is wide"""
+"""Or with this many bytes of rows, where a row is wide"""
 
 
 class Event(NamedTuple):
-    """Something that happened to one message, or to one job of a task."""
+    """An event of one message, or of one job of a task."""
 
     time: int
     """[ns]"""
     kind: str
     """One of `KINDS`"""
     what: str
-    """The name of the connection; of what a computer or a network does, COMPUTER.TASK or NETWORK.MESSAGE"""
+    """The name of the connection; COMPUTER.TASK for a job, NETWORK.MESSAGE for a frame"""
     sample: int
     """The index of the message, or of the job or frame"""
 
@@ -34,33 +34,33 @@ KINDS = (
     "released", "started", "preempted", "resumed", "finished", "missed", "skipped", "aborted",
     "queued", "transmitted", "retransmitted",
 )  # fmt: skip
-"""Of messages of connections; of jobs of tasks; and of frames of messages over networks"""
+"""Of messages of connections, of jobs of tasks, and of frames of messages over networks"""
 SAMPLED, SENT, ARRIVED, LOST = range(4)
 
 
 @dataclass(frozen=True, eq=False)
 class Events(Sequence[Event]):
-    """Events in order, as columns: one object for all of them, where a million are no rarity."""
+    """Events in order, as columns: one object for all of them, as there may be millions."""
 
     names: tuple[str, ...]
-    """what they happen to"""
+    """connections, tasks and messages that have events"""
     table: Integers
     """shape (n, 4): time [ns], index in `KINDS`, index in `names`, index of the message, job or frame"""
 
     @classmethod
     def of(cls, events: Iterable[Event]) -> "Events":
-        """The same as columns."""
+        """Make columns of a list of events."""
         listed = list(events)
         names = tuple(dict.fromkeys(event.what for event in listed))
         rows = [(time, KINDS.index(kind), names.index(what), sample) for time, kind, what, sample in listed]
         return cls(names, np.array(rows, dtype=np.int64).reshape(-1, 4))
 
     def are(self, kind: str, what: str | None = None) -> npt.NDArray[np.bool_]:
-        """Which are of a kind, and happen to `what` if it is given; shape (n,)."""
-        found: npt.NDArray[np.bool_] = self.table[:, 1] == KINDS.index(kind)
+        """Which are of a kind, and of `what` if it is given; shape (n,)."""
+        selected: npt.NDArray[np.bool_] = self.table[:, 1] == KINDS.index(kind)
         if what is not None:
-            found &= self.table[:, 2] == (self.names.index(what) if what in self.names else -1)
-        return found
+            selected &= self.table[:, 2] == (self.names.index(what) if what in self.names else -1)
+        return selected
 
     def __len__(self) -> int:
         return len(self.table)
@@ -82,13 +82,13 @@ class Events(Sequence[Event]):
 
 @dataclass(frozen=True, kw_only=True)
 class Chunk:
-    """Rows that follow each other, and what happened after the row before them up to the last one."""
+    """Consecutive rows, and the events after the row before them up to their last row."""
 
     columns: tuple[str, ...]
     rows: Floats
     """shape (n, number of columns), at most `ROWS` of them"""
     events: Events
-    """in order of time; the last chunk has those after its last row too"""
+    """in order of time; the last chunk also has those after its last row"""
 
     @property
     def signals(self) -> dict[str, Floats]:
@@ -97,7 +97,7 @@ class Chunk:
 
 
 class Recording(Protocol):
-    """What was recorded; to be gone through as often as one likes."""
+    """Recorded rows and events; can be iterated any number of times."""
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -107,38 +107,38 @@ class Recording(Protocol):
         """Number of rows."""
 
     def chunks(self, columns: Collection[str] | None = None) -> Iterator[Chunk]:
-        """In order of time, at least one; with all columns, or those of `columns` that there are."""
+        """In order of time, at least one; with all columns, or those of `columns` that exist."""
 
 
 About = Mapping[str, Mapping[str, str]]
-"""What is known of columns beside their values, by column: its `unit` and its `description`, where it has them"""
+"""The `unit` and the `description` of columns, where they have them, by column"""
 
 
 class Recorder(Protocol):
-    """Takes what a flight leaves."""
+    """Receives the chunks of a run."""
 
     def describe(self, about: About) -> None:
-        """What is known of the columns, for those who write it down; before they begin."""
+        """Units and descriptions of the columns, for recorders that write them; called before `begin`."""
 
     def begin(self, columns: tuple[str, ...]) -> None:
-        """The names of what every row has; before the first chunk."""
+        """The names of all columns; called before the first chunk."""
 
     def take(self, chunk: Chunk) -> None:
-        """The next chunk."""
+        """Receive the next chunk."""
 
     def finish(self) -> Recording:
-        """What was taken."""
+        """End; returns what was received."""
 
 
 class InMemory:
-    """A recorder that keeps everything, and the recording that it has made."""
+    """A recorder that keeps everything, and is its own recording."""
 
     def __init__(self) -> None:
         self.columns: tuple[str, ...] = ()
         self._chunks: list[Chunk] = []
 
     def describe(self, about: About) -> None:
-        """As `Recorder`; who has the result has this too."""
+        """As `Recorder`; not kept: the result has it."""
 
     def begin(self, columns: tuple[str, ...]) -> None:
         """As `Recorder`."""
@@ -156,14 +156,14 @@ class InMemory:
         return sum(len(chunk.rows) for chunk in self._chunks)
 
     def chunks(self, columns: Collection[str] | None = None) -> Iterator[Chunk]:
-        """As `Recording`; with all columns in any case, they are there."""
+        """As `Recording`; always with all columns."""
         return iter(self._chunks)
 
 
 def thinned(recording: Recording, columns: Collection[str], window: tuple[float, float], most: int) -> Recording:
-    """All rows in the `window` of time [s]; of the others every n-th, so that they are at most about `most`.
+    """All rows in the `window` of time [s]; of the others every n-th, so that they are about `most` at most.
 
-    Only those of `columns`, and of the events those at the rows that stay.
+    Only with `columns`, and with the events at the rows that are kept.
     """
     stride = -(-len(recording) // most)
     result = InMemory()
@@ -172,8 +172,8 @@ def thinned(recording: Recording, columns: Collection[str], window: tuple[float,
         keep = (np.arange(len(t)) % stride == 0) | ((t >= window[0]) & (t <= window[1]))
         events = chunk.events
         if stride > 1:
-            stays = np.isin(events.table[:, 0], np.round(t[keep] * 1e9).astype(np.int64))
-            events = Events(events.names, events.table[stays])
+            kept = np.isin(events.table[:, 0], np.round(t[keep] * 1e9).astype(np.int64))
+            events = Events(events.names, events.table[kept])
         result.begin(chunk.columns)
         result.take(Chunk(columns=chunk.columns, rows=chunk.rows[keep], events=events))
     return result

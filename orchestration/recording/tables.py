@@ -25,7 +25,7 @@ _EVENT = pa.schema(
 
 
 class ToFolder:
-    """A recorder that writes each chunk to the files of a folder as it comes."""
+    """A recorder that writes each chunk to the files of a folder when it is received."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -59,14 +59,14 @@ class ToFolder:
 
 
 class InFolder:
-    """A recording in the files of a folder, of which a chunk at a time is read.
+    """A recording in the files of a folder, read a chunk at a time.
 
-    Raises `UsageError` for files that are not as they were written: what is in a chunk is seen when that is read.
+    Raises `UsageError` for files that are not as they were written; damage within a chunk is found when it is read.
     """
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        with _opened(folder / SIGNALS) as signals, _opened(folder / EVENTS) as events:
+        with _open(folder / SIGNALS) as signals, _open(folder / EVENTS) as events:
             names = signals.schema_arrow.names
             if "time" not in names:
                 raise UsageError(f"{folder / SIGNALS}: no column time; expected those of a run")
@@ -83,7 +83,7 @@ class InFolder:
     def chunks(self, columns: Collection[str] | None = None) -> Iterator[Chunk]:
         """As `Recording`."""
         names = tuple(name for name in self.columns if columns is None or name in columns)
-        with _opened(self._folder / SIGNALS) as signals, _opened(self._folder / EVENTS) as events:
+        with _open(self._folder / SIGNALS) as signals, _open(self._folder / EVENTS) as events:
             for group in range(signals.num_row_groups):
                 table = _group(self._folder / SIGNALS, signals, group, [*names])
                 yield Chunk(
@@ -93,11 +93,11 @@ class InFolder:
                 )
 
 
-def _opened(path: Path) -> Any:
-    """A Parquet file whose pages are held to their checksums."""
+def _open(path: Path) -> Any:
+    """A Parquet file whose pages are checked against their checksums."""
     try:
         return pq.ParquetFile(path, page_checksum_verification=True)
-    except Exception as error:  # of many kinds, none of them documented
+    except Exception as error:  # of several undocumented types
         raise UsageError(f"{path}: expected a Parquet file, as it was written: {error}") from error
 
 
@@ -122,7 +122,7 @@ def _expect_schema(path: Path, file: Any, schema: Any) -> None:
 
 
 def copy(recording: Recording, folder: Path, about: About) -> None:
-    """Write the files of `folder`, with what is known of the columns in their metadata."""
+    """Write the files of `folder`, with units and descriptions in the metadata of the columns."""
     recorder = ToFolder(folder)
     recorder.describe(about)
     recorder.begin(recording.columns)
@@ -132,19 +132,19 @@ def copy(recording: Recording, folder: Path, about: About) -> None:
 
 
 def write_signals(path: Path | BinaryIO, recording: Recording, about: About) -> None:
-    """One column each for what is recorded, all float64, with what is known of it in its metadata."""
+    """Write all signals, a float64 column each, with unit and description in its metadata."""
     with pq.ParquetWriter(path, _signals_schema(recording.columns, about), write_page_checksum=True) as writer:
         for chunk in recording.chunks():
             writer.write_table(_signals_table(chunk))
 
 
 def schemas(columns: Iterable[str]) -> tuple[Any, Any]:
-    """Arrow's, of signals with these columns and of events."""
+    """The Arrow schemas of signals with these columns and of events."""
     return _signals_schema(columns, {}), _EVENT
 
 
 def both(chunk: Chunk) -> tuple[Any, Any]:
-    """A chunk as Arrow's tables: its signals, and its events."""
+    """A chunk as Arrow tables: its signals, and its events."""
     return _signals_table(chunk), _events_table(chunk.events)
 
 
@@ -169,13 +169,13 @@ def _events_table(events: Events) -> Any:
 
 
 def _numbers(values: npt.NDArray[Any]) -> Any:
-    """An array of Arrow's over the same memory; `pa.array` would load pandas, to ask whether it is of it."""
+    """An Arrow array over the same memory; `pa.array` would load pandas to check for its types."""
     values = np.ascontiguousarray(values)
     return pa.Array.from_buffers(pa.from_numpy_dtype(values.dtype), len(values), [None, pa.py_buffer(values)])
 
 
 def _texts(words: Sequence[str], places: Integers) -> Any:
-    """An array of Arrow's with the words at `places`."""
+    """An Arrow array of the words at `places`."""
     encoded = [word.encode() for word in words]
     ends = np.cumsum(np.array([0, *map(len, encoded)])[places + 1], dtype=np.int32)
     content = b"".join([encoded[place] for place in places.tolist()])
@@ -199,6 +199,6 @@ def _values(column: Any) -> npt.NDArray[Any]:
 
 
 def _places(texts: Any) -> tuple[tuple[str, ...], Integers]:
-    """The different texts of a column, and which of them each is."""
+    """The distinct texts of a column, and the index of each row in them."""
     encoded = texts.combine_chunks().dictionary_encode()
     return tuple(encoded.dictionary.to_pylist()), np.from_dlpack(encoded.indices).astype(np.int64)

@@ -5,14 +5,14 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from orchestration.report.known_layouts import layout_for
 from orchestration.report.model import Layout, Line, Panel
 from orchestration.results import display_names as labels
-from orchestration.results.column_info import Described
+from orchestration.results.column_info import ColumnInfo
 from orchestration.system.model import System
 from orchestration.system.variable_names import component_of
 
 MOST_LINES = 8
 """in one panel"""
 
-About = Mapping[str, Described]
+About = Mapping[str, ColumnInfo]
 """What is known of columns"""
 
 

@@ -19,7 +19,7 @@ from orchestration.report.subset import ALONE, MOST, chosen, points_for
 from orchestration.report.tables import ColumnAxis, Row, is_good, share_of, shares_along, table_of
 from orchestration.report.tracks import Tracks
 from orchestration.results import display_names as labels
-from orchestration.results.column_info import described
+from orchestration.results.column_info import column_infos
 from orchestration.results.criterion import judged
 from orchestration.results.quantities import quantity
 from orchestration.studies.axis_labels import quantity_of
@@ -226,7 +226,7 @@ def embed(
     for flight in fly(flown_study, files, some, lanes=lanes, progress=progress):
         note = _difference(flight, known[flight.index], metric)
         differing += note is not None
-        about = described(flight.system, files.models_of(flown_study.origin), flight.signals)
+        about = column_infos(flight.system, files.models_of(flown_study.origin), flight.signals)
         places[flight.index] = len(runs)
         settings: dict[str, Setting] = dict(known[flight.index]["settings"])
         track = tracks.compact(flight.system, flight.signals, about, points)

@@ -1,1 +1,1 @@
-"""What rows come to: objectives, their units, the names that people read."""
+"""The metrics of a run, their units, and display names."""

@@ -1,4 +1,4 @@
-"""What the FMUs of a run say of its columns: unit and description, for whoever draws or writes them."""
+"""Unit and description of the columns of a run, as its FMUs declare them."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -9,39 +9,39 @@ from orchestration.system.variable_names import component_of, variable_of
 
 
 @dataclass(frozen=True, kw_only=True)
-class Described:
-    """One column."""
+class ColumnInfo:
+    """Unit and description of one column."""
 
     unit: str | None = None
     """as FMI writes it, N.m for instance"""
     text: str | None = None
     """the FMU's description"""
 
-    def as_words(self) -> dict[str, str]:
-        """What there is, by `unit` and `description`, as the fields of a Parquet file have it."""
+    def as_metadata(self) -> dict[str, str]:
+        """Those that exist, by `unit` and `description`, as in the metadata of a Parquet column."""
         named = {"unit": self.unit, "description": self.text}
         return {name: text for name, text in named.items() if text}
 
 
-def described(system: System, models: Mapping[str, Model], columns: Iterable[str]) -> dict[str, Described]:
-    """By column; a source is described by what it feeds, a trajectory is a position in metres."""
+def column_infos(system: System, models: Mapping[str, Model], columns: Iterable[str]) -> dict[str, ColumnInfo]:
+    """By column; a source has those of the input that it feeds, a trajectory is a position in metres."""
     fed = {
         signal: end
         for name, source in system.sources.items()
         if source.to
         for signal, end in zip(source.signals(name), source.to, strict=True)
     }
-    found = {"time": Described(unit="s", text="time")}
+    infos = {"time": ColumnInfo(unit="s", text="time")}
     for column in columns:
         if column in fed:
-            found[column] = _of(models, fed[column])
+            infos[column] = _of(models, fed[column])
         elif component_of(column) in models:
-            found[column] = _of(models, column)
+            infos[column] = _of(models, column)
         elif column != "time":
-            found[column] = Described(unit="m", text="desired position")
-    return found
+            infos[column] = ColumnInfo(unit="m", text="desired position")
+    return infos
 
 
-def _of(models: Mapping[str, Model], signal: str) -> Described:
+def _of(models: Mapping[str, Model], signal: str) -> ColumnInfo:
     variable = models[component_of(signal)].variables.get(variable_of(signal))
-    return Described() if variable is None else Described(unit=variable.unit, text=variable.description)
+    return ColumnInfo() if variable is None else ColumnInfo(unit=variable.unit, text=variable.description)

@@ -1,4 +1,4 @@
-"""What a criterion is about: the objective that it judges, where it draws the line, what of it a run did not meet."""
+"""Parts of a criterion: the objective that it judges, its bound, and the parts that a run did not meet."""
 
 import operator
 from collections.abc import Iterator, Mapping
@@ -11,13 +11,13 @@ _HOLDS = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.
 
 
 def judged(system: System) -> str | None:
-    """The objective that the criterion is about, or the first one; None where there is none."""
+    """The objective that the criterion judges, or else the first one; None if there is none."""
     named = names(parse(system.criterion.good)) if system.criterion.good is not None else ()
     return next((name for name in named if name in system.objectives), next(iter(system.objectives), None))
 
 
 def edge(system: System, metric: str) -> float | None:
-    """The bound of a criterion that is `metric < number` and no more, or with another comparison."""
+    """The bound of a criterion that is only `metric < number`, or another comparison; None for any other."""
     if system.criterion.good is None:
         return None
     match parse(system.criterion.good):
@@ -27,10 +27,10 @@ def edge(system: System, metric: str) -> float | None:
 
 
 def unmet(system: System, metrics: Mapping[str, Any], units: Mapping[str, str]) -> str | None:
-    """Which part of the criterion a run did not meet, with its number against its bound; None: it did, or diverged.
+    """The parts of the criterion that a run did not meet, with value and bound; None: it met all, or diverged.
 
-    `units` are those of its metrics, by name. Parts are what `and` joins; of one that is no comparison of an objective
-    with a number it is only said that it does not hold.
+    `units` are those of its metrics, by name. Parts are joined by `and`; for one that is no comparison of an objective
+    with a number the text is only that it does not hold.
     """
     if system.criterion.good is None or metrics["good"] is not False or metrics["outcome"] == "diverged":
         return None

@@ -1,9 +1,9 @@
-"""Names for people: of metrics, signals and settings, with their units, wherever they are drawn or printed."""
+"""Display names of metrics, signals and settings, with their units, for figures and printed tables."""
 
 import re
 from collections.abc import Mapping
 
-from orchestration.results.column_info import Described
+from orchestration.results.column_info import ColumnInfo
 from orchestration.system.variable_names import component_of, variable_of
 
 METRICS: Mapping[str, tuple[str, str | None]] = {
@@ -31,7 +31,7 @@ METRICS: Mapping[str, tuple[str, str | None]] = {
     "wall_time": ("time that the run took", "s"),
     "engine": ("engine", None),
 }
-"""Of what a run of the quadrotor comes to, name and unit; docs/metrics.md defines each."""
+"""Metrics of a run of the quadrotor: name and unit; docs/metrics.md defines each."""
 
 SETTINGS: Mapping[str, tuple[str, str | None]] = {
     "stop_time": ("stop time", "s"),
@@ -66,7 +66,7 @@ SETTINGS: Mapping[str, tuple[str, str | None]] = {
     "plant.thrust_max": ("largest thrust", "N"),
     "plant.torque_max": ("largest torque", "N.m"),
 }
-"""Of what a scenario sets, by path: name and unit; what is not here goes by the words of its path."""
+"""Settings of a scenario, by path: name and unit; others are named by the words of their path."""
 
 SIGNALS: Mapping[str, str] = {
     "plant.thrust": "thrust",
@@ -84,23 +84,23 @@ SIGNALS: Mapping[str, str] = {
     "controller.sliding": "sliding variable",
     "controller.energy": "energy L",
 }
-"""Of the quadrotor's loop; vectors by their stem, a component is said behind it."""
+"""Signals of the quadrotor's loop; vectors by their stem, to which the axis is appended."""
 
 AXES: Mapping[str, str] = {"x": "x", "y": "y", "z": "z", "w": "w"}
 
 
 def metric(name: str) -> str:
-    """A metric or objective in words."""
+    """The display name of a metric or objective."""
     return METRICS[name][0] if name in METRICS else words(name)
 
 
 def metric_with_unit(name: str, of: str | None = None) -> str:
-    """A metric in words with its unit: the one that its FMUs give it, else the quadrotor's."""
+    """The display name of a metric with its unit: the unit from its FMUs, else the quadrotor's."""
     return with_unit(metric(name), of or METRICS.get(name, ("", None))[1])
 
 
 def setting(path: str) -> str:
-    """What a path of a scenario, system or study file sets, in words: the period of pilot for
+    """The display name of a path of a scenario, system or study file: `period of pilot` for
     `components.pilot.sampling.period`.
     """
     known = _known(path)
@@ -114,18 +114,18 @@ def setting(path: str) -> str:
 
 
 def unit_of_setting(path: str) -> str | None:
-    """The unit of what a path of a scenario sets; None where none is known here."""
+    """The unit of a path of a scenario; None if it is not known here."""
     known = _known(path)
     return None if known is None else known[1]
 
 
 def _known(path: str) -> tuple[str, str | None] | None:
-    """Of a path, or of a key of the timing by itself, as `limit` has it."""
+    """Name and unit of a path, or of a key of the timing without its table, as `limit` uses it."""
     return SETTINGS.get(path) or SETTINGS.get(f"timing.{path}")
 
 
-def signal(name: str, described: Mapping[str, Described]) -> str:
-    """A recorded column in words: of the quadrotor by name, of any other system by what its FMU says of it."""
+def signal(name: str, described: Mapping[str, ColumnInfo]) -> str:
+    """The display name of a recorded column: from the table for the quadrotor, else from the FMU's description."""
     stem, _, axis = name.rpartition(".")
     if name in SIGNALS:
         return SIGNALS[name]
@@ -139,17 +139,17 @@ def signal(name: str, described: Mapping[str, Described]) -> str:
 
 
 LONGEST = 32
-"""characters of a description that a legend takes"""
+"""characters of a description that fit into a legend"""
 _GOES_ON = {"of", "at", "in", "on", "from", "to", "by", "for", "asked", "between"}
 
 
 def words(name: str) -> str:
-    """The words of a name as files write it."""
+    """The words of a name in a file."""
     return re.sub(r"[_.\s]+", " ", name).strip()
 
 
 def unit(text: str | None) -> str | None:
-    """A unit as people write it: N·m for N.m, m/s² for m/s2; None where there is nothing to say."""
+    """A unit in print: N·m for N.m, m/s² for m/s2; None for none and for 1."""
     if text in (None, "", "1"):
         return None
     raised = re.sub(r"(?<=[A-Za-zµΩ°%)])\^?(-?\d+)", lambda found: found[1].translate(_RAISED), str(text))
@@ -166,6 +166,6 @@ def amount(value: float, of: str | None) -> str:
 
 
 def with_unit(name: str, of: str | None) -> str:
-    """A quantity with its unit in brackets, as axes and heads of tables have it."""
+    """A quantity with its unit in brackets, as on axes and in heads of tables."""
     shown = unit(of)
     return name if shown is None else f"{name} [{shown}]"

@@ -1,4 +1,4 @@
-"""A run in the formats of other programs."""
+"""Exports of a run to the formats of other programs."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,12 +13,12 @@ from orchestration.results.objectives import Metrics
 
 
 def to_mat(path: Path, recording: Recording, about: About, metrics: Metrics, units: Mapping[str, str]) -> Path:
-    """Write a run as the structure `run` of a MAT-file; its path.
+    """Write a run as the structure `run` of a MAT-file; returns its path.
 
     `run.time` [s] and `run.signals.plant.position.x` are columns of n rows; `run.units` has the same fields as
     `run.signals`, with the unit of each as text, empty where it has none. `run.events` has `time` [s], `event`, `what`
-    and `sample`; `run.metrics` the metrics, `run.metric_units` their units. `run.columns` lists the signals by the
-    names that they have elsewhere.
+    and `sample`; `run.metrics` the metrics, `run.metric_units` their units. `run.columns` lists the signals by their
+    usual names.
     """
     chunks = list(recording.chunks())
     rows = np.concatenate([chunk.rows for chunk in chunks])

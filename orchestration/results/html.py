@@ -1,4 +1,4 @@
-"""Results as notebooks show them: a line, and a table of what was found with its units."""
+"""HTML of results for notebooks: a heading, a line of facts, and a table of values with their units."""
 
 import html
 from collections.abc import Iterable, Sequence
@@ -11,7 +11,7 @@ _COLOURS = {True: "#2f8f5b", False: "#b5323e", None: "#6b6b6b"}
 
 
 def card(title: str, outcome: str | None, good: bool | None, facts: str, rows: Iterable[Row]) -> str:
-    """A heading with the outcome, in colour by whether it is good, a line of facts, and a table; styles are inline."""
+    """A heading with the outcome, coloured by whether it is good, a line of facts, and a table; styles are inline."""
     badge = "" if outcome is None else (
         f' <span style="background:{_COLOURS[good]};color:#fff;border-radius:0.6em;padding:0.05em 0.6em">'
         f"{html.escape(outcome)}</span>"
@@ -32,7 +32,7 @@ def _table(rows: Sequence[Row]) -> str:
 
 
 def number(value: float | int | bool | str | None) -> str:
-    """A value as people read it."""
+    """A value as text."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):

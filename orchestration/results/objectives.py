@@ -1,4 +1,4 @@
-"""What a run comes to, as numbers: the objectives and the criterion of its system."""
+"""The metrics of a run: the objectives and the criterion of its system."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -19,9 +19,9 @@ Metrics = dict[str, float | int | bool | str | None]
 
 GOOD = "criterion.good"
 FIXED = ("outcome", "good", "horizon", "diverged", "divergence_time", "steps")
-"""Names that every run has beside its objectives."""
+"""Metrics that every run has beside its objectives."""
 PRINTED = ("wall_time", "engine")
-"""Names of what `run` prints beside them."""
+"""What `run` prints beside them."""
 
 
 def compute(
@@ -33,18 +33,20 @@ def compute(
     steps: int,
     terminated: bool = False,
 ) -> Metrics:
-    """The objectives of a run by name, and what became of it by its `end` [s].
+    """The objectives of a run by name, and its outcome at its `end` [s].
 
-    A run that diverged has no objective: an average over the time that it lasted would grow better the sooner it
-    ended. One that an FMU has `terminated` has those of the time that it lasted, and is not good for the same reason.
-    Raises `UsageError` for an objective that cannot be evaluated, naming it.
+    A run that diverged has no objectives: an average over the time that it lasted would favour runs that end early.
+    One that an FMU has `terminated` has those of the time that it lasted, and is not good for the same reason.
+    Raises `UsageError`, naming it, for an objective that cannot be evaluated.
     """
     if divergence_time is not None:
-        return told(system, None, end=end, stop_time=system.stop_time, divergence_time=divergence_time, steps=steps)
+        return metrics_of(
+            system, None, end=end, stop_time=system.stop_time, divergence_time=divergence_time, steps=steps
+        )
     nodes = {name: parse(text) for name, text in system.objectives.items()}
     if system.criterion.good is not None:
         nodes[GOOD] = parse(system.criterion.good)
-    return told(
+    return metrics_of(
         system,
         evaluate(nodes, spans),
         end=end,
@@ -55,9 +57,9 @@ def compute(
     )
 
 
-def told(
+def metrics_of(
     system: System,
-    found: Mapping[str, float | None] | None,
+    values: Mapping[str, float | None] | None,
     *,
     end: float,
     stop_time: float,
@@ -65,39 +67,39 @@ def told(
     steps: int,
     terminated: bool = False,
 ) -> Metrics:
-    """The metrics of a run, from what its expressions, `GOOD` with them, have come to; None: it diverged.
+    """The metrics of a run from the `values` of its expressions, that of `GOOD` included; None: it diverged.
 
-    Of `system` are what the expressions are called, and the outcomes.
+    `system` has the names of the expressions and of the outcomes.
     """
     objectives: dict[str, float | None] = dict.fromkeys((*system.objectives, *system.optional))
     good = None if system.criterion.good is None else False
-    if found is not None:
-        objectives |= found
+    if values is not None:
+        objectives |= values
         if good is not None:
             good = bool(objectives.pop(GOOD)) and not terminated
     return {
-        "outcome": DIVERGED if found is None else TERMINATED if terminated else outcome(system, good),
+        "outcome": DIVERGED if values is None else TERMINATED if terminated else outcome(system, good),
         "good": good,
-        "horizon": stop_time if found is None else end,
+        "horizon": stop_time if values is None else end,
         **objectives,
-        "diverged": found is None,
+        "diverged": values is None,
         "divergence_time": divergence_time,
         "steps": steps,
     }
 
 
 def outcome(system: System, good: bool | None) -> str | None:
-    """What a run is called that came to its end; None if its system has no criterion."""
+    """The outcome of a run that reached its end; None if its system has no criterion."""
     return None if good is None else system.criterion.outcomes[0 if good else 1]
 
 
 def spans(system: System, recording: Recording, parameters: Mapping[str, float], end: float) -> Iterator[Recorded]:
-    """What expressions see of a run that ended at `end` [s], chunk by chunk, each with the last row of the one before.
+    """The data that expressions of a run up to `end` [s] use, chunk by chunk, each with the last row of the one before.
 
-    Their `stop_time` is the end, so that the last third of an interrupted run is of what there is.
+    Their `stop_time` is the end, so that the last third of an interrupted run is that of its recording.
     """
-    wanted = {name for _, expression in expressions(system) for name in names(parse(expression))}
-    columns = [c for c in recording.columns if c == "time" or c in wanted or c.rpartition(".")[0] in wanted]
+    named = {name for _, expression in expressions(system) for name in names(parse(expression))}
+    columns = [c for c in recording.columns if c == "time" or c in named or c.rpartition(".")[0] in named]
     lines = {x.name: _Line() for x in system.connections if x.hold == "first"}
     before: Floats | None = None
     for chunk in recording.chunks(columns):
@@ -119,22 +121,22 @@ def spans(system: System, recording: Recording, parameters: Mapping[str, float],
 def _arrivals(system: System, time: Floats, events: Events) -> dict[str, Booleans]:
     """By connection, the rows at which a message of it arrived, or was measured and not lost."""
     instants = np.round(time * NANOSECONDS).astype(np.int64)
-    found = {}
+    rows = {}
     for x in system.connections:
         arrived = events.table[events.are("arrived", x.name)]
         sampled, lost = events.table[events.are("sampled", x.name)], events.table[events.are("lost", x.name)]
-        measured = sampled[~np.isin(sampled[:, 3], lost[:, 3])]  # what is lost is so at the time of its sample
-        found[x.name] = np.isin(instants, np.concatenate([arrived[:, 0], measured[:, 0]]))
-    return found
+        measured = sampled[~np.isin(sampled[:, 3], lost[:, 3])]  # the event of a loss has the time of its sample
+        rows[x.name] = np.isin(instants, np.concatenate([arrived[:, 0], measured[:, 0]]))
+    return rows
 
 
-def known(system: System, signals: set[str], numbers: set[str]) -> System:
-    """`system` with the objectives that its FMUs have the variables for, where the others may be without a value.
+def with_available_objectives(system: System, signals: set[str], numbers: set[str]) -> System:
+    """`system` without the optional objectives whose variables its FMUs do not have.
 
-    Raises `UsageError` for an expression that names what is not there, and for a name that is taken.
+    Raises `UsageError` for an expression with an unknown name, and for a name that is taken.
     """
     valid = {"time", "stop_time", *signals, *vectors(dict.fromkeys(signals)), *numbers}
-    found = {}
+    available = {}
     for name, text in system.objectives.items():
         if name in (*FIXED, *PRINTED):
             raise UsageError(f"objectives.{name}: every run has a result of that name, expected another")
@@ -143,18 +145,18 @@ def known(system: System, signals: set[str], numbers: set[str]) -> System:
         if name in system.optional and not valid.issuperset(names(parse(text))):
             continue
         expect_names(parse(text), valid, f"objectives.{name}")
-        found[name] = text
+        available[name] = text
         valid.add(name)
     for place, expression in (("good", system.criterion.good), ("diverged", system.criterion.diverged)):
         if expression is not None:
             expect_names(parse(expression), valid, f"criterion.{place}")
-    return system if len(found) == len(system.objectives) else replace(system, objectives=found)
+    return system if len(available) == len(system.objectives) else replace(system, objectives=available)
 
 
 def _ends(
     system: System, signals: Mapping[str, Floats], arrivals: Mapping[str, Booleans], lines: Mapping[str, "_Line"]
 ) -> dict[str, Floats]:
-    """Of every signal that is held between rows, what it has become just before the next."""
+    """The value of every signal that is held between rows, just before the next row."""
     ends: dict[str, Floats] = {}
     for name, component in system.components.items():
         if component.sampling is not None:
@@ -172,19 +174,19 @@ def _ends(
 
 
 class _Line:
-    """The line through the last two values that arrived, from span to span."""
+    """First-order hold: the line through the last two values that arrived, continued from chunk to chunk."""
 
     def __init__(self) -> None:
         self._last: dict[str, list[tuple[float, float]]] = {}
 
     def ends(self, time: Floats, values: Mapping[str, Floats], arrived: Booleans) -> dict[str, Floats]:
-        """What is on the line just before each next row."""
+        """The values on the line just before each next row."""
         return {name: self._end(name, time, held, arrived) for name, held in values.items()}
 
     def _end(self, name: str, time: Floats, held: Floats, arrived: Booleans) -> Floats:
         past = self._last.get(name)
         rows = np.flatnonzero(arrived)
-        if past is None:  # that of initialisation is the first
+        if past is None:  # the value of initialisation is the first
             past = [(float(time[0]), float(held[0]))]
             rows = rows[rows > 0]
         points = [*past, *((float(time[i]), float(held[i])) for i in rows)]

@@ -1,4 +1,4 @@
-"""A quantity as people read it, wherever it is drawn or printed: its name, its unit, and its values in that unit."""
+"""Quantities for display: their names, units, and values in these units."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,36 +10,36 @@ from orchestration.basics.simulator import Floats
 from orchestration.results import display_names as labels
 
 LONG = 1.0
-"""[s]: times that are all shorter are read in milliseconds"""
+"""[s]: times that are all shorter are shown in milliseconds"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Quantity:
-    """What is varied or set, in words, and how its values are read."""
+    """A metric or a setting: its display name, and the unit in which its values are shown."""
 
     name: str
     unit: str | None = None
-    """in which values are read, as FMUs write it; None: they have none, or none is known"""
+    """in which values are shown, as FMI writes it; None: they have none, or it is unknown"""
     factor: float = 1.0
-    """on values as they are kept, which makes them values in that unit"""
+    """by which stored values are multiplied to have that unit"""
 
     @property
     def title(self) -> str:
-        """Its name with its unit in brackets, as axes and heads of tables have it."""
+        """Its name with its unit in brackets, as on axes and in heads of tables."""
         return labels.with_unit(self.name, self.unit)
 
     def of(self, values: object) -> Floats:
-        """Values as they are kept, in its unit; of the same shape."""
-        found: Floats = self.factor * np.asarray(values, float)
-        return found
+        """Stored values in its unit; of the same shape."""
+        scaled: Floats = self.factor * np.asarray(values, float)
+        return scaled
 
-    def said(self, value: float, digits: int = 6) -> str:
-        """A value as it is kept, in its unit and with it."""
+    def text_of(self, value: float, digits: int = 6) -> str:
+        """A stored value as text, in its unit and with it."""
         return f"{self.factor * value:.{digits}g} {labels.unit(self.unit) or ''}".rstrip()
 
 
 def quantity(name: str, unit: str | None, values: Iterable[Any]) -> Quantity:
-    """A quantity that takes these values, kept in this `unit`: times that are all below a second in milliseconds."""
+    """A quantity with these values in `unit`; times that are all below a second are shown in milliseconds."""
     sizes = [abs(value) for value in values if isinstance(value, int | float) and not isinstance(value, bool)]
     if unit == "s" and sizes and max(sizes) < LONG:
         return Quantity(name=name, unit="ms", factor=1e3)
@@ -47,17 +47,17 @@ def quantity(name: str, unit: str | None, values: Iterable[Any]) -> Quantity:
 
 
 def setting(path: str, values: Iterable[Any], unit: str | None = None) -> Quantity:
-    """What a path of a scenario, system or study file sets; the `unit` that a store has goes first."""
+    """The quantity of a path of a scenario, system or study file; the `unit` of a store takes precedence."""
     return quantity(labels.setting(path), unit or unit_known(path), values)
 
 
 def unit_known(path: str) -> str | None:
-    """The unit of what a path sets, as far as its words say it."""
+    """The unit of a path, as far as its words determine it."""
     return labels.unit_of_setting(path) or ("s" if is_in_seconds(path) else None)
 
 
 def is_in_seconds(path: str) -> bool:
-    """Whether what a path sets is a time [s] by itself; what a parameter is in, its FMU says."""
+    """Whether a path sets a time [s]; the unit of a parameter is declared by its FMU."""
     table, _, rest = path.partition(".")
     is_parameter = ".parameters." in path or (table in ("controller", "plant") and bool(rest))
     is_of_values = table == "connections" and path.endswith(".offset")

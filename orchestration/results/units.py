@@ -1,4 +1,4 @@
-"""The units of what a run comes to, from those that its FMUs declare."""
+"""The units of the metrics of a run, from those that its FMUs declare."""
 
 import functools
 from collections.abc import Mapping, Sequence
@@ -12,11 +12,11 @@ from orchestration.system.model import System
 from orchestration.system.variable_names import component_of, variable_of
 
 OF_EVERY_RUN = dict.fromkeys(("horizon", "divergence_time"), str(SECOND))
-"""Units of what every run comes to beside its objectives"""
+"""Units of the metrics that every run has beside its objectives"""
 
 
 def units(system: System, models: Mapping[str, Model]) -> dict[str, str]:
-    """The units of the objectives of a system that has been checked, by name, where all that they name has one.
+    """The units of the objectives of a checked system, by name, where all their operands have one.
 
     Raises `UsageError`, naming the expression, where values of different units are added or compared.
     """
@@ -26,7 +26,7 @@ def units(system: System, models: Mapping[str, Model]) -> dict[str, str]:
 
 
 Sources = tuple[tuple[tuple[str, ...], tuple[str, ...], bool], ...]
-"""Of each: its signals, where they go, and whether they are positions that go nowhere"""
+"""Of each: its signals, their destinations, and whether they are positions without a destination"""
 
 
 @functools.lru_cache(maxsize=256)
@@ -36,7 +36,7 @@ def _units(
     sources: Sources,
     models: tuple[tuple[str, Model], ...],
 ) -> dict[str, str]:
-    """Of all that it depends on: the runs of a study, which are checked one by one, have it in common."""
+    """Cached by all that it depends on, which the runs of a study, checked one by one, share."""
     texts = [text for _, text in objectives] + [text for text in criterion if text is not None]
     known = _of_signals(texts, sources, dict(models))
     for name, text in objectives:
@@ -55,15 +55,15 @@ def _unit(place: str, expression: str, known: Mapping[str, Unit | None]) -> Unit
 
 
 def _of_signals(texts: Sequence[str], sources: Sources, models: Mapping[str, Model]) -> dict[str, Unit | None]:
-    """Of all that expressions name, by COMPONENT.VARIABLE and SOURCE.VARIABLE."""
-    wanted = {name for expression in texts for name in names(parse(expression))}
-    found: dict[str, Unit | None] = {}
+    """The units of all names in expressions, by COMPONENT.VARIABLE and SOURCE.VARIABLE."""
+    named = {name for expression in texts for name in names(parse(expression))}
+    units: dict[str, Unit | None] = {}
     for name, model in models.items():
         for variable in model.variables:
             signal = f"{name}.{variable}"
-            if signal in wanted or signal.rpartition(".")[0] in wanted:
-                found[signal] = model.units.get(variable)
+            if signal in named or signal.rpartition(".")[0] in named:
+                units[signal] = model.units.get(variable)
     for signals, to, are_positions in sources:
         fed = [models[component_of(end)].units.get(variable_of(end)) for end in to]
-        found |= zip(signals, [METRE] * len(signals) if are_positions else fed, strict=True)
-    return found
+        units |= zip(signals, [METRE] * len(signals) if are_positions else fed, strict=True)
+    return units

@@ -10,7 +10,7 @@ from orchestration.basics.interrupt import Interrupted
 from orchestration.engines.job_numbers import job_numbers
 from orchestration.recording.recording import Recorder
 from orchestration.results import objectives
-from orchestration.results.column_info import described
+from orchestration.results.column_info import column_infos
 from orchestration.runs.resolved import ResolvedRequest
 from orchestration.runs.result import Provenance, Result
 
@@ -73,7 +73,7 @@ def result_of(
             terminated=outcome.termination is not None,
         ),
         units=resolved.units,
-        described=described(resolved.system, resolved.models, recording.columns),
+        described=column_infos(resolved.system, resolved.models, recording.columns),
         parameters=resolved.parameters,
         divergence=outcome.divergence,
         termination=outcome.termination,

@@ -132,7 +132,7 @@ def prepared(
             for name, component in system.components.items():
                 set_parameters(instances[name], component)
                 _set_clock(instances[name], component, models[name], timetable.first_samples.get(name, 0))
-            recorder.describe({name: one.as_words() for name, one in resolved.described.items()})
+            recorder.describe({name: one.as_metadata() for name, one in resolved.described.items()})
             sources = resolved.sources(streams)
             signals = {name: system.sources[name].signals(name) for name in sources}
             watched = (sources, signals, parameters)

@@ -9,7 +9,7 @@ from orchestration.building import fmus
 from orchestration.engines.sources import Values
 from orchestration.engines.wiring import checked, signals_of, source_values
 from orchestration.fmi.model import Model, read_model
-from orchestration.results.column_info import Described, described
+from orchestration.results.column_info import ColumnInfo, column_infos
 from orchestration.schedule.streams import Streams
 from orchestration.system.model import System
 from orchestration.system.request import Request, in_its_own_words
@@ -42,9 +42,9 @@ class ResolvedRequest:
         return [name for name, model in self.models.items() if not model.is_of_this_kit]
 
     @property
-    def described(self) -> dict[str, Described]:
+    def described(self) -> dict[str, ColumnInfo]:
         """The unit and the description of each column."""
-        return described(self.system, self.models, ("time", *signals_of(self.system, self.models)))
+        return column_infos(self.system, self.models, ("time", *signals_of(self.system, self.models)))
 
     def sources(self, streams: Streams) -> dict[str, Values]:
         """The values of the sources in a run, by name."""

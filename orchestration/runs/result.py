@@ -15,7 +15,7 @@ from orchestration.recording import frames
 from orchestration.recording.recording import About, Event, Recording
 from orchestration.results import display_names as labels
 from orchestration.results import exports, html
-from orchestration.results.column_info import Described
+from orchestration.results.column_info import ColumnInfo
 from orchestration.results.criterion import unmet
 from orchestration.results.objectives import Metrics
 from orchestration.system.model import System
@@ -74,7 +74,7 @@ class Result:
     [s] and `steps`. None is a metric without a value."""
     units: Mapping[str, str]
     """The units of those metrics that have one, by name, as FMI writes them (`N.m`)."""
-    described: Mapping[str, Described]
+    described: Mapping[str, ColumnInfo]
     """The unit and the description of each recorded column, by name, as its FMU gives them."""
     parameters: Mapping[str, float]
     """The numeric parameters of all components in the run, by COMPONENT.NAME, in the units of their FMUs."""
@@ -129,7 +129,7 @@ class Result:
     @property
     def about(self) -> About:
         """The `unit` and the `description` of each column, where it has them."""
-        return {name: one.as_words() for name, one in self.described.items()}
+        return {name: one.as_metadata() for name, one in self.described.items()}
 
     @property
     def end(self) -> float:

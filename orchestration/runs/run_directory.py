@@ -15,7 +15,7 @@ from orchestration.figures.views import files, view_of
 from orchestration.recording import tables
 from orchestration.recording.tables import ToFolder
 from orchestration.requests.request import load_request
-from orchestration.results.column_info import Described
+from orchestration.results.column_info import ColumnInfo
 from orchestration.runs.folder import NewFolder, new_folder
 from orchestration.runs.outcome import RunInterrupted, RunLost
 from orchestration.runs.result import Provenance, Result
@@ -97,7 +97,7 @@ def load_run(folder: str | Path) -> Result:
         recording=recording,
         metrics=metrics,
         units=notes.pop("units"),
-        described={name: Described(**one) for name, one in notes.pop("described").items()},
+        described={name: ColumnInfo(**one) for name, one in notes.pop("described").items()},
         parameters=notes.pop("parameters"),
         divergence=notes.pop("divergence"),
         termination=notes.pop("termination"),

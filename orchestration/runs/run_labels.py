@@ -59,4 +59,4 @@ def _one(path: str, named: Quantity, value: Any) -> str:
     if isinstance(value, str) and path.endswith((".fmu", ".file")):
         return PurePath(value).stem
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return f"{named.name} {named.said(value) if is_number else value}"
+    return f"{named.name} {named.text_of(value) if is_number else value}"

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from orchestration.recording.recording import Recording
-from orchestration.results.column_info import Described
+from orchestration.results.column_info import ColumnInfo
 from orchestration.results.objectives import Metrics
 from orchestration.system.model import System
 from orchestration.system.request import Request
@@ -30,7 +30,7 @@ class RunLike(Protocol):
         """Its metrics."""
 
     @property
-    def described(self) -> Mapping[str, Described]:
+    def described(self) -> Mapping[str, ColumnInfo]:
         """The unit and the description of each column."""
 
     @property

@@ -149,7 +149,7 @@ def spectral_radius(
     for limit, color, name in ((local_limit, BLUE, "local"), (large_signal_limit, ORANGE, "large-signal")):
         if limit is not None:
             at = across.factor * limit
-            panel.axvline(at, color=color, linestyle="--", label=f"{name} limit, {across.said(limit, 4)}")
+            panel.axvline(at, color=color, linestyle="--", label=f"{name} limit, {across.text_of(limit, 4)}")
     panel.set(xlabel=across.title, ylabel="spectral radius about hover [1]")
     panel.margins(x=0)
     if panel.get_legend_handles_labels()[0]:

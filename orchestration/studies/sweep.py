@@ -18,7 +18,7 @@ from orchestration.building.inputs import Files
 from orchestration.engines.engine import Engine
 from orchestration.engines.wiring import checked
 from orchestration.requests.ranges import paths_in, unit_at
-from orchestration.results.own_metrics import all_sourced
+from orchestration.results.own_metrics import metrics_from_sources
 from orchestration.runs.result import Result
 from orchestration.studies import store
 from orchestration.studies.checks import described, expect_flyable
@@ -81,7 +81,7 @@ def sweep(
     if time_limit is not None and not time_limit > 0.0:
         raise UsageError(f"--time-limit {time_limit:g}: expected a positive number of seconds")
     if metrics is not None:
-        study = replace(study, metrics=all_sourced(metrics))
+        study = replace(study, metrics=metrics_from_sources(metrics))
     study, files, how, follows = ready(study, engine)
     path = store.store_path(study.name, folder)
     with runs_reporter(progress) as hear, store.open_for_writing(path, study.judged) as opened:

@@ -16,7 +16,7 @@ from orchestration.engines.structures import structures
 from orchestration.engines.watch import watch
 from orchestration.engines.wiring import checked, source_values
 from orchestration.fmi.model import read_model
-from orchestration.results.objectives import Metrics, told
+from orchestration.results.objectives import Metrics, metrics_of
 from orchestration.schedule.schedule_cache import ScheduleCache, timing
 from orchestration.schedule.streams import Streams
 from orchestration.system.following import heard
@@ -125,7 +125,7 @@ def _told(shape: Shape, batch: Batch, result: BatchResult, systems: Sequence[Sys
             end = nanoseconds(system.stop_time) / NANOSECONDS
             metrics = {name: value[lane] if there[lane] else None for name, (there, value) in found.items()}
             yield RunSummary(
-                metrics=told(
+                metrics=metrics_of(
                     shape.system, metrics, end=end, stop_time=system.stop_time, divergence_time=None, steps=steps
                 ),
                 message=None,
@@ -133,7 +133,9 @@ def _told(shape: Shape, batch: Batch, result: BatchResult, systems: Sequence[Sys
         elif result.outcome[lane] == c.DIVERGED:
             time = int(result.time[lane]) / NANOSECONDS
             message = _complaint(shape, batch, system, lane, time)
-            metrics = told(shape.system, None, end=time, stop_time=system.stop_time, divergence_time=time, steps=steps)
+            metrics = metrics_of(
+                shape.system, None, end=time, stop_time=system.stop_time, divergence_time=time, steps=steps
+            )
             yield None if message is None else RunSummary(metrics=metrics, message=message)
         else:
             yield None

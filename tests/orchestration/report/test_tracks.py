@@ -14,11 +14,11 @@ from orchestration.report.blobs import Blobs
 from orchestration.report.layouts import layout_of
 from orchestration.report.model import Track
 from orchestration.report.tracks import Signals, Tracks
-from orchestration.results.column_info import Described
+from orchestration.results.column_info import ColumnInfo
 from orchestration.system.paths import changed
 from tests.orchestration.report.test_blobs import read
 
-ABOUT = {"tank.level": Described(unit="m", text="of the water")}
+ABOUT = {"tank.level": ColumnInfo(unit="m", text="of the water")}
 
 
 def flight(count: int = 5001) -> dict[str, Floats]:

@@ -6,7 +6,7 @@ import pytest
 
 import quadcosim
 from orchestration.results import display_names as labels
-from orchestration.results.column_info import Described
+from orchestration.results.column_info import ColumnInfo
 from quadcosim import Scenario
 
 METRICS_PAGE = Path(__file__).parents[3] / "docs" / "metrics.md"
@@ -32,9 +32,9 @@ def test_units_are_written_as_people_write_them(unit: str | None, expected: str 
 
 def test_a_signal_goes_by_its_own_name_or_by_what_its_fmu_says_of_it() -> None:
     about = {
-        "tank.level": Described(unit="m", text="of the water"),
-        "ball.h": Described(unit="m", text="Height of the ball."),
-        "car.x1": Described(text="a description that is too long for any legend of a figure"),
+        "tank.level": ColumnInfo(unit="m", text="of the water"),
+        "ball.h": ColumnInfo(unit="m", text="Height of the ball."),
+        "car.x1": ColumnInfo(text="a description that is too long for any legend of a figure"),
     }
     assert labels.signal("plant.position.x", about) == "position x"
     assert labels.signal("tank.level", about) == "tank: level of the water"

@@ -20,14 +20,14 @@ def test_times_are_in_milliseconds_where_all_of_them_are_below_a_second(
     values: list[object], unit: str, said: str
 ) -> None:
     found = quantity("period", "s", values)
-    assert (found.title, found.said(0.01)) == (f"period [{unit}]", said)
+    assert (found.title, found.text_of(0.01)) == (f"period [{unit}]", said)
     assert found.of([0.01, 0.5]).tolist() == ([10.0, 500.0] if unit == "ms" else [0.01, 0.5])
 
 
 def test_nothing_but_a_time_is_in_thousandths() -> None:
-    assert quantity("mass", "kg", [0.01]).said(0.01) == "0.01 kg"
+    assert quantity("mass", "kg", [0.01]).text_of(0.01) == "0.01 kg"
     assert quantity("share", None, [0.01]).title == "share"
-    assert quantity("share", "1", [0.01]).said(0.123456789, 3) == "0.123"
+    assert quantity("share", "1", [0.01]).text_of(0.123456789, 3) == "0.123"
 
 
 @pytest.mark.parametrize(
