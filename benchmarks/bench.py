@@ -31,7 +31,7 @@ from orchestration.runs.prepared import prepared
 from orchestration.schedule.cursor import Cursor
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import Timetable
-from orchestration.system.check import recorded
+from orchestration.system.check import recorded_variables
 from plant_fmu.wind import Wind
 
 STEPS = 5000
@@ -97,7 +97,7 @@ def bare(scenario: Scenario) -> float:
     """The same FMI calls as the master makes in a step, and nothing else."""
     system = scenario.as_system()
     paths = {name: Path(component.fmu) for name, component in system.components.items()}
-    board = Board(system, recorded(system, {name: read_model(path) for name, path in paths.items()}))
+    board = Board(system, recorded_variables(system, {name: read_model(path) for name, path in paths.items()}))
     with (
         Fmi2Instance(paths["plant"], "plant") as plant_fmu,
         Fmi2Instance(paths["controller"], "ctrl") as controller_fmu,

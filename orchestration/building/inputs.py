@@ -15,7 +15,7 @@ from orchestration.system.component import Component
 from orchestration.system.computers import Computer, Network
 from orchestration.system.connection import Connection
 from orchestration.system.distribution import with_traces_at
-from orchestration.system.files_read import files_read
+from orchestration.system.input_files import input_files
 from orchestration.system.model import System
 from orchestration.system.source import Source
 
@@ -77,7 +77,7 @@ def files_of(system: System, fmus_too: Iterable[str] = (), tables_too: Iterable[
 
 def tables_of(system: System) -> dict[str, Path]:
     """The files that a system reads beside its FMUs, by what it calls them."""
-    return {str(file): file for file in files_read(system).values()}
+    return {str(file): file for file in input_files(system).values()}
 
 
 def with_files(system: System, paths: Mapping[str, Path]) -> System:

@@ -26,7 +26,7 @@ from orchestration.certificates.family import Factor, Family, Letter
 from orchestration.certificates.margin import measured
 from orchestration.certificates.search import least_cost
 from orchestration.certificates.timeline import LOSS, Timeline, Varying
-from orchestration.requests.request import Asked, asked_for
+from orchestration.requests.request import RequestLike, request_of
 
 FALL = 1e-4
 """by which a form falls at least, relative; what covers the radius of what was measured"""
@@ -55,7 +55,7 @@ class Basin:
 
 
 @needs("flint", "clarabel")
-def basin(asked: Asked, connection: str, limit: float) -> Basin:
+def basin(asked: RequestLike, connection: str, limit: float) -> Basin:
     """A proved basin of a system's loop about its operating point, if each signal of a connection is cut to ±`limit`.
 
     The loop is linear but for that, punctual, and has one sampled component, which has no memory. The limit is of the
@@ -66,7 +66,7 @@ def basin(asked: Asked, connection: str, limit: float) -> Basin:
     """
     if not limit > 0.0:
         raise UsageError(f"limit {limit:g}: expected a positive number")
-    request = asked_for(asked)
+    request = request_of(asked)
     loop = measured(request)
     sampled = [name for name in loop.components if loop.is_sampled(name)]
     sent = [x.name for x in loop.system.connections if x.sender in sampled]

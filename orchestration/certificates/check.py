@@ -15,7 +15,7 @@ from orchestration.certificates.certificate import Certificate, read_certificate
 from orchestration.certificates.family import Family
 from orchestration.certificates.margin import cause_in, expect_unshared, measured, varying_of
 from orchestration.certificates.timeline import LOSS, Timeline, Varying
-from orchestration.requests.request import Asked, asked_for
+from orchestration.requests.request import RequestLike, request_of
 from orchestration.stability.known_loops import rested
 
 ROUNDING = 1e-12
@@ -45,7 +45,7 @@ class Checked:
 
 
 @needs("flint")
-def check(path: str | Path, asked: Asked | None = None) -> Checked:
+def check(path: str | Path, asked: RequestLike | None = None) -> Checked:
     """Verify the certificate of a file, and, with a system, that its matrices are those of that system's loop.
 
     Raises `QuadcosimError` for a certificate that proves nothing, `UsageError` for a file that is none and for one of
@@ -56,7 +56,7 @@ def check(path: str | Path, asked: Asked | None = None) -> Checked:
     certificate = read_certificate(Path(path))
     found, up_to = proven(certificate), None
     if asked is not None:
-        request = asked_for(asked)
+        request = request_of(asked)
         cause = cause_in(request, certificate.of[0]) if len(certificate.of) == 1 else None
         if cause is None:
             expect_unshared(request)

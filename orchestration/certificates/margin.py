@@ -23,13 +23,13 @@ from orchestration.exact.scheduled import without_scheduler
 from orchestration.fmi.foreign import computed
 from orchestration.fmi.reuse import Instances
 from orchestration.requests.ranges import paths_in
-from orchestration.requests.request import Asked, asked_for
+from orchestration.requests.request import RequestLike, request_of
 from orchestration.stability.delay_bounds import SampledLoop, certain_jitter
 from orchestration.stability.known_loops import rested
 from orchestration.stability.linear_loop import at_rest
 from orchestration.system.distribution import lowest
-from orchestration.system.placement import carried, tasks_of
-from orchestration.system.request import Request, in_its_own_words, system_meant
+from orchestration.system.placement import messages_by_connection, tasks_of
+from orchestration.system.request import Request, errors_in_own_terms, system_of
 from orchestration.system.times import NANOSECONDS, down_to_nanoseconds
 from orchestration.system.variable_names import variable_of
 
@@ -74,7 +74,7 @@ class Certified:
 
 
 @needs("flint", "clarabel")
-def margin(asked: Asked, of: str, *, progress: ShareProgress = None) -> Certified:
+def margin(asked: RequestLike, of: str, *, progress: ShareProgress = None) -> Certified:
     """How far a quantity of a system may vary from draw to draw, the loop linearised about its operating point.
 
     `of` is the path of a sampled component's `sampling.jitter`, of a connection's `delay_jitter`, or of its `loss`,
@@ -84,7 +84,7 @@ def margin(asked: Asked, of: str, *, progress: ShareProgress = None) -> Certifie
 
     Raises `UsageError` where the loop cannot be made linear or the path is for something else, saying why.
     """
-    request = asked_for(asked)
+    request = request_of(asked)
     cause = cause_in(request, of)
     if cause is not None:
         with share_reporter(progress, "certifying") as heard:
@@ -99,13 +99,13 @@ def margin(asked: Asked, of: str, *, progress: ShareProgress = None) -> Certifie
 
 def measured(request: Request) -> Loop:
     """The loop of a request about its operating point, from its FMUs; nothing makes it late."""
-    return computed(files_of(system_meant(request)).fmus.values(), _measured, request)
+    return computed(files_of(system_of(request)).fmus.values(), _measured, request)
 
 
 def _measured(request: Request) -> Loop:
     instances = Instances()
     try:
-        with in_its_own_words(request), at_rest(without_scheduler(rested(request)), instances) as rest:
+        with errors_in_own_terms(request), at_rest(without_scheduler(rested(request)), instances) as rest:
             return loop_of(rest)
     finally:
         instances.close()
@@ -113,19 +113,19 @@ def _measured(request: Request) -> Loop:
 
 def expect_unshared(request: Request) -> None:
     """Raise `UsageError` for what a scheduler decides, saying what to ask for instead."""
-    system = system_meant(request)
+    system = system_of(request)
     for name, task in tasks_of(system).items():
         raise UsageError(
             f"{task.place}: a scheduler has {name} sampled; expected --of {task.place}.execution, as a cause"
         )
-    for name, message in carried(system).items():
+    for name, message in messages_by_connection(system).items():
         raise UsageError(f"{message.place}: {name} waits for other frames; expected --of the jitter of one, as a cause")
 
 
 def cause_in(request: Request, of: str) -> Cause | None:
     """What a path is of, where it is of a computer or a network."""
     (path, *others) = paths_in(request, of) or (of,)
-    return None if others else cause_at(system_meant(request), path)
+    return None if others else cause_at(system_of(request), path)
 
 
 def varying_of(request: Request, of: str) -> Varying:
@@ -190,8 +190,8 @@ def _of_losses(timeline: Timeline, varying: Varying, progress: Share) -> Certifi
 
 
 def _of_cause(request: Request, cause: Cause, progress: Share) -> Certified:
-    system, files = rested(request), files_of(system_meant(request))
-    with in_its_own_words(request):
+    system, files = rested(request), files_of(system_of(request))
+    with errors_in_own_terms(request):
         loop = measured(request)
         caused = Caused(loop, system, cause)
         tried = computed(files.fmus.values(), least_repeated, system, cause, files.models, loop.period)

@@ -17,7 +17,7 @@ from orchestration.certificates.margin import expect_unshared, largest_certified
 from orchestration.certificates.timeline import LOSS, Timeline
 from orchestration.figures.palette import BLUE, RED
 from orchestration.figures.style import SCREEN, Style, save
-from orchestration.requests.request import Asked, asked_for
+from orchestration.requests.request import RequestLike, request_of
 from orchestration.system.times import down_to_nanoseconds
 
 COLUMNS = 6
@@ -79,13 +79,15 @@ class Region:
 
 
 @needs("flint", "clarabel")
-def region(asked: Asked, of: str, and_of: str, *, columns: int = COLUMNS, progress: ShareProgress = None) -> Region:
+def region(
+    asked: RequestLike, of: str, and_of: str, *, columns: int = COLUMNS, progress: ShareProgress = None
+) -> Region:
     """How far two quantities of a system may vary at once: see `margin`, of which both are paths of times.
 
     Raises `UsageError` as `margin` does, for two quantities of different sampled components, and for a loop that is
     unstable without either.
     """
-    request = asked_for(asked)
+    request = request_of(asked)
     pair = [varying_of(request, each) for each in (of, and_of)]
     if any(each.kind == LOSS for each in pair) or pair[0] == pair[1]:
         raise UsageError(f"--of {of} --and {and_of}: expected two different jitters or delay jitters")

@@ -313,7 +313,7 @@ def ssp(
     from orchestration.building import fmus
     from orchestration.interop.reading_back import readings
     from orchestration.requests.ssp import writing
-    from orchestration.requests.ssp.carried import carried
+    from orchestration.requests.ssp.export import export_of
 
     asked = request_from(scenario, flags)
     if asked.title is not None or scenario is None:
@@ -323,7 +323,7 @@ def ssp(
     written, timing = writing.write_with_timing(asked, out or usual, inform, warn)
     inform(f"{timing} has its timing, for quadcosim run")
     masters: dict[str, str | None] = {}
-    for reading in readings(written, carried(asked)) if read_back else ():
+    for reading in readings(written, export_of(asked)) if read_back else ():
         masters[reading.master] = reading.refusal
         if reading.refusal is None:
             inform(f"{reading.master} flies it")

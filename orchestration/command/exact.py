@@ -47,9 +47,9 @@ def say_if_endless(request: "Request", systems: "Sequence[System] | None" = None
     """Warn where averages over such runs mean nothing."""
     from orchestration.building.inputs import files_of
     from orchestration.exact.infinite_means import infinite_means_warning
-    from orchestration.system.request import system_meant
+    from orchestration.system.request import system_of
 
-    systems = [system_meant(request)] if systems is None else systems
+    systems = [system_of(request)] if systems is None else systems
     text = infinite_means_warning(request, systems, files_of(systems[0]) if files is None else files)
     if text is not None:
         warn(text)

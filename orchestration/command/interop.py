@@ -42,10 +42,10 @@ def interop(
     from orchestration.interop import table
     from orchestration.interop.catalogue import chosen
     from orchestration.interop.compare import agreements
-    from orchestration.system.request import system_meant
+    from orchestration.system.request import system_of
 
     asked = request_from(scenario, flags, timing)
-    tools = chosen(tool, system_meant(asked).components)
+    tools = chosen(tool, system_of(asked).components)
     with progress_bar("flying in other masters") as progress:
         found = agreements(asked, tools, announce=inform, progress=progress)
     if out is not None:

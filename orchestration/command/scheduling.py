@@ -52,10 +52,10 @@ def schedule(
         raise UsageError(f"--out {out}: expected a figure ending in one of {', '.join(FORMATS)}")
     from orchestration.runs import scheduling
     from orchestration.system.paths import changed
-    from orchestration.system.request import system_meant
+    from orchestration.system.request import system_of
 
     request = scheduling.request_until(system, until)
-    found = scheduling.schedule(changed(system_meant(request), assigned("set", changes)))
+    found = scheduling.schedule(changed(system_of(request), assigned("set", changes)))
     if out is not None:
         inform(str(_drawn(found, out, start, end)))
     document = {

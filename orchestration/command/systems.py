@@ -80,10 +80,10 @@ def show(
 ) -> Answer:
     """Show a system: components with their rates, connections with their delay, jitter, loss and hold, units."""
     from orchestration.system.description import as_text
-    from orchestration.system.request import system_meant
+    from orchestration.system.request import system_of
     from orchestration.system.written import tables_of
 
-    meant = system_meant(request_from(system, flags, timing))
+    meant = system_of(request_from(system, flags, timing))
     if out is not None:
         from orchestration.figures import diagram
 

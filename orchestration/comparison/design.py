@@ -11,7 +11,7 @@ from orchestration.studies.axes import Axis, Value
 from orchestration.studies.linked_settings import Key, LinkedSettings
 from orchestration.studies.study import Study
 from orchestration.system.paths import value_at
-from orchestration.system.request import ControlLoop, Ensemble, Start, Values
+from orchestration.system.request import ControlLoop, Ensemble, InitialConditions, Values
 from orchestration.system.request import Craft as Vehicle
 
 VEHICLE, CONDITION, CONTROLLER, START = "vehicle", "condition", "controller", "start"
@@ -117,9 +117,9 @@ class Comparison:
         return self.axis.values or ()
 
     @cached_property
-    def drawn(self) -> tuple[Start, ...]:
+    def drawn(self) -> tuple[InitialConditions, ...]:
         """The starts, around the beginning of the base's trajectory."""
-        return tuple(self.starts.starts_of(self.base))
+        return tuple(self.starts.initial_conditions(self.base))
 
     @cached_property
     def study(self) -> Study:
@@ -163,7 +163,7 @@ class Comparison:
     def _tuned(self) -> dict[Key, Values]:
         return {(one.name, *key): changes for one in self.controllers for key, changes in one.tuned.items()}
 
-    def _begun(self, index: int, start: Start) -> dict[str, Value]:
+    def _begun(self, index: int, start: InitialConditions) -> dict[str, Value]:
         return {**start.values, "seed": self.base.seed + self.starts.first + index}
 
     def cells(self) -> Iterator[Cell]:

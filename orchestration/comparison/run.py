@@ -24,7 +24,7 @@ from orchestration.studies.sweep import sweep
 from orchestration.studies.swept import Swept
 from orchestration.studies.table import export, frame, units_in
 from orchestration.system.model import System
-from orchestration.system.request import in_its_own_words
+from orchestration.system.request import errors_in_own_terms
 from orchestration.workers.batching import TOLERATED
 from orchestration.workers.choice import Chosen, EngineChoice, chosen
 from orchestration.workers.executors import RunEvaluator
@@ -173,7 +173,7 @@ def _ready(comparison: Comparison, indices: Sequence[int], engine: EngineChoice)
     def first(native: bool) -> tuple[System, Files]:
         study = replace(comparison, native=native).study
         files = study.files()
-        with in_its_own_words(comparison.base):
+        with errors_in_own_terms(comparison.base):
             systems = [study.system(index, files.starts_of(study.origin)) for index in indices]
             for system in systems:
                 checked(system, files.models_of(system))

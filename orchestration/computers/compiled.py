@@ -15,10 +15,10 @@ from orchestration.basics.libraries import cached_library
 from orchestration.basics.simulator import Integers
 from orchestration.computers import parts as constants
 from orchestration.computers.parts import (
+    ALL_KINDS,
     AT_ONCE,
     COLUMNS,
     LATER,
-    NOTED,
     STAYS,
     Carrier,
     Constant,
@@ -51,7 +51,7 @@ _KINDS = ("PROCESSORS", "TASKS", "CARRIERS", "MESSAGES", "LEGS", "LINKS")
 _DRAW, _TAKE = (ctypes.CFUNCTYPE(None, ctypes.c_int64) for _ in range(2))
 
 
-class _Given(ctypes.Structure):
+class _Arguments(ctypes.Structure):
     _fields_ = (
         ("stop", ctypes.c_int64),
         ("counts", ctypes.c_int64 * len(_KINDS)),
@@ -74,17 +74,17 @@ class Schedules(Protocol):
     """A scheduler, in whatever language."""
 
     @property
-    def reached(self) -> int:
+    def next_instant(self) -> int:
         """The next instant [ns]; LATER if there is none up to the end."""
 
     def run(self, until: int) -> None:
         """Go through all instants before `until` [ns], up to the end."""
 
-    def taken(self) -> Integers:
+    def take_notes(self) -> Integers:
         """The notes since they were taken last, a row each: time, what, whose, which, a number more."""
 
 
-def scheduler(parts: Parts, noted: Collection[int] = NOTED) -> Schedules:
+def scheduler(parts: Parts, noted: Collection[int] = ALL_KINDS) -> Schedules:
     """What goes through the instants of `parts`, in C where there is a compiler; notes are kept of kinds `noted`."""
     try:
         _library()
@@ -96,7 +96,7 @@ def scheduler(parts: Parts, noted: Collection[int] = NOTED) -> Schedules:
 class CompiledScheduler:
     """The scheduler in C; raises `QuadcosimError` without a compiler."""
 
-    def __init__(self, parts: Parts, noted: Collection[int] = NOTED) -> None:
+    def __init__(self, parts: Parts, noted: Collection[int] = ALL_KINDS) -> None:
         self._library, self._parts = _library(), parts
         self._tables = tables = _tables(
             tuple(parts.processors),
@@ -106,9 +106,9 @@ class CompiledScheduler:
             tuple(parts.links),
         )
         self._numbers, self._notes = _Numbers(parts.streams), _Notes()
-        self._kept = np.array([kind in noted for kind in range(len(NOTED))], dtype=np.uint8)
+        self._kept = np.array([kind in noted for kind in range(len(ALL_KINDS))], dtype=np.uint8)
         self._draw, self._take = _DRAW(self._numbers.draw), _TAKE(self._notes.take)
-        given = _Given(
+        arguments = _Arguments(
             stop=parts.stop,
             counts=tuple(len(tables[name.lower()]) for name in _KINDS),
             **{name: table.ctypes.data for name, table in self._tables.items()},
@@ -120,26 +120,26 @@ class CompiledScheduler:
             draw=self._draw,
             take=self._take,
         )
-        self._made = self._library.scheduler_made(ctypes.byref(given))
-        self._expect(bool(self._made))
-        weakref.finalize(self, self._library.scheduler_free, self._made)
+        self._handle = self._library.scheduler_new(ctypes.byref(arguments))
+        self._expect(bool(self._handle))
+        weakref.finalize(self, self._library.scheduler_free, self._handle)
 
     @property
-    def reached(self) -> int:
+    def next_instant(self) -> int:
         """As of the one in Python."""
-        return int(self._library.scheduler_reached(self._made))
+        return int(self._library.scheduler_next_instant(self._handle))
 
     def run(self, until: int) -> None:
         """As by the one in Python."""
-        noted = int(self._library.scheduler_run(self._made, until))
+        noted = int(self._library.scheduler_run(self._handle, until))
         self._expect(noted != _NO_MEMORY)
         if noted < _NO_MEMORY:
             raise self._parts.overfull(-2 - noted)
         self._notes.take(noted)
 
-    def taken(self) -> Integers:
+    def take_notes(self) -> Integers:
         """As of the one in Python."""
-        return self._notes.taken()
+        return self._notes.take_notes()
 
     def _expect(self, has_memory: bool) -> None:
         if self._numbers.failure is not None:
@@ -184,7 +184,7 @@ class _Notes:
         """Those that C has made."""
         self._noted.append(self.room[:noted].copy())
 
-    def taken(self) -> Integers:
+    def take_notes(self) -> Integers:
         """All since they were taken last."""
         found = self._noted[0] if len(self._noted) == 1 else np.concatenate([self.room[:0], *self._noted])
         self._noted.clear()
@@ -225,14 +225,14 @@ def _library() -> Any:
         library = ctypes.CDLL(str(path))
     except OSError as error:
         raise QuadcosimError(str(error)) from error
-    for name in ("size_of_given", "scheduler_reached", "scheduler_run"):
+    for name in ("size_of_arguments", "scheduler_next_instant", "scheduler_run"):
         getattr(library, name).restype = ctypes.c_int64
-    library.scheduler_made.restype = ctypes.c_void_p
-    library.scheduler_made.argtypes = (ctypes.c_void_p,)
+    library.scheduler_new.restype = ctypes.c_void_p
+    library.scheduler_new.argtypes = (ctypes.c_void_p,)
     library.scheduler_free.restype, library.scheduler_free.argtypes = None, (ctypes.c_void_p,)
-    library.scheduler_reached.argtypes = (ctypes.c_void_p,)
+    library.scheduler_next_instant.argtypes = (ctypes.c_void_p,)
     library.scheduler_run.argtypes = (ctypes.c_void_p, ctypes.c_int64)
-    assert library.size_of_given() == ctypes.sizeof(_Given)
+    assert library.size_of_arguments() == ctypes.sizeof(_Arguments)
     return library
 
 

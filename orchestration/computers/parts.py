@@ -57,7 +57,7 @@ class Task(NamedTuple):
     """the stream of how late they are"""
     execution: int
     """the stream of what its jobs take"""
-    is_heard: int = 1
+    reports_samples: int = 1
     """whether anybody is told of its samples"""
 
 
@@ -146,16 +146,16 @@ RELEASED, STARTED, PREEMPTED, RESUMED, FINISHED, ABORTED, SKIPPED, SWITCHING, IN
 where that is another, WRITTEN the sample whose outputs these are. Each
 SWITCHING, STARTED and RESUMED is ended on its processor by the next of these, or by PREEMPTED, FINISHED or INTERRUPTED,
 of one that is in its switch or aborted."""
-QUEUED, BEGUN, SPOILT, PASSED = range(11, 15)
-"""Of a message: the number of a frame; of QUEUED the nominal instant, of the others the leg. BEGUN is the first bit,
-SPOILT the end of one that has to be sent again, PASSED that of one which has not."""
+QUEUED, FRAME_STARTED, FRAME_CORRUPTED, FRAME_TRANSMITTED = range(11, 15)
+"""Of a message: the number of a frame, and of QUEUED the nominal instant, of the others the leg. FRAME_STARTED is the
+first bit; FRAME_CORRUPTED the last bit of a frame that is sent again, FRAME_TRANSMITTED of one that is not."""
 SENT, ARRIVES = range(15, 17)
 """Of a carrier: the number of a sample; 1 if it is lost on the way, 2 if nothing was sent, else 0; the time when it
 arrives"""
 KINDS = 17
 COLUMNS = 5
 
-NOTED = frozenset(range(KINDS))
+ALL_KINDS = frozenset(range(KINDS))
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ typedef struct {
 } LegState;
 
 typedef struct {
-    int64_t sending, spoilt, slot, slots_past, changed;
+    int64_t sending, corrupted, slot, slots_past, changed;
 } LinkState;
 
 typedef struct {
@@ -53,14 +53,14 @@ typedef struct {
     const int64_t *processors, *tasks, *carriers, *releases, *messages, *legs, *links;
     int64_t **numbers; /* of each stream, AT_ONCE of them */
     int64_t *used;     /* how many of these are, or STAYS */
-    int64_t *notes, room, noted;
-    const uint8_t *kept; /* which kinds of notes are */
+    int64_t *notes, room, note_count;
+    const uint8_t *kept; /* which kinds of notes are kept */
     void (*draw)(int64_t stream);
-    void (*take)(int64_t noted);
-} Given;
+    void (*take)(int64_t note_count);
+} Arguments;
 
 typedef struct {
-    Given g;
+    Arguments g;
     TaskState *tasks;
     ProcessorState *processors;
     LegState *legs;
@@ -69,7 +69,7 @@ typedef struct {
     MessageState *messages;
     int64_t *due, due_count;
     int64_t *busy, *line, *deadline, *arrival, *release, *instant, *hop, *slot; /* parts of due */
-    int heeds_deadlines; /* whether anything comes about at any */
+    int has_deadlines; /* whether any task writes or aborts at its deadline */
     int no_memory;
     int64_t overfull; /* the task, or after all tasks the message, of which too many wait */
 } Scheduler;
@@ -117,11 +117,11 @@ static int64_t number(Scheduler *s, int64_t stream) {
     return s->g.numbers[stream][used];
 }
 
-static void note(Scheduler *s, int64_t now, int64_t kind, int64_t whose, int64_t which, int64_t more) {
+static void note(Scheduler *s, int64_t now, int64_t kind, int64_t owner, int64_t item, int64_t extra) {
     if (!s->g.kept[kind]) return;
-    if (s->g.noted == s->g.room) s->g.take(s->g.noted), s->g.noted = 0;
-    int64_t *row = s->g.notes + COLUMNS * s->g.noted++;
-    row[0] = now, row[1] = kind, row[2] = whose, row[3] = which, row[4] = more;
+    if (s->g.note_count == s->g.room) s->g.take(s->g.note_count), s->g.note_count = 0;
+    int64_t *row = s->g.notes + COLUMNS * s->g.note_count++;
+    row[0] = now, row[1] = kind, row[2] = owner, row[3] = item, row[4] = extra;
 }
 
 static int64_t least(const int64_t *values, int64_t count) {
@@ -206,21 +206,21 @@ static void choose_frame(Scheduler *s, int64_t k, int64_t now) {
     link->slot = NONE;
     if (chosen == NONE) return;
     int64_t m = LEG(chosen, MESSAGE);
-    link->sending = chosen, link->spoilt = number(s, MESSAGE(m, CORRUPTED)) != 0;
-    s->line[k] = now + (link->spoilt ? LEG(chosen, CORRUPTED_LENGTH) : LEG(chosen, LENGTH));
-    note(s, now, BEGUN, m, ((Frame *)head(&s->legs[chosen].frames))->number, LEG(chosen, PLACE));
+    link->sending = chosen, link->corrupted = number(s, MESSAGE(m, CORRUPTED)) != 0;
+    s->line[k] = now + (link->corrupted ? LEG(chosen, CORRUPTED_LENGTH) : LEG(chosen, LENGTH));
+    note(s, now, FRAME_STARTED, m, ((Frame *)head(&s->legs[chosen].frames))->number, LEG(chosen, PLACE));
 }
 
-static void pass_on(Scheduler *s, LinkState *link, int64_t now) {
+static void end_frame(Scheduler *s, LinkState *link, int64_t now) {
     int64_t j = link->sending, m = LEG(j, MESSAGE);
     Frame frame = *(Frame *)head(&s->legs[j].frames);
     link->sending = NONE;
-    if (link->spoilt) {
-        note(s, now, SPOILT, m, frame.number, LEG(j, PLACE));
+    if (link->corrupted) {
+        note(s, now, FRAME_CORRUPTED, m, frame.number, LEG(j, PLACE));
         return;
     }
     drop(&s->legs[j].frames);
-    note(s, now, PASSED, m, frame.number, LEG(j, PLACE));
+    note(s, now, FRAME_TRANSMITTED, m, frame.number, LEG(j, PLACE));
     if (!LEG(j, IS_LAST)) {
         frame.coming = now + MESSAGE(m, PAUSE);
         PUSH(s, &s->legs[j + 1].coming, &frame);
@@ -244,7 +244,7 @@ static void sample(Scheduler *s, int64_t i, Job *job, int64_t now) {
     int64_t time = TASK(i, READS_AT_RELEASE) ? job->released : now;
     job->sample = task->samples++;
     task->sampled_at = time > task->sampled_at + 1 ? time : task->sampled_at + 1;
-    if (TASK(i, IS_HEARD)) note(s, now, SAMPLED, i, job->number, task->sampled_at);
+    if (TASK(i, REPORTS_SAMPLES)) note(s, now, SAMPLED, i, job->number, task->sampled_at);
 }
 
 static void set_deadline(Scheduler *s, int64_t i, int64_t now) {
@@ -256,18 +256,18 @@ static void set_deadline(Scheduler *s, int64_t i, int64_t now) {
     s->deadline[i] = due > now ? due : now;
 }
 
-static void let_go(Scheduler *s, int64_t i, int64_t nominal, int64_t now) {
+static void release_job(Scheduler *s, int64_t i, int64_t nominal, int64_t now) {
     TaskState *task = &s->tasks[i];
-    int64_t execution = number(s, TASK(i, EXECUTION)), which = task->number++;
+    int64_t execution = number(s, TASK(i, EXECUTION)), job_number = task->number++;
     if (TASK(i, OVERRUN) == SKIP && task->jobs.count) {
-        note(s, now, SKIPPED, i, which, nominal);
+        note(s, now, SKIPPED, i, job_number, nominal);
         return;
     }
-    Job job = {which, nominal, now, nominal + TASK(i, DEADLINE), execution, NONE, 0};
+    Job job = {job_number, nominal, now, nominal + TASK(i, DEADLINE), execution, NONE, 0};
     if (!has_room(s, &task->jobs, i)) return;
     PUSH(s, &task->jobs, &job);
     if (s->no_memory) return;
-    note(s, now, RELEASED, i, which, nominal);
+    note(s, now, RELEASED, i, job_number, nominal);
     if (TASK(i, READS_AT_RELEASE) && TASK(i, OVERRUN) != ABORT)
         sample(s, i, at(&task->jobs, task->jobs.count - 1), now);
     if (TASK(i, OVERRUN) == ABORT) set_deadline(s, i, now);
@@ -327,7 +327,7 @@ static int precedes(Scheduler *s, int64_t policy, int64_t i, int64_t j) {
     return a->released != b->released ? a->released < b->released : i < j;
 }
 
-static void take_away(Scheduler *s, ProcessorState *processor, int64_t now) {
+static void preempt(Scheduler *s, ProcessorState *processor, int64_t now) {
     int64_t i = processor->running;
     if (i == NONE) return;
     Job *job = first_job(s, i);
@@ -336,7 +336,7 @@ static void take_away(Scheduler *s, ProcessorState *processor, int64_t now) {
     processor->running = NONE, processor->at_work = 0;
 }
 
-static void go_on(Scheduler *s, ProcessorState *processor, int64_t now) {
+static void resume(Scheduler *s, ProcessorState *processor, int64_t now) {
     int64_t i = processor->running;
     Job *job = first_job(s, i);
     processor->at_work = 1, processor->ready_at = now;
@@ -346,7 +346,7 @@ static void go_on(Scheduler *s, ProcessorState *processor, int64_t now) {
     if (job->sample == NONE) sample(s, i, job, now);
 }
 
-static void choose(Scheduler *s, int64_t p, int64_t now) {
+static void dispatch(Scheduler *s, int64_t p, int64_t now) {
     ProcessorState *processor = &s->processors[p];
     int64_t cost = PROCESSOR(p, SWITCH), waits = 0, chosen = processor->running;
     processor->changed = 0;
@@ -360,13 +360,13 @@ static void choose(Scheduler *s, int64_t p, int64_t now) {
             if (chosen == NONE || precedes(s, PROCESSOR(p, POLICY), i, chosen)) chosen = i;
         }
     if (chosen != processor->running) {
-        take_away(s, processor, now);
+        preempt(s, processor, now);
         processor->running = chosen, processor->ready_at = now + cost;
         if (cost) note(s, now, SWITCHING, chosen, first_job(s, chosen)->number, 0);
     }
     int64_t then = LATER;
     if (processor->running != NONE) {
-        if (!processor->at_work && processor->ready_at <= now) go_on(s, processor, now);
+        if (!processor->at_work && processor->ready_at <= now) resume(s, processor, now);
         then = processor->ready_at + (processor->at_work ? first_job(s, processor->running)->left : 0);
     }
     s->busy[p] = waits && now + 1 < then ? now + 1 : then;
@@ -385,7 +385,7 @@ static void end(Scheduler *s, int64_t now) {
     EACH(k, LINKS) {
         if (s->line[k] != now) continue;
         s->line[k] = LATER, s->links[k].changed = 1;
-        pass_on(s, &s->links[k], now);
+        end_frame(s, &s->links[k], now);
     }
 }
 
@@ -412,12 +412,12 @@ static void arrive(Scheduler *s, int64_t now) {
         while (pending->count && *(int64_t *)head(pending) == now) {
             drop(pending);
             for (int64_t r = CARRIER(c, RELEASES); r < CARRIER(c, RELEASES_END); r++)
-                if (now < s->g.stop) let_go(s, s->g.releases[r], now, now);
+                if (now < s->g.stop) release_job(s, s->g.releases[r], now, now);
         }
         s->arrival[c] = pending->count ? *(int64_t *)head(pending) : LATER;
     }
     EACH(i, TASKS) while (s->release[i] == now) {
-        let_go(s, i, s->tasks[i].next_nominal, now);
+        release_job(s, i, s->tasks[i].next_nominal, now);
         draw_release(s, i);
     }
     EACH(m, MESSAGES) while (s->instant[m] == now) {
@@ -442,12 +442,12 @@ static void arrive(Scheduler *s, int64_t now) {
 }
 
 /* Goes through an instant; when the next one is, at the earliest: what was due may have been put off. */
-static int64_t pass(Scheduler *s, int64_t now) {
+static int64_t process_instant(Scheduler *s, int64_t now) {
     int64_t next;
     do {
         do {
             end(s, now);
-            if (s->heeds_deadlines) meet_deadlines(s, now);
+            if (s->has_deadlines) meet_deadlines(s, now);
             arrive(s, now);
             if (s->no_memory) return now;
             next = least(s->due, s->due_count);
@@ -455,7 +455,7 @@ static int64_t pass(Scheduler *s, int64_t now) {
         if (now == s->g.stop) return next;
         EACH(p, PROCESSORS) {
             if (!s->processors[p].changed) continue;
-            choose(s, p, now);
+            dispatch(s, p, now);
             next = s->busy[p] < next ? s->busy[p] : next;
         }
     } while (next == now);
@@ -471,7 +471,7 @@ static int64_t pass(Scheduler *s, int64_t now) {
 
 #define EXPORTED __attribute__((visibility("default")))
 
-EXPORTED int64_t size_of_given(void) { return sizeof(Given); }
+EXPORTED int64_t size_of_arguments(void) { return sizeof(Arguments); }
 
 EXPORTED void scheduler_free(Scheduler *s) {
     if (!s) return;
@@ -489,10 +489,10 @@ static void *zeros(Scheduler *s, int64_t count, size_t size) {
 }
 
 /* NULL where there is no memory. */
-EXPORTED Scheduler *scheduler_made(const Given *given) {
+EXPORTED Scheduler *scheduler_new(const Arguments *arguments) {
     Scheduler *s = calloc(1, sizeof(Scheduler));
     if (!s) return NULL;
-    s->g = *given, s->overfull = NONE;
+    s->g = *arguments, s->overfull = NONE;
     const int64_t *n = s->g.counts;
     s->due_count = n[PROCESSORS] + 2 * n[LINKS] + 2 * n[TASKS] + n[CARRIERS] + n[MESSAGES] + n[LEGS];
     s->tasks = zeros(s, n[TASKS], sizeof(TaskState)), s->processors = zeros(s, n[PROCESSORS], sizeof(ProcessorState));
@@ -511,7 +511,7 @@ EXPORTED Scheduler *scheduler_made(const Given *given) {
         s->tasks[i].jobs.size = s->tasks[i].unwritten.size = sizeof(Job);
         s->tasks[i].started_at = s->tasks[i].sampled_at = NONE;
         if (TASK(i, NOMINAL) != NONE) draw_release(s, i);
-        if (TASK(i, WRITES_AT_DEADLINE) || TASK(i, OVERRUN) == ABORT) s->heeds_deadlines = 1;
+        if (TASK(i, WRITES_AT_DEADLINE) || TASK(i, OVERRUN) == ABORT) s->has_deadlines = 1;
     }
     EACH(p, PROCESSORS) s->processors[p].running = NONE;
     EACH(j, LEGS) {
@@ -527,7 +527,7 @@ EXPORTED Scheduler *scheduler_made(const Given *given) {
     return s;
 }
 
-EXPORTED int64_t scheduler_reached(Scheduler *s) {
+EXPORTED int64_t scheduler_next_instant(Scheduler *s) {
     int64_t due = least(s->due, s->due_count);
     return due <= s->g.stop ? due : LATER;
 }
@@ -536,8 +536,8 @@ EXPORTED int64_t scheduler_reached(Scheduler *s) {
    less where too many wait. */
 EXPORTED int64_t scheduler_run(Scheduler *s, int64_t until) {
     int64_t last = until - 1 < s->g.stop ? until - 1 : s->g.stop, now = least(s->due, s->due_count);
-    while (now <= last && !s->no_memory) now = pass(s, now);
-    int64_t noted = s->g.noted;
-    s->g.noted = 0;
-    return s->overfull != NONE ? -2 - s->overfull : s->no_memory ? -1 : noted;
+    while (now <= last && !s->no_memory) now = process_instant(s, now);
+    int64_t note_count = s->g.note_count;
+    s->g.note_count = 0;
+    return s->overfull != NONE ? -2 - s->overfull : s->no_memory ? -1 : note_count;
 }

@@ -14,19 +14,20 @@ from orchestration.basics.simulator import Integers
 from orchestration.computers.parts import (
     ABORT,
     ABORTED,
+    ALL_KINDS,
     ARRIVES,
     AT_ONCE,
-    BEGUN,
     COLUMNS,
     EARLIEST_DEADLINE,
     FINISHED,
     FIXED_PRIORITY,
+    FRAME_CORRUPTED,
+    FRAME_STARTED,
+    FRAME_TRANSMITTED,
     INTERRUPTED,
     LATER,
     MOST_WAITING,
     NONE,
-    NOTED,
-    PASSED,
     PREEMPTED,
     QUEUED,
     RELEASED,
@@ -35,7 +36,6 @@ from orchestration.computers.parts import (
     SENT,
     SKIP,
     SKIPPED,
-    SPOILT,
     STARTED,
     SWITCHING,
     WRITTEN,
@@ -129,13 +129,13 @@ class _LegState:
 class _LinkState:
     """A link at work."""
 
-    __slots__ = ("changed", "legs", "sending", "slot", "slots", "spoilt")
+    __slots__ = ("changed", "corrupted", "legs", "sending", "slot", "slots")
 
     def __init__(self, legs: list[int], slots: int) -> None:
         self.legs, self.slots = legs, slots
         self.sending = NONE
         """the leg whose frame it carries"""
-        self.spoilt = False
+        self.corrupted = False
         self.slot = NONE
         """that which begins now"""
         self.changed = False
@@ -144,10 +144,10 @@ class _LinkState:
 class Scheduler:
     """Goes through the instants, and keeps notes of them."""
 
-    def __init__(self, parts: Parts, noted: Collection[int] = NOTED) -> None:
+    def __init__(self, parts: Parts, noted: Collection[int] = ALL_KINDS) -> None:
         """`noted` are the kinds of notes that are kept."""
         self._parts, self._stop = parts, parts.stop
-        self._noted = [kind in noted for kind in range(len(NOTED))]
+        self._noted = [kind in noted for kind in range(len(ALL_KINDS))]
         self._notes: list[int] = []
         self._numbers = [_Numbers(stream) for stream in parts.streams]
         carriers = range(len(parts.carriers))
@@ -197,7 +197,7 @@ class Scheduler:
         self._slots_past = [0] * len(parts.links)
 
     @property
-    def reached(self) -> int:
+    def next_instant(self) -> int:
         """The next instant [ns]; LATER if there is none up to the end."""
         due = min(self._due, default=LATER)
         return due if due <= self._stop else LATER
@@ -206,9 +206,9 @@ class Scheduler:
         """Go through all instants before `until` [ns], up to the end."""
         last, now = min(until - 1, self._stop), min(self._due, default=LATER)
         while now <= last:
-            now = self._pass(now)
+            now = self._process_instant(now)
 
-    def taken(self) -> Integers:
+    def take_notes(self) -> Integers:
         """The notes since they were taken last, a row each: time, what, whose, which, a number more."""
         found = np.array(self._notes, dtype=np.int64).reshape(-1, COLUMNS)
         self._notes.clear()
@@ -220,7 +220,7 @@ class Scheduler:
 
     # -- an instant ------------------------------------------------------------------------------------------------
 
-    def _pass(self, now: int) -> int:
+    def _process_instant(self, now: int) -> int:
         """Go through an instant; when the next one is, at the earliest: what was due may have been put off."""
         due, then = self._due, now
         while then == now:
@@ -233,7 +233,7 @@ class Scheduler:
                 return then
             for p, processor in enumerate(self._processors):
                 if processor.changed:
-                    self._choose(p, processor, now)
+                    self._dispatch(p, processor, now)
                     then = min(then, due[self._busy + p])
         for k, link in enumerate(self._links):
             if link.changed:
@@ -253,7 +253,7 @@ class Scheduler:
             if due[self._line + k] == now:
                 due[self._line + k] = LATER
                 link.changed = True
-                self._pass_on(link, now)
+                self._end_frame(link, now)
 
     def _meet_deadlines(self, now: int) -> None:
         due, late = self._due, []
@@ -277,11 +277,11 @@ class Scheduler:
                     pending.popleft()
                     for i in parts.carriers[c].releases:
                         if now < self._stop:
-                            self._let_go(i, now, now)
+                            self._release_job(i, now, now)
                 due[self._arrival + c] = pending[0] if pending else LATER
         for i, task in enumerate(self._tasks):
             while due[self._release + i] == now:
-                self._let_go(i, task.next_nominal, now)
+                self._release_job(i, task.next_nominal, now)
                 self._draw_release(i)
         for m, message in enumerate(parts.messages):
             while due[self._instant_of + m] == now:
@@ -306,7 +306,7 @@ class Scheduler:
         time = task.next_nominal + self._numbers[task.part.late].next()
         self._due[self._release + i] = time if time < self._stop else LATER
 
-    def _let_go(self, i: int, nominal: int, now: int) -> None:
+    def _release_job(self, i: int, nominal: int, now: int) -> None:
         """Release a job."""
         task = self._tasks[i]
         execution = self._numbers[task.part.execution].next()
@@ -331,7 +331,7 @@ class Scheduler:
         time = job.released if task.part.reads_at_release else now
         job.sample, task.samples = task.samples, task.samples + 1
         task.sampled_at = max(time, task.sampled_at + 1)
-        if task.part.is_heard:
+        if task.part.reports_samples:
             self._note(now, SAMPLED, i, job.number, task.sampled_at)
 
     def _set_deadline(self, i: int, now: int) -> None:
@@ -377,7 +377,7 @@ class Scheduler:
 
     # -- processors ------------------------------------------------------------------------------------------------
 
-    def _choose(self, p: int, processor: _ProcessorState, now: int) -> None:
+    def _dispatch(self, p: int, processor: _ProcessorState, now: int) -> None:
         """Give the processor to the job that comes first, and have it go on when its switch is over."""
         processor.changed = False
         part, waits = self._parts.processors[p], False
@@ -396,14 +396,14 @@ class Scheduler:
                 if least is None or order < least:
                     chosen, least = i, order
         if chosen != processor.running:
-            self._take_away(processor, now)
+            self._preempt(processor, now)
             processor.running, processor.ready_at = chosen, now + part.switch
             if part.switch:
                 self._note(now, SWITCHING, chosen, self._tasks[chosen].jobs[0].number, 0)
         then = LATER
         if processor.running != NONE:
             if not processor.at_work and processor.ready_at <= now:
-                self._go_on(processor, now)
+                self._resume(processor, now)
             left = self._tasks[processor.running].jobs[0].left if processor.at_work else 0
             then = processor.ready_at + left
         self._due[self._busy + p] = min(then, now + 1) if waits else then
@@ -417,7 +417,7 @@ class Scheduler:
             return job.deadline, priority, job.released, i
         return job.released, priority, i
 
-    def _take_away(self, processor: _ProcessorState, now: int) -> None:
+    def _preempt(self, processor: _ProcessorState, now: int) -> None:
         """The job that has the processor has it no more, if there is one."""
         i = processor.running
         if i == NONE:
@@ -430,7 +430,7 @@ class Scheduler:
             self._note(now, INTERRUPTED, i, job.number, 0)
         processor.running, processor.at_work = NONE, False
 
-    def _go_on(self, processor: _ProcessorState, now: int) -> None:
+    def _resume(self, processor: _ProcessorState, now: int) -> None:
         """The switch is over."""
         i = processor.running
         task = self._tasks[i]
@@ -513,21 +513,21 @@ class Scheduler:
         if chosen == NONE:
             return
         leg, message = self._legs[chosen], self._parts.messages[self._legs[chosen].message]
-        link.sending, link.spoilt = chosen, bool(self._numbers[message.corrupted].next())
-        length = leg.part.corrupted_length if link.spoilt else leg.part.length
+        link.sending, link.corrupted = chosen, bool(self._numbers[message.corrupted].next())
+        length = leg.part.corrupted_length if link.corrupted else leg.part.length
         self._due[self._line + k] = now + length
-        self._note(now, BEGUN, leg.message, leg.frames[0].number, leg.place)
+        self._note(now, FRAME_STARTED, leg.message, leg.frames[0].number, leg.place)
 
-    def _pass_on(self, link: _LinkState, now: int) -> None:
+    def _end_frame(self, link: _LinkState, now: int) -> None:
         """The last bit of what a link carries is over."""
         j, link.sending = link.sending, NONE
         leg = self._legs[j]
         message = self._parts.messages[leg.message]
-        if link.spoilt:
-            self._note(now, SPOILT, leg.message, leg.frames[0].number, leg.place)
+        if link.corrupted:
+            self._note(now, FRAME_CORRUPTED, leg.message, leg.frames[0].number, leg.place)
             return
         frame = leg.frames.popleft()
-        self._note(now, PASSED, leg.message, frame.number, leg.place)
+        self._note(now, FRAME_TRANSMITTED, leg.message, frame.number, leg.place)
         if not leg.is_last:
             self._legs[j + 1].coming.append((now + message.pause, frame))
             self._due[self._hop + j + 1] = self._legs[j + 1].coming[0][0]

@@ -7,22 +7,21 @@ from functools import partial
 import numpy as np
 
 from orchestration.basics.simulator import Booleans, Integers
-from orchestration.computers.happenings import Happenings
 from orchestration.computers.parts import (
     ABORTED,
-    BEGUN,
     FINISHED,
+    FRAME_CORRUPTED,
+    FRAME_STARTED,
+    FRAME_TRANSMITTED,
     INTERRUPTED,
     KINDS,
     LATER,
     NONE,
-    PASSED,
     PREEMPTED,
     QUEUED,
     RELEASED,
     RESUMED,
     SKIPPED,
-    SPOILT,
     STARTED,
     SWITCHING,
     WRITTEN,
@@ -42,10 +41,11 @@ from orchestration.computers.results import (
     Timeline,
 )
 from orchestration.computers.results import SKIPPED as WAS_SKIPPED
+from orchestration.computers.scheduler_events import EventBuilder
 from orchestration.recording.recording import Events
 
 _OF_TASKS = (RELEASED, STARTED, PREEMPTED, RESUMED, FINISHED, ABORTED, SKIPPED, SWITCHING, INTERRUPTED, WRITTEN)
-_OF_MESSAGES = (QUEUED, BEGUN, SPOILT, PASSED)
+_OF_MESSAGES = (QUEUED, FRAME_STARTED, FRAME_CORRUPTED, FRAME_TRANSMITTED)
 _ON_A_PROCESSOR = (SWITCHING, STARTED, RESUMED, PREEMPTED, FINISHED, INTERRUPTED)
 NEEDED = frozenset((*_OF_TASKS, *_OF_MESSAGES))
 """The kinds of notes that a timeline is made of"""
@@ -93,7 +93,7 @@ def timeline(
         links={
             name: _slices_of_link(of_messages, parts, k, names.messages, until) for k, name in enumerate(names.links)
         },
-        happenings=partial(_happenings, notes, parts, names, without),
+        happenings=partial(_events, notes, parts, names, without),
     )
 
 
@@ -137,8 +137,9 @@ def _frames(notes: Integers, deadline: int, legs: int, stop: int) -> Frames:
     what = notes[:, 1]
     first = notes[what == QUEUED]
     started, ended = np.full((2, len(first)), NEVER, dtype=np.int64)
-    begun, last = notes[(what == BEGUN) & (notes[:, 4] == 0)], notes[(what == PASSED) & (notes[:, 4] == legs - 1)]
-    started[begun[::-1, 3]] = begun[::-1, 0]  # of several attempts the first
+    first_bits = notes[(what == FRAME_STARTED) & (notes[:, 4] == 0)]
+    last = notes[(what == FRAME_TRANSMITTED) & (notes[:, 4] == legs - 1)]
+    started[first_bits[::-1, 3]] = first_bits[::-1, 0]  # of several attempts the first
     ended[last[:, 3]] = last[:, 0]
     return Frames(
         nominal=first[:, 4],
@@ -146,7 +147,7 @@ def _frames(notes: Integers, deadline: int, legs: int, stop: int) -> Frames:
         started=started,
         ended=ended,
         deadline=np.minimum(first[:, 4], LATER - deadline) + deadline,
-        attempts=np.bincount(notes[what == BEGUN, 3], minlength=len(first)),
+        attempts=np.bincount(notes[what == FRAME_STARTED, 3], minlength=len(first)),
         stop=stop,
     )
 
@@ -167,9 +168,9 @@ def _slices_of_link(notes: Integers, parts: Parts, link: int, names: Sequence[st
             where[m, place] = leg.link
     notes = notes[notes[:, 1] != QUEUED]
     kept = notes[where[notes[:, 2], notes[:, 4]] == link]
-    is_spoilt = np.append(kept[1:, 1] == SPOILT, [False])[: len(kept)]
+    is_corrupted = np.append(kept[1:, 1] == FRAME_CORRUPTED, [False])[: len(kept)]
     owners = np.flatnonzero((where == link).any(axis=1)).tolist()
-    return _slices(kept, np.where(is_spoilt, CORRUPTED, RUN), (BEGUN,), owners, names, stop)
+    return _slices(kept, np.where(is_corrupted, CORRUPTED, RUN), (FRAME_STARTED,), owners, names, stop)
 
 
 def _slices(
@@ -187,6 +188,6 @@ def _slices(
     )
 
 
-def _happenings(notes: Integers, parts: Parts, names: Names, without: Collection[str]) -> Events:
-    found = Happenings(parts, names.all, without)
+def _events(notes: Integers, parts: Parts, names: Names, without: Collection[str]) -> Events:
+    found = EventBuilder(parts, names.all, without)
     return Events(found.names, found.before(parts.stop + 1, notes))

@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from orchestration.basics.errors import UsageError
-from orchestration.computers.bounded import Bounds, bounds_of
+from orchestration.computers.system_bounds import Bounds, bounds_of
 from orchestration.system.distribution import highest, lowest
 from orchestration.system.frames import frame_nanoseconds
 from orchestration.system.model import System
-from orchestration.system.placement import PlacedMessage, PlacedTask, carried, tasks_of
+from orchestration.system.placement import PlacedMessage, PlacedTask, messages_by_connection, tasks_of
 from orchestration.system.sampling import SamplingOnArrival
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds, nanoseconds
 
@@ -63,7 +63,7 @@ def windows_of(system: System) -> dict[str, Window]:
     Raises `UsageError` where theory has no bound, where a job or frame may still be under way when the next one comes,
     and for what is neither a periodic task nor sent by a sampled component.
     """
-    tasks, messages, bounds = tasks_of(system), carried(system), bounds_of(system)
+    tasks, messages, bounds = tasks_of(system), messages_by_connection(system), bounds_of(system)
     found = {}
     for name, component in system.components.items():
         sent = [x.name for x in system.connections if x.sender == name]

@@ -7,7 +7,7 @@ import numpy as np
 from orchestration.basics.simulator import Floats, Integers
 from orchestration.engines.at_work import AtWork
 from orchestration.recording.recording import BYTES, EVENTS, ROWS, Chunk, Recorder
-from orchestration.schedule.happened import Happened
+from orchestration.schedule.run_events import RunEvents
 from orchestration.system.times import NANOSECONDS
 
 
@@ -74,7 +74,7 @@ class Backlog:
 
     def __init__(self, work: AtWork, tables: Tables, recorder: Recorder) -> None:
         self._work, self.tables, self._recorder = work, tables, recorder
-        self._happened = Happened(work.system)
+        self._run_events = RunEvents(work.system)
         self.handed_over: int | None = None
         """up to when [ns]; None: nothing has been"""
         recorder.begin(work.columns)
@@ -85,7 +85,7 @@ class Backlog:
         return Chunk(
             columns=self._work.columns,
             rows=self.tables.rows_with_sources(),
-            events=self._happened.with_messages(events, self._work.now),
+            events=self._run_events.with_messages(events, self._work.now),
         )
 
     def hand_over(self) -> None:
@@ -94,7 +94,7 @@ class Backlog:
         self.tables.keep_events(self._past_and_later()[1])
         self.tables.keep_rows(b"")
         self.handed_over = self._work.now
-        self._happened.hand_over(self._work.now)
+        self._run_events.hand_over(self._work.now)
 
     def hand_over_rest(self) -> None:
         """At the end of the run: a recorder hears of at least one chunk."""
@@ -125,7 +125,7 @@ class Backlog:
         self.tables.keep_events(events)
         self.handed_over = handed_over
         if handed_over is not None:
-            self._happened.hand_over(handed_over)
+            self._run_events.hand_over(handed_over)
 
     def _past_and_later(self) -> tuple[Integers, Integers]:
         """The events up to now, and those of messages that go out later."""

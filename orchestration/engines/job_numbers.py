@@ -10,16 +10,16 @@ from orchestration.expressions.over_run import evaluate
 from orchestration.expressions.recorded import Recorded
 from orchestration.expressions.syntax import (
     Call,
+    JobMeasure,
     Name,
     Node,
-    OfJobs,
     Operation,
     Sampled,
     children,
-    is_of_jobs,
     names,
+    names_job_measure,
     parse,
-    parse_of_jobs,
+    parse_job_measures,
     text,
 )
 from orchestration.schedule.resources import timeline_of
@@ -35,14 +35,14 @@ def job_numbers(system: System) -> dict[str, float]:
     Raises `UsageError` for a task that there is not, and for jobs of several tasks in one.
     """
     wanted = dict.fromkeys(
-        name for _, expression in expressions(system) for name in names(parse(expression)) if is_of_jobs(name)
+        name for _, expression in expressions(system) for name in names(parse(expression)) if names_job_measure(name)
     )
     if not wanted:
         return {}
     timeline = timeline_of(system)
     found = {}
     for name in wanted:
-        call = parse_of_jobs(name)
+        call = parse_job_measures(name)
         assert isinstance(call, Call)
         value = evaluate({name: _at_jobs(call)}, lambda call=call: iter([_recorded(timeline, call)]))[name]  # type: ignore[misc]
         found[name] = np.nan if value is None else value
@@ -57,7 +57,7 @@ def _at_jobs(call: Call) -> Call:
 
 def _named(node: Node) -> Node:
     match node:
-        case OfJobs():
+        case JobMeasure():
             return Name(text(node))
         case Operation(sign, operands):
             return Operation(sign, tuple(map(_named, operands)))
@@ -85,14 +85,14 @@ def _recorded(timeline: Timeline, call: Call) -> Recorded:
     )
 
 
-def _of_jobs(node: Node) -> Iterable[OfJobs]:
-    if isinstance(node, OfJobs):
+def _of_jobs(node: Node) -> Iterable[JobMeasure]:
+    if isinstance(node, JobMeasure):
         yield node
     for child in children(node):
         yield from _of_jobs(child)
 
 
-def _jobs(timeline: Timeline, of: OfJobs) -> Jobs | Frames:
+def _jobs(timeline: Timeline, of: JobMeasure) -> Jobs | Frames:
     """Those of a task, or the frames of a message, by its name alone where no other has it."""
     every: dict[str, Jobs | Frames] = {**timeline.jobs, **timeline.frames}
     found = [name for name in every if of.task in (name, name.partition(".")[2])]

@@ -28,13 +28,13 @@ from orchestration.results import objectives
 from orchestration.results.units import units
 from orchestration.schedule.fixed_step import FixedStep
 from orchestration.schedule.streams import VALUE, Streams
-from orchestration.signals.library import made
+from orchestration.signals.library import make_signal
 from orchestration.signals.table_file import read_table
 from orchestration.signals.waypoints import read_waypoints
-from orchestration.system.check import check, recorded
+from orchestration.system.check import check, recorded_variables
 from orchestration.system.component import Component
-from orchestration.system.following import followed, heard
 from orchestration.system.model import System
+from orchestration.system.references import connect_references, describe_references
 from orchestration.system.source import MOTION, Source
 from orchestration.system.times import Grid, exact_nanoseconds
 from orchestration.system.variable_names import variable_of
@@ -57,7 +57,7 @@ class Checked:
 def checked(system: System, models: Mapping[str, Model]) -> Checked:
     """A system held to what its FMUs say; raises `UsageError` for what they do not have, or cannot take."""
     check(system, models)
-    words, system = followed(system, models), heard(system, models)
+    words, system = describe_references(system, models), connect_references(system, models)
     for name, component in system.components.items():
         _expect_clock(name, component, models[name])
     parameters = _parameters(system, models)
@@ -103,7 +103,7 @@ def _parameters(system: System, models: Mapping[str, Model]) -> dict[str, float]
 
 def signals_of(system: System, models: Mapping[str, Model]) -> set[str]:
     """Everything that is recorded, or comes from a source."""
-    found = {f"{name}.{variable}" for name, variables in recorded(system, models).items() for variable in variables}
+    found = {f"{name}.{each}" for name, variables in recorded_variables(system, models).items() for each in variables}
     return found.union(columns_of(system)) - {"time"}
 
 
@@ -136,7 +136,7 @@ def _of_file_or_signal(system: System, name: str, streams: Streams) -> Values:
     source = system.sources[name]
     quantities = [MOTION.index(".".join(signal.split(".")[-2:])) for signal in source.signals(name) if source.is_motion]
     if source.signal is not None:
-        signal = made(source.signal, source.parameters)
+        signal = make_signal(source.signal, source.parameters)
         if source.is_motion:
             return Moving(by_name(signal), quantities)
         return gusts(signal, system.stop_time, streams.of(f"sources.{name}", VALUE))

@@ -13,10 +13,10 @@ from orchestration.exact.objective_means import ObjectiveMeans
 from orchestration.exact.scheduled import is_scheduled
 from orchestration.expressions.syntax import Call
 from orchestration.fmi.foreign import computed
-from orchestration.requests.request import Asked, asked_for
+from orchestration.requests.request import RequestLike, request_of
 from orchestration.stability.known_loops import LOOPS, rested
 from orchestration.system.model import System
-from orchestration.system.request import in_its_own_words
+from orchestration.system.request import errors_in_own_terms
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +46,7 @@ class Expected:
         return f"<Expected: {listed or 'no objectives'}; mean-square radius {self.mean_square_radius:.6g}>"
 
 
-def expect(asked: Asked, *, as_simulated: bool = False, horizon: float | None = None) -> Expected:
+def expect(asked: RequestLike, *, as_simulated: bool = False, horizon: float | None = None) -> Expected:
     """The stationary expectation of each objective that consists of means of quadratic expressions of signals.
 
     The system is linearised about its operating point, or its initial state. Noise of sources is white; delays, jitter
@@ -58,10 +58,10 @@ def expect(asked: Asked, *, as_simulated: bool = False, horizon: float | None = 
     """
     if horizon is not None and not 1e-9 <= horizon < math.inf:
         raise UsageError(f"horizon = {horizon:g} s: expected a finite time above 0")
-    request = asked_for(asked)
+    request = request_of(asked)
     if horizon is not None and LOOPS.of(request.kind) is not None:
         raise UsageError("horizon: expected a system file, which has an initial state")
-    with in_its_own_words(request):
+    with errors_in_own_terms(request):
         system = rested(request)
         files = files_of(system)
         loops = Loops(files.models, simulated=as_simulated)

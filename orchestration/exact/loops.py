@@ -35,7 +35,7 @@ from orchestration.stability.linear_loop import Beside, at_rest
 from orchestration.stability.operating_point import true_period
 from orchestration.system.model import System
 from orchestration.system.paths import changed
-from orchestration.system.sampling import Sampling, is_foreseen
+from orchestration.system.sampling import Sampling, has_scheduled_instants
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
 from orchestration.system.variable_names import component_of
 from orchestration.system.written import tables_of
@@ -258,7 +258,9 @@ class Loops:
         self, system: System, linear: Linear, effects: LoopEffects, horizon: float | None = None
     ) -> tuple[Sequence[Task], Sequence[Link]]:
         """The tasks and links, those of a scheduler included: over its period, or up to a `horizon` [s]."""
-        unscheduled = [task.period for task in tasks_of(system) if not is_foreseen(_sampling(system, task.name))]
+        unscheduled = [
+            task.period for task in tasks_of(system) if not has_scheduled_instants(_sampling(system, task.name))
+        ]
         steps = [link.step for link in links_of(system) if link.step is not None]
         schedule = periodic_schedule(system, horizon=horizon, other_periods=[*unscheduled, *steps, *effects.grids])
         tasks, links = tasks_of(system, schedule), links_of(system, schedule)

@@ -9,8 +9,8 @@ from orchestration.exact.objectives import Mean, evaluated, inlined_objectives, 
 from orchestration.expressions.syntax import Call, names
 from orchestration.fmi.model import Model
 from orchestration.stability.linear_loop import AtRest
-from orchestration.system.following import AT_REST
 from orchestration.system.model import System
+from orchestration.system.references import AT_REST
 from orchestration.system.source import Source
 from orchestration.system.variable_names import component_of, variable_of
 

@@ -48,7 +48,7 @@ class ScheduleTrace:
         self.resources = Resources(system, stop)
         running = scheduler(self.resources.of_run(Streams(system.seed, system.streams)))
         running.run(LATER)
-        self.notes = running.taken()
+        self.notes = running.take_notes()
         self.places = [each.place for each in placed_tasks(system.computers)]
         self.messages = [each.place for each in placed_messages(system.networks)]
         self.system, self.stop = system, stop

@@ -22,8 +22,8 @@ from orchestration.computers.parts import (
     ARRIVES,
     FINISHED,
     FIXED_PRIORITY,
+    FRAME_TRANSMITTED,
     NONE,
-    PASSED,
     QUEUED,
     RELEASED,
     RESUMED,
@@ -39,8 +39,8 @@ from orchestration.exact.periodic_schedule import NO_SCHEDULE, PeriodicSchedule,
 from orchestration.exact.scheduled import expect_certain, is_scheduled
 from orchestration.system.distribution import highest
 from orchestration.system.model import System
-from orchestration.system.placement import carried, placed_messages, placed_tasks, released_by
-from orchestration.system.sampling import is_foreseen
+from orchestration.system.placement import messages_by_connection, placed_messages, placed_tasks, released_by
+from orchestration.system.sampling import has_scheduled_instants
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds, nanoseconds
 
 MOST_JOBS = 200_000
@@ -94,7 +94,7 @@ def periodic_schedule(
 
 def _instants(system: System) -> list[tuple[Fraction, Fraction]]:
     """The offset and the period [ns] of everything periodic that shares a resource."""
-    over, releases = carried(system), released_by(system)
+    over, releases = messages_by_connection(system), released_by(system)
     found = []
     for task in placed_tasks(system.computers):
         if task.task.period is not None:
@@ -104,7 +104,7 @@ def _instants(system: System) -> list[tuple[Fraction, Fraction]]:
             found.append((message.message.offset, message.message.period, 1.0))
     for name in {x.sender for x in system.connections if x.name in over or x.name in releases}:
         sampling = system.components[name].sampling
-        if sampling is not None and not is_foreseen(sampling):
+        if sampling is not None and not has_scheduled_instants(sampling):
             found.append((sampling.offset, sampling.period, sampling.clock_ratio))
     ratios = [Fraction(repr(float(ratio))) for _, _, ratio in found]
     grids = [(exact_nanoseconds(o) / r, exact_nanoseconds(p) / r) for (o, p, _), r in zip(found, ratios)]
@@ -187,7 +187,7 @@ class _Windows:
     def _received(self, notes: Integers, message: int) -> int:
         """How many frames of a message were received."""
         last = len(self._trace.resources.parts.messages[message].legs) - 1
-        return int(((notes[:, 1] == PASSED) & (notes[:, 2] == message) & (notes[:, 4] == last)).sum())
+        return int(((notes[:, 1] == FRAME_TRANSMITTED) & (notes[:, 2] == message) & (notes[:, 4] == last)).sum())
 
     def failure_text(self) -> str:
         """Why no schedule repeats, in one line."""

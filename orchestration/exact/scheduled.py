@@ -8,14 +8,14 @@ from dataclasses import replace
 from orchestration.basics.errors import UsageError
 from orchestration.system.distribution import Distribution, Varying
 from orchestration.system.model import System
-from orchestration.system.placement import carried, placed_messages, placed_tasks, released_by
-from orchestration.system.sampling import Sampling, is_foreseen
+from orchestration.system.placement import messages_by_connection, placed_messages, placed_tasks, released_by
+from orchestration.system.sampling import Sampling, has_scheduled_instants
 
 
 def is_scheduled(system: System) -> bool:
     """Whether a scheduler decides on times of events of a system."""
     samplings = (one.sampling for one in system.components.values())
-    on_arrivals = any(each is not None and is_foreseen(each) for each in samplings)
+    on_arrivals = any(each is not None and has_scheduled_instants(each) for each in samplings)
     return bool(system.computers or system.networks) or on_arrivals
 
 
@@ -25,7 +25,7 @@ def without_scheduler(system: System) -> System:
         return system
     components = {
         name: one
-        if one.sampling is None or not is_foreseen(one.sampling)
+        if one.sampling is None or not has_scheduled_instants(one.sampling)
         else replace(one, sampling=Sampling(period=one.sampling.period, clock_ratio=one.sampling.clock_ratio))
         for name, one in system.components.items()
     }
@@ -63,7 +63,7 @@ def _random_quantities(system: System) -> Iterator[tuple[str, str]]:
             yield f"{message.place}.jitter", "random from message to message"
         if message.network.error > 0.0:
             yield f"networks.{message.network_name}.error", "frames are repeated at random"
-    over, releases = carried(system), released_by(system)
+    over, releases = messages_by_connection(system), released_by(system)
     for x in system.connections:
         sampling = system.components[x.sender].sampling
         if (x.name in over or x.name in releases) and sampling is not None and sampling.is_random:

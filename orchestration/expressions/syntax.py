@@ -27,7 +27,7 @@ SAMPLED = "sampled"
 """`sampled(CONNECTION, x)`: the values of x at the rows at which a message of that connection arrived"""
 
 
-OF_JOBS = ("response", "missed")
+JOB_MEASURES = ("response", "missed")
 """`response(TASK)`, `missed(TASK)`: of the jobs of a task, as `control` or COMPUTER.TASK"""
 
 
@@ -90,14 +90,14 @@ class Sampled(_Deep):
 
 
 @dataclass(frozen=True)
-class OfJobs:
+class JobMeasure:
     """What there is of each job of a task: its response [s], or whether it missed its deadline."""
 
     what: str
     task: str
 
 
-Node: TypeAlias = Number | Name | Operation | Call | Sampled | OfJobs
+Node: TypeAlias = Number | Name | Operation | Call | Sampled | JobMeasure
 
 
 @functools.lru_cache(maxsize=1024)
@@ -106,11 +106,11 @@ def parse(text: str) -> Node:
 
     What it says of jobs, which no signal decides, is one number of the run: it is there by its text, as a name.
     """
-    return _with_numbers(parse_of_jobs(text))
+    return _with_numbers(parse_job_measures(text))
 
 
 @functools.lru_cache(maxsize=1024)
-def parse_of_jobs(text: str) -> Node:
+def parse_job_measures(text: str) -> Node:
     """The same, with what it says of jobs as it is written."""
     if not isinstance(text, str) or len(text) > LONGEST:
         raise UsageError(f"expected an expression of at most {LONGEST} characters")
@@ -122,21 +122,21 @@ def parse_of_jobs(text: str) -> Node:
     return _node(tree.body, text, 0)
 
 
-def is_of_jobs(name: str) -> bool:
+def names_job_measure(name: str) -> bool:
     """Whether a name is the text of what is said of jobs."""
     return name.endswith(")")
 
 
-def says_of_jobs(node: Node) -> bool:
+def has_job_measure(node: Node) -> bool:
     """Whether something in an expression is said of jobs."""
-    return isinstance(node, OfJobs) or any(map(says_of_jobs, children(node)))
+    return isinstance(node, JobMeasure) or any(map(has_job_measure, children(node)))
 
 
 def _with_numbers(node: Node) -> Node:
     match node:
-        case OfJobs():
+        case JobMeasure():
             raise UsageError(f"{text(node)}: has a value for each job; expected it inside max, mean, share or the like")
-        case Call() if is_over_run(node) and says_of_jobs(node):
+        case Call() if is_over_run(node) and has_job_measure(node):
             return Name(text(node))
         case Operation(sign, operands):
             return Operation(sign, tuple(map(_with_numbers, operands)))
@@ -163,7 +163,7 @@ def text(node: Node) -> str:
             return name
         case Sampled(connection, argument):
             return f"{SAMPLED}({connection}, {text(argument)})"
-        case OfJobs(what, task):
+        case JobMeasure(what, task):
             return f"{what}({task})"
         case Call(function, arguments):
             return f"{function}({', '.join(map(text, arguments))})"
@@ -187,7 +187,7 @@ def is_number(node: Node) -> bool:
     match node:
         case Operation(sign):
             return not OPERATORS[sign].gives_truth
-        case Call() | Sampled() | OfJobs():
+        case Call() | Sampled() | JobMeasure():
             return True
     return isinstance(node, Number) and node.value not in (0.0, 1.0)
 
@@ -250,7 +250,7 @@ def _node(tree: ast.expr, text: str, depth: int) -> Node:
         case ast.Call(func=ast.Name(id="sampled"), args=[ast.Name(id=connection), argument], keywords=[]):
             return Sampled(connection, build(argument))
         case ast.Call(func=ast.Name(id="response" | "missed" as what), args=[task], keywords=[]):
-            return OfJobs(what, _dotted(task, text))
+            return JobMeasure(what, _dotted(task, text))
         case ast.Call(func=ast.Name(id=function), keywords=[]):
             return Call(_known(function, len(tree.args), text), tuple(map(build, tree.args)))
     raise UsageError(
@@ -277,7 +277,7 @@ def _dotted(tree: ast.expr, text: str) -> str:
 
 def _known(function: str, count: int, text: str) -> str:
     at_instant = {word: operator.arguments for word, operator in OPERATORS.items() if operator.tree is None}
-    functions = {**at_instant, **OVER_RUN, SAMPLED: (2, 2), **dict.fromkeys(OF_JOBS, (1, 1))}
+    functions = {**at_instant, **OVER_RUN, SAMPLED: (2, 2), **dict.fromkeys(JOB_MEASURES, (1, 1))}
     if function not in functions:
         near = difflib.get_close_matches(function, functions, n=1)
         hint = f"; did you mean {near[0]}?" if near else ""

@@ -9,15 +9,15 @@ from orchestration.expressions.operators import OPERATORS
 from orchestration.expressions.recorded import STOP_TIME, TIME
 from orchestration.expressions.syntax import (
     Call,
+    JobMeasure,
     Name,
     Node,
     Number,
-    OfJobs,
     Operation,
     Sampled,
-    is_of_jobs,
     is_over_run,
-    parse_of_jobs,
+    names_job_measure,
+    parse_job_measures,
     text,
 )
 from orchestration.expressions.unit_rules import Operand, agreed
@@ -35,7 +35,7 @@ def unit_of(node: Node, units: Units) -> Unit | None:
     match node:
         case Number():
             return NUMBER
-        case OfJobs(what):
+        case JobMeasure(what):
             return SECOND if what == "response" else NUMBER
         case Name(name):
             return _named(name, units)
@@ -52,8 +52,8 @@ def _operand(node: Node, units: Units) -> Operand:
 
 
 def _named(name: str, units: Units) -> Unit | None:
-    if is_of_jobs(name):
-        return unit_of(parse_of_jobs(name), units)
+    if names_job_measure(name):
+        return unit_of(parse_job_measures(name), units)
     if name in (TIME, STOP_TIME):
         return SECOND
     if name in units:

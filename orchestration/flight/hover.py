@@ -15,8 +15,8 @@ from orchestration.fmi.instance import Instance
 from orchestration.quadrotor import wiring
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice
-from orchestration.system.following import AT_REST
 from orchestration.system.model import System
+from orchestration.system.references import AT_REST
 
 STEP = 1e-6
 """of each coordinate in a difference; a thousandth of a boundary layer that is smaller than 1 mm"""

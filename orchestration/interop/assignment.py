@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from orchestration.basics.errors import UsageError
 from orchestration.fmi.model import Kind
 from orchestration.interop.job import End
-from orchestration.requests.ssp.carried import Carried
+from orchestration.requests.ssp.export import Export
 from orchestration.system.variable_names import variable_of
 
 
@@ -51,7 +51,7 @@ class Loop:
         return {name: behind[component, name] for name in self.ports[component].inputs}
 
 
-def loop_of(given: Carried) -> Loop:
+def loop_of(given: Export) -> Loop:
     """The loop of a system; raises `UsageError` for a connection that does not pass on values as they are."""
     for x in given.system.connections:
         if x.converts:

@@ -21,12 +21,12 @@ from orchestration.interop.trace import Trace, read_trace
 from orchestration.processes import subprocesses
 from orchestration.processes.child import Child
 from orchestration.requests.ssp import writing
-from orchestration.requests.ssp.carried import Part, carried, wholly_carried
+from orchestration.requests.ssp.export import Part, complete_export, export_of
 from orchestration.runs.prepared import prepared
 from orchestration.system.component import Parameter
 from orchestration.system.model import System
 from orchestration.system.paths import changed
-from orchestration.system.request import Request, in_its_own_words
+from orchestration.system.request import Request, errors_in_own_terms
 from orchestration.system.times import exact_nanoseconds
 
 _TEMPORARY = ("TMPDIR", "TEMP", "TMP")
@@ -41,9 +41,9 @@ class Flights:
 
     def __init__(self, asked: Request, folder: Path, announce: Callable[[str], None] | None) -> None:
         self._folder = folder
-        with in_its_own_words(asked):
+        with errors_in_own_terms(asked):
             system = _in_order(asked.as_system(), "gauss-seidel")
-            given = wholly_carried(system, announce)
+            given = complete_export(system, announce)
             self._fmus = {part.name: part.fmu.absolute() for part in given.parts}
             self._system = _with_fmus(system, self._fmus)
             self._clocks = {part.name for part in given.parts if part.model.has_clock}
@@ -87,7 +87,7 @@ class Flights:
         folder = self._folder / tool.call.replace(":", "_") / purpose
         folder.mkdir(parents=True)
         system = _with_fmus(self._system, {name: prepare(name, folder) for name in self._fmus})
-        parts = carried(system).parts
+        parts = export_of(system).parts
         job = Job(
             fmus={part.name: part.fmu for part in parts},
             ssp=writing.write(system, folder / "loop.ssp"),
@@ -179,9 +179,9 @@ def _in_order(system: System, order: str, step: float = 0.0) -> System:
     changes: dict[str, Any] = {}
     for x in system.connections:
         sampling = system.components[x.sender].sampling
-        has_own = sampling is not None and sampling.clock == "fmu"
-        changes[f"connections.{x.name}.order"] = "gauss-seidel" if has_own else order
-        if has_own and order == "jacobi":
+        has_built_in_trajectory = sampling is not None and sampling.clock == "fmu"
+        changes[f"connections.{x.name}.order"] = "gauss-seidel" if has_built_in_trajectory else order
+        if has_built_in_trajectory and order == "jacobi":
             changes[f"connections.{x.name}.delay"] = step
     return changed(system, changes)
 

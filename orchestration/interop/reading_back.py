@@ -9,7 +9,7 @@ from pathlib import Path
 from orchestration.interop.catalogue import TOOLS
 from orchestration.interop.job import Job
 from orchestration.processes.child import Child
-from orchestration.requests.ssp.carried import Carried
+from orchestration.requests.ssp.export import Export
 
 READERS = tuple(name for name in TOOLS if name.endswith(", SSP"))
 STEPS = 2
@@ -28,7 +28,7 @@ class Reading:
     """why it does not fly the file; None if it does"""
 
 
-def readings(ssp: Path, given: Carried) -> Iterator[Reading]:
+def readings(ssp: Path, given: Export) -> Iterator[Reading]:
     """What came of each master that is installed and reads SSPs, one after the other, in processes of their own."""
     with tempfile.TemporaryDirectory() as temporary:
         job = Job(

@@ -21,7 +21,7 @@ from orchestration.results import quantities
 from orchestration.results.quantities import Quantity
 from orchestration.stability.known_loops import LOOPS, KnownLoop
 from orchestration.studies import figures
-from orchestration.system.request import Request, system_meant
+from orchestration.system.request import Request, system_of
 
 DIGITS = 4
 """of what is said of a value"""
@@ -158,7 +158,7 @@ def draw_spectral_radius(request: Request, found: Found, folder: Path, style: St
     ends = [limit for limit in (found.local_limit, found.large_signal_limit) if limit is not None]
     last = 1.3 * max(ends, default=0.1)
     values = np.array([0.001 + i / 199.0 * (last - 0.001) for i in range(200)])
-    radii = computed(files_of(system_meant(request)).fmus.values(), _radii, known, request, found.of, values)
+    radii = computed(files_of(system_of(request)).fmus.values(), _radii, known, request, found.of, values)
     return (
         []
         if radii is None

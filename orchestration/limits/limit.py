@@ -17,14 +17,14 @@ from orchestration.exact.mean_square import MeanSquareLimit, mean_square_limit
 from orchestration.fmi.foreign import LostError, computed
 from orchestration.limits.evaluation import RELIABILITY, Evaluator, said
 from orchestration.limits.found import Continuous, Found
-from orchestration.requests.ranges import Varied, range_asked_for, usual_quantity
-from orchestration.requests.request import Asked, asked_for
+from orchestration.requests.ranges import Varied, default_quantity, search_range
+from orchestration.requests.request import RequestLike, request_of
 from orchestration.results import html
 from orchestration.results.criterion import edge, judged
 from orchestration.stability.known_loops import Local
 from orchestration.stability.local_limit import local_limits
 from orchestration.system.chance import has_random_timing, is_random
-from orchestration.system.request import Request, in_its_own_words, system_meant
+from orchestration.system.request import Request, errors_in_own_terms, system_of
 from orchestration.workers.choice import alone
 from orchestration.workers.executors import RunEvaluator
 
@@ -87,7 +87,7 @@ class Limit(Found):
 
 @explains_missing
 def find(
-    asked: Asked,
+    asked: RequestLike,
     of: str | None = None,
     *,
     first: float | None = None,
@@ -111,15 +111,15 @@ def find(
 
     Raises `UsageError` for a quantity, range, tolerance, step or confidence that cannot be.
     """
-    request, how = alone(asked_for(asked), engine)
-    of = of or usual_quantity(request)
+    request, how = alone(request_of(asked), engine)
+    of = of or default_quantity(request)
     varied, files = _checked(request, of, confidence)
     near = request.near_continuous(CONTINUOUS) if continuous else None
     if continuous and near is None:
         raise UsageError("--continuous: for the quadrotor only")
     models = files.models_of(varied.system)
-    span = range_asked_for(varied, models, first=first, last=last, tolerance=tolerance, scan=scan)
-    with in_its_own_words(request):
+    span = search_range(varied, models, first=first, last=last, tolerance=tolerance, scan=scan)
+    with errors_in_own_terms(request):
         fitting = [checked(varied.at(value), models) for value in span.values()]
     units, metric = fitting[0].units, judged(varied.system)
     random = is_random(varied.at(span.last))
@@ -229,7 +229,7 @@ def _refuted(trials: Evaluator, bracket: Bracket | None, above: list[float]) -> 
 
 def _flown(near: Request, pool: RunEvaluator) -> Continuous:
     """What comes of a run near continuous time."""
-    (metrics,) = pool.fly([system_meant(near)], stop=lambda metrics: False)
+    (metrics,) = pool.fly([system_of(near)], stop=lambda metrics: False)
     return Continuous(period=CONTINUOUS, outcome=metrics["outcome"], settling_time=metrics["settling_time"])
 
 

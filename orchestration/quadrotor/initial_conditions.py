@@ -15,7 +15,7 @@ from orchestration.engines.wiring import source_values
 from orchestration.fmi.kit import TRAJECTORY
 from orchestration.quadrotor.wiring import REFERENCE
 from orchestration.schedule.streams import Streams
-from orchestration.system.request import Start
+from orchestration.system.request import InitialConditions
 
 
 @record("starts.")
@@ -56,12 +56,12 @@ class Starts:
         """The same ensemble with `count` members from index `first` on."""
         return dataclasses.replace(self, first=first, count=count)
 
-    def starts_of(self, request: Any) -> tuple[Start, ...]:
+    def initial_conditions(self, request: Any) -> tuple[InitialConditions, ...]:
         """The initial conditions about the start of the reference of a `Scenario`, in the order of their indices."""
         position, velocity = _start_of_reference(request)
         return tuple(self._start(i, position, velocity) for i in range(self.first, self.first + self.count))
 
-    def _start(self, index: int, position: Floats, velocity: Floats) -> Start:
+    def _start(self, index: int, position: Floats, velocity: Floats) -> InitialConditions:
         size = 1.0 - _van_der_corput(index)
         generator = Streams(self.seed).of(f"starts.{index}", "direction")
         place, motion, axis, spin = (_direction(generator) for _ in range(4))
@@ -73,7 +73,7 @@ class Starts:
             "plant.initial.angular_velocity": size * self.rate * spin,
         }
         values = {f"{name}.{letter}": float(x) for name, vector in vectors.items() for letter, x in zip("xyzw", vector)}
-        return Start(size=size, values=values)
+        return InitialConditions(size=size, values=values)
 
 
 def starts_in(table: Mapping[str, Any], beside: Sequence[str] = ()) -> Starts:

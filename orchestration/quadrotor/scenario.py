@@ -39,7 +39,7 @@ from orchestration.results.quantities import setting
 from orchestration.system.component import Parameter
 from orchestration.system.description import varying
 from orchestration.system.distribution import Distribution
-from orchestration.system.distribution_table import meant_in
+from orchestration.system.distribution_table import parsed_fields
 from orchestration.system.model import System
 from orchestration.system.paths import changed
 from orchestration.system.requirements import is_finite
@@ -117,7 +117,7 @@ class Scenario:
         parameters = {**of_tables, **(parameters or {})}
         changed = dataclasses.replace(self, **fields)
         if timing:
-            values = meant_in(self.timing, "timing.", timing)
+            values = parsed_fields(self.timing, "timing.", timing)
             changed = dataclasses.replace(changed, timing=dataclasses.replace(self.timing, **values))
         for name, value in parameters.items():
             side, _, parameter = name.partition(".")
@@ -182,7 +182,7 @@ class Scenario:
             raise UsageError(f"controller.{USE_REFERENCE_INPUTS}: expected [reference] name or file = … to feed them")
         return disturbed(changed(quadrotor(), changes), this.disturbance)
 
-    def in_words(self, text: str) -> str:
+    def in_own_terms(self, text: str) -> str:
         """`text` with the paths of the system replaced by the names of a scenario."""
         return in_scenario_terms(text)
 

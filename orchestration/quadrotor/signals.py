@@ -88,7 +88,7 @@ def _expect_signal(place: str, name: str | None, parameters: Mapping[str, Any]) 
         if name is None:
             library.limits(parameters)
         else:
-            library.made(name, parameters, library.KINDS["wind" if place == "disturbance" else "motion"])
+            library.make_signal(name, parameters, library.KINDS["wind" if place == "disturbance" else "motion"])
     except UsageError as error:
         text = str(error)
         raise UsageError(f"{place}.{text.removeprefix('parameters.').replace('signal =', 'name =')}") from error

@@ -14,9 +14,9 @@ from orchestration.report.tracks import Signals
 from orchestration.results.objectives import Metrics
 from orchestration.runs.simulation import run
 from orchestration.studies.study import Study
-from orchestration.system.check import recorded
-from orchestration.system.following import heard
+from orchestration.system.check import recorded_variables
 from orchestration.system.model import System
+from orchestration.system.references import connect_references
 from orchestration.workers.choice import chosen
 
 SOME = 64
@@ -60,7 +60,7 @@ def fly(
     for first in range(0, len(indices), SOME if lanes else 1):
         some = indices[first : first + (SOME if lanes else 1)]
         asked = [study.system(i, starts) for i in some]
-        known = [heard(system, files.models_of(system)) for system in asked]
+        known = [connect_references(system, files.models_of(system)) for system in asked]
         systems = all_with_files(known, paths)
         for index, system, found in zip(some, systems, _flown(systems, starts, batches, _columns(known, files))):
             if found is not None:
@@ -115,7 +115,7 @@ def _columns(systems: Sequence[System], files: Files) -> list[str]:
 
 def _recorded(system: System, models: Mapping[str, Model]) -> list[str]:
     """The columns that its run has: what is exchanged first."""
-    own = [f"{name}.{variable}" for name, some in recorded(system, models).items() for variable in some]
+    own = [f"{name}.{variable}" for name, some in recorded_variables(system, models).items() for variable in some]
     return [*dict.fromkeys((*columns_of(system)[1:], *own))]
 
 

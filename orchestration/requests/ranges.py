@@ -13,7 +13,7 @@ from orchestration.results.quantities import is_in_seconds
 from orchestration.system.distribution import Distribution
 from orchestration.system.model import System
 from orchestration.system.paths import TOP, changed, value_at
-from orchestration.system.request import Request, in_its_own_words, system_meant
+from orchestration.system.request import Request, errors_in_own_terms, system_of
 from orchestration.system.sampling import TaskSampling
 
 PERIOD = "period"
@@ -40,7 +40,7 @@ class Varied:
     @cached_property
     def system(self) -> System:
         """As it is."""
-        return system_meant(self.request)
+        return system_of(self.request)
 
     @cached_property
     def paths(self) -> tuple[str, ...]:
@@ -57,11 +57,11 @@ class Varied:
 
     def at(self, value: float) -> System:
         """With another value; raises `UsageError` for one that cannot be."""
-        with in_its_own_words(self.request):
+        with errors_in_own_terms(self.request):
             return changed(self.system, dict.fromkeys(self.paths, value))
 
 
-def range_asked_for(
+def search_range(
     varied: Varied,
     models: Mapping[str, Model],
     *,
@@ -92,17 +92,17 @@ def range_asked_for(
     )
 
 
-def usual_quantity(request: Request) -> str:
+def default_quantity(request: Request) -> str:
     """What is looked for where nobody says what: the period, of a system that of its only sampled component.
 
     Raises `UsageError` naming the periods of a system that has none or several.
     """
     if request.range_of(PERIOD) is not None:
         return PERIOD
-    components = system_meant(request).components.items()
+    components = system_of(request).components.items()
     sampled = [(name, each.sampling) for name, each in components if each.sampling is not None]
     owners = [one.task if isinstance(one, TaskSampling) else f"components.{name}.sampling" for name, one in sampled]
-    paths = [path for owner in owners if value_at(system_meant(request), path := f"{owner}.{PERIOD}") is not None]
+    paths = [path for owner in owners if value_at(system_of(request), path := f"{owner}.{PERIOD}") is not None]
     if len(paths) != 1:
         listed = f", one of {', '.join(paths)}" if paths else ""
         raise UsageError(f"--of: expected a path, as connections.NAME.delay{listed}")
@@ -134,5 +134,5 @@ def paths_in(base: Request, target: str) -> tuple[str, ...]:
     """The paths of a target in the system that `base` means; raises `UsageError` where there is no such."""
     paths = base.paths_of(target)
     for path in paths:
-        value_at(system_meant(base), path)
+        value_at(system_of(base), path)
     return paths

@@ -23,26 +23,26 @@ SSP = "ssp"
 """Key of a file with timing: the SSP that it is for"""
 
 
-Asked: TypeAlias = Request | str | os.PathLike[str] | Mapping[str, Any]
+RequestLike: TypeAlias = Request | str | os.PathLike[str] | Mapping[str, Any]
 """A request, the path of its file, or what stands in that as a dictionary"""
 
 
-def asked_for(given: Asked) -> Request:
-    """The request that is given, whichever way; relative paths of a dictionary start at the current folder.
+def request_of(request: RequestLike) -> Request:
+    """The request of whatever form it has; relative paths of a dictionary start at the current folder.
 
     Raises `UsageError` for what is none, and as `load_request`.
     """
-    if isinstance(given, (str, os.PathLike)):
-        return load_request(Path(given))
-    if isinstance(given, Mapping):
-        return request_from_tables(copy.deepcopy(dict(given)), Path())
-    if isinstance(given, type) or not isinstance(given, Request):
+    if isinstance(request, (str, os.PathLike)):
+        return load_request(Path(request))
+    if isinstance(request, Mapping):
+        return request_from_tables(copy.deepcopy(dict(request)), Path())
+    if isinstance(request, type) or not isinstance(request, Request):
         expected = "a Scenario, a System, the path of a file of one, or its tables as a dictionary"
-        raise UsageError(f"{shown(repr(given))}: expected {expected}")
-    return given
+        raise UsageError(f"{shown(repr(request))}: expected {expected}")
+    return request
 
 
-def usual() -> Scenario:
+def default_scenario() -> Scenario:
     """What runs where nobody says what: the paper's flight."""
     return Scenario()
 
@@ -63,12 +63,12 @@ def load_request(path: str | Path, timing: str | Path | None = None) -> Scenario
             and (Path(timing or "").parent / str(on_top.pop(SSP))).resolve() != path.resolve()
         ):
             raise UsageError(f"{timing}: ssp: names another file than {path}")
-        with _said_of(path if timing is None else Path(timing)):
+        with _errors_naming(path if timing is None else Path(timing)):
             return _from_ssp(path, on_top, path.parent if timing is None else Path(timing).parent)
     if timing is not None:
         raise UsageError(f"{timing}: expected no second file; only an SSP leaves its timing to one")
     tables = read_toml(path, "system or scenario file")
-    with _said_of(path):
+    with _errors_naming(path):
         if isinstance(tables.get(SSP), str):
             return _from_ssp(path.parent / tables.pop(SSP), tables, path.parent)
         return request_from_tables(tables, path.parent)
@@ -86,7 +86,7 @@ def _from_ssp(path: Path, timing: dict[str, Any] | None, folder: Path) -> System
 
 
 @contextmanager
-def _said_of(path: Path) -> Iterator[None]:
+def _errors_naming(path: Path) -> Iterator[None]:
     try:
         yield
     except UsageError as error:

@@ -17,7 +17,7 @@ from orchestration.recording.recording import Chunk, Recorder
 from orchestration.runs.outcome import Course, Progress, RunLost, RunOutcome, result_of
 from orchestration.runs.resolved import ResolvedRequest
 from orchestration.runs.result import Result
-from orchestration.schedule.happened import Happened
+from orchestration.schedule.run_events import RunEvents
 from orchestration.schedule.streams import Streams
 from orchestration.system.request import Request
 from orchestration.system.times import NANOSECONDS
@@ -173,8 +173,8 @@ def _chunk(resolved: ResolvedRequest, receiver: _Receiver, left: Left) -> Chunk:
     for name, values in resolved.sources(Streams(system.seed, system.streams)).items():
         places = [columns.index(signal) for signal in system.sources[name].signals(name)]
         rows[:, places] = values.over(rows[:, 0])
-    happened = Happened(system)
+    run_events = RunEvents(system)
     if receiver.recorded_until >= 0.0:
-        happened.hand_over(round(receiver.recorded_until * NANOSECONDS))
-    events = happened.with_messages(left.events, round(float(rows[-1, 0]) * NANOSECONDS))
+        run_events.hand_over(round(receiver.recorded_until * NANOSECONDS))
+    events = run_events.with_messages(left.events, round(float(rows[-1, 0]) * NANOSECONDS))
     return Chunk(columns=columns, rows=rows, events=events)

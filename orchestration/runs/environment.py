@@ -8,7 +8,7 @@ import numpy as np
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
-from orchestration.requests.request import Asked
+from orchestration.requests.request import RequestLike
 from orchestration.runs.stepping import Simulation
 
 Reward = Callable[[Mapping[str, float]], float]
@@ -28,7 +28,7 @@ class Environment(gymnasium.Env[Floats, Floats]):  # type: ignore[misc]
 
     def __init__(
         self,
-        request: Asked,
+        request: RequestLike,
         reward: Reward,
         *,
         low: Any,

@@ -16,14 +16,14 @@ from orchestration.engines.batch.batches import Batches
 from orchestration.engines.batch.shape import expect_lanes
 from orchestration.engines.wiring import checked, columns_of, source_signals
 from orchestration.fmi.model import Model, read_model
-from orchestration.requests.request import Asked, asked_for
+from orchestration.requests.request import RequestLike, request_of
 from orchestration.results.objectives import FIXED, Metrics
 from orchestration.runs.columns import Columns, columns
 from orchestration.runs.simulation import run
-from orchestration.system.check import check, recorded
-from orchestration.system.following import heard
+from orchestration.system.check import check, recorded_variables
 from orchestration.system.model import System
-from orchestration.system.request import in_its_own_words
+from orchestration.system.references import connect_references
+from orchestration.system.request import errors_in_own_terms
 from orchestration.system.variable_names import component_of, variable_of
 
 BATCH = "batch"
@@ -62,7 +62,7 @@ class Flights(Mapping[str, Floats]):
 
 
 def run_many(
-    request: Asked, values: Mapping[str, Any], *, outputs: Sequence[str] | None = None, record: Sequence[str] = ()
+    request: RequestLike, values: Mapping[str, Any], *, outputs: Sequence[str] | None = None, record: Sequence[str] = ()
 ) -> Flights:
     """Run a system, or a scenario, many times, from arrays into arrays, without a store or a result for each run.
 
@@ -75,12 +75,12 @@ def run_many(
     else each run is one of `run`. Raises `UsageError` for a path, an output or a column that does not exist, arrays of
     different lengths and invalid values; and what `run` raises for a run that fails, naming it.
     """
-    loaded = asked_for(request)
-    with in_its_own_words(loaded):
+    loaded = request_of(request)
+    with errors_in_own_terms(loaded):
         system = located(loaded.as_system())
         models = {name: read_model(Path(component.fmu)) for name, component in system.components.items()}
         check(system, models)
-        system = heard(system, models)
+        system = connect_references(system, models)
         fits = checked(_recording(system, models, record), models)
         names = _outputs(fits.system, outputs)
         runs = columns(loaded, fits.system, models, values)
@@ -183,7 +183,7 @@ def located(system: System) -> System:
 
 def _recording(system: System, models: Mapping[str, Model], record: Sequence[str]) -> System:
     """The system, recording these columns too; raises `UsageError` for one that cannot be recorded."""
-    known, usual = {"time", *columns_of(system)}, recorded(system, models)
+    known, usual = {"time", *columns_of(system)}, recorded_variables(system, models)
     components = dict(system.components)
     for column in record:
         name, variable = component_of(column), variable_of(column)

@@ -13,20 +13,20 @@ from orchestration.engines.engine import Engine
 from orchestration.processes.limits import Limits
 from orchestration.recording.recording import InMemory, Recorder
 from orchestration.recording.tables import InFolder, ToFolder
-from orchestration.requests.request import Asked, asked_for, load_request
+from orchestration.requests.request import RequestLike, load_request, request_of
 from orchestration.runs.outcome import Progress
 from orchestration.runs.prepared import PreparedRun
 from orchestration.runs.resolved import Announce
 from orchestration.runs.result import Result
 from orchestration.runs.run_directory import METRICS, SCENARIO, STATE, keep_run
 from orchestration.runs.simulation import simulate
-from orchestration.system.files_read import files_read
-from orchestration.system.request import system_meant
+from orchestration.system.input_files import input_files
+from orchestration.system.request import system_of
 from orchestration.system.times import nanoseconds
 
 
 def run_until(
-    request: Asked,
+    request: RequestLike,
     pause_at: float,
     folder: str | Path,
     *,
@@ -43,8 +43,8 @@ def run_until(
     Returns None, or the result if the run ended before: its directory is then in `folder`. All other arguments are
     those of `run`.
     """
-    loaded = asked_for(request)
-    stop_time = system_meant(loaded).stop_time
+    loaded = request_of(request)
+    stop_time = system_of(loaded).stop_time
     if not 0.0 <= pause_at < stop_time:
         raise UsageError(f"pause at {pause_at:g} s: expected a time from 0 to before stop_time {stop_time:g} s")
 
@@ -158,7 +158,7 @@ def _hashes(simulation: PreparedRun) -> dict[str, str]:
     """The hashes of all that a resumed run depends on beside its state."""
     return {
         SCENARIO: hashlib.sha256(simulation.request.to_toml().encode()).hexdigest(),
-        **{f"the file of {name}": _hash(path) for name, path in files_read(simulation.system).items()},
+        **{f"the file of {name}": _hash(path) for name, path in input_files(simulation.system).items()},
         **{f"the FMU of {name}": _hash(instance.path) for name, instance in simulation.instances.items()},
     }
 

@@ -34,10 +34,10 @@ from orchestration.runs.resolved import Announce, ResolvedRequest, resolve
 from orchestration.runs.result import Provenance, Result
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import Timetable
-from orchestration.system.check import recorded
+from orchestration.system.check import recorded_variables
 from orchestration.system.component import Component
 from orchestration.system.model import System
-from orchestration.system.request import Request, in_its_own_words
+from orchestration.system.request import Request, errors_in_own_terms
 from orchestration.system.times import NANOSECONDS
 from orchestration.system.variable_names import component_of, variable_of
 
@@ -127,7 +127,7 @@ def prepared(
     streams = Streams(system.seed, system.streams)
     with deferred_interrupts() as interrupt, ExitStack() as stack:
         instances = {name: stack.enter_context(load(path, name)) for name, path in resolved.paths.items()}
-        with in_its_own_words(request):
+        with errors_in_own_terms(request):
             timetable = Timetable(system, streams, fixed_steps(system, models))
             for name, component in system.components.items():
                 set_parameters(instances[name], component)
@@ -142,7 +142,7 @@ def prepared(
                 instances,
                 timetable=timetable,
                 streams=streams,
-                recorded=recorded(system, models),
+                recorded=recorded_variables(system, models),
                 recorder=recorder,
                 sources=[(signals[name], values) for name, values in sources.items()],
                 feeds=_feeds(system, sources, instances),

@@ -12,7 +12,7 @@ from orchestration.fmi.model import Model, read_model
 from orchestration.runs.resolved import ResolvedRequest
 from orchestration.system.model import System
 from orchestration.system.paths import changed
-from orchestration.system.request import Request, in_its_own_words
+from orchestration.system.request import Request, errors_in_own_terms
 from orchestration.system.variable_names import component_of, variable_of
 
 
@@ -33,7 +33,7 @@ class Replacement:
 
     def resolve(self, values: Mapping[str, Any]) -> ResolvedRequest:
         """Resolve it with other values by target; raises `UsageError` for values that are invalid."""
-        with in_its_own_words(self.request):
+        with errors_in_own_terms(self.request):
             paths = {path: value for target, value in values.items() for path in self.request.paths_of(target)}
             system = changed(self.system, paths) if paths else self.system
             if system.fmus != self.system.fmus:
@@ -47,7 +47,7 @@ class Replacement:
 
 def replace_component(request: Request, component: str | None) -> Replacement:
     """Replace a component of a request; None: the only sampled one. Raises `UsageError` if it cannot be replaced."""
-    with in_its_own_words(request):
+    with errors_in_own_terms(request):
         system = request.as_system()
         name = component_named(system, component, "to replace")
         _expect_no_clock(system, name)

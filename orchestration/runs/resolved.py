@@ -12,7 +12,7 @@ from orchestration.fmi.model import Model, read_model
 from orchestration.results.column_info import ColumnInfo, column_infos
 from orchestration.schedule.streams import Streams
 from orchestration.system.model import System
-from orchestration.system.request import Request, in_its_own_words
+from orchestration.system.request import Request, errors_in_own_terms
 
 Announce = Callable[[str], None]
 """Receives a line for each thing that is done before the run begins."""
@@ -56,7 +56,7 @@ def resolve(request: Request, announce: Announce | None = None) -> ResolvedReque
 
     Raises `UsageError` for what the FMUs do not have.
     """
-    with in_its_own_words(request):
+    with errors_in_own_terms(request):
         system = request.as_system()
         if not system.components:
             raise UsageError("components = none: expected at least one to run; computers and networks alone have none")
@@ -66,7 +66,7 @@ def resolve(request: Request, announce: Announce | None = None) -> ResolvedReque
 
 def resolve_with_models(request: Request, models: Mapping[str, Model]) -> ResolvedRequest:
     """As `resolve`, with FMUs whose models have been read."""
-    with in_its_own_words(request):
+    with errors_in_own_terms(request):
         fits = checked(request.as_system(), models)
     return ResolvedRequest(
         request=request, system=fits.system, paths={name: model.path for name, model in models.items()}, models=models,

@@ -19,7 +19,7 @@ from orchestration.results.column_info import ColumnInfo
 from orchestration.runs.folder import NewFolder, new_folder
 from orchestration.runs.outcome import RunInterrupted, RunLost
 from orchestration.runs.result import Provenance, Result
-from orchestration.system.request import system_meant
+from orchestration.system.request import system_of
 
 SIGNALS, EVENTS = tables.SIGNALS, tables.EVENTS
 METRICS, SCENARIO, PROVENANCE = "metrics.json", "scenario.toml", "provenance.json"
@@ -79,7 +79,7 @@ def load_run(folder: str | Path) -> Result:
     checksums = notes.pop(CHECKSUMS)
     recording = tables.InFolder(folder)
     request = load_request(folder / SCENARIO)
-    system = system_meant(request)
+    system = system_of(request)
     missing = [name for name in columns_of(system) if name not in recording.columns]
     if missing:
         raise UsageError(f"{folder / SIGNALS}: no column {', '.join(missing)}; expected those of a run")

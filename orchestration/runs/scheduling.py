@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 from orchestration.basics.documents import read_toml
 from orchestration.basics.errors import UsageError
 from orchestration.computers.results import Timeline
-from orchestration.requests.request import SSP, SSP_ENDINGS, Asked, asked_for, request_from_tables
+from orchestration.requests.request import SSP, SSP_ENDINGS, RequestLike, request_from_tables, request_of
 from orchestration.schedule.resources import timeline_of
 from orchestration.schedule.responses import Responses, responses_of
-from orchestration.system.request import Request, system_meant
+from orchestration.system.request import Request, system_of
 
 if TYPE_CHECKING:
     from orchestration.figures.gallery import Figures
@@ -44,14 +44,14 @@ class Scheduled:
             return Figures({"schedule": gantt.draw(self.timeline, chosen, window)}, chosen)
 
 
-def schedule(request: Asked, until: float | None = None) -> Scheduled:
+def schedule(request: RequestLike, until: float | None = None) -> Scheduled:
     """Schedule the tasks and messages of a system up to a time; default: its `stop_time`.
 
     `request` may also be the path of a file or a dictionary with the content of one; its FMUs need not exist.
 
     Raises `UsageError` for a system without computers and networks.
     """
-    system = system_meant(request_until(request, until))
+    system = system_of(request_until(request, until))
     if not (system.computers or system.networks):
         raise UsageError("computers: none, and no networks: expected at least one of them to schedule")
     timeline = timeline_of(system)
@@ -65,15 +65,15 @@ def schedule(request: Asked, until: float | None = None) -> Scheduled:
     )
 
 
-def request_until(request: Asked, until: float | None) -> Request:
+def request_until(request: RequestLike, until: float | None) -> Request:
     """A request with this stop time; a file that is used for this only need not have one."""
     if until is None:
-        return asked_for(request)
+        return request_of(request)
     if isinstance(request, (str, os.PathLike)) and Path(request).suffix.lower() not in SSP_ENDINGS:
         path = Path(request)
         tables = read_toml(path, "system or scenario file")
         if SSP not in tables:
             return request_from_tables({**tables, "stop_time": until}, path.parent)
     if isinstance(request, Mapping):
-        return asked_for({**request, "stop_time": until})
-    return replace(system_meant(asked_for(request)), stop_time=until)
+        return request_of({**request, "stop_time": until})
+    return replace(system_of(request_of(request)), stop_time=until)

@@ -15,7 +15,7 @@ from orchestration.runs.result import Result
 from orchestration.system.request import Request
 
 if TYPE_CHECKING:
-    from orchestration.requests.request import Asked
+    from orchestration.requests.request import RequestLike
 
 
 def run_to_end(simulation: PreparedRun, progress: Progress | None) -> bool:
@@ -26,7 +26,7 @@ def run_to_end(simulation: PreparedRun, progress: Progress | None) -> bool:
 
 @overload
 def run(
-    request: "Asked | None" = None, *, recorder: Recorder | None = None, progress: Progress | None = None,
+    request: "RequestLike | None" = None, *, recorder: Recorder | None = None, progress: Progress | None = None,
     announce: Announce | None = None, engine: Engine | None = None, in_process: bool = False,
     time_limit: float | None = None, memory_limit: float = Limits.memory,
 ) -> Result: ...  # fmt: skip
@@ -37,7 +37,7 @@ def run(
     time_limit: float | None = None, memory_limit: float = Limits.memory,
 ) -> list[Result]: ...  # fmt: skip
 def run(
-    request: "Asked | list[Any] | None" = None,
+    request: "RequestLike | list[Any] | None" = None,
     *,
     recorder: Recorder | None = None,
     progress: Progress | None = None,
@@ -62,7 +62,7 @@ def run(
     refuses a call for another reason than divergence, `RunLost` with what was recorded if an FMU or a limit ends
     the process, `RunInterrupted` after Ctrl-C.
     """
-    from orchestration.requests.request import asked_for, usual  # not before: they load readers of files
+    from orchestration.requests.request import default_scenario, request_of  # not before: they load readers of files
 
     if isinstance(request, list):
         if recorder is not None:
@@ -74,8 +74,9 @@ def run(
             ) for each in request
         ]  # fmt: skip
     result = simulate(
-        usual() if request is None else asked_for(request), run_to_end, recorder=recorder, progress=progress,
-        announce=announce, engine=engine, in_process=in_process, time_limit=time_limit, memory_limit=memory_limit,
+        default_scenario() if request is None else request_of(request), run_to_end, recorder=recorder,
+        progress=progress, announce=announce, engine=engine, in_process=in_process, time_limit=time_limit,
+        memory_limit=memory_limit,
     )  # fmt: skip
     assert result is not None
     return result

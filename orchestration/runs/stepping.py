@@ -17,7 +17,7 @@ from orchestration.basics.simulator import Floats
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.reuse import Instances
 from orchestration.recording.recording import InMemory
-from orchestration.requests.request import Asked, asked_for
+from orchestration.requests.request import RequestLike, request_of
 from orchestration.runs.outcome import RunOutcome, result_of
 from orchestration.runs.prepared import PreparedRun, prepared
 from orchestration.runs.replacement import replace_component
@@ -43,12 +43,12 @@ class Simulation:
     else is as in the run with that FMU, by the same engine, to the bit.
     """
 
-    def __init__(self, request: Asked, component: str | None = None) -> None:
+    def __init__(self, request: RequestLike, component: str | None = None) -> None:
         """`component` is the one that is replaced; default: the only sampled one.
 
         Raises `UsageError` for a system that cannot run, and for a component that does not exist or has its own clock.
         """
-        self._replacement = replacement = replace_component(asked_for(request), component)
+        self._replacement = replacement = replace_component(request_of(request), component)
         self.component = replacement.component
         """The name of the component that is replaced."""
         self.measured = replacement.measured

@@ -31,7 +31,7 @@ class Cursor:
         Raises `UsageError` if the run cannot go through it.
         """
         if self._schedule is None or self.at == len(self._schedule):
-            self._schedule, self._before, self.at = self._timetable.following(INSTANTS), self.past, 0
+            self._schedule, self._before, self.at = self._timetable.next_schedule(INSTANTS), self.past, 0
         return self._schedule
 
     def instants(self) -> Iterator[Instant]:

@@ -12,11 +12,11 @@ from orchestration.schedule.fixed_step import FixedStep, seconds
 from orchestration.schedule.longest import expect_no_longer
 from orchestration.schedule.plan import Plan
 from orchestration.schedule.resources import Resources
-from orchestration.schedule.spans import Collected, Instants
+from orchestration.schedule.spans import InstantCollector, Instants
 from orchestration.system.distribution import highest
 from orchestration.system.model import System
-from orchestration.system.placement import carried, placed_tasks, tasks_of
-from orchestration.system.sampling import is_foreseen
+from orchestration.system.placement import messages_by_connection, placed_tasks, tasks_of
+from orchestration.system.sampling import has_scheduled_instants
 from orchestration.system.times import Grid, exact_nanoseconds, nanoseconds
 
 _KEPT = 8
@@ -51,11 +51,11 @@ class Frame:
         self.sender = np.array([names.index(x.sender) for x in system.connections], dtype=np.int64)
         self.receiver = np.array([names.index(x.receiver) for x in system.connections], dtype=np.int64)
         """components at the ends of the connections"""
-        self.foresees = bool(system.computers or system.networks) or any(
-            each.sampling is not None and is_foreseen(each.sampling) for each in system.components.values()
+        self.uses_scheduler = bool(system.computers or system.networks) or any(
+            each.sampling is not None and has_scheduled_instants(each.sampling) for each in system.components.values()
         )
         """whether the scheduler finds the instants of any component or connection"""
-        self.pace = _pace(system)
+        self.mean_interval = _mean_interval(system)
         """from one instant to the next [ns], about"""
         self._changes = [
             (Grid(Fraction(0), exact_nanoseconds(source.period)), [names.index(end.split(".")[0]) for end in source.to])
@@ -84,7 +84,7 @@ class Frame:
         if (begin, end) in self._kept:
             self._kept.move_to_end((begin, end))
             return self._kept[begin, end]
-        found = Collected(len(self.continuous))
+        found = InstantCollector(len(self.continuous))
         for component, grid in self.points.items():
             found.add(grid.between(grid.index_from(begin), grid.index_from(end)), self.place[component])
         if begin == 0:
@@ -104,7 +104,7 @@ class Frame:
 
 def _expect_moves(system: System, fixed: Mapping[str, FixedStep]) -> None:
     """Raise `UsageError` for a component of fixed steps that a task or a network meets between two of its points."""
-    tasks, over = tasks_of(system), carried(system)
+    tasks, over = tasks_of(system), messages_by_connection(system)
     for x in system.connections:
         places = [of.place for of in (tasks.get(x.sender), tasks.get(x.receiver), over.get(x.name)) if of is not None]
         for name in (x.sender, x.receiver):
@@ -115,17 +115,17 @@ def _expect_moves(system: System, fixed: Mapping[str, FixedStep]) -> None:
                 )
 
 
-def _pace(system: System) -> float:
+def _mean_interval(system: System) -> float:
     """From one instant to the next [ns], about."""
     periods = [component.step for component in system.components.values()]
     periods += [source.period for source in system.sources.values()]
     rates = [1.0 / float(exact_nanoseconds(period)) for period in periods if period is not None]
     for component in system.components.values():
         if component.sampling is not None:
-            instants = 2.0 if is_foreseen(component.sampling) else 1.0  # it samples, and it writes
+            instants = 2.0 if has_scheduled_instants(component.sampling) else 1.0  # it samples, and it writes
             period = float(exact_nanoseconds(component.sampling.period))
             rates.append(instants * component.sampling.clock_ratio / period)
-    by_connection = carried(system)
+    by_connection = messages_by_connection(system)
     periods = [by_connection[x.name].message.period for x in system.connections if x.name in by_connection]
     rates += [1.0 / float(exact_nanoseconds(period)) for period in periods if period is not None]
     if not rates:

@@ -5,7 +5,7 @@ from orchestration.system.computers import require_less
 from orchestration.system.distribution import highest
 from orchestration.system.frames import ERROR_BITS, frame_nanoseconds
 from orchestration.system.model import System
-from orchestration.system.placement import carried, placed_messages, placed_tasks
+from orchestration.system.placement import messages_by_connection, placed_messages, placed_tasks
 from orchestration.system.sampling import Sampling
 from orchestration.system.times import NANOSECONDS
 
@@ -44,7 +44,7 @@ def expect_no_longer(system: System) -> None:
     for place, time in times.items():
         if time >= LONGEST / NANOSECONDS:
             raise UsageError(f"{place} = {time:g} s: expected less than {LONGEST / NANOSECONDS:.4g} s")
-    over = carried(system)
+    over = messages_by_connection(system)
     for x in system.connections:
         sampling = system.components[x.receiver].sampling
         if sampling is None or system.components[x.sender].sampling is not None:

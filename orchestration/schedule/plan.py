@@ -6,7 +6,7 @@ from functools import cached_property
 from orchestration.schedule.order import ranked
 from orchestration.system.connection import Connection
 from orchestration.system.model import System
-from orchestration.system.placement import carried
+from orchestration.system.placement import messages_by_connection
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Plan:
     @cached_property
     def over_networks(self) -> frozenset[int]:
         """Connections that go over networks."""
-        names = carried(self.system)
+        names = messages_by_connection(self.system)
         return frozenset(i for i, x in enumerate(self._connections) if x.name in names)
 
     @cached_property

@@ -9,7 +9,7 @@ import numpy as np
 from orchestration.basics.simulator import Integers
 from orchestration.schedule.drawing import times
 from orchestration.schedule.fixed_step import FixedStep, Refusal, seconds
-from orchestration.schedule.foreseen import NEVER, Foreseen
+from orchestration.schedule.lookahead import NEVER, Lookahead
 from orchestration.schedule.message_times import lateness, losses
 from orchestration.schedule.plan import Plan
 from orchestration.schedule.streams import DELAY, DELAY_JITTER, JITTER, LOSS, Streams
@@ -85,7 +85,7 @@ class TimedComponent:
         self._fixed = [fixed[x] for x in sorted({connections[link.index].sender for link in self.incoming} & {*fixed})]
         self.rows: Integers = np.zeros((0, 3 + 2 * (len(self.incoming) + len(self.outgoing))), dtype=np.int64)
 
-    def drawn_to(self, end: int) -> None:
+    def draw_until(self, end: int) -> None:
         """Draw until no sample that is still to be drawn has anything to do with what is before `end` [ns]."""
         raise NotImplementedError
 
@@ -150,7 +150,7 @@ class SampledComponent(TimedComponent):
         """Of samples `first` up to `end`, without that one; `before` is that of the one before them [ns]."""
         return self._moved(self._grid.between(first, end) + self._late(end - first), first, before)
 
-    def drawn_to(self, end: int) -> None:
+    def draw_until(self, end: int) -> None:
         """Draw until no sample that is still to be drawn has anything to do with what is before `end` [ns]."""
         while self._next[0] - self._ahead < end:
             last = max(self._grid.index_from(end + self._ahead), self._k + 1)
@@ -174,30 +174,30 @@ class ScheduledComponent(TimedComponent):
         name: str,
         plan: Plan,
         links: Sequence[Link],
-        foreseen: Foreseen,
+        lookahead: Lookahead,
         fixed: Mapping[str, FixedStep],
         refused: list[Refusal],
     ) -> None:
         super().__init__(name, plan, links, fixed, refused)
-        self._foreseen, self._samples = foreseen, foreseen.samples[name]
+        self._lookahead, self._samples = lookahead, lookahead.samples[name]
         names = [x.name for x in plan.system.connections]
-        self._sent = [foreseen.messages.get(names[link.index]) for link in self.outgoing]
+        self._sent = [lookahead.messages.get(names[link.index]) for link in self.outgoing]
         self._k, self._before = 0, -1
-        while not (len(self._samples.times) or foreseen.over):
-            foreseen.further()
+        while not (len(self._samples.times) or lookahead.is_complete):
+            lookahead.advance()
         first = self._moved(self._samples.times[:1], 0, -1)
         self.first = int(first[0]) if len(first) else NEVER
 
-    def drawn_to(self, end: int) -> None:
+    def draw_until(self, end: int) -> None:
         """As in any other."""
-        foreseen, samples = self._foreseen, self._samples
+        lookahead, samples = self._lookahead, self._samples
         end += self._ahead
-        foreseen.to(end)
+        lookahead.advance_to(end)
         while True:
-            self._take(min(samples.known(foreseen.over), samples.before(end)))
-            if foreseen.over or (len(samples.times) and samples.times[0] >= end):
+            self._take(min(samples.known(lookahead.is_complete), samples.before(end)))
+            if lookahead.is_complete or (len(samples.times) and samples.times[0] >= end):
                 return
-            foreseen.further()
+            lookahead.advance()
 
     def _take(self, count: int) -> None:
         """So many more are drawn."""

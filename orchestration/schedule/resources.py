@@ -14,7 +14,6 @@ import numpy as np
 
 from orchestration.basics.simulator import Integers
 from orchestration.computers.compiled import scheduler
-from orchestration.computers.happenings import Happenings
 from orchestration.computers.parts import (
     ABORT,
     EARLIEST_DEADLINE,
@@ -35,6 +34,7 @@ from orchestration.computers.parts import (
     Task,
 )
 from orchestration.computers.results import Timeline
+from orchestration.computers.scheduler_events import EventBuilder
 from orchestration.computers.timeline import NEEDED, Names, timeline
 from orchestration.schedule.drawing import times
 from orchestration.schedule.longest import expect_no_longer
@@ -47,7 +47,7 @@ from orchestration.system.model import System
 from orchestration.system.placement import (
     PlacedMessage,
     PlacedTask,
-    carried,
+    messages_by_connection,
     nodes_of,
     placed_messages,
     placed_tasks,
@@ -82,7 +82,7 @@ class Resources:
         released = released_by(system)
         self.tasks = {each.task.component: i for i, each in enumerate(placed) if each.task.component is not None}
         """by component, that whose jobs are its steps"""
-        by_network = carried(system)
+        by_network = messages_by_connection(system)
         sending = {x.sender for x in system.connections if x.name in by_network or x.name in released}
         for name, component in system.components.items():
             sampling = component.sampling
@@ -141,11 +141,11 @@ class Resources:
         at_work.run(LATER)
         dues = [each.message.due for each in self._over]
         deadlines = [LATER if due is None else nanoseconds(due) for due in dues]
-        return timeline(parts, self._names, deadlines, at_work.taken(), without=self._alone)
+        return timeline(parts, self._names, deadlines, at_work.take_notes(), without=self._alone)
 
-    def happenings(self) -> Happenings:
+    def event_builder(self) -> EventBuilder:
         """What makes events of the notes of a scheduler of these parts."""
-        return Happenings(self.parts, self._names.all, without=self._alone)
+        return EventBuilder(self.parts, self._names.all, without=self._alone)
 
     # -- tasks -----------------------------------------------------------------------------------------------------
 
@@ -164,7 +164,7 @@ class Resources:
             nominal=nominal,
             late=self._late(task.jitter, "uniform", of.place),
             execution=self._times(task.execution, of.place, EXECUTION),
-            is_heard=task.component is not None,
+            reports_samples=task.component is not None,
         )
 
     def _task_alone(self, name: str, processor: int) -> Task:
@@ -235,15 +235,14 @@ class Resources:
     def _legs(self, of: PlacedMessage) -> tuple[Leg, ...]:
         network, name = of.network, of.network_name
         length = frame_nanoseconds(network, of.message)
-        spoilt = frame_nanoseconds(network, of.message, ERROR_BITS) if network.kind != "tdma" else length
+        corrupted = frame_nanoseconds(network, of.message, ERROR_BITS) if network.kind != "tdma" else length
         slot = of.message.slot if network.kind == "tdma" and of.message.slot is not None else NONE
         ways = [name]
         if network.kind == "ethernet":
             start, end = nodes_of(self._system, of)
             ways = [f"{name}: {start} -> switch", f"{name}: switch -> {end}"]
-        return tuple(
-            Leg(link=self._link(way, network.slots), slot=slot, length=length, corrupted_length=spoilt) for way in ways
-        )
+        links = [self._link(way, network.slots) for way in ways]
+        return tuple(Leg(link=link, slot=slot, length=length, corrupted_length=corrupted) for link in links)
 
     def _link(self, name: str, slots: tuple[float, ...]) -> int:
         if name not in self._link_names:

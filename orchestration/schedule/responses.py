@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestration.basics.simulator import Integers
-from orchestration.computers.bounded import bounds_of
 from orchestration.computers.results import ABORTED, NEVER, SKIPPED, Frames, Jobs, Timeline
+from orchestration.computers.system_bounds import bounds_of
 from orchestration.system.computers import Message, Task
 from orchestration.system.distribution import mean
 from orchestration.system.frames import frame_nanoseconds
@@ -71,7 +71,7 @@ class Responses:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Found:
+class SystemResponses:
     """Of all tasks and messages of a system, up to its end."""
 
     tasks: Mapping[str, Responses]
@@ -82,7 +82,7 @@ class Found:
     """the share of the time that a computer was at work, switches included, or a link carried a frame"""
 
 
-def responses_of(system: System, timeline: Timeline) -> Found:
+def responses_of(system: System, timeline: Timeline) -> SystemResponses:
     """What has become of the tasks and messages of a system."""
     bounds, tasks, messages = bounds_of(system), {}, {}
     for name, computer in system.computers.items():
@@ -99,7 +99,7 @@ def responses_of(system: System, timeline: Timeline) -> Found:
             messages[place] = _of_frames(frames, asked, bounds[place])
     shared = {**timeline.processors, **timeline.links}
     busy = {name: float((each.end - each.begin).sum()) / timeline.stop for name, each in shared.items()}
-    return Found(tasks=tasks, messages=messages, busy=busy)
+    return SystemResponses(tasks=tasks, messages=messages, busy=busy)
 
 
 def _of_jobs(jobs: Jobs, utilisation: float, bound: int | None, read_at_release: bool) -> Responses:

@@ -50,7 +50,7 @@ def timing(system: System) -> Timing:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Course:
+class RunSchedule:
     """What happens when in a run."""
 
     first_samples: Mapping[str, int]
@@ -65,15 +65,15 @@ class ScheduleCache:
         self._frames: OrderedDict[Hashable, Frame] = OrderedDict()
         self._kept: OrderedDict[Hashable, tuple[Mapping[str, int], Sequence[Span]]] = OrderedDict()
 
-    def of(self, outline: Hashable, timing: Timing, system: System) -> Course:
+    def of(self, outline: Hashable, timing: Timing, system: System) -> RunSchedule:
         """What happens when in a system that has an outline and a timing; raises `UsageError` as a `Timetable`."""
         key = outline, timing
         if key in self._kept:
             self._kept.move_to_end(key)
             first_samples, spans = self._kept[key]
-            return Course(first_samples=first_samples, spans=iter(spans))
+            return RunSchedule(first_samples=first_samples, spans=iter(spans))
         table = Timetable(system, Streams(system.seed, system.streams), frame=self._frame(outline, timing, system))
-        return Course(first_samples=table.first_samples, spans=self._spans(key, table))
+        return RunSchedule(first_samples=table.first_samples, spans=self._spans(key, table))
 
     def _frame(self, outline: Hashable, timing: Timing, system: System) -> Frame:
         key = outline, timing.regular

@@ -20,7 +20,7 @@ class Instants:
     def __len__(self) -> int:
         return len(self.times)
 
-    def with_(self, others: "Instants") -> "Instants":
+    def merged_with(self, others: "Instants") -> "Instants":
         """These and some others."""
         at = np.searchsorted(self.times, others.times)
         new = np.ones(len(others), dtype=np.bool_)
@@ -31,7 +31,7 @@ class Instants:
         return Instants(times=np.insert(self.times, at[new], others.times[new]), stepped=stepped)
 
 
-class Collected:
+class InstantCollector:
     """Instants as they are found, and who is stepped to them: a component in continuous time by its place, or nobody
     (-1).
     """
@@ -99,7 +99,7 @@ class Span:
 
     def schedule(self, continuous: Integers) -> Schedule:
         """The same instant by instant; `continuous` are the components in continuous time, in their order."""
-        instants = self.regular.with_(self.own)
+        instants = self.regular.merged_with(self.own)
         of, places = np.nonzero(instants.stepped)
 
         def begins(times: Integers) -> Integers:

@@ -14,8 +14,8 @@ import numpy as np
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Booleans, Integers
 from orchestration.schedule.fixed_step import FixedStep, Refusal
-from orchestration.schedule.foreseen import Foreseen
 from orchestration.schedule.frame import Frame
+from orchestration.schedule.lookahead import Lookahead
 from orchestration.schedule.random_timing import (
     MESSAGES,
     NEXT,
@@ -26,7 +26,7 @@ from orchestration.schedule.random_timing import (
     TimedComponent,
 )
 from orchestration.schedule.schedule import Schedule
-from orchestration.schedule.spans import Collected, Span
+from orchestration.schedule.spans import InstantCollector, Span
 from orchestration.schedule.streams import Streams
 from orchestration.system.model import System
 
@@ -54,7 +54,7 @@ class Timetable:
         for i, x in enumerate(self._connections):
             stepped = self._fixed.get(x.sender if i in self._plan.measured else x.receiver)
             self._links.append(Link(i, x, streams, stepped, self._refused))
-        self._foreseen = Foreseen(frame.system, frame.resources, streams) if frame.foresees else None
+        self._lookahead = Lookahead(frame.system, frame.resources, streams) if frame.uses_scheduler else None
         self._tasks = [self._timed(name, streams) for name in self._plan.sampled]
         self.first_samples = {
             name: task.first for name, task in zip(self._plan.sampled, self._tasks) if task.first < self.stop
@@ -68,11 +68,11 @@ class Timetable:
         self._ahead: Schedule | None = None
 
     def _timed(self, name: str, streams: Streams) -> TimedComponent:
-        if self._foreseen is not None and name in self._foreseen.samples:
-            return ScheduledComponent(name, self._plan, self._links, self._foreseen, self._fixed, self._refused)
+        if self._lookahead is not None and name in self._lookahead.samples:
+            return ScheduledComponent(name, self._plan, self._links, self._lookahead, self._fixed, self._refused)
         return SampledComponent(name, self._plan, self._links, streams, self._fixed, self._refused)
 
-    def following(self, most: int) -> Schedule | None:
+    def next_schedule(self, most: int) -> Schedule | None:
         """The next instants, about `most` of them; None at the end.
 
         Raises `UsageError` for what cannot be on the grid of a component of fixed steps, when all instants before it
@@ -112,10 +112,10 @@ class Timetable:
     def _span(self, most: int) -> Span:
         """About `most` instants from where the one before ended, or none."""
         begin = self._begin
-        self._begin = end = min(self._end, begin + max(int(most * self._frame.pace), 1))
+        self._begin = end = min(self._end, begin + max(int(most * self._frame.mean_interval), 1))
         for task in self._tasks:
-            task.drawn_to(end)
-        found = Collected(len(self._frame.continuous))
+            task.draw_until(end)
+        found = InstantCollector(len(self._frame.continuous))
         posted, later = self._post(begin, end, found)
         measured = self._measure(begin, end, found)
         samples, exchanged, sent = self._sample(begin, end, found)
@@ -134,7 +134,7 @@ class Timetable:
             exchanged=exchanged,
         )
 
-    def _post(self, begin: int, end: int, found: Collected) -> tuple[Integers, Integers]:
+    def _post(self, begin: int, end: int, found: InstantCollector) -> tuple[Integers, Integers]:
         """Messages of components in continuous time to one another: all in order, and those that arrive later."""
         tables = [np.zeros((0, _ORDER + 4), dtype=np.int64)]
         later = [np.zeros((0, _ORDER + 4), dtype=np.int64)]
@@ -161,12 +161,12 @@ class Timetable:
 
     def _networked(self, link: Link, end: int) -> tuple[Integers, Integers, Integers]:
         """Messages of a component in continuous time over a network before `end` [ns]: k, when they go and arrive."""
-        foreseen = self._foreseen
-        assert foreseen is not None
-        messages, end = foreseen.messages[self._connections[link.index].name], min(end, self.stop)
-        foreseen.to(end)
-        while (count := int(np.searchsorted(messages.instants(), end))) > messages.known(foreseen.over):
-            foreseen.further()
+        lookahead = self._lookahead
+        assert lookahead is not None
+        messages, end = lookahead.messages[self._connections[link.index].name], min(end, self.stop)
+        lookahead.advance_to(end)
+        while (count := int(np.searchsorted(messages.instants(), end))) > messages.known(lookahead.is_complete):
+            lookahead.advance()
         first = self._posted_before[link.index]
         self._posted_before[link.index] += count
         sent, own = messages.take(count)
@@ -175,7 +175,7 @@ class Timetable:
             sent = stepped.aligned(sent, "a message", self._refused)
         return np.arange(first, first + count), sent, link.arrivals(np.where(own < 0, -1, np.maximum(own, sent)))
 
-    def _measure(self, begin: int, end: int, found: Collected) -> Integers:
+    def _measure(self, begin: int, end: int, found: InstantCollector) -> Integers:
         """What is measured for samples to come."""
         tables = [np.zeros((0, 4), dtype=np.int64)]
         for task in self._tasks:
@@ -188,7 +188,7 @@ class Timetable:
         table = np.concatenate(tables)
         return table[np.argsort(table[:, 2], kind="stable")]
 
-    def _sample(self, begin: int, end: int, found: Collected) -> tuple[Integers, Integers, Integers]:
+    def _sample(self, begin: int, end: int, found: InstantCollector) -> tuple[Integers, Integers, Integers]:
         """Samples with their time before them, what they exchange, and of what they send that which arrives later."""
         later = [np.zeros((0, _ORDER + 4), dtype=np.int64)]
         drawn, exchanged = [np.zeros((0, 6), dtype=np.int64)], [np.zeros((0, 0, 4), dtype=np.int64)]
@@ -210,12 +210,12 @@ class Timetable:
                 later.append(self._under_way(_Sent(link, k, sent, arrivals, samples[:, 0], 1, task.rank, place), found))
         return *_one_after_the_other(np.concatenate(drawn), exchanged), np.concatenate(later)
 
-    def _under_way(self, sent: "_Sent", found: Collected) -> Integers:
+    def _under_way(self, sent: "_Sent", found: InstantCollector) -> Integers:
         """Messages that arrive later; for those that arrive at once their receiver is stepped."""
         found.add(sent.time[sent.arrival == sent.time], self._frame.place[self._frame.receiver[sent.link.index]])
         return sent.table(sent.arrival > sent.time)
 
-    def _arrive(self, end: int, more: Sequence[Integers], found: Collected) -> Integers:
+    def _arrive(self, end: int, more: Sequence[Integers], found: InstantCollector) -> Integers:
         """Messages that arrive before `end`; the others stay on their way."""
         table = np.concatenate([self._on_their_way, *more])
         now = table[:, 3] < end

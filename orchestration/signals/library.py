@@ -15,7 +15,7 @@ SIGNALS = {name: kind for kinds in KINDS.values() for name, kind in kinds.items(
 WAY_POINTS = "way-points"
 
 
-def made(name: str, parameters: Mapping[str, Any], among: Mapping[str, type] = SIGNALS) -> Any:
+def make_signal(name: str, parameters: Mapping[str, Any], among: Mapping[str, type] = SIGNALS) -> Any:
     """The signal of a name with these parameters; the others are what its class says.
 
     Raises `UsageError` for a name or a parameter that there is none of, naming those there are, or a value that
@@ -27,7 +27,7 @@ def made(name: str, parameters: Mapping[str, Any], among: Mapping[str, type] = S
 
 
 def limits(parameters: Mapping[str, Any]) -> Limits:
-    """How fast a curve through way-points may be; raises `UsageError` as `made` does."""
+    """How fast a curve through way-points may be; raises `UsageError` as `make_signal` does."""
     found: Limits = _with_parameters(WAY_POINTS, Limits, parameters)
     return found
 

@@ -35,7 +35,7 @@ from orchestration.system.component import Component
 from orchestration.system.criterion import Criterion
 from orchestration.system.distribution import highest
 from orchestration.system.model import System
-from orchestration.system.placement import expect_none
+from orchestration.system.placement import expect_unscheduled
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
 from orchestration.system.variable_names import component_of, variable_of
 
@@ -141,7 +141,7 @@ def at_rest(
 
 
 def _expect_period(system: System) -> Fraction:
-    expect_none(system, "has no fixed period, which a loop that is made linear needs")
+    expect_unscheduled(system, "has no fixed period, which a loop that is made linear needs")
     for name, component in system.components.items():
         if component.sampling is not None and component.sampling.clock == "fmu":
             raise UsageError(f"{name} has a clock of its own")

@@ -6,14 +6,14 @@ import numpy as np
 
 from orchestration.basics.errors import UsageError
 from orchestration.fmi.reuse import Instances
-from orchestration.requests.request import Asked, asked_for
+from orchestration.requests.request import RequestLike, request_of
 from orchestration.runs.replacement import component_named
 from orchestration.stability.known_loops import rested
 from orchestration.stability.linear_loop import AtRest, at_rest, map_of
 from orchestration.stability.linear_simulator import Opened
 from orchestration.stability.operating_point import true_period
 from orchestration.stability.state_space import StateSpace, reduced
-from orchestration.system.request import in_its_own_words
+from orchestration.system.request import errors_in_own_terms
 from orchestration.system.times import NANOSECONDS
 
 
@@ -30,7 +30,7 @@ class Linearised:
     the other components in between."""
 
 
-def linearise(asked: Asked, component: str | None = None) -> Linearised:
+def linearise(asked: RequestLike, component: str | None = None) -> Linearised:
     """The loop of a system, or a scenario, about its operating point, cut open at a component that is sampled.
 
     Without a `component` at the only one that is sampled. A system rests where its file has `[operating_point]`, else
@@ -41,10 +41,10 @@ def linearise(asked: Asked, component: str | None = None) -> Linearised:
     Raises `UsageError` where nothing rests there, for FMUs that cannot save their state, and for a component that is
     not sampled, or more often than another one.
     """
-    request = asked_for(asked)
+    request = request_of(asked)
     instances = Instances()
     try:
-        with in_its_own_words(request):
+        with errors_in_own_terms(request):
             system = rested(request)
             name = component_named(system, component, "at which to cut the loop open")
             if system.components[name].sampling is None:

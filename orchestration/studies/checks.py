@@ -12,10 +12,10 @@ from orchestration.signals.waypoints import read_waypoints
 from orchestration.studies.store import expect_columns
 from orchestration.studies.study import Study
 from orchestration.system.check import check_parameter
-from orchestration.system.files_read import drawn
-from orchestration.system.following import heard
+from orchestration.system.input_files import distributions_in
 from orchestration.system.model import System
-from orchestration.system.request import in_its_own_words
+from orchestration.system.references import connect_references
+from orchestration.system.request import errors_in_own_terms
 
 
 def expect_flyable(study: Study, files: Files) -> tuple[str, ...]:
@@ -28,7 +28,7 @@ def expect_flyable(study: Study, files: Files) -> tuple[str, ...]:
     starts, longest, alike = files.starts_of(study.origin), study.origin, _Alike(files)
     for index in range(len(study.points)):
         try:
-            with in_its_own_words(study.base):
+            with errors_in_own_terms(study.base):
                 system = study.system(index, starts)
                 alike.expect(system)
             longest = max(longest, system, key=lambda one: one.stop_time)
@@ -37,8 +37,8 @@ def expect_flyable(study: Study, files: Files) -> tuple[str, ...]:
             wrong += 1
     if wrong:
         raise UsageError(first + (f" ({wrong - 1} more runs cannot be)" if wrong > 1 else ""))
-    with in_its_own_words(study.base):
-        expect_tables(heard(longest, files.models_of(longest)))
+    with errors_in_own_terms(study.base):
+        expect_tables(connect_references(longest, files.models_of(longest)))
     return tuple(filter(None, alike.follows))
 
 
@@ -70,7 +70,7 @@ class _Alike:
 
 def expect_tables(system: System) -> None:
     """Raise `UsageError` for a trace or a table of a source that cannot be read, or does not last."""
-    for _, each in drawn(system):
+    for _, each in distributions_in(system):
         _ = each.highest
     for source in system.sources.values():
         if source.file is not None and source.is_motion:

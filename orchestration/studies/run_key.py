@@ -144,7 +144,7 @@ def study_parts(study: Study) -> dict[str, str]:
     parts |= _parts("criterion", system.criterion, tables)
     said: dict[str, str] = {}
     for path, value in parts.items():
-        name = study.base.in_words(path)
+        name = study.base.in_own_terms(path)
         said[path if name in said else name] = json.dumps(value, sort_keys=True)
     return said
 

@@ -16,10 +16,10 @@ from orchestration.results.own_metrics import OwnMetric
 from orchestration.studies.axes import Axis, Method, Points, Value
 from orchestration.studies.linked_settings import LinkedSettings
 from orchestration.studies.store import is_column
-from orchestration.system.distribution_table import is_table, trace_in
+from orchestration.system.distribution_table import is_table, trace_path
 from orchestration.system.model import System
 from orchestration.system.paths import changed, names_table, value_at
-from orchestration.system.request import Request, in_its_own_words, system_meant
+from orchestration.system.request import Request, errors_in_own_terms, system_of
 
 
 @record()
@@ -69,7 +69,7 @@ class Study:
     @cached_property
     def origin(self) -> System:
         """The system that the base means."""
-        system = system_meant(self.base)
+        system = system_of(self.base)
         return native_twins(system) if self.native else system
 
     @property
@@ -120,7 +120,7 @@ class Study:
         changes: dict[str, Any] = {}
         if self.vary_seed and "seed" not in point:
             changes["seed"] = _own_seed(self.origin.seed, point)
-        with in_its_own_words(self.base):
+        with errors_in_own_terms(self.base):
             for axis in self.axes:
                 value = point[axis.name]
                 for path in self._paths_of(axis.targets):
@@ -162,7 +162,7 @@ class Study:
 
 def _traces(values: Iterable[tuple[str, str]]) -> list[str]:
     """The files of what is drawn that values say."""
-    found = (trace_in(value) for path, value in values if is_table(value) and ".parameters." not in path)
+    found = (trace_path(value) for path, value in values if is_table(value) and ".parameters." not in path)
     return [file for file in found if file is not None]
 
 

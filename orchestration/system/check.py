@@ -68,7 +68,7 @@ def _check_divergence(condition: str, models: Mapping[str, Model]) -> None:
             raise UsageError(f"criterion.diverged: {name} is a Real; expected a condition, as in {name} > 1")
 
 
-def recorded(system: System, models: Mapping[str, Model]) -> dict[str, tuple[str, ...]]:
+def recorded_variables(system: System, models: Mapping[str, Model]) -> dict[str, tuple[str, ...]]:
     """What is recorded of each component beside what is exchanged: as the file says, or all outputs and local Reals.
 
     Constants are not, but what an expression names is recorded in any case.

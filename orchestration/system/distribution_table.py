@@ -26,7 +26,7 @@ def with_distributions(place: str, table: Any, folder: Path) -> dict[str, Any]:
     return keys
 
 
-def meant_in(of: Any, place: str, keys: Mapping[str, Any]) -> dict[str, Any]:
+def parsed_fields(of: Any, place: str, keys: Mapping[str, Any]) -> dict[str, Any]:
     """New values of fields of a record, those that are drawn from the table, or the text of one, as that says.
 
     Relative paths of traces start at the current folder. Raises `UsageError` for a table that cannot be.
@@ -53,7 +53,7 @@ def as_text(table: Mapping[str, Any], folder: Path) -> str:
     return f"{{{', '.join(f'{key} = {json.dumps(value, default=str)}' for key, value in told.items())}}}"
 
 
-def trace_in(value: str) -> str | None:
+def trace_path(value: str) -> str | None:
     """What a table that is given as text calls the file of its trace; None for one without, or that is none."""
     file = toml_of(f"value = {value}", value)["value"].get("file")
     return None if file is None else str(Path(file))

@@ -87,7 +87,7 @@ class System:
         """Itself."""
         return self
 
-    def in_words(self, text: str) -> str:
+    def in_own_terms(self, text: str) -> str:
         """`text` as it is."""
         return text
 

@@ -268,9 +268,9 @@ def for_each(start: Iterable[str], value: Any) -> Any:
 
 def _replaced(place: str, of: Any, keys: Mapping[str, Any]) -> Any:
     if any(isinstance(value, (str, Mapping)) for value in keys.values()):
-        from orchestration.system.distribution_table import meant_in  # with it comes what reads files
+        from orchestration.system.distribution_table import parsed_fields  # with it comes what reads files
 
-        keys = meant_in(of, f"{place}.", keys)
+        keys = parsed_fields(of, f"{place}.", keys)
     try:
         return dataclasses.replace(of, **dict(keys))
     except UsageError as error:

@@ -70,7 +70,7 @@ def tasks_of(system: "System") -> dict[str, PlacedTask]:
     return {each.task.component: each for each in placed_tasks(system.computers) if each.task.component is not None}
 
 
-def carried(system: "System") -> dict[str, PlacedMessage]:
+def messages_by_connection(system: "System") -> dict[str, PlacedMessage]:
     """Messages by the connection that they are of."""
     found = placed_messages(system.networks)
     return {each.message.connection: each for each in found if each.message.connection is not None}
@@ -87,10 +87,10 @@ def released_by(system: "System") -> dict[str, tuple[str, ...]]:
     return found
 
 
-def expect_none(system: "System", why: str) -> None:
+def expect_unscheduled(system: "System", why: str) -> None:
     """Raise `UsageError`, saying `why`, for a system of which something happens when the scheduler says."""
     placed = [task.place for task in tasks_of(system).values()]
-    placed += [message.place for message in carried(system).values()]
+    placed += [message.place for message in messages_by_connection(system).values()]
     placed += [f"components.{name}.sampling.on" for name in _by_arrivals(system)]
     if placed:
         raise UsageError(f"{placed[0]}: {why}")
@@ -233,7 +233,7 @@ def _expect_period(of: PlacedMessage, sender: str) -> None:
 
 def expect_placement(system: "System") -> None:
     """Raise `UsageError` for what cannot be whatever the FMUs are."""
-    tasks, messages, released = tasks_of(system), carried(system), released_by(system)
+    tasks, messages, released = tasks_of(system), messages_by_connection(system), released_by(system)
     connections = {x.name: x for x in system.connections}
     periods = _Periods(system.components, system.connections, tasks, system.networks)
     for each in placed_tasks(system.computers):

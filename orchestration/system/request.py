@@ -37,7 +37,7 @@ class Request(Protocol):
     def as_system(self) -> System:
         """The system that it means; raises `UsageError` in the words of the system."""
 
-    def in_words(self, text: str) -> str:
+    def in_own_terms(self, text: str) -> str:
         """`text` with the paths of its system as it calls them itself."""
 
     def paths_of(self, target: str) -> tuple[str, ...]:
@@ -63,25 +63,25 @@ class Request(Protocol):
 
 
 @contextmanager
-def in_its_own_words(request: Request) -> Iterator[None]:
+def errors_in_own_terms(request: Request) -> Iterator[None]:
     """What is wrong with the system of a request is said of the request, which is what somebody wrote."""
     try:
         yield
     except UsageError as error:
-        said = request.in_words(str(error))
+        said = request.in_own_terms(str(error))
         if said == str(error):
             raise
         raise type(error)(said) from error
 
 
-def system_meant(request: Request) -> System:
+def system_of(request: Request) -> System:
     """The system that a request means; raises `UsageError` in the request's own words."""
-    with in_its_own_words(request):
+    with errors_in_own_terms(request):
         return request.as_system()
 
 
 @dataclass(frozen=True, kw_only=True)
-class Start:
+class InitialConditions:
     """One initial state of an ensemble."""
 
     size: float
@@ -105,7 +105,7 @@ class Ensemble(Protocol):
     def some(self, first: int, count: int) -> "Ensemble":
         """Others of the same kind."""
 
-    def starts_of(self, request: Any) -> Sequence[Start]:
+    def initial_conditions(self, request: Any) -> Sequence[InitialConditions]:
         """In the order of their indices."""
 
 

@@ -75,6 +75,6 @@ class SamplingOnArrival(Sampling):
         require(self.clock == "master", "clock", self.clock, "master beside on: messages say when it runs")
 
 
-def is_foreseen(sampling: Sampling) -> bool:
+def has_scheduled_instants(sampling: Sampling) -> bool:
     """Whether the scheduler finds its instants."""
     return isinstance(sampling, (TaskSampling, SamplingOnArrival))

@@ -113,7 +113,10 @@ class Source:
         if self.signal is not None or self.interpolation == "spline":
             from orchestration.signals import library  # not before: the command line answers --help without it
 
-            _ = library.limits(self.parameters) if self.signal is None else library.made(self.signal, self.parameters)
+            if self.signal is None:
+                library.limits(self.parameters)
+            else:
+                library.make_signal(self.signal, self.parameters)
         else:
             given = ", ".join(self.parameters)
             require(not self.parameters, "parameters", given, "none but for a signal by name, or way-points")

@@ -13,7 +13,7 @@ from orchestration.exact.loops import Loops
 from orchestration.fmi.foreign import computed
 from orchestration.stability.known_loops import rested
 from orchestration.system.model import System
-from orchestration.system.request import in_its_own_words
+from orchestration.system.request import errors_in_own_terms
 from orchestration.tuning.sought import COST, Outcome, Sought, lowest
 
 UNSTABLE = 1e100
@@ -27,7 +27,7 @@ class ExactTuning(Sought):
     @cached_property
     def origin(self) -> System:
         """The system that the base means, where it is at rest."""
-        with in_its_own_words(self.base):
+        with errors_in_own_terms(self.base):
             return rested(self.base)
 
     def described(self) -> list[str]:
@@ -62,7 +62,7 @@ def search_exactly(tuning: ExactTuning, period: float, seed: int, progress: Call
 
     def expected(points: Sequence[Sequence[float]]) -> list[Expected]:
         systems = [tuning.system(period, tuning.values(shares)) for shares in points]
-        with in_its_own_words(tuning.base):
+        with errors_in_own_terms(tuning.base):
             return computed(files.fmus.values(), _expected, systems, loops)
 
     def costs(points: Sequence[Floats]) -> list[float]:

@@ -10,11 +10,11 @@ from orchestration.basics.errors import UsageError
 from orchestration.basics.records import record
 from orchestration.basics.simulator import Floats
 from orchestration.building.inputs import Files, files_of
-from orchestration.requests.ranges import Varied, paths_in, usual_quantity
+from orchestration.requests.ranges import Varied, default_quantity, paths_in
 from orchestration.studies.axes import Axis
 from orchestration.system.model import System
 from orchestration.system.paths import changed
-from orchestration.system.request import Request, in_its_own_words, system_meant
+from orchestration.system.request import Request, errors_in_own_terms, system_of
 
 COST = "cost"
 """The objective that a tuning adds"""
@@ -57,7 +57,7 @@ class Sought:
     @cached_property
     def origin(self) -> System:
         """The system that the base means."""
-        return system_meant(self.base)
+        return system_of(self.base)
 
     @cached_property
     def _paths(self) -> dict[str, tuple[str, ...]]:
@@ -66,7 +66,7 @@ class Sought:
     @cached_property
     def _of_period(self) -> tuple[str, ...]:
         try:
-            return Varied(request=self.base, of=usual_quantity(self.base)).paths
+            return Varied(request=self.base, of=default_quantity(self.base)).paths
         except UsageError:
             raise UsageError("search.periods: expected a base with one period, of its only sampled component") from None
 
@@ -92,7 +92,7 @@ class Sought:
     def system(self, period: float, values: Mapping[str, float]) -> System:
         """With a period and values of the targets; raises `UsageError` for one that cannot be."""
         given = {path: value for target, value in values.items() for path in self._paths[target]}
-        with in_its_own_words(self.base):
+        with errors_in_own_terms(self.base):
             system = changed(self.origin, {**given, **dict.fromkeys(self._of_period, period)})
             return replace(system, objectives={**system.objectives, COST: self.cost})
 

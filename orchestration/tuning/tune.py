@@ -15,7 +15,7 @@ from orchestration.basics.progress import ShareProgress, share_reporter
 from orchestration.basics.terminal import inform
 from orchestration.building.inputs import Files
 from orchestration.results import html
-from orchestration.system.following import followed
+from orchestration.system.references import describe_references
 from orchestration.tuning.exact import ExactFound, ExactTuning, search_exactly
 from orchestration.tuning.sought import Outcome, Sought, best_by_period
 from orchestration.tuning.tuning import Found, Tuning, search
@@ -123,7 +123,7 @@ def _flown(
     files = asked.files()
     if engine == "auto":
         announce(str(how))
-    if follows := followed(asked.origin, files.models_of(asked.origin)):
+    if follows := describe_references(asked.origin, files.models_of(asked.origin)):
         announce(f"follows {follows}")
     with share_reporter(progress, "searching") as hear, RunEvaluator(files, workers, how.engine) as pool:
         fly = functools.partial(pool.fly_all, in_lanes=how.in_lanes, on_gpu=how.on_gpu)

@@ -14,7 +14,7 @@ from orchestration.building.inputs import Files
 from orchestration.limits.evaluation import is_good
 from orchestration.system.model import System
 from orchestration.system.paths import changed
-from orchestration.system.request import ControlLoop, Ensemble, in_its_own_words, system_meant
+from orchestration.system.request import ControlLoop, Ensemble, errors_in_own_terms, system_of
 from orchestration.tuning.sought import COST, Outcome, Sought, lowest
 
 Fly = Callable[[Sequence[System]], Sequence[dict[str, Any]]]
@@ -44,7 +44,7 @@ class Tuning(Sought):
     @cached_property
     def origin(self) -> System:
         """The system that the base means, by native FMUs if these are to fly."""
-        system = system_meant(self.base)
+        system = system_of(self.base)
         return native_twins(system) if self.native else system
 
     def first(self) -> tuple[System, Files]:
@@ -55,10 +55,10 @@ class Tuning(Sought):
     def systems(self, period: float, values: Mapping[str, float], starts: Ensemble) -> list[System]:
         """The flights from an ensemble of starts; raises `UsageError` for a value that cannot be."""
         system = self.system(period, values)
-        with in_its_own_words(self.base):
+        with errors_in_own_terms(self.base):
             return [
                 changed(system, {path: v for target, v in start.values.items() for path in self.base.paths_of(target)})
-                for start in starts.starts_of(self.base)
+                for start in starts.initial_conditions(self.base)
             ]
 
     def judging(self) -> Ensemble:

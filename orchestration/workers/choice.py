@@ -11,7 +11,7 @@ from orchestration.engines.batch.shape import expect_lanes
 from orchestration.engines.engine import Engine
 from orchestration.engines.wiring import checked
 from orchestration.system.model import System
-from orchestration.system.request import Twin, system_meant
+from orchestration.system.request import Twin, system_of
 
 EngineChoice = Literal["auto", "python", "compiled", "batch", "cuda"]
 """`auto`: `batch` where it can be had, else native FMUs one at a time, else the FMUs as they are"""
@@ -98,7 +98,7 @@ def alone(request: Twin, engine: Engine | Literal["auto"]) -> tuple[Twin, Chosen
         return request, Chosen(native=False, in_lanes=False, engine=engine)
     native = native_twins(request)
     try:
-        files_of(system_meant(native))
+        files_of(system_of(native))
     except QuadcosimError as error:
         return request, Chosen(native=False, in_lanes=False, engine=None, reason=str(error))
     return native, Chosen(native=True, in_lanes=False, engine=None)

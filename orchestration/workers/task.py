@@ -16,7 +16,7 @@ from orchestration.fmi.reuse import Instances
 from orchestration.results.own_metrics import OwnMetric
 from orchestration.runs.prepared import prepared
 from orchestration.runs.result import Result
-from orchestration.system.files_read import files_read
+from orchestration.system.input_files import input_files
 from orchestration.system.model import System
 from orchestration.workers.row import Row
 
@@ -171,7 +171,7 @@ def _batches(*, on_gpu: bool) -> "Batches":
 def _expect_files(system: System) -> None:
     """Raise `WorkerEnvironmentError` if a file is not there, or is not the FMU that the coordinator has read."""
     fmus = [Path(component.fmu) for component in system.components.values()]
-    for file in (*fmus, *files_read(system).values()):
+    for file in (*fmus, *input_files(system).values()):
         if not file.is_file():
             raise WorkerEnvironmentError(f"{file}: is no longer there")
     try:

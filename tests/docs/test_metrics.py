@@ -7,7 +7,7 @@ import pytest
 
 from orchestration.basics.documents import read_toml
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.system.request import system_meant
+from orchestration.system.request import system_of
 from quadcosim import Result, run
 
 PAGE = (Path(__file__).parents[2] / "docs" / "metrics.md").read_text(encoding="utf-8")
@@ -31,7 +31,7 @@ def test_the_page_has_the_units_that_follow_from_those_of_the_fmus(flight: Resul
 
 def test_the_expressions_on_the_page_are_those_that_are_computed(tmp_path: Path) -> None:
     (shown,) = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
-    computed = {name: " ".join(each.split()) for name, each in system_meant(Scenario()).objectives.items()}
+    computed = {name: " ".join(each.split()) for name, each in system_of(Scenario()).objectives.items()}
     assert computed.pop("saturation_share")
     (tmp_path / "shown.toml").write_text(shown, encoding="utf-8")
     assert read_toml(tmp_path / "shown.toml", "block") == computed

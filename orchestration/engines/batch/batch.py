@@ -20,10 +20,10 @@ from orchestration.engines.structures import address, structures
 from orchestration.engines.wires import clock_of
 from orchestration.engines.wiring import source_values
 from orchestration.expressions.recorded import STOP_TIME
-from orchestration.expressions.syntax import Call, is_of_jobs
+from orchestration.expressions.syntax import Call, names_job_measure
 from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.fmi.values import number_of, taken
-from orchestration.schedule.schedule_cache import Course, ScheduleCache, Timing
+from orchestration.schedule.schedule_cache import RunSchedule, ScheduleCache, Timing
 from orchestration.schedule.spans import Instants, Span
 from orchestration.schedule.streams import NOISE, Streams
 from orchestration.system.model import System
@@ -117,7 +117,7 @@ class Batch:
         self._starts = {
             name: (component_of(name), variable_of(name), variable, number_of(variable, variable.start))
             for name in (*shape.numbers, *(each for names in self._trajectories.values() for each in names))
-            if not is_of_jobs(name)
+            if not names_job_measure(name)
             for variable in [shape.variable(name)]
         }
         kernels = list(shape.kernels.values())
@@ -320,7 +320,7 @@ class Batch:
     def _number(self, lane: int, system: System, name: str) -> float:
         if name in self._own:
             return float(self._own[name][lane])
-        if is_of_jobs(name):
+        if names_job_measure(name):
             return self._of_jobs(system)[name]
         owner, parameter, variable, start = self._starts[name]
         given = system.components[owner].parameters.get(parameter)
@@ -436,7 +436,7 @@ class Batch:
     # -- schedules -------------------------------------------------------------------------------------------------
 
     def _tracks_of(
-        self, runs: Sequence[Run], timings: Sequence[Timing], courses: Mapping[Timing, Course]
+        self, runs: Sequence[Run], timings: Sequence[Timing], courses: Mapping[Timing, RunSchedule]
     ) -> list[Track]:
         found: dict[Timing, list[int]] = {}
         for lane, timing in enumerate(timings):

@@ -19,8 +19,8 @@ from orchestration.fmi.model import read_model
 from orchestration.results.objectives import Metrics, metrics_of
 from orchestration.schedule.schedule_cache import ScheduleCache, timing
 from orchestration.schedule.streams import Streams
-from orchestration.system.following import heard
 from orchestration.system.model import System
+from orchestration.system.references import connect_references
 from orchestration.system.times import NANOSECONDS, nanoseconds
 
 
@@ -78,7 +78,7 @@ class Batches:
             shape, flier = self._flier_of(key, systems[places[0]])
             timings = {place: known[id(systems[place])][1] for place in places}
             several = {id(systems[place]): systems[place] for place in places}
-            fed = {key: heard(system, shape.models) for key, system in several.items()}
+            fed = {key: connect_references(system, shape.models) for key, system in several.items()}
             groups = [*_groups(places, timings, self._lanes)]
             given = [
                 Group(

@@ -20,11 +20,11 @@ from orchestration.engines.wires import Wires
 from orchestration.expressions.over_run import inlined, reductions
 from orchestration.expressions.recorded import STOP_TIME, TIME, vectors
 from orchestration.expressions.scalars import scalars
-from orchestration.expressions.syntax import Call, Node, is_of_jobs, names, parse
+from orchestration.expressions.syntax import Call, Node, names, names_job_measure, parse
 from orchestration.fmi.model import Model, Variable
 from orchestration.results.objectives import GOOD
 from orchestration.schedule.plan import is_plain
-from orchestration.system.check import recorded
+from orchestration.system.check import recorded_variables
 from orchestration.system.computers import Network
 from orchestration.system.connection import Connection
 from orchestration.system.model import System
@@ -93,7 +93,7 @@ class Shape:
     @cached_property
     def wires(self) -> Wires:
         """What reaches what, and what is read of the components."""
-        return Wires(self.system, recorded(self.system, self.models))
+        return Wires(self.system, recorded_variables(self.system, self.models))
 
     @property
     def board(self) -> Board:
@@ -182,7 +182,7 @@ class Shape:
     def numbers(self) -> tuple[str, ...]:
         """Parameters that expressions name, as COMPONENT.NAME."""
         wanted = self._wanted
-        return tuple(name for name in sorted(wanted) if is_of_jobs(name) or self._is_parameter(name))
+        return tuple(name for name in sorted(wanted) if names_job_measure(name) or self._is_parameter(name))
 
     @cached_property
     def seen(self) -> Mapping[str, tuple[str, ...]]:

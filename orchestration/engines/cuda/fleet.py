@@ -20,7 +20,7 @@ from orchestration.engines.cuda.memory import SharedMemory
 from orchestration.engines.cuda.program import Code, Known, program
 from orchestration.engines.structures import address
 from orchestration.expressions.syntax import Call
-from orchestration.schedule.schedule_cache import Course, ScheduleCache, Timing
+from orchestration.schedule.schedule_cache import RunSchedule, ScheduleCache, Timing
 from orchestration.system.model import System
 
 _MESSAGES, _VALUES = 16, 1024
@@ -184,7 +184,7 @@ class _Threads(Batch):
             kept.count = 0
 
     def _tracks_of(
-        self, runs: Sequence[Run], timings: Sequence[Timing], courses: Mapping[Timing, Course]
+        self, runs: Sequence[Run], timings: Sequence[Timing], courses: Mapping[Timing, RunSchedule]
     ) -> list[Track]:
         found: dict[int, Track] = {}
         for timing, course in courses.items():

@@ -13,7 +13,7 @@ from orchestration.fmi.model import Model, read_model
 from orchestration.requests.ssp.document import read
 from orchestration.requests.ssp.package import opened
 from orchestration.requests.ssp.parameters import Value
-from orchestration.requests.ssp.structure import Node, Path_, Structure, Wire, said, structure_of
+from orchestration.requests.ssp.structure import Node, Path_, Structure, Wire, dotted, structure_of
 from orchestration.requests.ssp.timing import expect_tables, from_text
 from orchestration.system.component import Parameter
 from orchestration.system.conversion import Conversion, OtherQuantity, between
@@ -148,7 +148,7 @@ def _passed(value: Parameter, wires: Sequence[Wire], structure: Structure, model
     if conversion.is_none:
         return value
     if isinstance(value, (bool, str)):
-        raise UsageError(f"connection {wires[0].said}: is converted; expected a number, not {value!r}")
+        raise UsageError(f"connection {wires[0].label}: is converted; expected a number, not {value!r}")
     return conversion(value)
 
 
@@ -160,7 +160,7 @@ def _in_own_unit(structure: Structure, node: Node, value: Value, model: Model | 
         return number
     one = value.definition or structure.definitions.get(value.unit)
     other = structure.definitions.get(own) or (model.base_units(own) if model is not None else None)
-    return _conversion(one, other, f"{said(node)} in {value.unit}, expected {own}")(number)
+    return _conversion(one, other, f"{dotted(node)} in {value.unit}, expected {own}")(number)
 
 
 def _signals(structure: Structure, names: Mapping[Path_, str], models: Mapping[Path_, Model]) -> list[Signal]:
@@ -197,7 +197,7 @@ def _of_units(wire: Wire, structure: Structure, models: Mapping[Path_, Model]) -
         defined.append(own or (model.base_units(name) if model is not None else None))
     if not all(named) or named[0] == named[1]:
         return Conversion()
-    return _conversion(defined[0], defined[1], f"connection {wire.said}, from {named[0]} to {named[1]}")
+    return _conversion(defined[0], defined[1], f"connection {wire.label}, from {named[0]} to {named[1]}")
 
 
 def _conversion(one: BaseUnits | None, other: BaseUnits | None, place: str) -> Conversion:

@@ -28,9 +28,9 @@ class Wire:
     converts_units: bool
 
     @property
-    def said(self) -> str:
+    def label(self) -> str:
         """For messages."""
-        return f"{said(self.start)} -> {said(self.end)}"
+        return f"{dotted(self.start)} -> {dotted(self.end)}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +63,7 @@ class Structure:
             node = wire.start
 
 
-def said(node: Node) -> str:
+def dotted(node: Node) -> str:
     """A connector by its path."""
     return ".".join((*node[0], node[1]))
 
@@ -89,12 +89,12 @@ def _walk(system: Read, path: Path_, package: Package, into: Structure) -> None:
         elif kind == "Component":
             _component(child, (*path, name), package, into)
         else:
-            raise UsageError(f"{said((path, name))}: is a {kind}; only components and systems are read")
+            raise UsageError(f"{dotted((path, name))}: is a {kind}; only components and systems are read")
     for connection in all_of(system, "ssd:Connections/ssd:Connection"):
         _wire(connection, path, into)
     # After those of its elements: what is bound further out is taken.
     for name, value in values_of(system, package, package.structure):
-        into.values[_meant(name, path, elements)] = value
+        into.values[_node_named(name, path, elements)] = value
 
 
 def _component(component: Read, path: Path_, package: Package, into: Structure) -> None:
@@ -126,15 +126,15 @@ def _wire(connection: Read, path: Path_, into: Structure) -> None:
         element = connection.get(f"{which}Element")
         node: Node = ((path if element is None else (*path, element)), connection.get(f"{which}Connector"))
         if node not in into.kinds:
-            raise UsageError(f"connection to {said(node)}: there is no such connector")
+            raise UsageError(f"connection to {dotted(node)}: there is no such connector")
         ends.append(node)
     gives = [into.kinds[node] in (("input", "parameter") if node[0] == path else ("output",)) for node in ends]
     if gives[0] == gives[1]:
-        kinds = " and ".join(f"{said(node)} ({into.kinds[node]})" for node in ends)
+        kinds = " and ".join(f"{dotted(node)} ({into.kinds[node]})" for node in ends)
         raise UsageError(f"connection of {kinds}: expected an output and an input")
     start, end = (ends[0], ends[1]) if gives[0] else (ends[1], ends[0])
     if end in into.wires:
-        raise UsageError(f"connection to {said(end)}: is connected already; expected one connection")
+        raise UsageError(f"connection to {dotted(end)}: is connected already; expected one connection")
     into.wires[end] = Wire(
         start=start,
         end=end,
@@ -143,7 +143,7 @@ def _wire(connection: Read, path: Path_, into: Structure) -> None:
     )
 
 
-def _meant(name: str, path: Path_, elements: dict[str, Read]) -> Node:
+def _node_named(name: str, path: Path_, elements: dict[str, Read]) -> Node:
     """What a name in a parameter set of a system means: of an element, if it begins with that one's name."""
     owners = [owner for owner in elements if name.startswith(f"{owner}.")]
     if not owners:
@@ -153,7 +153,7 @@ def _meant(name: str, path: Path_, elements: dict[str, Read]) -> Node:
     rest = name[len(owner) + 1 :]
     if not inside.tag.endswith("}System"):
         return (*path, owner), rest
-    return _meant(rest, (*path, owner), {child.get("name"): child for child in all_of(inside, "ssd:Elements/*")})
+    return _node_named(rest, (*path, owner), {child.get("name"): child for child in all_of(inside, "ssd:Elements/*")})
 
 
 def _stop(root: Read) -> float | None:

@@ -14,7 +14,7 @@ ANNOTATION = "quadcosim.timing"
 """Type of the annotation of an SSP that says the same"""
 
 
-def written(system: System, ssp: Path) -> Path:
+def write(system: System, ssp: Path) -> Path:
     """Write the file that makes `system` of its SSP again, beside it; its path."""
     path = ssp.with_suffix(ENDING)
     path.write_text(as_text(system, ssp=ssp.name), encoding="utf-8")
@@ -25,7 +25,7 @@ def as_text(system: System, **before: str) -> str:
     """What such a file says, behind other keys."""
     import tomli_w
 
-    return tomli_w.dumps({**before, **_left_to_say(system)})
+    return tomli_w.dumps({**before, **_timing_tables(system)})
 
 
 def from_text(text: str) -> dict[str, Any]:
@@ -33,7 +33,7 @@ def from_text(text: str) -> dict[str, Any]:
     return toml_of(text, f"annotation {ANNOTATION}")
 
 
-def _left_to_say(system: System) -> dict[str, Any]:
+def _timing_tables(system: System) -> dict[str, Any]:
     """The tables of a system without its FMUs, their parameters and the conversions of connections."""
     tables = tables_of(system)
     carried = {"components": ("fmu", "parameters"), "connections": ("scale", "offset")}

@@ -18,10 +18,10 @@ from orchestration.basics.errors import UsageError
 from orchestration.basics.units import BASE
 from orchestration.fmi.model import Kind, Variable
 from orchestration.requests.ssp import timing
-from orchestration.requests.ssp.carried import Carried, Part, carried
 from orchestration.requests.ssp.document import add, document, element
+from orchestration.requests.ssp.export import Export, Part, export_of
 from orchestration.requests.ssp.names import PARAMETER_SET, SYSTEM_PARAMETERS
-from orchestration.requests.ssp.refused import refused
+from orchestration.requests.ssp.rejections import rejections
 from orchestration.system.model import System
 from orchestration.system.request import Request
 from orchestration.system.variable_names import variable_of
@@ -42,12 +42,12 @@ def write(
     another system without its file with timing; and of what it says and some masters do not take. Raises `UsageError`
     for different FMUs of one file name.
     """
-    given = carried(asked, announce)
+    given = export_of(asked, announce)
     if warn is not None:
-        for line in given.unsaid:
+        for line in given.unsupported:
             warn(f"{line.partition('; expected')[0]}; only its file with timing does")
-        for line in refused(given):
-            warn(asked.in_words(line))
+        for line in rejections(given):
+            warn(asked.in_own_terms(line))
     files = {source: fmu.read_bytes() for source, fmu in _sources(given.parts).items()}
     for part in given.parts:
         files[_parameter_file(part)] = document(_parameter_set({"": part}))
@@ -67,7 +67,7 @@ def write_with_timing(
 ) -> tuple[Path, Path]:
     """As `write`, and beside it the file that makes the system of it again."""
     write(asked, path, announce, warn)
-    return path, timing.written(asked.as_system(), path)
+    return path, timing.write(asked.as_system(), path)
 
 
 def _sources(parts: Iterable[Part]) -> dict[str, Path]:
@@ -91,7 +91,7 @@ def _parameter_file(part: Part) -> str:
 # -- the documents ----------------------------------------------------------------------------------------
 
 
-def _structure(given: Carried, name: str, about: Mapping[str, str]) -> Element:
+def _structure(given: Export, name: str, about: Mapping[str, str]) -> Element:
     root = element(
         "ssd:SystemStructureDescription",
         name=name,

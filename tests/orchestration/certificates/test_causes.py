@@ -23,7 +23,7 @@ from orchestration.certificates.region import region
 from orchestration.certificates.repeated import least_repeated
 from orchestration.exact.loops import Loops
 from orchestration.limits.evaluation import is_good
-from orchestration.requests.request import asked_for
+from orchestration.requests.request import request_of
 from orchestration.system.computers import Computer, Message, Network, Task
 from orchestration.system.distribution import Distribution
 from orchestration.system.model import System
@@ -62,7 +62,7 @@ def on_a_bus(**sampling: Any) -> System:
 
 @pytest.fixture(scope="module")
 def loop() -> Loop:
-    return measured(asked_for(on_a_computer()))
+    return measured(request_of(on_a_computer()))
 
 
 def caused(loop: Loop, system: System, path: str) -> Caused:

@@ -12,7 +12,7 @@ from orchestration.figures import gantt
 from orchestration.figures.run import Run, Window
 from orchestration.figures.style import SCREEN
 from orchestration.recording.recording import InMemory
-from orchestration.requests.ranges import usual_quantity
+from orchestration.requests.ranges import default_quantity
 from orchestration.system.model import System
 from orchestration.system.system_file import load_system
 from quadcosim import schedule
@@ -149,4 +149,4 @@ def test_values_of_the_system_are_changed_by_their_paths(main: Main, file: Path)
 
 def test_the_period_of_a_task_that_messages_release_is_no_usual_quantity() -> None:
     with pytest.raises(UsageError, match=r"of: expected a path, as connections\.NAME\.delay$"):
-        usual_quantity(load_system(EXAMPLES / "three_servos" / "can.toml"))
+        default_quantity(load_system(EXAMPLES / "three_servos" / "can.toml"))

@@ -116,4 +116,4 @@ class Described:
         parts = self.parts()
         made = scheduler(parts)
         made.run(LATER)
-        return timeline(parts, self.names(), [LATER] * len(self.messages), made.taken())
+        return timeline(parts, self.names(), [LATER] * len(self.messages), made.take_notes())

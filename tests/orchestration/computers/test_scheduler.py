@@ -153,7 +153,7 @@ def test_two_halves_of_a_run_are_the_whole():
     found = []
     for until in (1, 2, 77, 500, 501, 1000, 1001, LATER):
         halves.run(until)
-        found.append(halves.taken())
+        found.append(halves.take_notes())
         assert not len(found[-1]) or found[-1][-1, 0] < until
-    assert np.concatenate(found).tolist() == whole.taken().tolist()
+    assert np.concatenate(found).tolist() == whole.take_notes().tolist()
     assert NONE == -1

@@ -13,7 +13,7 @@ from orchestration.interop import tools
 from orchestration.interop.catalogue import TOOLS
 from orchestration.interop.flights import parameters_for
 from orchestration.interop.job import Job
-from orchestration.requests.ssp.carried import Part, carried
+from orchestration.requests.ssp.export import Part, export_of
 from quadcosim import Scenario, UsageError
 from tests.orchestration.interop.common import LOOP
 
@@ -88,7 +88,7 @@ def test_its_rows_have_the_time_at_the_end_of_each_step(tmp_path: Path) -> None:
 def part(name: str, **parameters: float) -> Part:
     """A component of the paper's flight, with some parameters of its own."""
     asked = Scenario().with_changes(parameters={f"{name}.{variable}": value for variable, value in parameters.items()})
-    return next(part for part in carried(asked).parts if part.name == name)
+    return next(part for part in export_of(asked).parts if part.name == name)
 
 
 def test_a_parameter_that_is_no_real_is_left_where_it_starts() -> None:

@@ -13,7 +13,7 @@ from orchestration.quadrotor.signals import DRAG, choice_of
 from orchestration.quadrotor.translation import paths_of
 from orchestration.runs.result import Result
 from orchestration.signals.dryden import DRAWS, Dryden
-from orchestration.signals.library import made
+from orchestration.signals.library import make_signal
 from orchestration.signals.waypoints import read_waypoints
 from orchestration.system.paths import changed
 from orchestration.system.system_file import system_from_tables
@@ -49,7 +49,7 @@ def simulated(**fields: object) -> Result:
 
 def test_the_controller_is_fed_the_motion_at_its_samples_and_its_error_is_recorded() -> None:
     flight = simulated(reference=ReferenceChoice(name="lemniscate", parameters={"radius": 1.5}), stop_time=1.0)
-    motion = made("lemniscate", {"radius": 1.5})
+    motion = make_signal("lemniscate", {"radius": 1.5})
     for i in (0, 10, 990):
         expected = motion.at(flight.signals["time"][i])
         assert [flight.signals[f"reference.position.{axis}"][i] for axis in "xyz"] == [*expected.position]

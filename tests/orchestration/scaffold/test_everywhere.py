@@ -12,7 +12,7 @@ from orchestration.quadrotor import vehicle
 from orchestration.runs.simulation import run
 from orchestration.scaffold.folder import write
 from orchestration.signals.motions import MOTIONS
-from orchestration.system.request import in_its_own_words
+from orchestration.system.request import errors_in_own_terms
 from quadcosim import FmuChoice, ReferenceChoice, Scenario, UsageError, load_vehicle
 from tests.commands import Main
 
@@ -146,7 +146,7 @@ def test_a_comparison_judges_it_as_single_runs_do_by_any_engine(scenario: Scenar
 def flown_alone(comparison: Comparison, cell: int) -> tuple[int, int]:
     """How many starts of a cell survive and settle, each flown as `run` flies a scenario."""
     starts = comparison.study.files().starts_of(comparison.study.origin)
-    with in_its_own_words(comparison.base):
+    with errors_in_own_terms(comparison.base):
         metrics = [
             run(comparison.request(i, starts)).metrics for i in comparison.runs_of(comparison.cell(cell))
         ]  # fmt: skip

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from orchestration.basics.errors import UsageError
-from orchestration.computers.bounded import bounds_of
+from orchestration.computers.system_bounds import bounds_of
 from orchestration.runs.scheduling import Scheduled, schedule
 from orchestration.system.system_file import system_from_tables
 

@@ -9,7 +9,7 @@ import sympy
 
 from fmu_kit.trajectory import Reference, Trajectory
 from orchestration.engines.sources import EXACT, by_name
-from orchestration.signals.library import KINDS, SIGNALS, made
+from orchestration.signals.library import KINDS, SIGNALS, make_signal
 from orchestration.signals.motions import MOTIONS, Circle, Helix, Lemniscate, Motion, Paper, Step
 from orchestration.system.source import MOTION
 from quadcosim import UsageError
@@ -30,7 +30,7 @@ def orders(one: Reference) -> list[list[float]]:
 
 
 def of(name: str) -> Motion:
-    motion: Motion = made(name, EXAMPLES[name])
+    motion: Motion = make_signal(name, EXAMPLES[name])
     return motion
 
 
@@ -58,7 +58,7 @@ def test_position_to_snap_are_continuous_where_a_motion_changes_its_formula(name
 @pytest.mark.parametrize("name", sorted({*MOTIONS} - {"step"}))
 def test_what_has_a_ramp_begins_at_rest_where_it_is_told(name: str) -> None:
     given = {"x": 1.0, "y": -2.0, "z": 0.5} if name != "paper" else {"start_z": 0.5}
-    begin = orders(made(name, given | ({} if name == "hover" else {"ramp": 1.5})).at(0.0))
+    begin = orders(make_signal(name, given | ({} if name == "hover" else {"ramp": 1.5})).at(0.0))
     assert begin[0] == pytest.approx([given.get("x", 0.0), given.get("y", 0.0), 0.5], abs=1e-15)
     assert not np.any(begin[1:])
 
@@ -129,7 +129,7 @@ def test_many_times_at_once_give_the_bits_of_one_after_the_other(name: str) -> N
 )
 def test_what_no_signal_can_be_is_refused_in_one_line(name: str, parameters: dict[str, float], line: str) -> None:
     with pytest.raises(UsageError) as error:
-        made(name, parameters)
+        make_signal(name, parameters)
     assert str(error.value).startswith(line)
 
 

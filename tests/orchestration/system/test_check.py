@@ -7,7 +7,7 @@ import pytest
 from orchestration.basics.errors import UsageError
 from orchestration.fmi.model import read_model
 from orchestration.results import objectives
-from orchestration.system.check import check, recorded
+from orchestration.system.check import check, recorded_variables
 from orchestration.system.model import System
 from orchestration.system.paths import changed
 from orchestration.system.system_file import load_system
@@ -62,7 +62,7 @@ def checked(folder: Path, text: str) -> None:
     system = load_system(folder / "system.toml")
     models = {name: read_model(Path(component.fmu)) for name, component in system.components.items()}
     check(system, models)
-    signals = {f"{name}.{variable}" for name, variables in recorded(system, models).items() for variable in variables}
+    signals = {f"{name}.{each}" for name, variables in recorded_variables(system, models).items() for each in variables}
     objectives.with_available_objectives(system, signals, set())
 
 

@@ -13,7 +13,7 @@ from orchestration.schedule.drawing import times_from
 from orchestration.system.connection import Connection
 from orchestration.system.description import timing, varying
 from orchestration.system.distribution import Distribution, content, highest, is_random, lowest, mean
-from orchestration.system.files_read import files_read
+from orchestration.system.input_files import input_files
 from orchestration.system.sampling import Sampling
 from orchestration.system.system_file import load_system
 from orchestration.system.times import NANOSECONDS
@@ -85,7 +85,7 @@ def test_a_system_is_written_as_it_was_read(folder: Path) -> None:
     lines = 'delay = { file = "trace.csv", column = "delay", order = "as recorded" }\nloss = { values = [0, 1] }'
     read(folder, lines)
     system = load_system(folder / "system.toml")
-    assert files_read(system) == {"connections.x.delay": folder / "trace.csv"}
+    assert input_files(system) == {"connections.x.delay": folder / "trace.csv"}
     (folder / "again.toml").write_text(system.to_toml())
     assert load_system(folder / "again.toml") == system
 

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestration.recording.recording import Event
-from orchestration.schedule.happened import Happened
 from orchestration.schedule.resources import timeline_of
+from orchestration.schedule.run_events import RunEvents
 from orchestration.system.computers import Computer, Task
 from orchestration.system.model import System
 from tests.orchestration.engines.systems_on_computers import systems_on_computers
@@ -23,13 +23,13 @@ def test_events_are_the_same_in_parts_of_any_length_and_behind_any_time(
 ) -> None:
     """Some parts are handed over without anybody asking for them, as on the way to where a run was paused."""
     stop, whole = round(system.stop_time * 1e9), list(timeline_of(system).happenings())
-    happened, found, expected = Happened(system), list[Event](), list[Event]()
+    run_events, found, expected = RunEvents(system), list[Event](), list[Event]()
     ends = [(-1, True), *sorted((round(share * stop), is_asked) for share, is_asked in parts), (stop, True)]
     for (begin, _), (end, is_asked) in pairwise(ends):
         if is_asked:
-            found += happened.with_messages(NO_MESSAGES, end)
+            found += run_events.with_messages(NO_MESSAGES, end)
             expected += [event for event in whole if begin < event.time <= end]
-        happened.hand_over(end)
+        run_events.hand_over(end)
     assert found == expected
 
 
@@ -55,17 +55,17 @@ def test_what_is_told_is_what_became_of_each_job_and_frame(system: System) -> No
 
 def test_a_job_released_behind_its_deadline_is_missed_when_it_is_released() -> None:
     task = Task(period=0.1, offset=0.03, jitter=0.025, deadline=0.001, execution=0.0)
-    happened = Happened(System(stop_time=0.1, seed=0, computers={"one": Computer(tasks={"late": task})}))
-    assert not list(happened.with_messages(NO_MESSAGES, 35_000_000))
-    events = list(happened.with_messages(NO_MESSAGES, 100_000_000))
+    run_events = RunEvents(System(stop_time=0.1, seed=0, computers={"one": Computer(tasks={"late": task})}))
+    assert not list(run_events.with_messages(NO_MESSAGES, 35_000_000))
+    events = list(run_events.with_messages(NO_MESSAGES, 100_000_000))
     assert [event.kind for event in events] == ["released", "started", "finished", "missed"]
     assert len({event.time for event in events}) == 1
 
 
 def test_of_a_starved_task_only_what_is_not_late_yet_is_kept_in_mind() -> None:
     tasks = {"all": Task(period=0.001, execution=0.001), "none": Task(period=0.001, priority=2)}
-    happened = Happened(System(stop_time=10.0, computers={"one": Computer(tasks=tasks)}))
-    found = happened.with_messages(NO_MESSAGES, 9_999_500_000)
+    run_events = RunEvents(System(stop_time=10.0, computers={"one": Computer(tasks=tasks)}))
+    found = run_events.with_messages(NO_MESSAGES, 9_999_500_000)
     missed = found.table[found.are("missed", "one.none")]
     assert missed[:, 3].tolist() == list(range(9999))
     assert missed[:, 0].tolist() == [1_000_000 * (k + 1) for k in range(9999)]

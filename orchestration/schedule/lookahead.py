@@ -27,7 +27,7 @@ class Messages:
         self._rows: Integers = np.zeros((0, 3), dtype=np.int64)
         self._first = 0
 
-    def hear(self, sent: Integers, arriving: Integers) -> None:
+    def add(self, sent: Integers, arriving: Integers) -> None:
         """Notes of when some were sent and what became of them, and of when some arrive."""
         known = len(self._rows)
         rows = np.empty((known + len(sent), 3), dtype=np.int64)
@@ -35,9 +35,9 @@ class Messages:
         self._rows = rows
         self._rows[arriving[:, 3] - self._first, 2] = arriving[:, 4]
 
-    def known(self, over: bool) -> int:
+    def known(self, is_complete: bool) -> int:
         """How many there are, up to the first of which it is open when it arrives; at the end nothing is open."""
-        if over:
+        if is_complete:
             return len(self._rows)
         is_open = (self._rows[:, 1] == _SENT) & (self._rows[:, 2] == _UNKNOWN)
         return int(is_open.argmax()) if is_open.any() else len(self._rows)
@@ -69,14 +69,14 @@ class Samples:
         self.times: Integers = np.zeros(0, dtype=np.int64)
         self._messages = messages
 
-    def hear(self, times: Integers) -> None:
+    def add(self, times: Integers) -> None:
         """Some more."""
         self.times = np.concatenate([self.times, times])
 
-    def known(self, over: bool) -> int:
+    def known(self, is_complete: bool) -> int:
         """Of how many all is known, the time of the next one too."""
-        count = len(self.times) if over else max(len(self.times) - 1, 0)
-        return count if over else min([count, *(each.known(over) for each in self._messages)])
+        count = len(self.times) if is_complete else max(len(self.times) - 1, 0)
+        return count if is_complete else min([count, *(each.known(is_complete) for each in self._messages)])
 
     def before(self, end: int) -> int:
         """How many are before `end` [ns], as far as there are any: a starved task has the scheduler run far ahead."""
@@ -89,7 +89,7 @@ class Samples:
         return times, then
 
 
-class Foreseen:
+class Lookahead:
     """The scheduler of a system at work."""
 
     def __init__(self, system: System, resources: Resources, streams: Streams) -> None:
@@ -107,18 +107,18 @@ class Foreseen:
         """by component"""
 
     @property
-    def over(self) -> bool:
+    def is_complete(self) -> bool:
         """Whether all is known up to the end."""
         return self._reached > self._stop
 
-    def to(self, time: int) -> None:
+    def advance_to(self, time: int) -> None:
         """Find out what happens before `time` [ns], and somewhat later: of what begins before it, how it ends."""
         if time <= self._reached:
             return
         time += max((time - self._reached) // 16, _FURTHER)
-        self._reached = LATER if self._scheduler.reached == LATER else time
+        self._reached = LATER if self._scheduler.next_instant == LATER else time
         self._scheduler.run(time)
-        notes = self._scheduler.taken()
+        notes = self._scheduler.take_notes()
         if not len(notes):
             return
         which = KINDS * notes[:, 2] + notes[:, 1]
@@ -127,10 +127,10 @@ class Foreseen:
             return notes.take(np.flatnonzero(which == KINDS * who + kind), axis=0)
 
         for name, task in self._tasks.items():
-            self.samples[name].hear(of(SAMPLED, task)[:, 4])
+            self.samples[name].add(of(SAMPLED, task)[:, 4])
         for i, messages in enumerate(self.messages.values()):
-            messages.hear(of(SENT, i), of(ARRIVES, i))
+            messages.add(of(SENT, i), of(ARRIVES, i))
 
-    def further(self) -> None:
+    def advance(self) -> None:
         """Find out more, as something before the time that was asked for is not known yet."""
-        self.to(self._reached + max(self._reached // 4, _FURTHER))
+        self.advance_to(self._reached + max(self._reached // 4, _FURTHER))

@@ -3,12 +3,12 @@
 from collections.abc import Iterator
 
 from fmu_kit.variables import INDEX
-from orchestration.requests.ssp.carried import Carried, Part
+from orchestration.requests.ssp.export import Export, Part
 from orchestration.system.component import Parameter
 from orchestration.system.variable_names import variable_of
 
 
-def refused(given: Carried) -> Iterator[str]:
+def rejections(given: Export) -> Iterator[str]:
     """Values and connections, a line each that names the place, in the words of a system, and the masters."""
     parts = {part.name: part for part in given.parts}
     for part in given.parts:

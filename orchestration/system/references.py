@@ -13,7 +13,7 @@ BUILT_IN, AT_REST = "paper", "hover"
 """Signals: what controllers of this project have built in, and the only one that needs nobody to hear it"""
 
 
-def heard(system: System, models: Mapping[str, Model]) -> System:
+def connect_references(system: System, models: Mapping[str, Model]) -> System:
     """A `system` that fits its FMUs, with each source that says what a component follows feeding inputs that hear it.
 
     A component without a trajectory of its own is fed the paper's. Raises `UsageError` for one that has no inputs for
@@ -22,7 +22,7 @@ def heard(system: System, models: Mapping[str, Model]) -> System:
     sources, components = dict(system.sources), dict(system.components)
     for name, source, follower in _followed(system):
         model = models[follower]
-        if source.is_built_in and has_own(model):
+        if source.is_built_in and has_built_in_trajectory(model):
             continue
         inputs = {*model.names("input")}
         to = tuple(f"{follower}.{name}.{each}" for each in MOTION if f"{name}.{each}" in inputs)
@@ -41,14 +41,14 @@ def heard(system: System, models: Mapping[str, Model]) -> System:
     return system if sources == system.sources else replace(system, sources=sources, components=components)
 
 
-def followed(system: System, models: Mapping[str, Model]) -> str:
+def describe_references(system: System, models: Mapping[str, Model]) -> str:
     """What is followed, and by whom, of a system that is not `heard` yet; empty where nothing is."""
-    fed = heard(system, models)
+    fed = connect_references(system, models)
     words = (_words(source, fed.sources[name], models[follower]) for name, source, follower in _followed(system))
     return "; ".join(words)
 
 
-def has_own(model: Model) -> bool:
+def has_built_in_trajectory(model: Model) -> bool:
     """Whether an FMU has a built-in trajectory."""
     return not TRAJECTORY.keys().isdisjoint(model.variables)
 

@@ -8,13 +8,13 @@ from orchestration.system.model import System
 from orchestration.system.placement import SHARED
 
 
-def files_read(system: System) -> dict[str, Path]:
+def input_files(system: System) -> dict[str, Path]:
     """The files, each by whose it is: the name of a source, or the place of what is drawn."""
     found = {name: source.file for name, source in system.sources.items() if source.file is not None}
-    return found | {place: each.file for place, each in drawn(system) if each.file is not None}
+    return found | {place: each.file for place, each in distributions_in(system) if each.file is not None}
 
 
-def drawn(system: System) -> Iterator[tuple[str, Distribution]]:
+def distributions_in(system: System) -> Iterator[tuple[str, Distribution]]:
     """Everything that is drawn from a distribution or a trace, by its place."""
     components = ((f"components.{name}", component) for name, component in system.components.items())
     connections = ((f"connections.{x.name}", x) for x in system.connections)

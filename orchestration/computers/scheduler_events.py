@@ -8,33 +8,34 @@ from orchestration.basics.simulator import Integers
 from orchestration.computers.parts import (
     ABORTED,
     FINISHED,
+    FRAME_CORRUPTED,
+    FRAME_TRANSMITTED,
     LATER,
     NONE,
-    PASSED,
     PREEMPTED,
     QUEUED,
     RELEASED,
     RESUMED,
     SKIPPED,
-    SPOILT,
     STARTED,
     Parts,
 )
 from orchestration.computers.parts import KINDS as KINDS_OF_NOTES
 from orchestration.recording.recording import KINDS
 
-_SAID = {
+_EVENTS = {
     RELEASED: "released", STARTED: "started", PREEMPTED: "preempted", RESUMED: "resumed", FINISHED: "finished",
-    ABORTED: "aborted", SKIPPED: "skipped", QUEUED: "queued", PASSED: "transmitted", SPOILT: "retransmitted",
+    ABORTED: "aborted", SKIPPED: "skipped", QUEUED: "queued", FRAME_TRANSMITTED: "transmitted",
+    FRAME_CORRUPTED: "retransmitted",
 }  # fmt: skip
-NEEDED = frozenset(_SAID)
+NEEDED = frozenset(_EVENTS)
 """The kinds of notes that they are made of"""
 _KIND = np.full(KINDS_OF_NOTES, NONE)
-_KIND[[*_SAID]] = [KINDS.index(word) for word in _SAID.values()]
+_KIND[[*_EVENTS]] = [KINDS.index(word) for word in _EVENTS.values()]
 _MISSED = KINDS.index("missed")
 
 
-class Happenings:
+class EventBuilder:
     """Makes events of notes, which come a part of the run after the other."""
 
     def __init__(self, parts: Parts, names: Sequence[str], without: Collection[str] = ()) -> None:
@@ -54,7 +55,7 @@ class Happenings:
         of_messages = what >= QUEUED
         kind, owner = _KIND[what], whose + self._tasks * of_messages
         said = (kind != NONE) & self._is_told[owner]
-        passed = np.flatnonzero(what == PASSED)
+        passed = np.flatnonzero(what == FRAME_TRANSMITTED)
         said[passed] &= notes[passed, 4] == self._last_leg[whose[passed]]
         told, jobs = np.flatnonzero(said), np.flatnonzero(said & ~of_messages)
         found = _table(notes[told, 0], kind[told], owner[told], notes[told, 3])

@@ -4,7 +4,7 @@ import numpy as np
 
 from orchestration.basics.simulator import Integers
 from orchestration.computers.compiled import scheduler
-from orchestration.computers.happenings import NEEDED
+from orchestration.computers.scheduler_events import NEEDED
 from orchestration.recording.recording import Events
 from orchestration.schedule.resources import Resources
 from orchestration.schedule.streams import Streams
@@ -21,18 +21,18 @@ class _OnComputers:
     def __init__(self, system: System) -> None:
         resources = Resources(system, nanoseconds(system.stop_time))
         parts = resources.of_run(Streams(system.seed, system.streams))
-        self._scheduler, self._happenings = scheduler(parts, NEEDED), resources.happenings()
-        self.names = self._happenings.names
+        self._scheduler, self._events = scheduler(parts, NEEDED), resources.event_builder()
+        self.names = self._events.names
         self.reached = -1
 
     def up_to(self, time: int) -> Integers:
         """What happens after that which was asked for last up to `time` [ns]."""
         self.reached = time
         self._scheduler.run(time + 1)
-        return self._happenings.before(time + 1, self._scheduler.taken())
+        return self._events.before(time + 1, self._scheduler.take_notes())
 
 
-class Happened:
+class RunEvents:
     """Events that are not handed over yet."""
 
     def __init__(self, system: System) -> None:

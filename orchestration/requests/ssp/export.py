@@ -14,9 +14,9 @@ from orchestration.schedule.streams import Streams
 from orchestration.system.check import check
 from orchestration.system.component import Component, Parameter
 from orchestration.system.connection import Connection
-from orchestration.system.following import AT_REST, heard
 from orchestration.system.model import System
-from orchestration.system.request import Request, in_its_own_words
+from orchestration.system.references import AT_REST, connect_references
+from orchestration.system.request import Request, errors_in_own_terms
 from orchestration.system.sampling import Sampling
 from orchestration.system.source import Source
 from orchestration.system.variable_names import component_of, variable_of
@@ -41,7 +41,7 @@ class Part:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Carried:
+class Export:
     """A system for other masters."""
 
     system: System
@@ -50,30 +50,30 @@ class Carried:
     after the other exchanges what this master does"""
     step: float
     """communication step of all [s]"""
-    unsaid: tuple[str, ...]
+    unsupported: tuple[str, ...]
     """what other masters are not told, a line each that names its place"""
 
 
-def carried(asked: Request, announce: Callable[[str], None] | None = None) -> Carried:
+def export_of(asked: Request, announce: Callable[[str], None] | None = None) -> Export:
     """What other masters are given of a system, and what they cannot be told.
 
     That is: anything late, lost or noisy, a source that is no constant, and components at steps of their own. A
     sampled component needs the common step for its period, or an FMU with a clock of its own by `sample_period`.
     """
-    with in_its_own_words(asked):
+    with errors_in_own_terms(asked):
         system = asked.as_system()
         located = fmus.of_components(system.fmus, announce)
         models = {name: read_model(path) for name, path in located.items()}
         check(system, models)
-        system = _held(heard(system, models))
+        system = _held(connect_references(system, models))
         plan = Plan(system)
         step, unequal = _common_step(system, models)
-        unsaid = (*_unsaid(system), *unequal)
-        return Carried(
+        unsupported = (*_unsupported(system), *unequal)
+        return Export(
             system=system,
             parts=tuple(_part(system, name, located[name], models[name]) for name in plan.sampled + plan.continuous),
             step=step,
-            unsaid=tuple(map(asked.in_words, unsaid)),
+            unsupported=tuple(map(asked.in_own_terms, unsupported)),
         )
 
 
@@ -92,15 +92,15 @@ def _held(system: System) -> System:
     return replace(system, sources=sources)
 
 
-def wholly_carried(asked: Request, announce: Callable[[str], None] | None = None) -> Carried:
+def complete_export(asked: Request, announce: Callable[[str], None] | None = None) -> Export:
     """As `carried`; raises `UsageError` for the first that other masters cannot be told."""
-    given = carried(asked, announce)
-    if given.unsaid:
-        raise UsageError(given.unsaid[0])
+    given = export_of(asked, announce)
+    if given.unsupported:
+        raise UsageError(given.unsupported[0])
     return given
 
 
-def _unsaid(system: System) -> Iterator[str]:
+def _unsupported(system: System) -> Iterator[str]:
     for name, component in system.components.items():
         if component.sampling is not None:
             yield from _not_plain(f"components.{name}.sampling", component.sampling, ("jitter", "clock_ratio"))
@@ -144,17 +144,17 @@ def _common_step(system: System, models: Mapping[str, Model]) -> tuple[float, li
     periods = {f"components.{name}.sampling.period": sampling.period for name, sampling in by_master.items()}
     own = [c.sampling.period for c in system.components.values() if c.sampling is not None]
     first = next(iter((*steps.values(), *periods.values(), *own)))
-    unsaid = [
+    unsupported = [
         f"{place} = {step}: an SSP has one step for all; expected {first}"
         for place, step in (steps | periods).items()
         if step != first
     ]
-    unsaid += [
+    unsupported += [
         f"components.{name}.sampling.offset = {sampling.offset}: an SSP cannot say that; expected 0"
         for name, sampling in by_master.items()
         if sampling.offset != 0.0
     ]
-    return first, unsaid
+    return first, unsupported
 
 
 def _part(system: System, name: str, path: Path, model: Model) -> Part:
