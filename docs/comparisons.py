@@ -19,16 +19,16 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from orchestration.basics.statistics import first_end, wilson
-from orchestration.comparison import pictures
+from orchestration.comparison import figures as plots
 from orchestration.comparison.cells import CellSummary, Median, Share, sizes
 from orchestration.comparison.design import Comparison
-from orchestration.comparison.fates import FATES, RESIDUAL, SETTLING, survived
+from orchestration.comparison.figures import BINS, Reach
 from orchestration.comparison.file import load_comparison
 from orchestration.comparison.fronts import Point
 from orchestration.comparison.limits import Limit
 from orchestration.comparison.outcome import as_json
-from orchestration.comparison.pictures import BINS, Reach
 from orchestration.comparison.run import compare
+from orchestration.comparison.survival import FATES, RESIDUAL, SETTLING, survived
 from orchestration.figures.palette import BLUE, BROWN, GREEN, GREY, ORANGE, PURPLE, RED
 from orchestration.figures.style import DOCS
 from orchestration.quadrotor.initial_conditions import Starts
@@ -233,13 +233,13 @@ def figures() -> Iterator[tuple[str, Figure]]:
     outer = Quantity(name="period", unit="ms", factor=1e3)  # of the outer loops
     by_size = dict([*_by_size("periods"), *_by_size("fast_inner", RATES)])
     tall = replace(DOCS, width=280.0, height=260.0)
-    yield "comparison_basins", pictures.basins(by_size, outer, "survive", "paper's body", tall)
+    yield "comparison_basins", plots.basins(by_size, outer, "survive", "paper's body", tall)
     yield (
         "comparison_positions",
-        pictures.basins(dict(_by_size("positions")), outer, "survive", "initial error of up to 8 m, at rest", WIDE),
+        plots.basins(dict(_by_size("positions")), outer, "survive", "initial error of up to 8 m, at rest", WIDE),
     )
     reaches = [*_reaches("periods"), *_reaches("fast_inner", RATES)]
-    yield "comparison_limits", pictures.limits_of(reaches, outer, True, WIDE)
+    yield "comparison_limits", plots.limits_of(reaches, outer, True, WIDE)
     yield "comparison_tuned", _shares({"paper's body": [*_cells("tuned"), *_cells("tuned_mean")]}, "tuned")
     yield "comparison_fronts", _fronts("periods", (0.02, 0.05, 0.08))
     yield "comparison_tuned_fronts", _fronts("tuned", (0.01, 0.05, 0.1))
@@ -258,13 +258,13 @@ def _axis(name: str) -> Quantity:
 
 
 def _shares(found: Mapping[str, Sequence[CellSummary]], name: str) -> Figure:
-    return pictures.shares(found, _axis(name), COLORS, WIDE)
+    return plots.shares(found, _axis(name), COLORS, WIDE)
 
 
 def _fronts(name: str, values: Sequence[float]) -> Figure:
     front, points = loaded(name).front, [*map(_read_point, kept(name)["fronts"])]
     metrics = (labels.metric_with_unit(front.effort, "N.m"), labels.metric_with_unit(front.error, "m"))
-    return pictures.fronts_of(points, values, _axis(name), metrics, COLORS, "paper's body", WIDE)
+    return plots.fronts_of(points, values, _axis(name), metrics, COLORS, "paper's body", WIDE)
 
 
 def _cells(name: str) -> list[CellSummary]:
@@ -281,7 +281,7 @@ def _cells(name: str) -> list[CellSummary]:
     ]
 
 
-def _by_size(name: str, factor: float = 1.0) -> Iterator[tuple[str, pictures.BySize]]:
+def _by_size(name: str, factor: float = 1.0) -> Iterator[tuple[str, plots.BySize]]:
     """Of each controller under each condition values of the axis, with a factor, and the shares that survive."""
     several = len(loaded(name).conditions) > 1
     for key, group in groupby(kept(name)["cells"], lambda cell: (cell["controller"], cell["condition"])):

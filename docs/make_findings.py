@@ -20,7 +20,7 @@ from docs import charts, comparisons, theory
 from docs import processor as processors
 from docs.theory import PAPER
 from orchestration.basics.statistics import first_end, quantile, wilson
-from orchestration.comparison.fates import FATES, SETTLING, survived
+from orchestration.comparison.survival import FATES, SETTLING, survived
 from orchestration.figures.style import DOCS, save
 from orchestration.flight.hover_loop import HoverLoop
 from orchestration.flight.local_limit import about_hover

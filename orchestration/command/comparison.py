@@ -49,7 +49,7 @@ def all_cells(
 
 def cell(comparison: Comparison, index: int, out: Path | None, *, workers: int, engine: EngineChoice) -> Answer:
     """Fly one cell again, and tell whether the store has the same."""
-    (found,) = run.cells_again(comparison, [index], workers=workers, engine=engine)
+    (found,) = run.rerun_cells(comparison, [index], workers=workers, engine=engine)
     stored = run.stored_cell(comparison, index, out)
     same = None if stored is None else run.agree(stored, found)
     lines = list(terminal.cell_lines(comparison, found))

@@ -16,7 +16,7 @@ def lines(comparison: Comparison, outcome: Outcome) -> Iterator[str]:
     for (vehicle, condition), group in groupby(outcome.cells, lambda cell: (cell.vehicle, cell.condition)):
         cells = [*group]
         yield (
-            f"{vehicle}, {condition}: of {len(comparison.drawn)} starts, those that survive / settle by "
+            f"{vehicle}, {condition}: of {len(comparison.initial_conditions)} starts, those that survive / settle by "
             f"{comparison.study.origin.stop_time:g} s, and the share that survives with its 95 % interval"
         )
         rows = [[axis, *names]]

@@ -1,1 +1,1 @@
-"""Controllers against each other: the same starts for all, what flies, how well and at what effort."""
+"""Comparison of controllers from the same initial conditions: survival, settling, limits, error and effort."""

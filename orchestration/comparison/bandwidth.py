@@ -1,11 +1,11 @@
-"""The bandwidth of each controller's loop, by which controllers of any structure are put side by side."""
+"""The bandwidth of each controller's loop, by which controllers of any structure are compared."""
 
 from collections.abc import Mapping
 
 from orchestration.building import fmus
 from orchestration.building.inputs import files_of
 from orchestration.comparison.crossovers import CROSSOVERS
-from orchestration.comparison.design import FMU, Comparison, Controller, Craft
+from orchestration.comparison.design import FMU, Comparison, Controller, VehicleEntry
 from orchestration.fmi.foreign import computed
 from orchestration.fmi.model import read_model
 from orchestration.studies.axes import Value
@@ -18,11 +18,11 @@ _OF_THE_PERIOD = ("hold_period", "prediction")
 
 
 def bandwidths(comparison: Comparison) -> dict[Key, float]:
-    """Of every controller on every vehicle [rad/s], at each value of the axis; only tuned ones differ there."""
+    """Of every controller on every vehicle [rad/s], by value of the axis, on which only that of tuned ones depends."""
     crossover = CROSSOVERS.of(comparison.base.kind)
     if crossover is None:
         return {}
-    found: dict[Key, float] = {}
+    by_key: dict[Key, float] = {}
     for controller in comparison.controllers:
         for vehicle in comparison.vehicles:
             known: dict[tuple[tuple[str, Value], ...], float] = {}
@@ -32,15 +32,15 @@ def bandwidths(comparison: Comparison) -> dict[Key, float]:
                     loop = _loop(comparison, controller, vehicle, tuned)
                     fmus_of_it = files_of(loop.as_system()).fmus.values()
                     known[tuned] = controller.bandwidth or computed(fmus_of_it, crossover, loop)
-                found[controller.name, vehicle.name, value] = known[tuned]
-    return found
+                by_key[controller.name, vehicle.name, value] = known[tuned]
+    return by_key
 
 
 def _loop(
-    comparison: Comparison, controller: Controller, vehicle: Craft, tuned: tuple[tuple[str, Value], ...]
+    comparison: Comparison, controller: Controller, vehicle: VehicleEntry, tuned: tuple[tuple[str, Value], ...]
 ) -> ControlLoop:
     fmu = comparison.fmu_of(controller)
-    sets = {**comparison.told(vehicle, controller), **controller.sets, **dict(tuned)}
+    sets = {**comparison.parameters_for(vehicle, controller), **controller.sets, **dict(tuned)}
     known = read_model(fmus.locate(fmu)).variables
     sets |= {f"controller.{name}": 0.0 for name in _OF_THE_PERIOD if name in known}
     plant = comparison.base.as_system().fmus["plant"]

@@ -1,4 +1,4 @@
-"""How the bandwidth of a controller is measured, by the kind of its request."""
+"""Functions that measure the bandwidth of a controller, by the kind of request."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from orchestration.system.request import ControlLoop
 
     Crossover = Callable[[ControlLoop], float]
-    """Of the loop in which controllers are put side by side [rad/s]; `math.inf` or 0 outside of its range"""
+    """The bandwidth of the loop by which controllers are compared [rad/s]; `math.inf` or 0 outside of its range"""
 
 CROSSOVERS: Registry[Crossover] = Registry()
-"""Rooms above enter theirs"""
+"""Rooms above register theirs"""

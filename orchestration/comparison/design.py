@@ -1,4 +1,4 @@
-"""What is compared, and the study that it is: every controller on every vehicle from the same starts."""
+"""The design of a comparison, and its study: every controller on every vehicle from the same initial conditions."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,50 +20,50 @@ FMU = "controller.fmu"
 
 @record()
 class Controller:
-    """One that is compared: an FMU with parameters."""
+    """A controller that is compared: an FMU with parameters."""
 
     name: str
     sets: Values = field(default_factory=dict)
     tuned: Mapping[Key, Values] = field(default_factory=dict)
-    """what it is set to beside, by vehicle and value of the axis"""
+    """further values by vehicle and value of the axis"""
     bandwidth: float | None = None
     """of its attitude loop [rad/s]; None: that of the FMU about hover"""
 
 
 @record()
-class Craft:
-    """A vehicle that they fly."""
+class VehicleEntry:
+    """A vehicle on which controllers are compared."""
 
     name: str
     vehicle: Vehicle | None = None
-    """what it is; None: the plant of the base"""
+    """its parameters; None: the plant of the base"""
 
 
 @record()
 class Condition:
-    """What differs from what a controller believes, or goes wrong: mass, lag, wind, losses."""
+    """A deviation from the controllers' model, or a fault: mass, lag, wind, losses."""
 
     name: str
-    """What tables and pictures call it."""
+    """Its name in tables and pictures."""
     sets: Values = field(default_factory=dict)
     """Values by path."""
     multiplies: Mapping[str, float] = field(default_factory=dict)
-    """Factors by path, on the value that is there by then."""
+    """Factors by path, applied to the value after all other settings."""
 
 
 @record("front.")
 class Front:
-    """What is weighed against each other, both the less the better."""
+    """Two objectives with a trade-off, both to be minimised."""
 
     error: str = "position_rmse"
-    """The objective that says how well a run flew."""
+    """The objective that measures the error of a run."""
     effort: str = "total_variation.torque"
-    """The objective that says what it took."""
+    """The objective that measures its effort."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cell:
-    """One controller on one vehicle under one condition at one value of the axis: a run from each start."""
+    """One controller on one vehicle under one condition at one value of the axis: a run from each initial condition."""
 
     index: int
     vehicle: str
@@ -74,36 +74,38 @@ class Cell:
 
 @record()
 class Comparison:
-    """Controllers on vehicles under conditions over an axis, each from all starts; raises `UsageError`."""
+    """Controllers on vehicles under conditions over an axis, from the same initial conditions; raises `UsageError`."""
 
     name: str
     """The name of the comparison, and of the folder of its store in `results`."""
     base: ControlLoop
-    """The scenario that all flights begin from."""
+    """The scenario that all runs modify."""
     controllers: tuple[Controller, ...]
-    """Who is compared."""
-    vehicles: tuple[Craft, ...]
-    """The vehicles that they fly."""
+    """The controllers that are compared."""
+    vehicles: tuple[VehicleEntry, ...]
+    """The vehicles on which they are compared."""
     conditions: tuple[Condition, ...]
-    """What differs from what a controller believes, or goes wrong."""
+    """Deviations from the controllers' model, and faults."""
     axis: Axis
-    """What is varied, over growing values."""
+    """The quantity that is varied, with increasing values."""
     starts: Ensemble
-    """The initial states, the same for all."""
+    """The initial conditions, the same for all."""
     front: Front = field(default_factory=Front)
-    """The two objectives that are weighed against each other."""
+    """The two objectives of the trade-off."""
     native: bool = False
-    """Whether it is flown by the native twins of its FMUs."""
+    """Whether to use the native twins of its FMUs."""
 
     def __post_init__(self) -> None:
         for kind in ("controllers", "vehicles", "conditions"):
             names = [one.name for one in getattr(self, kind)]
             if not names or len(set(names)) != len(names):
-                raise UsageError(f"{kind} = {', '.join(names)}: expected at least one, each with a name of its own")
+                raise UsageError(f"{kind} = {', '.join(names)}: expected at least one, each with its own name")
         if self.axis.values is None or any(isinstance(v, str) for v in self.axis.values):
             raise UsageError(f"axis {self.axis.name}: expected values, or start, stop and number")
         if sorted(self.axis.values) != [*self.axis.values]:
-            raise UsageError(f"axis {self.axis.name}: expected values that grow: what flies is told up to a value")
+            raise UsageError(
+                f"axis {self.axis.name}: expected increasing values; limits are values up to which runs survive"
+            )
         if self.axis.name in (VEHICLE, CONDITION, CONTROLLER, START):
             raise UsageError(f"axis {self.axis.name}: expected another name")
         objectives = self.study.origin.objectives
@@ -113,17 +115,17 @@ class Comparison:
 
     @property
     def values(self) -> tuple[Value, ...]:
-        """Of the axis."""
+        """The values of the axis."""
         return self.axis.values or ()
 
     @cached_property
-    def drawn(self) -> tuple[InitialConditions, ...]:
-        """The starts, around the beginning of the base's trajectory."""
+    def initial_conditions(self) -> tuple[InitialConditions, ...]:
+        """The initial conditions, about the start of the base's reference."""
         return tuple(self.starts.initial_conditions(self.base))
 
     @cached_property
     def study(self) -> Study:
-        """Its runs, cell after cell; in a cell start after start. A start has a seed of its own, for all alike."""
+        """The study of all runs, cell by cell. Each initial condition has its own seed, the same in every cell."""
         return Study(
             name=self.name,
             base=self.base,
@@ -133,18 +135,21 @@ class Comparison:
                 _named(CONDITION, self.conditions),
                 _named(CONTROLLER, self.controllers),
                 self.axis,
-                Axis(name=START, targets=(), values=tuple(range(len(self.drawn)))),
+                Axis(name=START, targets=(), values=tuple(range(len(self.initial_conditions)))),
             ),
             together=(
-                LinkedSettings(axes=(VEHICLE, CONTROLLER), sets=self._told()),
+                LinkedSettings(axes=(VEHICLE, CONTROLLER), sets=self._vehicle_settings()),
                 LinkedSettings(axes=(CONTROLLER,), sets={(one.name,): one.sets for one in self.controllers}),
-                LinkedSettings(axes=(CONTROLLER, VEHICLE, self.axis.name), sets=self._tuned()),
+                LinkedSettings(axes=(CONTROLLER, VEHICLE, self.axis.name), sets=self._tuned_settings()),
                 LinkedSettings(
                     axes=(CONDITION,),
                     sets={(one.name,): one.sets for one in self.conditions},
                     multiplies={(one.name,): one.multiplies for one in self.conditions},
                 ),
-                LinkedSettings(axes=(START,), sets={(i,): self._begun(i, start) for i, start in enumerate(self.drawn)}),
+                LinkedSettings(
+                    axes=(START,),
+                    sets={(i,): self._start_settings(i, start) for i, start in enumerate(self.initial_conditions)},
+                ),
             ),
         )
 
@@ -153,21 +158,21 @@ class Comparison:
         fmu = str(controller.sets.get(FMU, self.base.as_system().fmus["controller"]))
         return fmus.native_twin(fmu) if self.native else fmu
 
-    def told(self, craft: Craft, controller: Controller) -> dict[str, Value]:
-        """What the plant is made of on a vehicle, and what this controller is told of it."""
-        return {} if craft.vehicle is None else dict(craft.vehicle.parameters_for(self.fmu_of(controller)))
+    def parameters_for(self, entry: VehicleEntry, controller: Controller) -> dict[str, Value]:
+        """The parameters of the plant of a vehicle and of a controller on it, by target."""
+        return {} if entry.vehicle is None else dict(entry.vehicle.parameters_for(self.fmu_of(controller)))
 
-    def _told(self) -> dict[Key, Values]:
-        return {(v.name, one.name): self.told(v, one) for v in self.vehicles for one in self.controllers}
+    def _vehicle_settings(self) -> dict[Key, Values]:
+        return {(v.name, one.name): self.parameters_for(v, one) for v in self.vehicles for one in self.controllers}
 
-    def _tuned(self) -> dict[Key, Values]:
+    def _tuned_settings(self) -> dict[Key, Values]:
         return {(one.name, *key): changes for one in self.controllers for key, changes in one.tuned.items()}
 
-    def _begun(self, index: int, start: InitialConditions) -> dict[str, Value]:
+    def _start_settings(self, index: int, start: InitialConditions) -> dict[str, Value]:
         return {**start.values, "seed": self.base.seed + self.starts.first + index}
 
     def cells(self) -> Iterator[Cell]:
-        """All, in the order of their indices."""
+        """All cells in the order of their indices."""
         grid = (
             (vehicle, condition, controller, value)
             for vehicle in self.vehicles
@@ -185,18 +190,18 @@ class Comparison:
             )
 
     def cell(self, index: int) -> Cell:
-        """One of them; raises `UsageError` for an index that there is not."""
+        """The cell of an index; raises `UsageError` if there is none."""
         cells = [*self.cells()]
         if not 0 <= index < len(cells):
             raise UsageError(f"--cell {index}: expected a number from 0 to {len(cells) - 1}")
         return cells[index]
 
     def runs_of(self, cell: Cell) -> range:
-        """The indices of its runs in the study."""
-        return range(cell.index * len(self.drawn), (cell.index + 1) * len(self.drawn))
+        """The indices in the study of the runs of a cell."""
+        return range(cell.index * len(self.initial_conditions), (cell.index + 1) * len(self.initial_conditions))
 
     def request(self, index: int, starts: Mapping[str, float]) -> ControlLoop:
-        """A run of the study by itself, as the base is written; `starts` are the FMUs' own parameters."""
+        """A single run of the study as a request of the kind of the base; `starts` are the FMUs' default parameters."""
         system = self.study.system(index, starts)
         targets = [*self.axis.targets, *(target for each in self.study.together for target in each.targets)]
         values = {target: value_at(system, path) for target in targets for path in self.base.paths_of(target)[:1]}
@@ -204,5 +209,5 @@ class Comparison:
         return self.base.with_values({**{target: v for target, v in values.items() if v is not None}, **fmus})
 
 
-def _named(name: str, ones: Sequence[Controller] | Sequence[Craft] | Sequence[Condition]) -> Axis:
+def _named(name: str, ones: Sequence[Controller] | Sequence[VehicleEntry] | Sequence[Condition]) -> Axis:
     return Axis(name=name, targets=(), values=tuple(one.name for one in ones))

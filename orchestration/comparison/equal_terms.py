@@ -1,4 +1,4 @@
-"""Controllers side by side at equal bandwidth and at equal peak torque, from the runs and cells that there are."""
+"""Controllers compared at equal bandwidth and at equal peak torque, from existing runs and cells."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -10,21 +10,21 @@ import numpy as np
 from orchestration.comparison.bandwidth import Bandwidths
 from orchestration.comparison.cells import PEAK, CellSummary, Share
 from orchestration.comparison.design import CONDITION, CONTROLLER, VEHICLE, Comparison
-from orchestration.comparison.fates import survived
+from orchestration.comparison.survival import survived
 from orchestration.studies.axes import Value
 
 if TYPE_CHECKING:
     import pandas as pd
 
 PHASES = (0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.5, 2.0, 3.0)
-"""Values of the axis [s] times the bandwidth of the attitude loop [rad/s], at which controllers are side by side."""
+"""Values of the axis [s] times the bandwidth of the attitude loop [rad/s] at which controllers are compared"""
 BUDGETS = 8
-"""Peak torques at which controllers are side by side."""
+"""Number of peak torques at which controllers are compared"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class AtPhase:
-    """The shares that survive and settle where the axis is a given part of the time scale of the attitude loop."""
+    """The shares that survive and settle at a fixed ratio of the axis to the time scale of the attitude loop."""
 
     vehicle: str
     condition: str
@@ -33,12 +33,12 @@ class AtPhase:
     """axis times bandwidth [rad]"""
     survives: float
     settles: float
-    """between those of the two cells beside it, by the logarithm of the axis"""
+    """interpolated between the two neighbouring cells over the logarithm of the axis"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class WithinTorque:
-    """The share of the starts that survive with no more than a given peak torque."""
+    """The share of the initial conditions that survive within a peak torque."""
 
     vehicle: str
     condition: str
@@ -53,7 +53,7 @@ class WithinTorque:
 
 
 def at_equal_bandwidth(cells: Sequence[CellSummary], bandwidths: Bandwidths) -> Iterator[AtPhase]:
-    """For an axis in seconds: each controller at the same values of axis times its own bandwidth."""
+    """For an axis in seconds: each controller at the same values of axis times bandwidth."""
     groups: dict[tuple[str, str, str], list[CellSummary]] = {}
     for cell in cells:
         groups.setdefault((cell.vehicle, cell.condition, cell.controller), []).append(cell)
@@ -61,7 +61,7 @@ def at_equal_bandwidth(cells: Sequence[CellSummary], bandwidths: Bandwidths) -> 
         phases = [(cell, bandwidths[controller, vehicle, cell.value] * float(cell.value)) for cell in group]
         known = [cell for cell, phase in phases if 0.0 < phase < math.inf]
         at = np.log([phase for _, phase in phases if 0.0 < phase < math.inf])
-        if not (np.diff(at) > 0.0).all():  # tuned for each value, so that the bandwidth falls faster than that grows
+        if not (np.diff(at) > 0.0).all():  # tuned at each value: its bandwidth falls faster than the axis grows
             continue
         for phase in PHASES:
             if len(at) and at[0] <= math.log(phase) <= at[-1]:
@@ -76,7 +76,7 @@ def at_equal_bandwidth(cells: Sequence[CellSummary], bandwidths: Bandwidths) -> 
 
 
 def at_equal_torque(comparison: Comparison, table: "pd.DataFrame") -> Iterator[WithinTorque]:
-    """Each cell at the same peak torques, those that its vehicle's flights under its condition have."""
+    """Each cell at the same peak torques, quantiles of those of all runs of its vehicle under its condition."""
     done = table[table["status"] == "done"]
     for (vehicle, condition), group in done.groupby([VEHICLE, CONDITION], sort=False):
         peaks = group.loc[survived(group), PEAK].dropna().to_numpy(float)

@@ -1,4 +1,4 @@
-"""Reads comparison files, and the files of parameters that they name."""
+"""Reads comparison files, and the parameter files that they name."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -10,7 +10,7 @@ from orchestration.basics.documents import read_toml
 from orchestration.basics.errors import UsageError, no_such_key
 from orchestration.basics.records import record
 from orchestration.basics.typed_tables import table_of
-from orchestration.comparison.design import FMU, Comparison, Condition, Controller, Craft, Front
+from orchestration.comparison.design import FMU, Comparison, Condition, Controller, Front, VehicleEntry
 from orchestration.expressions.at_instant import compiled
 from orchestration.expressions.syntax import is_truth, names, parse
 from orchestration.studies.axes import Value
@@ -22,30 +22,30 @@ from orchestration.system.request import ControlLoop
 
 @record()
 class ControllerTable:
-    """`[[controllers]]`: an FMU, a file of parameters, and parameters on top of that."""
+    """`[[controllers]]`: an FMU, a parameter file, and parameters on top of that."""
 
     name: str
-    """What tables and pictures call it."""
+    """Its name in tables and pictures."""
     fmu: str | None = None
-    """The FMU, by name or path; without it, that of the base."""
+    """The FMU, by name or path; default: that of the base."""
     file: str | None = None
-    """A file with parameters in `[controller]`; {vehicle}, {value} and {milli}, 1000 · value, are filled in."""
+    """A file with parameters in `[controller]`; {vehicle}, {value} and {milli}, 1000 · value, are substituted."""
     parameters: dict[str, Any] = field(default_factory=dict)
     """Parameters on top of those of the file."""
     scheduled: dict[str, Any] = field(default_factory=dict)
-    """Parameters that follow the axis, on top of all others: expressions over its name, such as "0.9 / period"."""
+    """Parameters that depend on the axis, on top of all others: expressions of its name, such as "0.9 / period"."""
     bandwidth: float | None = None
-    """Its bandwidth [rad/s]; without it, the bandwidth is measured."""
+    """Its bandwidth [rad/s]; default: the measured one."""
 
 
 @record()
 class VehicleTable:
-    """`[[vehicles]]`: one by its name or its file, and parameters on top of that."""
+    """`[[vehicles]]`: a vehicle by name or file, and parameters on top of that."""
 
     name: str
-    """What tables and pictures call it."""
+    """Its name in tables and pictures."""
     vehicle: str | None = None
-    """A vehicle by name, or the path of its file; without it, that of the base."""
+    """A vehicle by name, or the path of its file; default: that of the base."""
     plant: dict[str, Any] = field(default_factory=dict)
     """Parameters of the plant on top of those of the vehicle."""
     controller: dict[str, Any] = field(default_factory=dict)
@@ -55,38 +55,37 @@ class VehicleTable:
 class ConditionTable(
     table_of(Condition, sets=(dict[str, Any], {}), multiplies=(dict[str, Any], {}))  # type: ignore[misc]
 ):
-    """`[[conditions]]`: what is set, and what is multiplied, by the names of axes of studies."""
+    """`[[conditions]]`: values to set and factors, by the names that axes of studies have."""
 
 
 @record()
 class ComparisonFile:
-    """The file: a scenario, or the path of one, and what is compared on it."""
+    """A comparison file: a scenario, or the path of one, and the comparison on it."""
 
     controllers: list[ControllerTable]
-    """The controllers; pairs are made with the first."""
+    """The controllers; each is paired with the first."""
     axis: AxisTable
-    """What is varied: one axis of numbers that grow."""
+    """The quantity that is varied: one axis of increasing numbers."""
     vehicles: list[VehicleTable] = field(default_factory=list)
-    """The vehicles; without any, that of the base."""
+    """The vehicles; default: that of the base."""
     conditions: list[ConditionTable] = field(default_factory=lambda: [ConditionTable(name="nominal")])
-    """What else each is flown under; without any, nothing but the base."""
+    """The conditions under which each is run; default: the base unchanged."""
     starts: dict[str, Any] = field(default_factory=dict)
-    """The initial states that every controller is flown from."""
+    """The initial conditions, the same for every controller."""
     front: Front = field(default_factory=Front)
-    """The two objectives that are weighed against each other."""
+    """The two objectives of the trade-off."""
     name: str | None = None
-    """The name of the comparison and of its folder in `results/`; without it, that of the file."""
+    """The name of the comparison and of its folder in `results/`; default: that of the file."""
     scenario: str | None = None
-    """The path of the scenario file that everything is flown on."""
+    """The path of the scenario file that all runs modify."""
     base: dict[str, Any] = field(default_factory=dict)
-    """The same here instead of in a file of its own: the tables of a scenario file."""
+    """Instead of `scenario`, the tables of a scenario file."""
 
 
 def load_comparison(path: str | Path) -> Comparison:
-    """Read such a file; paths in it are relative to its folder.
+    """Read a comparison file; paths in it are relative to its folder.
 
-    Raises `UsageError` for a file that cannot be read, a key that does not exist (naming those that do) or a value
-    that cannot be.
+    Raises `UsageError` for a file that cannot be read, an unknown key (with the known ones) or an invalid value.
     """
     return load(Path(path), "comparison file", ComparisonFile, _comparison)
 
@@ -95,13 +94,13 @@ def _comparison(file: ComparisonFile, path: Path) -> Comparison:
     folder = path.parent
     base = loop_of(file, folder)
     axis = axis_of(file.axis, folder)
-    crafts = _crafts(file.vehicles, base, folder)
-    keys = [(craft.name, value) for craft in crafts for value in axis.values or ()]
+    vehicles = _vehicles(file.vehicles, base, folder)
+    keys = [(entry.name, value) for entry in vehicles for value in axis.values or ()]
     return Comparison(
         name=file.name or path.stem,
         base=base.without_vehicle(),
         controllers=tuple(_controller(table, axis.name, keys, folder) for table in file.controllers),
-        vehicles=crafts,
+        vehicles=vehicles,
         conditions=tuple(_condition(table) for table in file.conditions),
         axis=axis,
         starts=base.ensemble(file.starts),
@@ -109,12 +108,12 @@ def _comparison(file: ComparisonFile, path: Path) -> Comparison:
     )
 
 
-def _crafts(tables: list[VehicleTable], base: ControlLoop, folder: Path) -> tuple[Craft, ...]:
+def _vehicles(tables: list[VehicleTable], base: ControlLoop, folder: Path) -> tuple[VehicleEntry, ...]:
     if base.vehicle is None:
-        return tuple(_craft(table, base, folder) for table in tables or [VehicleTable(name="base")])
+        return tuple(_vehicle(table, base, folder) for table in tables or [VehicleTable(name="base")])
     if tables:
         raise UsageError("base.vehicle and vehicles: expected one of them")
-    return (Craft(name=base.vehicle.name, vehicle=base.vehicle),)
+    return (VehicleEntry(name=base.vehicle.name, vehicle=base.vehicle),)
 
 
 def _controller(table: ControllerTable, axis: str, keys: list[tuple[str, Value]], folder: Path) -> Controller:
@@ -124,31 +123,31 @@ def _controller(table: ControllerTable, axis: str, keys: list[tuple[str, Value]]
         sets[FMU] = str(folder / table.fmu) if table.fmu.endswith(".fmu") else table.fmu
     own = _of_controller(parameters_in(table.parameters, f"{place}.parameters"))
     tuned: dict[Key, Mapping[str, Value]] = {}
-    if table.file is not None and "{" in table.file:  # a file for each vehicle, or value of the axis
+    if table.file is not None and "{" in table.file:  # one file for each vehicle or value of the axis
         for vehicle, value in keys:
-            name = _filled(table.file, vehicle, value)
+            name = _substituted(table.file, vehicle, value)
             tuned[vehicle, value] = {**_read(folder / name), **own}
     elif table.file is not None:
         sets |= _read(folder / table.file)
     for target, text in parameters_in(table.scheduled, f"{place}.scheduled").items():
-        follows = _followed(text, axis, f"{place}.scheduled.{target}")
+        parameter = _function_of_axis(text, axis, f"{place}.scheduled.{target}")
         for vehicle, value in keys:
-            tuned[vehicle, value] = {**tuned.get((vehicle, value), {}), f"controller.{target}": follows(value)}
+            tuned[vehicle, value] = {**tuned.get((vehicle, value), {}), f"controller.{target}": parameter(value)}
     return Controller(name=table.name, sets={**sets, **own}, tuned=tuned, bandwidth=table.bandwidth)
 
 
-def _followed(text: Value, axis: str, place: str) -> Callable[[Value], float]:
-    """What a parameter is at a value of the axis, by an expression over the axis's name."""
+def _function_of_axis(text: Value, axis: str, place: str) -> Callable[[Value], float]:
+    """A parameter as a function of the value of the axis, from an expression of the axis's name."""
     if not isinstance(text, str):
         raise UsageError(f'{place} = {text}: expected an expression over {axis}, such as "0.9 / {axis}"')
 
-    def follows(value: Value) -> float:
+    def parameter(value: Value) -> float:
         if not _is_number(value):
-            raise UsageError(f"axis {axis}: expected numbers for {place} to follow")
-        found = at([float(value)])
-        if not math.isfinite(found):
-            raise UsageError(f"{place} = {text}: is {found} at {axis} = {value}; expected a number")
-        return found
+            raise UsageError(f"axis {axis}: expected numbers, for {place} depends on it")
+        result = at([float(value)])
+        if not math.isfinite(result):
+            raise UsageError(f"{place} = {text}: is {result} at {axis} = {value}; expected a number")
+        return result
 
     try:
         node = parse(text)
@@ -160,11 +159,11 @@ def _followed(text: Value, axis: str, place: str) -> Callable[[Value], float]:
         at = compiled(node, {axis: 0})
     except UsageError as error:
         raise UsageError(f"{place} = {text}: {error}") from None
-    return follows
+    return parameter
 
 
-def _filled(name: str, vehicle: str, value: Value) -> str:
-    """A file's name for one vehicle and value of the axis."""
+def _substituted(name: str, vehicle: str, value: Value) -> str:
+    """The name of the file for one vehicle and value of the axis."""
     known = {"vehicle": vehicle, "value": value}
     if isinstance(value, int | float):
         known |= {"value": f"{value:g}", "milli": f"{1e3 * value:g}"}
@@ -176,10 +175,10 @@ def _filled(name: str, vehicle: str, value: Value) -> str:
         ) from None
 
 
-def _craft(table: VehicleTable, base: ControlLoop, folder: Path) -> Craft:
+def _vehicle(table: VehicleTable, base: ControlLoop, folder: Path) -> VehicleEntry:
     place = f"vehicles.{table.name}"
     plant, own = parameters_in(table.plant, f"{place}.plant"), parameters_in(table.controller, f"{place}.controller")
-    return Craft(name=table.name, vehicle=base.craft(table.vehicle, folder, plant=plant, controller=own))
+    return VehicleEntry(name=table.name, vehicle=base.craft(table.vehicle, folder, plant=plant, controller=own))
 
 
 def _condition(table: ConditionTable) -> Condition:

@@ -1,4 +1,4 @@
-"""What no other controller beats in error and in effort, on the starts that all of them survive."""
+"""Pareto fronts of error and effort, over the initial conditions that all controllers survive."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -6,19 +6,19 @@ from typing import TYPE_CHECKING
 
 from orchestration.comparison.cells import Median
 from orchestration.comparison.design import CONDITION, CONTROLLER, START, VEHICLE, Comparison
-from orchestration.comparison.fates import survived
+from orchestration.comparison.survival import survived
 from orchestration.studies.axes import Value
 
 if TYPE_CHECKING:
     import pandas as pd
 
 LEAST = 0.5
-"""Share of the starts that a controller has to survive to be weighed against others."""
+"""Share of the initial conditions that a controller has to survive to be included"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Point:
-    """One controller among those that survive at a value of the axis."""
+    """One controller at a value of the axis, among those that survive enough."""
 
     vehicle: str
     condition: str
@@ -30,22 +30,22 @@ class Point:
     effort: Median
     """over those starts"""
     on_front: bool
-    """whether no other has less of both"""
+    """whether no other is better in one and no worse in the other"""
 
 
 def points(comparison: Comparison, table: "pd.DataFrame") -> Iterator[Point]:
-    """The controllers that survive half the starts or more, at each value of the axis."""
+    """The controllers that survive half the initial conditions or more, at each value of the axis."""
     done = table[table["status"] == "done"]
     for (vehicle, condition, value), rows in done.groupby([VEHICLE, CONDITION, comparison.axis.name], sort=False):
         alive = rows[survived(rows)]
         counts = alive[CONTROLLER].value_counts()
-        enough = LEAST * len(comparison.drawn)
-        chosen = [one.name for one in comparison.controllers if counts.get(one.name, 0) >= enough]
-        alive = alive[alive[CONTROLLER].isin(chosen)]
-        by_all = alive[START].value_counts() == len(chosen)
+        enough = LEAST * len(comparison.initial_conditions)
+        names = [one.name for one in comparison.controllers if counts.get(one.name, 0) >= enough]
+        alive = alive[alive[CONTROLLER].isin(names)]
+        by_all = alive[START].value_counts() == len(names)
         common = alive[alive[START].isin(by_all[by_all].index)]
-        found = [(name, *_medians(comparison, common[common[CONTROLLER] == name])) for name in chosen]
-        for name, error, effort in found:
+        medians = [(name, *_medians(comparison, common[common[CONTROLLER] == name])) for name in names]
+        for name, error, effort in medians:
             yield Point(
                 vehicle=vehicle,
                 condition=condition,
@@ -54,7 +54,7 @@ def points(comparison: Comparison, table: "pd.DataFrame") -> Iterator[Point]:
                 starts=int(by_all.sum()),
                 error=error,
                 effort=effort,
-                on_front=not any(_beats((a.value, b.value), (error.value, effort.value)) for _, a, b in found),
+                on_front=not any(_dominates((a.value, b.value), (error.value, effort.value)) for _, a, b in medians),
             )
 
 
@@ -63,8 +63,8 @@ def _medians(comparison: Comparison, rows: "pd.DataFrame") -> tuple[Median, Medi
     return Median.of(rows[front.error].to_numpy(float)), Median.of(rows[front.effort].to_numpy(float))
 
 
-def _beats(one: tuple[float | None, float | None], other: tuple[float | None, float | None]) -> bool:
-    """Whether one is no worse in either and better in one."""
+def _dominates(one: tuple[float | None, float | None], other: tuple[float | None, float | None]) -> bool:
+    """Whether `one` is no worse in both and better in one."""
     if None in one or None in other:
         return False
     pairs = [(a, b) for a, b in zip(one, other) if a is not None and b is not None]

@@ -1,4 +1,4 @@
-"""What a comparison comes to, as one value, and as the files in its folder."""
+"""The conclusions of a comparison, as one value and as the files in its folder."""
 
 import dataclasses
 import json
@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from orchestration.comparison import equal_terms as slices
-from orchestration.comparison import fronts
+from orchestration.comparison import equal_terms, fronts
 from orchestration.comparison.bandwidth import Bandwidths
-from orchestration.comparison.cells import CellSummary, results
+from orchestration.comparison.cells import CellSummary, cell_summaries
 from orchestration.comparison.design import Comparison
 from orchestration.comparison.limits import Limit, limits
 from orchestration.comparison.pairs import Pair, pairs
@@ -30,30 +29,30 @@ class Outcome:
     limits: list[Limit]
     fronts: list[fronts.Point]
     pairs: list[Pair]
-    at_equal_bandwidth: list[slices.AtPhase]
-    at_equal_torque: list[slices.WithinTorque]
+    at_equal_bandwidth: list[equal_terms.AtPhase]
+    at_equal_torque: list[equal_terms.WithinTorque]
 
 
-def concluded(comparison: Comparison, table: "pd.DataFrame", bandwidths: Bandwidths) -> Outcome:
-    """From the rows of the study of a comparison, and the bandwidths of its controllers."""
-    cells = results(comparison, table)
+def outcome_of(comparison: Comparison, table: "pd.DataFrame", bandwidths: Bandwidths) -> Outcome:
+    """The conclusions from the runs of a comparison and the bandwidths of its controllers."""
+    cells = cell_summaries(comparison, table)
     in_seconds = all(is_in_seconds(target) for target in comparison.axis.targets) and not comparison.axis.multiplies
     return Outcome(
         cells=cells,
         limits=limits(comparison, table, bandwidths),
         fronts=[*fronts.points(comparison, table)],
         pairs=[*pairs(comparison, table)],
-        at_equal_bandwidth=[*slices.at_equal_bandwidth(cells, bandwidths)] if in_seconds else [],
-        at_equal_torque=[*slices.at_equal_torque(comparison, table)],
+        at_equal_bandwidth=[*equal_terms.at_equal_bandwidth(cells, bandwidths)] if in_seconds else [],
+        at_equal_torque=[*equal_terms.at_equal_torque(comparison, table)],
     )
 
 
 def as_json(comparison: Comparison, outcome: Outcome, bandwidths: Bandwidths) -> dict[str, Any]:
-    """In JSON types; what is not finite or not known is null."""
+    """The outcome in JSON types; values that are not finite or not known are null."""
     content = {
         "name": comparison.name,
         "axis": comparison.axis.name,
-        "starts": len(comparison.drawn),
+        "starts": len(comparison.initial_conditions),
         "bandwidths": [
             {"controller": controller, "vehicle": vehicle, "value": value, "bandwidth": bandwidth}
             for (controller, vehicle, value), bandwidth in bandwidths.items()
@@ -61,8 +60,8 @@ def as_json(comparison: Comparison, outcome: Outcome, bandwidths: Bandwidths) ->
         **dataclasses.asdict(dataclasses.replace(outcome, cells=[])),
         "cells": [cell.row("value") for cell in outcome.cells],
     }
-    found: dict[str, Any] = _finite(content)
-    return found
+    finite: dict[str, Any] = _finite(content)
+    return finite
 
 
 def write(comparison: Comparison, outcome: Outcome, bandwidths: Bandwidths, folder: Path) -> list[Path]:

@@ -1,4 +1,4 @@
-"""Each controller against the first, start by start: the same starts make for differences that medians hide."""
+"""Paired comparison of each controller with the first: equal initial conditions show differences that medians hide."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from orchestration.comparison.cells import Median
 from orchestration.comparison.design import CONDITION, CONTROLLER, START, VEHICLE, Comparison
-from orchestration.comparison.fates import settled, survived
+from orchestration.comparison.survival import settled, survived
 from orchestration.studies.axes import Value
 
 if TYPE_CHECKING:
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
 
 _RATIOS = 2
-"""that are told of a pair"""
+"""reported for a pair: error and effort"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Pair:
-    """A controller and the first one of the file, at one value of the axis."""
+    """A controller and the first of the file, at one value of the axis."""
 
     vehicle: str
     condition: str
@@ -27,16 +27,16 @@ class Pair:
     controller: str
     against: str
     both: int
-    """starts that both survive"""
+    """initial conditions that both survive"""
     only_it: int
     only_other: int
     neither: int
     settles: int
-    """of those that both survive, starts that it alone settles from, less those that the other alone does"""
+    """among those that both survive, the number that only it settles minus the number that only the other settles"""
     error: Median
     effort: Median
-    """its value over that of the first, start by start, where both survive; the intervals hold for all pairs of the
-    comparison together (Bonferroni)"""
+    """medians of the ratio of its value to that of the first where both survive; the intervals hold for all pairs of
+    the comparison together (Bonferroni)"""
 
 
 def pairs(comparison: Comparison, table: "pd.DataFrame") -> Iterator[Pair]:

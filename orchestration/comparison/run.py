@@ -1,4 +1,4 @@
-"""Flies a comparison, concludes from it, and flies a cell of it again."""
+"""Runs a comparison and draws its conclusions; reruns single cells."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -12,9 +12,9 @@ from orchestration.basics.progress import CountProgress
 from orchestration.basics.terminal import inform
 from orchestration.building.inputs import Files
 from orchestration.comparison.bandwidth import Bandwidths, bandwidths
-from orchestration.comparison.cells import CellSummary, frame_of, results
+from orchestration.comparison.cells import CellSummary, cell_summaries, frame_of
 from orchestration.comparison.design import Comparison
-from orchestration.comparison.outcome import Outcome, concluded, write
+from orchestration.comparison.outcome import Outcome, outcome_of, write
 from orchestration.engines.wiring import checked
 from orchestration.results import html
 from orchestration.runs.run_directory import keep_run
@@ -37,12 +37,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Compared:
-    """A comparison that was flown, and what is concluded from it."""
+    """The result of a comparison."""
 
     axis: str
-    """The name of what it varies."""
+    """The name of its axis."""
     summary: Swept
-    """How the sweep of its runs went, and where their rows are."""
+    """The summary of the sweep of its runs, with the path of the store."""
     table: "pd.DataFrame"
     """A row for each run."""
     bandwidths: Bandwidths
@@ -58,7 +58,7 @@ class Compared:
         )
 
     def _repr_html_(self) -> str:
-        """As notebooks show it: how far each controller goes."""
+        """The limits of each controller, as notebooks show them."""
         rows = [
             (
                 f"{one.controller} on {one.vehicle}, {one.condition}: {one.share} of the starts {one.fate} up to",
@@ -73,13 +73,13 @@ class Compared:
 
     @explains_missing
     def to_pandas(self, what: Literal["cells", "limits", "runs"] = "cells") -> "pd.DataFrame":
-        """A row for each cell: how many starts survive and settle, medians; or the limits, or the runs."""
+        """A row for each cell: counts of runs that survive and settle, medians; or the limits, or the runs."""
         import pandas as pd
 
         if what == "runs":
             return self.table
-        found = self.outcome.limits if what == "limits" else self.outcome.cells
-        return pd.DataFrame([one.row(self.axis) if isinstance(one, CellSummary) else vars(one) for one in found])
+        listed = self.outcome.limits if what == "limits" else self.outcome.cells
+        return pd.DataFrame([one.row(self.axis) if isinstance(one, CellSummary) else vars(one) for one in listed])
 
 
 @needs("filelock", "pandas")
@@ -95,20 +95,20 @@ def compare(
     progress: CountProgress = "bar",
     announce: Callable[[str], None] | None = inform,
 ) -> Compared:
-    """Fly what is missing of a comparison, conclude, and write its tables and pictures beside its store.
+    """Run what is missing of a comparison, and write its tables and pictures beside its store.
 
     `folder`, `workers`, `engine`, `time_limit`, `progress` and `announce` are those of `sweep`, which raises what this
-    does. Pictures are left out unless `figures`, drawn in a `style`, by default for a screen.
+    does. Pictures are drawn unless `figures` is false, in a `style`, by default for a screen.
     """
     summary = sweep(
         comparison.study, folder=folder, workers=workers, engine=engine, time_limit=time_limit, progress=progress,
         announce=announce,
     )  # fmt: skip
     comparison = replace(comparison, native=summary.study.native)
-    known = bandwidths(comparison)  # after the design has been checked, which names the run that cannot be
+    known = bandwidths(comparison)  # after the check of the design, which names an invalid run
     place = summary.path.parent
     table = frame(summary.path)
-    outcome = concluded(comparison, table, known)
+    outcome = outcome_of(comparison, table, known)
     written = [*export(summary.path, place), *write(comparison, outcome, known, place)]
     if figures:
         from orchestration.comparison import pictures
@@ -120,25 +120,25 @@ def compare(
     )
 
 
-def cells_again(
+def rerun_cells(
     comparison: Comparison, indices: Sequence[int], *, workers: int = 1, engine: EngineChoice = "auto"
 ) -> list[CellSummary]:
-    """Fly all runs of some cells, whatever a store has of them; in the order of the cells.
+    """Run all runs of some cells, whether or not a store has them; in the order of the cells.
 
-    Raises `UsageError` for a cell that there is not.
+    Raises `UsageError` for a cell that does not exist.
     """
     runs = [comparison.runs_of(comparison.cell(index)) for index in indices]
-    comparison, files, how = _ready(comparison, [some[0] for some in runs], engine)
+    comparison, files, how = _prepared(comparison, [of_cell[0] for of_cell in runs], engine)
     study = comparison.study
     starts = files.starts_of(study.origin)
     systems = [study.system(i, starts) for i in chain(*runs)]
     with RunEvaluator(files, workers, how.engine) as pool:
         flights = pool.fly_all(systems, in_lanes=how.in_lanes, on_gpu=how.on_gpu)
-    return results(comparison, frame_of(comparison, zip(chain(*runs), flights)))
+    return cell_summaries(comparison, frame_of(comparison, zip(chain(*runs), flights)))
 
 
 def agree(one: CellSummary, other: CellSummary) -> bool:
-    """Whether two results of a cell are the same, but for what lanes may differ by in a metric."""
+    """Whether two summaries of a cell are equal, up to the tolerance of metrics of a SIMD batch."""
     same = ("cell", "count", "survives", "settles", "diverged")
     counts = all(getattr(one, key) == getattr(other, key) for key in same)
     pairs = ((one.medians[name], other.medians.get(name)) for name in one.medians)
@@ -146,28 +146,28 @@ def agree(one: CellSummary, other: CellSummary) -> bool:
 
 
 def stored_cell(comparison: Comparison, index: int, folder: Path | None) -> CellSummary | None:
-    """The same cell by what is in the store; None if nothing is."""
+    """The summary of a cell from the store; None if it has no runs there."""
     path = store_path(comparison.name, folder)
     if not path.is_file():
         return None
-    found = results(comparison, frame(path))
-    return next((cell for cell in found if cell.cell == index), None)
+    summaries = cell_summaries(comparison, frame(path))
+    return next((cell for cell in summaries if cell.cell == index), None)
 
 
 def flight(comparison: Comparison, index: int, start: int, out: Path, *, engine: EngineChoice = "auto") -> None:
-    """Fly one start of a cell, alone, and keep all of it in a directory of a run."""
+    """Run one initial condition of a cell by itself, and keep it in a run directory."""
     runs = comparison.runs_of(comparison.cell(index))
     if not 0 <= start < len(runs):
         raise UsageError(f"--start {start}: expected a number from 0 to {len(runs) - 1}")
-    comparison, files, how = _ready(comparison, [runs[start]], engine)
+    comparison, files, how = _prepared(comparison, [runs[start]], engine)
     request = comparison.request(runs[start], files.starts_of(comparison.study.origin))
     keep_run(out, lambda to: fly(request, recorder=to, engine=how.engine))
 
 
-def _ready(comparison: Comparison, indices: Sequence[int], engine: EngineChoice) -> tuple[Comparison, Files, Chosen]:
-    """A comparison as some of its runs are flown by an engine, its files and how.
+def _prepared(comparison: Comparison, indices: Sequence[int], engine: EngineChoice) -> tuple[Comparison, Files, Chosen]:
+    """A comparison as an engine runs some of its runs, its files and the choice of the engine.
 
-    Raises `UsageError` for a run that cannot be.
+    Raises `UsageError` for an invalid run.
     """
 
     def first(native: bool) -> tuple[System, Files]:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from orchestration.comparison.cells import CellSummary, Median, results
+from orchestration.comparison.cells import CellSummary, Median, cell_summaries
 from orchestration.comparison.cells import Share as Counted
 from orchestration.comparison.design import START, Comparison
 from orchestration.report.flights import Progress
@@ -38,7 +38,7 @@ def comparison_report(
         axes=[*axes_of(stored, study), ColumnAxis(name=SIZE, quantity=Quantity(name=SIZE))],
         choose=_from_each_cell(comparison, stored),
     )  # fmt: skip
-    cells = results(comparison, frame(path))
+    cells = cell_summaries(comparison, frame(path))
     axis = next(one for one in axes_of(stored, study) if one.name == comparison.axis.name)
     return replace(
         found,
@@ -51,19 +51,22 @@ def comparison_report(
             controllers=tuple(one.name for one in comparison.controllers),
             cells=tuple(_cell(cell, axis.quantity) for cell in cells),
         ),
-        summary=f"{len(cells)} cells of {len(comparison.drawn)} starts each. {found.summary}",
+        summary=f"{len(cells)} cells of {len(comparison.initial_conditions)} starts each. {found.summary}",
     )
 
 
 def _with_sizes(stored: Stored, comparison: Comparison) -> Stored:
-    sizes = [start.size for start in comparison.drawn]
+    sizes = [start.size for start in comparison.initial_conditions]
     rows = [{**row, "settings": {**row["settings"], SIZE: sizes[int(row["settings"][START])]}} for row in stored.rows]
     return replace(stored, rows=rows)
 
 
 def _from_each_cell(comparison: Comparison, stored: Stored) -> Callable[[int], list[int]]:
     """Chooses so many runs, as many of each cell as of any other."""
-    starts, flown = len(comparison.drawn), {row["design_index"] for row in stored.rows if row["status"] == "done"}
+    starts, flown = (
+        len(comparison.initial_conditions),
+        {row["design_index"] for row in stored.rows if row["status"] == "done"},
+    )
     cells = sum(1 for _ in comparison.cells())
 
     def choose(most: int) -> list[int]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from docs import comparisons
-from orchestration.comparison.run import cells_again
+from orchestration.comparison.run import rerun_cells
 
 PAGES = sorted((Path(comparisons.__file__).parent / "findings").glob("*.md"))
 FLOWN = sorted(path.stem for path in comparisons.DATA.glob("*.json"))
@@ -41,8 +41,8 @@ def test_one_cell_in_a_hundred_is_what_is_flown_again(name: str) -> None:
     """What `quadcosim compare studies/comparisons/NAME.toml --cell K` flies, here in lanes."""
     kept = comparisons.kept(name)["cells"]
     chosen = sorted(random.Random(name).sample(kept, math.ceil(len(kept) / 100)), key=lambda cell: cell["cell"])
-    flown = cells_again(comparisons.loaded(name), [cell["cell"] for cell in chosen], engine="batch")
-    steady = cells_again(
+    flown = rerun_cells(comparisons.loaded(name), [cell["cell"] for cell in chosen], engine="batch")
+    steady = rerun_cells(
         comparisons.on_path(comparisons.loaded(name)), [cell["cell"] for cell in chosen], engine="batch"
     )
     for cell, summary, alone in zip(chosen, flown, steady, strict=True):

@@ -124,7 +124,10 @@ def test_an_lqi_against_the_law_of_the_paper_has_the_same_shares_through_compare
         asked = laws[cell.controller].with_changes(
             stop_time=6.0, timing={"period": 0.05, "plant_interval": 0.005}, plant={"max_internal_step": 0.005}
         )
-        flights = [asked.with_values(start.values).with_changes(seed=i) for i, start in enumerate(comparison.drawn)]
+        flights = [
+            asked.with_values(start.values).with_changes(seed=i)
+            for i, start in enumerate(comparison.initial_conditions)
+        ]
         results = [result.metrics for result in quadcosim.run(flights)]
         survive = [each["outcome"] != "diverged" for each in results]
         settle = [lives and each["settling_time"] is not None for lives, each in zip(survive, results)]

@@ -8,15 +8,14 @@ import pandas as pd
 import pytest
 from scipy.stats import binomtest
 
-from orchestration.comparison import equal_terms as slices
-from orchestration.comparison import fronts
+from orchestration.comparison import equal_terms, fronts
 from orchestration.comparison.bandwidth import Bandwidths
-from orchestration.comparison.cells import frame_of, results
-from orchestration.comparison.design import Comparison, Condition, Controller, Craft
-from orchestration.comparison.fates import survived
+from orchestration.comparison.cells import cell_summaries, frame_of
+from orchestration.comparison.design import Comparison, Condition, Controller, VehicleEntry
 from orchestration.comparison.limits import first_ends, limits
-from orchestration.comparison.outcome import as_json, concluded
+from orchestration.comparison.outcome import as_json, outcome_of
 from orchestration.comparison.pairs import pairs
+from orchestration.comparison.survival import survived
 from orchestration.quadrotor.initial_conditions import Starts
 from orchestration.studies.axes import Axis
 from quadcosim import Scenario
@@ -33,7 +32,7 @@ def comparison() -> Comparison:
         name="made up",
         base=Scenario(),
         controllers=tuple(Controller(name=name, bandwidth=value) for name, value in SPEED.items()),
-        vehicles=(Craft(name="v"),),
+        vehicles=(VehicleEntry(name="v"),),
         conditions=(Condition(name="c"),),
         axis=Axis(name="period", targets=("timing.period",), values=PERIODS),
         starts=Starts(count=STARTS),
@@ -76,7 +75,7 @@ def table(comparison: Comparison) -> pd.DataFrame:
 
 
 def test_a_cell_tells_survival_settling_and_residual_apart(comparison: Comparison, table: pd.DataFrame) -> None:
-    cells = {(cell.controller, cell.value): cell for cell in results(comparison, table)}
+    cells = {(cell.controller, cell.value): cell for cell in cell_summaries(comparison, table)}
     cell = cells["slow", 0.03]
     assert (cell.count, cell.survives.count, cell.settles.count, cell.diverged) == (40, 32, 21, 8)
     assert cell.diverged_late == 8  # at 42 s and later, of a horizon of 30 s
@@ -128,7 +127,8 @@ def test_controllers_with_missing_runs_have_no_limit_yet(comparison: Comparison,
 
 def test_at_equal_bandwidth_what_depends_on_that_alone_is_the_same(comparison: Comparison, table: pd.DataFrame) -> None:
     found = {
-        (one.controller, one.phase): one for one in slices.at_equal_bandwidth(results(comparison, table), BANDWIDTHS)
+        (one.controller, one.phase): one
+        for one in equal_terms.at_equal_bandwidth(cell_summaries(comparison, table), BANDWIDTHS)
     }
     assert found["slow", 0.2].survives == found["fast", 0.2].survives == pytest.approx(0.9)
     assert found["slow", 0.4].survives == found["fast", 0.4].survives == pytest.approx(0.7)
@@ -137,7 +137,7 @@ def test_at_equal_bandwidth_what_depends_on_that_alone_is_the_same(comparison: C
 
 
 def test_within_a_peak_torque_only_what_needs_no_more_counts(comparison: Comparison, table: pd.DataFrame) -> None:
-    found = [one for one in slices.at_equal_torque(comparison, table) if one.value == 0.02]
+    found = [one for one in equal_terms.at_equal_torque(comparison, table) if one.value == 0.02]
     assert {one.torque for one in found if one.controller == "slow"} == {one.torque for one in found}
     for one in found:
         count = sum(
@@ -191,7 +191,7 @@ def test_nothing_in_the_json_is_infinite(comparison: Comparison, table: pd.DataF
         inner = [*value.values()] if isinstance(value, dict) else value if isinstance(value, list) else []
         return [x for one in inner for x in numbers(one)] + ([value] if isinstance(value, float) else [])
 
-    content = as_json(comparison, concluded(comparison, table, BANDWIDTHS), BANDWIDTHS)
+    content = as_json(comparison, outcome_of(comparison, table, BANDWIDTHS), BANDWIDTHS)
     found = numbers(content)
     assert len(found) > 100
     assert all(map(math.isfinite, found))

@@ -166,11 +166,11 @@ def test_scheduled_parameters_follow_the_axis_on_top_of_all_others(file: Path) -
 @pytest.mark.parametrize(
     ("before", "after", "words"),
     [
-        ('name = "tuned"', 'name = "plain"', "controllers = plain, plain: expected at least one, each with a name of"),
+        ('name = "tuned"', 'name = "plain"', "controllers = plain, plain: expected at least one, each with its own"),
         ("gains_{vehicle}_{milli}ms", "gains_{vehikel}", "expected a file, with {vehicle}, {value} of the axis"),
         ("gains_{vehicle}", "no_{vehicle}", "no_light_10ms.toml: expected a readable file of parameters"),
         ("light.toml", "laws.toml", "base: expected the tables [plant], [controller]"),
-        ("values = [0.01, 0.02, 0.04]", "values = [0.02, 0.01]", "axis period: expected values that grow"),
+        ("values = [0.01, 0.02, 0.04]", "values = [0.02, 0.01]", "axis period: expected increasing values"),
         ('name = "period"', 'name = "start"', "axis start: expected another name"),
         ('sets = ["timing.period"]', 'sets = ["timing.perod"]', "timing.perod: expected controller.NAME"),
         ('"plant.mass" = 1.5', '"plant.mass" = "much"', "conditions.mismatch.multiplies.plant.mass = much"),
@@ -220,7 +220,7 @@ REPOSITORY = Path(__file__).parents[3]
 @pytest.mark.parametrize("path", sorted((REPOSITORY / "studies" / "comparisons").glob("*.toml")), ids=lambda p: p.stem)
 def test_every_comparison_of_the_repository_loads_and_has_200_starts_or_more(path: Path) -> None:
     comparison = load_comparison(path)
-    assert len(comparison.drawn) >= 200
+    assert len(comparison.initial_conditions) >= 200
     for cell in comparison.cells():
         comparison.study.system(comparison.runs_of(cell)[0], {})
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from matplotlib.figure import Figure
 
 from orchestration.comparison.cells import CellSummary, Share
-from orchestration.comparison.pictures import colors_of, shares
+from orchestration.comparison.figures import colors_of, shares
 from orchestration.results.quantities import Quantity
 
 SURVIVORS = {"soon": (20, 3, 0), "later": (20, 14, 0), "never": (20, 20, 20)}

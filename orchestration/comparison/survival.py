@@ -1,0 +1,38 @@
+"""The outcomes of the runs of a comparison: which survive, and which of these settle by the horizon.
+
+A run survives if it has not diverged by its horizon. It settles if its error stays within the band of the objective
+from some time on, its settling time. The largest error after that is its residual.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    Fate = Callable[["pd.DataFrame"], "pd.Series"]
+    """A mask of the rows of a table of runs"""
+
+SETTLING = "settling_time"
+"""The objective that is the time at which a run settles; it has no value for one that does not"""
+RESIDUAL = "ultimate_bound"
+"""The objective that is the largest error at the end"""
+
+
+def survived(table: "pd.DataFrame") -> "pd.Series":
+    """Mask of the runs that have not diverged by their horizon."""
+    return table["outcome"].notna() & table["outcome"].ne("diverged")
+
+
+def settled(table: "pd.DataFrame") -> "pd.Series":
+    """Mask of the runs that survive and settle by their horizon."""
+    return survived(table) & table[SETTLING].notna()
+
+
+def diverged_late(table: "pd.DataFrame", horizon: float) -> "pd.Series":
+    """Mask of the runs that diverged in the second half of a horizon [s]: with a longer one more might."""
+    return ~survived(table) & table["divergence_time"].astype(float).gt(0.5 * horizon)
+
+
+FATES: Mapping[str, "Fate"] = {"survive": survived, "settle": settled}
+"""By the name in tables and files"""
