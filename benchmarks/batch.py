@@ -20,7 +20,7 @@ import numpy as np
 from orchestration.building import fmus
 from orchestration.engines.batch.batch import Batch, Group
 from orchestration.engines.batch.batches import Batches
-from orchestration.engines.batch.kernels import lanes_here
+from orchestration.engines.batch.kernels import preferred_lanes
 from orchestration.engines.batch.shape import Shape
 from orchestration.engines.structures import address
 from orchestration.engines.wiring import checked
@@ -51,8 +51,8 @@ def systems(period: float, stop_time: float) -> tuple[Shape, list[System]]:
     one = fmus.native_twins(Scenario(timing=Timing(period=period), stop_time=stop_time).as_system())
     models = {name: read_model(path) for name, path in fmus.of_components(one.fmus).items()}
     one = checked(one, models).system
-    places = np.linspace(0.0, 1.0, lanes_here()).tolist()
-    return Shape(system=one, models=models, lanes=lanes_here()), [changed(one, {X: place}) for place in places]
+    places = np.linspace(0.0, 1.0, preferred_lanes()).tolist()
+    return Shape(system=one, models=models, lanes=preferred_lanes()), [changed(one, {X: place}) for place in places]
 
 
 def bare(shape: Shape, batch: Batch, period: float, stop_time: float) -> float:
@@ -115,7 +115,7 @@ def from_arrays(period: float, runs: int) -> tuple[float, float]:
     flight = Scenario(timing=Timing(period=period), stop_time=20.0)
     system, places = located(flight.as_system()), np.linspace(0.0, 1.0, runs)
     given, batches = [changed(system, {X: place}) for place in places.tolist()], Batches()
-    batches.run(given[: lanes_here()])
+    batches.run(given[: preferred_lanes()])
     begin = time.process_time()
     batches.run(given)
     between = time.process_time()
@@ -140,7 +140,7 @@ def main() -> None:
             found[case, "batch"].append(flown(batches[case], runs))
             found[case, "bare"].append(bare(shape, batches[case], period, stop_time))
             found[case, "compiled"].append(compiled(replace(runs[0], stop_time=5.0)))
-    print(f"load {os.getloadavg()[0]:.1f}; {lanes_here()} lanes; the smallest of {REPETITIONS}, in turns")
+    print(f"load {os.getloadavg()[0]:.1f}; {preferred_lanes()} lanes; the smallest of {REPETITIONS}, in turns")
     for case in CASES:
         batch, kernels, loop = (min(found[case, what]) for what in ("batch", "bare", "compiled"))
         print(

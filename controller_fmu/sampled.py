@@ -9,7 +9,7 @@ from controller_fmu.vehicle import Measurement, Model
 from fmu_kit.algebra import ZERO
 from fmu_kit.authors import AUTHOR, LICENSE
 from fmu_kit.errors import require
-from fmu_kit.interface import gathered
+from fmu_kit.interface import read_fields
 from fmu_kit.mixer import Mixer, Thrusts
 from fmu_kit.rigid_body import Wrench
 from fmu_kit.saved_state import State
@@ -25,7 +25,7 @@ class SampledController(ControllerInterface):
     author, license = AUTHOR, LICENSE
     initial_outputs_depend_on_inputs = True
     initially_idle = frozenset({"sample_offset"})
-    usually = MappingProxyType({"sample_period": 0.0})  # the master's clock decides when it samples
+    usual_parameters = MappingProxyType({"sample_period": 0.0})  # the master's clock decides when it samples
 
     @abstractmethod
     def control(self, measurement: Measurement, reference: Reference) -> None:
@@ -33,9 +33,9 @@ class SampledController(ControllerInterface):
 
     def read_parameters(self) -> None:
         """Build the nominal model and the trajectory, and check the clock; laws add what is theirs."""
-        self._model = gathered(self, Model)
-        self._trajectory = gathered(self, Trajectory, "trajectory_")
-        self._mixer = gathered(self, Mixer, "motor_")
+        self._model = read_fields(self, Model)
+        self._trajectory = read_fields(self, Trajectory, "trajectory_")
+        self._mixer = read_fields(self, Mixer, "motor_")
         period = self.sample_period
         require(
             period == 0.0 or period >= SHORTEST_PERIOD, "sample_period", period, f"0 or at least {SHORTEST_PERIOD} s"
@@ -92,7 +92,7 @@ class SampledController(ControllerInterface):
     def _reference(self, t: float) -> Reference:
         if not self.use_reference_inputs:
             return self._built_in(t)
-        return gathered(self, Reference, "reference_")
+        return read_fields(self, Reference, "reference_")
 
     def _built_in(self, t: float) -> Reference:
         """The trajectory, which is in the axes that the FMU is told in."""

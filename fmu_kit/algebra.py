@@ -1,9 +1,9 @@
 """3-vectors, unit quaternions and inertia matrices over any scalar.
 
 Operators read as the equations do: `a * b` is elementwise (the paper's ∘), `a @ b` the inner product,
-`a.cross(b)` the vector product, `Q1 * Q2` the quaternion product ⊙. Components are plain attributes
-and nothing converts them, so floats, numpy arrays (one value a point) and symbols all work.
-Instances are values: nothing modifies one after it was made.
+`a.cross(b)` the vector product, `Q1 * Q2` the quaternion product ⊙. Components are plain attributes,
+used without conversion, so floats, numpy arrays (one value per point) and symbols all work.
+Instances are values and are never modified.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from fmu_kit.scalar import FLOAT, Scalar, ScalarOps
 
 
 class Vec3:
-    """A 3-vector [x, y, z] of scalars; its unit and frame are those of the quantity it holds."""
+    """A 3-vector [x, y, z] of scalars; unit and frame are those of the quantity it represents."""
 
     __slots__ = ("x", "y", "z")
     __array_ufunc__ = None  # numpy on the left of an operator leaves the operation to this class
@@ -34,7 +34,7 @@ class Vec3:
         return Vec3(-self.x, -self.y, -self.z)
 
     def __mul__(self, other: Vec3 | Scalar) -> Vec3:
-        """Elementwise with a vector, every component with a scalar."""
+        """The elementwise product with a vector, or the product with a scalar."""
         if type(other) is Vec3:
             return Vec3(self.x * other.x, self.y * other.y, self.z * other.z)
         return Vec3(self.x * other, self.y * other, self.z * other)
@@ -43,7 +43,7 @@ class Vec3:
         return Vec3(scalar * self.x, scalar * self.y, scalar * self.z)
 
     def plus(self, factor: Scalar, other: Vec3) -> Vec3:
-        """self + factor * other, in one go."""
+        """self + factor * other."""
         return Vec3(self.x + factor * other.x, self.y + factor * other.y, self.z + factor * other.z)
 
     def __truediv__(self, scalar: Scalar) -> Vec3:
@@ -107,9 +107,9 @@ class Quaternion:
     def from_axes(cls, a: Vec3, b: Vec3, c: Vec3, ops: ScalarOps = FLOAT) -> Quaternion:
         """The attitude of a body whose axes are `a`, `b`, `c` in inertial components: the columns of R(Q)ᵀ.
 
-        Of Q and -Q the one whose scalar is not negative.
+        Returns that of Q and -Q whose scalar is not negative.
         """
-        # Each row is four times one component of Q times all of Q: that of the largest loses no digits.
+        # Each row is Q times four times one of its components; the row of the largest component loses no digits.
         xx, yy, zz = a.x, b.y, c.z
         xy, yz, zx = a.y + b.x, b.z + c.y, c.x + a.z
         xw, yw, zw = b.z - c.y, c.x - a.z, a.y - b.x
@@ -213,7 +213,7 @@ class Quaternion:
 
 
 class Inertia:
-    """A symmetric 3x3 matrix J [kg·m²] in the body frame, given by its entries J_ij themselves."""
+    """A symmetric 3x3 matrix J [kg·m²] in the body frame, given by its entries J_ij."""
 
     __slots__ = ("_columns", "_inverse_columns", "xx", "xy", "xz", "yy", "yz", "zz")
 
@@ -256,6 +256,6 @@ def _combine(columns: tuple[Vec3, Vec3, Vec3], v: Vec3) -> Vec3:
 
 
 def is_positive_definite(xx: float, yy: float, zz: float, xy: float, xz: float, yz: float) -> bool:
-    """Whether the symmetric matrix of these entries is: every leading principal minor is positive."""
+    """Whether the symmetric matrix of these entries is positive definite: all leading principal minors are positive."""
     determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
     return xx > 0.0 and xx * yy - xy * xy > 0.0 and determinant > 0.0

@@ -1,4 +1,4 @@
-"""An .fmu of this kit as an archive: what is where in it, what it says of itself, and how it is written."""
+"""An .fmu of this kit as an archive: the paths in it, the metadata that it carries, and writing it."""
 
 import hashlib
 import json
@@ -11,20 +11,20 @@ from fmu_kit.loader import GUID_FILE
 from fmu_kit.variants import Variant
 
 PAGE = "documentation/index.html"
-"""The documentation of an FMU, by its place in the archive."""
+"""The path of an FMU's documentation in its archive."""
 ICONS = {2: "model.png", 3: "terminalsAndIcons/icon.png"}
-"""The icon of an FMU, by the version of FMI (2.0.4, section 2.3; 3.0, section 2.5)."""
+"""The path of an FMU's icon, by version of FMI (2.0.4, section 2.3; 3.0, section 2.5)."""
 
 NATIVE_TABLES = "sources/tables.h"
-"""Of an FMU without Python inside: the file of its sources that has the GUID."""
+"""In an FMU without Python inside: the source file that has the GUID."""
 SOURCE_HASH_FILE = "resources/source_hash.txt"
 VARIANT_FILE = "resources/variant.json"
-"""Of a slave with values that are fixed: that slave, and the values."""
+"""In the FMU of a variant: the slave, and its fixed values."""
 _STAMP = (1980, 1, 1, 0, 0, 0)
 
 
 def read_source_hash(fmu: Path) -> str | None:
-    """The source hash that an .fmu carries; None if it is not one of ours or not readable."""
+    """The source hash stored in an .fmu; None if it was not made by this kit or is not readable."""
     try:
         with zipfile.ZipFile(fmu) as archive:
             return archive.read(SOURCE_HASH_FILE).decode().strip()
@@ -33,7 +33,7 @@ def read_source_hash(fmu: Path) -> str | None:
 
 
 def read_variant(fmu: Path) -> tuple[str, Variant] | None:
-    """Of which slave, as `module:Class`, an .fmu is which variant; None if it is none of ours or not readable."""
+    """The slave, as `module:Class`, and the variant of it that an .fmu is; None if it is none or not readable."""
     try:
         with zipfile.ZipFile(fmu) as archive:
             slave, text = json.loads(archive.read(VARIANT_FILE))
@@ -43,9 +43,9 @@ def read_variant(fmu: Path) -> tuple[str, Variant] | None:
 
 
 def content_guid(files: dict[str, bytes]) -> str:
-    """A GUID from the content of an FMU: all files but that of the GUID, in the description all but it and the date.
+    """The GUID of an FMU's content: a hash of all files, without GUID and date of generation.
 
-    Of an FMU that was written out as C, the libraries do not count: compiled anywhere, it is the same FMU.
+    The libraries of an FMU in C are left out: wherever it is compiled, it is the same FMU.
     """
     compiled = "binaries/" if NATIVE_TABLES in files else "\0"
     digest = hashlib.sha256()
@@ -60,9 +60,9 @@ def content_guid(files: dict[str, bytes]) -> str:
 
 
 def write_archive(path: Path, files: dict[str, bytes], *, first: str) -> None:
-    """Write a zip of `files` by name, `first` at its head: the same content, the same bytes.
+    """Write a zip of `files` by name, beginning with `first`; the same content gives the same bytes.
 
-    Stored, not compressed: the bytes must not depend on a version of zlib.
+    Files are stored uncompressed, so that the bytes do not depend on a version of zlib.
     """
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
         for name in sorted(files, key=lambda name: (name != first, name)):

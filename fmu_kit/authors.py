@@ -1,4 +1,4 @@
-"""Whose this project's FMUs are; those of others are their authors'."""
+"""The author and the licence of this project's FMUs; FMUs of other projects name their own."""
 
 AUTHOR = "The quadcosim authors"
 LICENSE = "MIT"

@@ -1,4 +1,4 @@
-"""What an FMU brings along: the sources that a slave needs, found without importing any, under names of its own."""
+"""The sources that an FMU bundles: those its slave needs, found without importing any, in a package unique to it."""
 
 import ast
 import functools
@@ -8,18 +8,18 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from fmu_kit.syntax_trees import parsed, statements
+from fmu_kit.syntax_trees import parse_module, statements
 from fmu_kit.variants import MODULE, Variant
 
 SHARED_PACKAGES = ("fmu_kit", "pythonfmu")
-"""What every FMU bundles; else only what lies beside its slave, and the standard library, may be imported."""
+"""Packages that every FMU bundles; beyond them, a slave may import what lies beside it and the standard library."""
 
 EMPTY_INIT = {"pythonfmu/__init__.py"}
-"""Package files replaced by empty ones: pythonfmu's imports its builder."""
+"""Package files replaced by empty ones, since pythonfmu's own imports its builder."""
 
 
 class PackagingError(Exception):
-    """The slave cannot be packed; the text says why."""
+    """The slave cannot be packed, for the reason that the text gives."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,9 +29,9 @@ class Target:
     module: str
     model: str
     root: Path | None = None
-    """the folder in which modules are looked for first; None: only as Python finds them"""
+    """the folder that is searched for modules first; None: only `sys.path` is searched"""
     variant: Variant | None = None
-    """of the slave, with values that are fixed"""
+    """of the slave, with fixed values; None: the slave itself"""
 
     @classmethod
     def parse(cls, text: str, root: Path | None = None) -> "Target":
@@ -42,9 +42,9 @@ class Target:
         return cls(module, model, root)
 
     def bundles(self, module: str) -> bool:
-        """Whether a module goes into the FMU: of the kit, of pythonfmu, the slave's own, or lying beside that.
+        """Whether the FMU bundles a module: one of the kit, of pythonfmu, of the slave's package or beside that.
 
-        Where packages are installed everything lies beside everything, and counts for nothing.
+        What lies beside the slave in site-packages is not bundled.
         """
         top, own = module.partition(".")[0], self.module.partition(".")[0]
         if top in (*SHARED_PACKAGES, own):
@@ -56,7 +56,7 @@ class Target:
 
     @property
     def name(self) -> str:
-        """What its FMU is called."""
+        """The name of its FMU."""
         return self.model if self.variant is None else self.variant.name
 
     @property
@@ -66,19 +66,19 @@ class Target:
 
     @property
     def fragment(self) -> Path:
-        """Where the part of its documentation written by hand is, if it has one: beside it, under its name."""
+        """The path of the hand-written part of its documentation, if it has one: beside it, under its name."""
         return module_path(self.module, self.root).with_name(f"{self.model}.html")
 
     @property
     def icon(self) -> Path:
-        """Where its icon is, if it has one."""
+        """The path of its icon, if it has one."""
         return module_path(self.module, self.root).with_name(f"{self.model}.png")
 
 
 def bundled_sources(target: Target) -> dict[str, str]:
     """The text of every module that the slave needs, by its path in the bundle; none is imported.
 
-    Raises `PackagingError` if one of them imports what is neither bundled nor the standard library.
+    Raises `PackagingError` for an import of what is neither bundled nor in the standard library.
     """
     sources: dict[str, str] = {}
     found: set[str] = set()
@@ -89,7 +89,7 @@ def bundled_sources(target: Target) -> dict[str, str]:
             continue
         found.add(module)
         path = module_path(module, target.root)
-        key = _place(module, path)
+        key = _path_in_bundle(module, path)
         sources[key] = "" if key in EMPTY_INIT else path.read_text(encoding="utf-8")
         package = module if path.name == "__init__.py" else module.rpartition(".")[0]
         waiting += _imported_modules(sources[key], package, path, target)
@@ -101,7 +101,7 @@ def bundled_sources(target: Target) -> dict[str, str]:
 
 
 def module_path(module: str, root: Path | None = None) -> Path:
-    """Where a module's source is, without importing it or its package; raises `PackagingError` if it has none."""
+    """The path of a module's source, found without importing anything; raises `PackagingError` if it has none."""
     top, *rest = module.split(".")
     base = _top_level(top, root)
     if base is None:
@@ -129,9 +129,9 @@ def _top_level(name: str, root: Path | None) -> Path | None:
 
 @functools.cache
 def _installed(name: str, path: tuple[str, ...]) -> Path:
-    """Where Python finds a package or module as long as `sys.path` is `path`.
+    """The path at which Python finds a package or module while `sys.path` is `path`.
 
-    Raises `LookupError` if it does not: that is not kept, as it may be there the next time.
+    Raises `LookupError` if there is none, which is not cached, since it may be installed later.
     """
     spec = importlib.util.find_spec(name) if name else None
     if spec is None or spec.origin is None or not spec.has_location:
@@ -140,19 +140,19 @@ def _installed(name: str, path: tuple[str, ...]) -> Path:
     return origin.parent if origin.name == "__init__.py" else origin
 
 
-def place(module: str, root: Path | None = None) -> str:
-    """Where a module is in the bundle."""
-    return _place(module, module_path(module, root))
+def path_in_bundle(module: str, root: Path | None = None) -> str:
+    """The path of a module in the bundle."""
+    return _path_in_bundle(module, module_path(module, root))
 
 
-def _place(module: str, path: Path) -> str:
+def _path_in_bundle(module: str, path: Path) -> str:
     return "/".join(module.split(".")) + ("/__init__.py" if path.name == "__init__.py" else ".py")
 
 
-def tree_of(text: str, path: Path) -> ast.Module:
-    """The syntax tree of a source; raises `PackagingError` if it is no Python."""
+def parse_source(text: str, path: Path) -> ast.Module:
+    """The syntax tree of a source; raises `PackagingError` if it is not Python."""
     try:
-        return parsed(text, str(path))
+        return parse_module(text, str(path))
     except (SyntaxError, ValueError) as error:
         line = getattr(error, "lineno", None) or 1
         raise PackagingError(f"{path}:{line}: {getattr(error, 'msg', error)}; expected Python") from error
@@ -160,7 +160,7 @@ def tree_of(text: str, path: Path) -> ast.Module:
 
 @functools.cache
 def _imported_modules(text: str, package: str, path: Path, target: Target) -> tuple[str, ...]:
-    """The bundled modules that a source imports; only the forms that renaming understands are allowed."""
+    """The bundled modules that a source imports; raises `PackagingError` for a form that cannot be renamed."""
     found = []
     for node in _imports(text, path):
         if isinstance(node, ast.Import):
@@ -182,8 +182,8 @@ def _imported_modules(text: str, package: str, path: Path, target: Target) -> tu
 
 @functools.cache
 def _imports(text: str, path: Path) -> tuple[ast.Import | ast.ImportFrom, ...]:
-    """The imports of a source, whichever slave it is needed by."""
-    return tuple(node for node in statements(tree_of(text, path)) if isinstance(node, ast.Import | ast.ImportFrom))
+    """The import statements of a source."""
+    return tuple(node for node in statements(parse_source(text, path)) if isinstance(node, ast.Import | ast.ImportFrom))
 
 
 def _is_module(package: str, name: str, root: Path | None) -> bool:
@@ -191,15 +191,15 @@ def _is_module(package: str, name: str, root: Path | None) -> bool:
     return base.name == "__init__.py" and ((base.parent / f"{name}.py").is_file() or (base.parent / name).is_dir())
 
 
-def renamed(text: str, bundle: str, target: Target) -> str:
-    """The source with its imports of bundled packages going to the bundle."""
+def rename_imports(text: str, bundle: str, target: Target) -> str:
+    """The source with its imports of bundled packages redirected to the bundle."""
     lines = text.encode().splitlines(keepends=True)
     imports = [
         node
-        for node in ast.walk(parsed(text))
+        for node in ast.walk(parse_module(text))
         if isinstance(node, ast.ImportFrom) and node.level == 0 and target.bundles(node.module or "")
     ]
-    for node in sorted(imports, key=lambda node: -node.col_offset):  # from the right, so that columns stay true
+    for node in sorted(imports, key=lambda node: -node.col_offset):  # from the right, so that columns stay valid
         line, column = lines[node.lineno - 1], node.col_offset
         moved = re.sub(rb"from\s+", f"from {bundle}.".encode(), line[column:], count=1)
         lines[node.lineno - 1] = line[:column] + moved

@@ -6,16 +6,16 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from fmu_kit.bundle import PackagingError, Target, module_path, tree_of
+from fmu_kit.bundle import PackagingError, Target, module_path, parse_source
 
 BASE = ("fmu_kit.slave", "Slave")
 
 
 def slaves_in(folder: Path) -> list[Target]:
-    """The slave classes of a folder that leave no method open, by module; raises `PackagingError`.
+    """The concrete slave classes of a folder, by module; raises `PackagingError`.
 
-    A folder with `__init__.py` is a package, and found by its name where its outermost package lies; in another
-    one each module stands for itself.
+    A folder with `__init__.py` is a package, imported from the folder of its outermost package; otherwise each
+    module is imported by itself.
     """
     root, package = _root_of(folder.resolve())
     found = []
@@ -23,23 +23,23 @@ def slaves_in(folder: Path) -> list[Target]:
         name = ".".join((*package, path.stem)) if path.stem != "__init__" else ".".join(package)
         if not name:
             continue
-        for node in tree_of(path.read_text(encoding="utf-8"), path).body:
-            if isinstance(node, ast.ClassDef) and _is_whole(name, node.name, root):
+        for node in parse_source(path.read_text(encoding="utf-8"), path).body:
+            if isinstance(node, ast.ClassDef) and _is_concrete(name, node.name, root):
                 found.append(Target(name, node.name, root))
     return found
 
 
 def slave_beside(fmu: Path) -> Target | None:
-    """The slave that an .fmu of this name in this folder is built from; None if no module there defines it."""
-    named = f"class {fmu.stem}"
+    """The slave from which an .fmu of this name in this folder is built; None if no module there defines it."""
+    definition = f"class {fmu.stem}"
     for path in sorted(fmu.parent.glob("*.py")):
-        if named in path.read_text(encoding="utf-8", errors="ignore"):
+        if definition in path.read_text(encoding="utf-8", errors="ignore"):
             return next((target for target in slaves_in(fmu.parent) if target.model == fmu.stem), None)
     return None
 
 
 def _root_of(folder: Path) -> tuple[Path, tuple[str, ...]]:
-    """Where the outermost package around a folder lies, and the path of the folder from there."""
+    """The folder that contains the outermost package around a folder, and the path of the folder from there."""
     names: tuple[str, ...] = ()
     while (folder / "__init__.py").is_file():
         folder, names = folder.parent, (folder.name, *names)
@@ -47,15 +47,15 @@ def _root_of(folder: Path) -> tuple[Path, tuple[str, ...]]:
 
 
 class _Class(NamedTuple):
-    """One of those that a slave is made of: where it stands, and for each method that it has whether it is open."""
+    """A class among the ancestors of a slave: its module, its name, and whether each of its methods is abstract."""
 
     module: str
     name: str
     methods: tuple[tuple[str, bool], ...]
 
 
-def _is_whole(module: str, name: str, root: Path) -> bool:
-    """Whether a class is made from `Slave` and leaves none of its methods to others."""
+def _is_concrete(module: str, name: str, root: Path) -> bool:
+    """Whether a class is derived from `Slave` and has no abstract method."""
     first: dict[str, bool] = {}
     for each in _ancestry(module, name, root):
         first = dict(each.methods) | first
@@ -63,15 +63,15 @@ def _is_whole(module: str, name: str, root: Path) -> bool:
 
 
 def _ancestry(module: str, name: str, root: Path | None, deepest: int = 20) -> list[_Class]:
-    """A class and those that it is made of, up to `Slave`, in the order in which Python looks for a method.
+    """A class and its ancestors up to `Slave`, in method resolution order, through any modules between them.
 
-    Empty for a name that is no such class, whatever modules lie between.
+    Empty for a name that is not a class derived from `Slave`.
     """
     if (module, name) == BASE:
         return [_Class(module, name, (("step", True),))]
     try:
         path = module_path(module, root)
-        body = tree_of(path.read_text(encoding="utf-8"), path).body
+        body = parse_source(path.read_text(encoding="utf-8"), path).body
     except (OSError, PackagingError):
         return []
     if deepest == 0:
@@ -81,7 +81,7 @@ def _ancestry(module: str, name: str, root: Path | None, deepest: int = 20) -> l
             bases = [base.id for base in node.bases if isinstance(base, ast.Name) and base.id != name]
             above = [found for base in bases if (found := _ancestry(module, base, root, deepest - 1))]
             own = _Class(module, name, tuple(_methods(node)))
-            return [own, *_merged([*above, [found[0] for found in above]])] if above else []
+            return [own, *_linearised([*above, [found[0] for found in above]])] if above else []
         if isinstance(node, ast.ImportFrom):
             package = module if path.name == "__init__.py" else module.rpartition(".")[0]
             base = importlib.util.resolve_name("." * node.level + (node.module or ""), package)
@@ -91,18 +91,18 @@ def _ancestry(module: str, name: str, root: Path | None, deepest: int = 20) -> l
     return []
 
 
-def _merged(lines: list[list[_Class]]) -> Iterator[_Class]:
-    """Of the lines of ancestors of several bases the one that keeps their order (C3); ends where there is none."""
-    while lines := [line for line in lines if line]:
-        first = next((line[0] for line in lines if not any(line[0] in other[1:] for other in lines)), None)
+def _linearised(lineages: list[list[_Class]]) -> Iterator[_Class]:
+    """The C3 linearisation of the ancestors of several bases; ends early where there is none."""
+    while lineages := [line for line in lineages if line]:
+        first = next((line[0] for line in lineages if not any(line[0] in other[1:] for other in lineages)), None)
         if first is None:
             return
         yield first
-        lines = [line[1:] if line[0] == first else line for line in lines]
+        lineages = [line[1:] if line[0] == first else line for line in lineages]
 
 
 def _methods(node: ast.ClassDef) -> Iterator[tuple[str, bool]]:
-    """Each method that a class defines, and whether it leaves that open."""
+    """Each method that a class defines, and whether it is abstract."""
     for each in node.body:
         if isinstance(each, ast.FunctionDef):
             marks = each.decorator_list

@@ -1,7 +1,7 @@
-"""`documentation/index.html` of an FMU: what its author wrote by hand, and tables of what the slave declares.
+"""`documentation/index.html` of an FMU: the part that its author wrote, and tables of what the slave declares.
 
-Used when an FMU is built: no slave may import it, for an FMU bundles what its slave imports. The page is
-well-formed XML, and everything in it is in the file: the viewers that tools have load nothing else.
+Used only when an FMU is built: a slave must not import it, since an FMU bundles what its slave imports. The page is
+well-formed XML and self-contained, since the viewers of tools load no other files.
 """
 
 import itertools
@@ -18,25 +18,25 @@ from fmu_kit.model_description import PYTHON_REQUIRED
 from fmu_kit.variables import Variable
 
 TEMPLATE = Path(__file__).with_name("page.html")
-"""The page around the part written by hand."""
+"""The template of the page, around the hand-written part."""
 IN_PYTHON = Path(__file__).with_name("needs.html")
-"""What an FMU needs whose slave runs in Python."""
+"""The requirements of an FMU whose slave runs in Python."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Making:
-    """How an FMU was made: what the page says of it."""
+class BuildNotes:
+    """What the page says of how an FMU was built."""
 
     version: int = 2
     """of FMI"""
     needs: Path
-    """what it needs and where its sources are, as a template like the page"""
+    """the template of its requirements and of where its sources are"""
     source: str
-    """the link from the page to where its sources begin"""
+    """the link from the page to the module of the slave"""
     status: str
-    """of a call that fails"""
+    """FMI status of a call that fails"""
     afterwards: str
-    """what to do then"""
+    """advice for after a failure"""
 
 
 HEADINGS = {
@@ -46,55 +46,54 @@ HEADINGS = {
     "local": "Locals",
     "constant": "Constants, fixed when the FMU was built",
 }
-"""The causalities in the order of the page, and what is constant."""
+"""The headings of the page in order, by causality; constants are separate."""
 
 
-def to_html(slave: Any, making: Making, fragment: str = "") -> str:
+def to_html(slave: Any, notes: BuildNotes, fragment: str = "") -> str:
     """The page of a `Slave` class.
 
-    `fragment` is the part written by hand: sections of XHTML, whose relative links start at the folder of the
-    sources.
+    `fragment` is the hand-written part: sections of XHTML, whose relative links start at the folder of the sources.
     """
     experiment = slave.default_experiment
-    said = {
+    values = {
         "model": escape(slave.__name__),
-        "whose": escape(_whose(slave)),
+        "whose": escape(_attribution(slave)),
         "licence": escape(slave.license) or "that its author names",
         "python": escape(PYTHON_REQUIRED),
-        "source": escape(making.source),
-        "fmi": str(making.version),
+        "source": escape(notes.source),
+        "fmi": str(notes.version),
     }
     return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
-        model=said["model"],
-        fmi=said["fmi"],
+        model=values["model"],
+        fmi=values["fmi"],
         description=escape(slave.description),
-        whose=said["whose"],
+        whose=values["whose"],
         start=_number(experiment.start_time),
         stop=_number(experiment.stop_time),
         step=_number(experiment.step_size),
-        status=making.status,
-        afterwards=escape(making.afterwards),
-        needs=Template(making.needs.read_text(encoding="utf-8")).substitute(said),
+        status=notes.status,
+        afterwards=escape(notes.afterwards),
+        needs=Template(notes.needs.read_text(encoding="utf-8")).substitute(values),
         contents="".join(f"{link} · " for link in _contents(fragment)),
-        fragment=_relocated(fragment, posixpath.dirname(making.source)).strip(),
+        fragment=_relocated(fragment, posixpath.dirname(notes.source)).strip(),
         variables="\n".join(variable_tables(slave.variables)),
         categories=_table(("Category", "Messages"), [(_code(k), escape(v)) for k, v in slave.log_categories.items()]),
     )
 
 
-def _whose(slave: Any) -> str:
-    """Author, copyright and licence, as far as they are named."""
+def _attribution(slave: Any) -> str:
+    """Author, copyright and licence, as far as the slave names them."""
     named = {"Author": slave.author, "Copyright": slave.copyright, "Licence": slave.license}
-    return "".join(f" {what}: {said}." for what, said in named.items() if said)
+    return "".join(f" {what}: {text}." for what, text in named.items() if text)
 
 
 def files_linked(page: str) -> list[str]:
-    """The links of a page that lead to files beside it, not to a section or to the web."""
+    """The links of a page to files, not to a section or to the web."""
     return re.findall(r'\bhref="(?!#|[a-z]+:)([^"#]*)', page)
 
 
 def _contents(fragment: str) -> list[str]:
-    """Links to the sections of the part written by hand."""
+    """Links to the sections of the hand-written part."""
     return [f'<a href="#{name}">{title}</a>' for name, title in re.findall(r'<h2 id="([^"]+)">(.*?)</h2>', fragment)]
 
 
@@ -114,7 +113,7 @@ def variable_tables(variables: Sequence[Variable]) -> Iterator[str]:
 
 
 def _vectors(variables: Sequence[Variable]) -> Iterator[list[Variable]]:
-    """Neighbours that differ in the last part of the name and in the start only, together."""
+    """Variables in groups: neighbours that differ only in the last part of the name and in the start value."""
 
     def shared(variable: Variable) -> tuple[str, Variable]:
         vector = variable.name.rpartition(".")[0] or variable.name
@@ -142,7 +141,7 @@ def _row(alike: list[Variable]) -> tuple[str, ...]:
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table of cells that are HTML already; columns in which no row has anything are left out."""
+    """A table of cells in HTML; empty columns are left out."""
     kept = [i for i in range(len(columns)) if any(row[i] for row in rows)]
     lines = ["".join(f"<th>{columns[i]}</th>" for i in kept)]
     lines += ["".join(f"<td>{row[i]}</td>" for i in kept) for row in rows]
@@ -154,13 +153,13 @@ def _code(text: str) -> str:
 
 
 def _start(variable: Variable) -> str:
-    """The start value, that of an Enumeration by its item."""
+    """The start value; for an Enumeration, the name of its item."""
     items = {value: name for name, value in variable.items.items()}
     return _code(items[int(variable.start)]) if items else _number(variable.start)
 
 
 def _number(value: float | int | bool | None) -> str:
-    """In the shortest form that is exact; nothing for None."""
+    """A number in its shortest exact form; empty for None."""
     if value is None:
         return ""
     if isinstance(value, bool):

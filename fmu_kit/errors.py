@@ -1,11 +1,11 @@
-"""What can go wrong inside an FMU, in words for the person who wired it."""
+"""Errors inside an FMU, worded for the person who wired it."""
 
 import math
 from collections.abc import Iterable
 
 
 class FmuError(Exception):
-    """A call that cannot be carried out; the text names the variable, its value and what was expected."""
+    """An FMI call that is refused; the text names the variable, its value and what was expected."""
 
 
 class DivergenceError(FmuError):

@@ -1,6 +1,6 @@
-"""How a failure gets out of a slave: as one readable message, without bringing the host down.
+"""Reporting a failure of a slave: as one readable message, without crashing the host.
 
-Everything here answers to how the native part of pythonfmu 0.7.0 treats exceptions and references.
+All of it works around how the native part of pythonfmu 0.7.0 treats exceptions and references.
 """
 
 import inspect
@@ -16,34 +16,34 @@ from fmu_kit.errors import DivergenceError, FmuError
 _kept_references: list[Any] = []
 
 
-def keep(module_globals: dict[str, Any]) -> None:
-    """Called by an entry script: give back the reference to its globals that each instantiation drops.
+def restore_reference(module_globals: dict[str, Any]) -> None:
+    """Restore the reference to a module's globals that each instantiation drops; called by the entry script.
 
-    The native part decrements the borrowed reference of the module's dictionary every time that it looks for
-    the slave class. Classes that it leaks hide this as long as they hold more references to the dictionary
-    than it drops; what is given back here does not depend on that.
+    Whenever the native part looks up the slave class, it decrements the borrowed reference of the module's
+    dictionary. The classes that it leaks may hide this, while they hold more references to the dictionary than
+    it drops; the reference restored here does not depend on that.
     """
     _kept_references.append(module_globals)
 
 
-def keep_failed(slave: Any, *, again: bool) -> None:
+def keep_alive(slave: Any, *, again: bool) -> None:
     """Keep a slave whose call is about to raise alive for as long as the process.
 
     After an exception the native part drops its references to the instance, the class and the log queue
-    but keeps the pointers, and drops them once more when the instance is freed or reset. So one reference
-    each is given for every exception, and one more the first time so that the count never ends.
+    but keeps the pointers, and drops them once more when the instance is freed or reset. So each gets one more
+    reference per exception, and another the first time so that the count never reaches zero.
     """
     dropped = [slave, type(slave), slave.log_queue]
     _kept_references.extend(dropped if again else 2 * dropped)
 
 
 class Failure(Exception):
-    """What a callback raises: the native part logs its repr, as a printf format."""
+    """The exception that a callback raises; the native part logs its repr, as a printf format."""
 
     def __init__(self, error: Exception) -> None:
-        message = str(error) if isinstance(error, FmuError) else f"{error!r}{_in_the_fmu(error)}"
+        message = str(error) if isinstance(error, FmuError) else f"{error!r}{_place_in_fmu(error)}"
         if isinstance(error, DivergenceError) and isinstance(error.__cause__, Exception):
-            message += f" ({_in_the_fmu(error.__cause__).strip()})"
+            message += f" ({_place_in_fmu(error.__cause__).strip()})"
         details = "".join(traceback.format_exception(error)).rstrip()
         self.text = printf_safe(f"{message}\n{details}")
         super().__init__(self.text)
@@ -64,7 +64,7 @@ class DivergenceMessage(LogMsg):  # type: ignore[misc]
     def msg(self) -> str:
         """The text; catching an exception clears the pending one, under which a Python logger would fail.
 
-        What is caught is a SystemError: under a pending exception, not even another can be made.
+        The exception caught is a SystemError: under a pending exception, no other can even be created.
         """
         try:
             raise LookupError
@@ -73,20 +73,20 @@ class DivergenceMessage(LogMsg):  # type: ignore[misc]
 
 
 def printf_safe(text: str) -> str:
-    """`text` as a printf format that prints it, without what UTF-8 cannot hold: the native part would crash on it."""
+    """A printf format that prints `text`, without what UTF-8 cannot encode, on which the native part would crash."""
     return text.encode("utf-8", "backslashreplace").decode("utf-8").replace("%", "%%")
 
 
 def place_of(error: BaseException) -> str:
-    """File and line of the statement of the model that failed, before what went wrong; nothing where there is none.
+    """File and line of the statement of the model that failed, as a prefix of the message; empty if there is none.
 
-    What fails inside of the kit is the fault of whoever called it.
+    For a failure inside the kit, it is the statement that called the kit.
     """
     return next((f"{frame.filename}, line {frame.lineno}: " for frame in reversed(_own_frames(error))), "")
 
 
-def _in_the_fmu(error: BaseException) -> str:
-    """File and line; the file with its folder, which says whose it is, unless that is the bundle of an FMU."""
+def _place_in_fmu(error: BaseException) -> str:
+    """File and line of a failure; the file with its folder, unless that is the bundle of an FMU."""
     frames = _own_frames(error) or traceback.extract_tb(error.__traceback__)
     if not frames:
         return ""
@@ -96,11 +96,11 @@ def _in_the_fmu(error: BaseException) -> str:
 
 def _own_frames(error: BaseException) -> list[traceback.FrameSummary]:
     frames = traceback.extract_tb(error.__traceback__)
-    return [each for each in frames if is_of_a_model(each.filename)]
+    return [each for each in frames if is_model_code(each.filename)]
 
 
-def is_of_a_model(filename: str) -> bool:
-    """Whether a file is Python, and none of what every slave stands on."""
+def is_model_code(filename: str) -> bool:
+    """Whether a file is Python of a model, and not of the kit or of what lies under every slave."""
     return filename.endswith(".py") and not _KIT & {*Path(filename).parents}
 
 
@@ -108,8 +108,8 @@ _KIT = {Path(__file__).parent, Path(inspect.getfile(LogMsg)).parent}
 
 
 def report(slave: Any, error: Exception, *, again: bool) -> Failure:
-    """What to raise for `error` in a callback of `slave`; `again` if this instance has failed before."""
-    keep_failed(slave, again=again)
+    """The exception to raise for `error` in a callback of `slave`; `again` if this instance has failed before."""
+    keep_alive(slave, again=again)
     failure = Failure(error)
     if isinstance(error, DivergenceError):
         slave.log_queue.append(DivergenceMessage(failure))

@@ -1,4 +1,4 @@
-"""A slave that may be wired in another convention for axes than that of its equations."""
+"""A slave whose variables may be in another axes convention than its equations."""
 
 from fmu_kit.frames import Frame
 from fmu_kit.interface import FixedParameter
@@ -6,7 +6,7 @@ from fmu_kit.slave import Slave
 
 
 class Framed(Slave):
-    """Its variables, but for those that no axes matter to, are in a convention that is chosen."""
+    """A slave with a choice of axes convention, for all of its variables that depend on axes."""
 
     frame = FixedParameter(
         "axes of all that is wired and set: inertial north-east-down and body forward-right-down (ned), or inertial "
@@ -16,5 +16,5 @@ class Framed(Slave):
 
     @property
     def is_turned(self) -> bool:
-        """Whether that is another one than the equations have."""
+        """Whether the chosen convention differs from that of the equations."""
         return self.frame == Frame.ENU  # type: ignore[no-any-return]

@@ -1,9 +1,9 @@
-"""Conventions for axes: what is told in one of them, in the other.
+"""Axes conventions: quantities of one of them, in the other.
 
-The equations of this project are north-east-down, of a body whose axes are forward, right and down. Each variable of
-a slave that may be wired in another convention (`fmu_kit.framed`) says with `frame=` which function of this module
-takes it from one convention to the other; methods see what the equations have. Every function is its own inverse: what
-is `turned` is told in the axes of the other convention, all else stays as it is, to the bit.
+The equations of this project are north-east-down, with body axes forward, right and down. Each variable of a slave
+with a choice of convention (`fmu_kit.framed`) declares by `frame=` which function of this module converts it between
+the two; methods see the convention of the equations. Every function is its own inverse: it converts where `turned`
+holds, and otherwise returns its argument to the bit.
 """
 
 import enum
@@ -16,7 +16,7 @@ _HALF = math.sqrt(0.5)
 
 
 class Frame(enum.IntEnum):
-    """Along what the axes are, inertial and of the body."""
+    """Directions of the axes of the inertial and of the body frame."""
 
     NED = 1
     """north-east-down; forward-right-down"""
@@ -31,30 +31,30 @@ def inertial(turned: Scalar, v: Vec3) -> Vec3:
 
 
 def inertial_sizes(turned: Scalar, v: Vec3) -> Vec3:
-    """What there is along each inertial axis, in whatever direction, as gains: x and y change places."""
+    """Magnitudes along each inertial axis, such as gains: x and y change places."""
     return Vec3(FLOAT.where(turned, v.y, v.x), FLOAT.where(turned, v.x, v.y), v.z)
 
 
 def body(turned: Scalar, v: Vec3) -> Vec3:
-    """A vector in the frame of the body: y and z change their signs."""
+    """A vector in the body frame: y and z change their signs."""
     return Vec3(v.x, FLOAT.where(turned, -v.y, v.y), FLOAT.where(turned, -v.z, v.z))
 
 
 def body_matrix(turned: Scalar, J: Inertia) -> Inertia:
-    """An inertia matrix in the frame of the body: the products with x change their signs."""
+    """An inertia matrix in the body frame: the products with x change their signs."""
     xy, xz = FLOAT.where(turned, -J.xy, J.xy), FLOAT.where(turned, -J.xz, J.xz)
     return Inertia(xx=J.xx, yy=J.yy, zz=J.zz, xy=xy, xz=xz, yz=J.yz)
 
 
 def attitude(turned: Scalar, Q: Quaternion) -> Quaternion:
-    """An attitude, inertial to body: turned half round about north-east before and about forward behind."""
+    """An attitude, inertial to body: with half turns about north-east before it and about forward after it."""
     x, y, z, w = Q
     others = (_HALF * (x + y), _HALF * (x - y), _HALF * (w - z), _HALF * (w + z))
     return Quaternion.from_xyzw(*(FLOAT.where(turned, other, own) for other, own in zip(others, Q)))
 
 
 def rotation(turned: Scalar, Q: Quaternion) -> Quaternion:
-    """A rotation from one frame of the body to another, as an attitude error: its axis is a vector there."""
+    """A rotation between body frames, such as an attitude error: its axis is a vector in the body frame."""
     return Quaternion(body(turned, Q.vector), Q.scalar)
 
 
@@ -64,5 +64,5 @@ def yaw(turned: Scalar, angle: Scalar) -> Scalar:
 
 
 def about_z(turned: Scalar, angle: Scalar) -> Scalar:
-    """A turn [rad] in the horizontal plane, or its rate, from x of the inertial frame towards y."""
+    """An angle [rad] turned in the horizontal plane, or its rate, from x of the inertial frame towards y."""
     return FLOAT.where(turned, -angle, angle)

@@ -1,4 +1,4 @@
-"""The classical fourth-order Runge-Kutta method, for any state that can be moved along its rate."""
+"""The classical fourth-order Runge-Kutta method, for any state with a `plus` along its rate."""
 
 import math
 from collections.abc import Callable
@@ -6,7 +6,7 @@ from typing import Any, Protocol, TypeVar
 
 
 class Movable(Protocol):
-    """A state, and equally a rate: `x.plus(h, k)` is x + h k."""
+    """A state or a rate: `x.plus(h, k)` is x + h k."""
 
     def plus(self, factor: float, rate: Any) -> Any:
         """self + factor * rate."""
@@ -28,5 +28,5 @@ def rk4_step(f: Callable[[float, X], X], t: float, x: X, h: float) -> X:
 
 
 def internal_steps(h: float, largest: float) -> int:
-    """How many equal internal steps of at most `largest` [s] cover a communication step `h` [s]."""
+    """The number of equal internal steps of at most `largest` [s] in a communication step `h` [s]."""
     return max(1, math.ceil(h / largest - 1e-6))

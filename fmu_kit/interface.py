@@ -1,4 +1,4 @@
-"""The variables of a slave as attributes of its class: what is declared there, its methods read and set.
+"""The variables of a slave, declared as attributes of its class, which its methods read and set.
 
     class Feedback(Slave):
         x = Input("measured state", "1")
@@ -10,10 +10,10 @@
 
 The type of the start value is the type of the attribute: a float, a `Vec3` (an FMI variable for each of .x, .y, .z), a
 `Quaternion` (.x, .y, .z, .w), an `Inertia` (.xx, .yy, .zz, .xy, .xz, .yz), a `NamedTuple` of floats (one for each of
-its fields), a bool, a member of an `IntEnum`, which is read as its number, or an int if `unit` is None. Beside an
-Enumeration NAME, which such a member makes, there is an Integer NAME_index with the numbers of its items, for tools
-that set no Enumeration. Units are in SI, as in `fmu_kit.units`. What several slaves have in common is declared in a
-class that they inherit.
+its fields), a bool, a member of an `IntEnum`, which is read as its number, or an int if `unit` is None. A member of an
+`IntEnum` makes an Enumeration NAME, and an Integer NAME_index with the numbers of its items, for tools that cannot set
+an Enumeration. Units are in SI, as in `fmu_kit.units`. Variables that several slaves share are declared in a common
+base class.
 """
 
 from collections.abc import Callable, Iterable
@@ -27,12 +27,12 @@ from fmu_kit.variables import INDEX, Causality, Variability, Variable
 
 _Get = Callable[[Any], Any]
 _Put = Callable[[Any, Any], None]
-"""How an attribute of a slave is read, and set."""
+"""Functions that read and set an attribute of a slave."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Kind:
-    """What an attribute can hold, and how it is read from the place of its first variable on."""
+    """A type of attribute; `get` makes its reading function from the index of its first variable."""
 
     type: type
     get: Callable[[int], _Get]
@@ -61,11 +61,11 @@ def _quaternion(x: int) -> Callable[[Any], Quaternion]:
     return get
 
 
-def _inertia(place: int) -> Callable[[Any], Inertia]:
+def _inertia(index: int) -> Callable[[Any], Inertia]:
     def get(slave: Any) -> Inertia:
         """The matrix of six entries; raises `FmuError` unless it is positive definite."""
-        entries = dict(zip(_INERTIA_AXES, slave._reals[place : place + 6]))
-        name = slave.variables[place].name.removesuffix(_INERTIA_AXES[0]) + f"{{{','.join(_INERTIA_AXES)}}}"
+        entries = dict(zip(_INERTIA_AXES, slave._reals[index : index + 6]))
+        name = slave.variables[index].name.removesuffix(_INERTIA_AXES[0]) + f"{{{','.join(_INERTIA_AXES)}}}"
         listed = ", ".join(f"{axis} {value:g}" for axis, value in entries.items())
         require(is_positive_definite(**entries), name, listed, "a positive definite matrix")
         return Inertia(**entries)
@@ -86,7 +86,7 @@ _KINDS = (  # a bool is an int too, and an item of an IntEnum
 
 
 def _kind_of(start: Any) -> _Kind:
-    """What holds a start; raises `TypeError` for one that no variable can have."""
+    """The kind of a start value; raises `TypeError` for one that no variable can have."""
     for kind in _KINDS:
         if isinstance(start, kind.type):
             return kind
@@ -97,9 +97,9 @@ def _kind_of(start: Any) -> _Kind:
 
 
 def _named(record: type[Any], fields: tuple[str, ...]) -> _Kind:
-    def at(place: int) -> _Get:
-        end = place + len(fields)
-        return lambda slave: record(*slave._reals[place:end])
+    def at(index: int) -> _Get:
+        end = index + len(fields)
+        return lambda slave: record(*slave._reals[index:end])
 
     return _Kind(type=record, get=at, axes=fields, expected=f"a {record.__name__}")
 
@@ -107,17 +107,17 @@ def _named(record: type[Any], fields: tuple[str, ...]) -> _Kind:
 _NO_NUMBER = (Vec3, Quaternion, Inertia, str, tuple, list, dict, type(None))
 
 
-class Declared(property):
-    """A variable that is declared as an attribute; each causality is a class of its own, below.
+class Declaration(property):
+    """A variable declared as an attribute; each causality has a subclass, below.
 
-    What it reads and sets depends on where its class has it: each class of slaves has its own, made by `at`.
+    The value references depend on the class that has it: each class of slaves has its own copy, made by `at`.
     """
 
     causality: ClassVar[Causality]
-    usually: ClassVar[Variability]
-    """The variability, unless another is said."""
-    own: ClassVar[bool] = True
-    """Whether the slave sets it, and not whoever steps it."""
+    default_variability: ClassVar[Variability]
+    """The variability if none is given."""
+    set_by_slave: ClassVar[bool] = True
+    """Whether the slave sets it, rather than the master."""
 
     def __init__(
         self,
@@ -135,11 +135,11 @@ class Declared(property):
         terminal: str | None = None,
         frame: Callable[[Any, Any], Any] | None = None,
     ) -> None:
-        """`name`: where that of the FMI variable is not the attribute's; what is between that and `frame`: `Variable`.
+        """`name`: of the FMI variable, if it is not the attribute's; arguments up to `frame` are those of `Variable`.
 
-        `frame`: the function of `fmu_kit.frames` by which it is told in other axes, of a slave that is `Framed`.
+        `frame`: the function of `fmu_kit.frames` that converts it to other axes, in a `Framed` slave.
 
-        Raises `ValueError` for a unit that is none, `TypeError` for a start that no variable can have.
+        Raises `ValueError` for an unknown unit, `TypeError` for a start value that no variable can have.
         """
         super().__init__()
         self.description = description
@@ -148,9 +148,9 @@ class Declared(property):
         self.unit = unit if self._kind.is_real else None
         if self.unit is not None:
             base_unit_exponents(self.unit)
-        self.name, self._variability = name or "", variability or self.usually
+        self.name, self._variability = name or "", variability or self.default_variability
         bounds = {"minimum": minimum, "maximum": maximum, "above": above}
-        self._said: dict[str, Any] = {
+        self._details: dict[str, Any] = {
             **bounds,
             "nominal": nominal,
             "named_quantity": quantity,
@@ -163,26 +163,26 @@ class Declared(property):
 
     @property
     def first(self) -> str:
-        """The name of the first of its FMI variables."""
+        """The name of its first FMI variable."""
         return ".".join((self.name, *self._kind.axes[:1]))
 
-    def at(self, place: int) -> "Declared":
-        """The same, read and set in slaves that have its first variable at a place."""
+    def at(self, index: int) -> "Declaration":
+        """A copy for slaves that have its first variable at `index`."""
         placed = type(self).__new__(type(self))
         vars(placed).update(vars(self))
-        get, put = self._turning(self._kind.get(place), self._put_at(place))
+        get, put = self._in_declared_frame(self._kind.get(index), self._put_at(index))
 
-        def give(slave: Any, value: Any) -> None:
+        def put_before_run(slave: Any, value: Any) -> None:
             if not slave.is_fresh:
                 what = "an input" if self.causality == "input" else "a parameter"
-                raise AttributeError(f"self.{self.attribute} cannot be set: it is {what}, which is given to the FMU")
+                raise AttributeError(f"self.{self.attribute} cannot be set: it is {what}, which the master sets")
             put(slave, value)
 
-        property.__init__(placed, get, put if self.own else give)
+        property.__init__(placed, get, put if self.set_by_slave else put_before_run)
         return placed
 
-    def _turning(self, get: _Get, put: _Put) -> tuple[_Get, _Put]:
-        """The same for a slave that may be told in other axes than those of its attributes."""
+    def _in_declared_frame(self, get: _Get, put: _Put) -> tuple[_Get, _Put]:
+        """The two functions, converting between the axes of the FMU and those of the attributes."""
         turn = self._frame
         if turn is None:
             return get, put
@@ -197,35 +197,35 @@ class Declared(property):
 
         return get_turned, put_turned
 
-    def _put_at(self, place: int) -> _Put:
-        kind, end = self._kind, place + len(self._kind.axes)
+    def _put_at(self, index: int) -> _Put:
+        kind, end = self._kind, index + len(self._kind.axes)
 
         def put_vec3(slave: Any, value: Any) -> None:
             if not isinstance(value, Vec3):
                 self._refuse(value)
-            slave._reals[place:end] = (value.x, value.y, value.z)  # the most frequent of all: not by its iterator
+            slave._reals[index:end] = (value.x, value.y, value.z)  # the most frequent case: faster than its iterator
 
         def put_parts(slave: Any, value: Any) -> None:
             if not isinstance(value, kind.type):
                 self._refuse(value)
-            slave._reals[place:end] = value
+            slave._reals[index:end] = value
 
         def put_real(slave: Any, value: Any) -> None:
             if type(value) is not float and isinstance(value, _NO_NUMBER):
                 self._refuse(value)
-            slave._reals[place] = value
+            slave._reals[index] = value
 
         def put_other(slave: Any, value: Any) -> None:
             if isinstance(value, _NO_NUMBER):
                 self._refuse(value)
-            slave._others[place] = value
+            slave._others[index] = value
 
         if kind.type is Vec3:
             return put_vec3
         return put_parts if kind.axes else put_real if kind.is_real else put_other
 
     def index(self) -> list[Variable]:
-        """Of an Enumeration, the Integer by which tools may set it too; nothing for other types."""
+        """The Integer by which tools may also set an Enumeration; empty for other types."""
         return [
             Variable(
                 name=f"{each.name}{INDEX}",
@@ -256,66 +256,66 @@ class Declared(property):
             variability=variability,
             unit=self.unit,
             start=0.0 if axes else self.start,
-            **self._said,
+            **self._details,
         )
         if not axes:
             return [variable]
         return [replace(variable, name=f"{name}.{axis}", start=value) for axis, value in zip(axes, self.start)]
 
 
-class Input(Declared):
-    """What is connected to the FMU; `start` holds until something is."""
+class Input(Declaration):
+    """An input of the FMU; it has its start value until something is connected."""
 
-    causality, usually, own = "input", "continuous", False
+    causality, default_variability, set_by_slave = "input", "continuous", False
 
 
-class Parameter(Declared):
-    """What is set before a run and, unless its variability is fixed, between steps."""
+class Parameter(Declaration):
+    """A parameter, set before a run and, unless its variability is fixed, between steps."""
 
-    causality, own = "parameter", False
-    usually: ClassVar[Variability] = "tunable"
+    causality, set_by_slave = "parameter", False
+    default_variability: ClassVar[Variability] = "tunable"
 
 
 class FixedParameter(Parameter):
-    """What is set before a run, and holds for all of it."""
+    """A parameter that is set before a run and constant during it."""
 
-    usually = "fixed"
-
-
-class Output(Declared):
-    """What the FMU gives, held from one step to the next; `start` holds until it is set."""
-
-    causality, usually = "output", "discrete"
+    default_variability = "fixed"
 
 
-class Local(Declared):
-    """What the slave remembers from one step to the next, and shows; else as an output."""
+class Output(Declaration):
+    """An output, held from one step to the next; it has its start value until it is set."""
 
-    causality, usually = "local", "discrete"
+    causality, default_variability = "output", "discrete"
 
 
-class State(Declared):
-    """An output, a Real, that evolves from `start`, which is a parameter of the FMU: `initial.NAME`."""
+class Local(Declaration):
+    """An internal value that is kept from one step to the next and can be read from outside."""
 
-    causality, usually = "output", "continuous"
+    causality, default_variability = "local", "discrete"
+
+
+class State(Declaration):
+    """A Real output that evolves from `start`, which is a parameter of the FMU: `initial.NAME`."""
+
+    causality, default_variability = "output", "continuous"
 
     def initial(self) -> list[Variable]:
-        """The parameters from which it starts."""
+        """The parameters with its initial value."""
         return self._as(f"initial.{self.name}", f"{self.name}(0)", "parameter", "fixed")
 
 
-def declared_in(slave: type) -> list[Declared]:
-    """What a class and those that it is made of declare, in order; what is declared again counts where it was first."""
-    found: dict[str, Declared] = {}
+def declarations_in(slave: type) -> list[Declaration]:
+    """The declarations of a class and its bases, in order; one that is overridden keeps its first position."""
+    found: dict[str, Declaration] = {}
     for cls in reversed(slave.__mro__):
-        found |= {name: value for name, value in vars(cls).items() if isinstance(value, Declared)}
+        found |= {name: value for name, value in vars(cls).items() if isinstance(value, Declaration)}
     return list(found.values())
 
 
-def variables_of(declared: Iterable[Declared]) -> tuple[Variable, ...]:
-    """Their FMI variables: as declared, then the starts of states; Reals first, among them locals last.
+def variables_of(declared: Iterable[Declaration]) -> tuple[Variable, ...]:
+    """Their FMI variables: as declared, then the initial values of states; Reals first, and among these locals last.
 
-    After all of them come the Integers beside Enumerations.
+    The Integers of Enumerations come after all others.
     """
     listed = list(declared)
     found = [variable for each in listed for variable in each.variables()]
@@ -324,8 +324,8 @@ def variables_of(declared: Iterable[Declared]) -> tuple[Variable, ...]:
     return (*found, *(index for each in listed for index in each.index()))
 
 
-def initial_values(declared: Iterable[Declared]) -> dict[str, str]:
-    """The variables of states, and the parameters from which they start."""
+def initial_values(declared: Iterable[Declaration]) -> dict[str, str]:
+    """The variables of states, each with the parameter of its initial value."""
     states = [each for each in declared if isinstance(each, State)]
     return {v.name: start.name for each in states for v, start in zip(each.variables(), each.initial())}
 
@@ -333,12 +333,12 @@ def initial_values(declared: Iterable[Declared]) -> dict[str, str]:
 _Record = TypeVar("_Record")
 
 
-def gathered(slave: Any, record: Callable[..., _Record], prefix: str = "") -> _Record:
-    """A dataclass of the attributes of a slave that are called as its fields are, with a prefix."""
+def read_fields(slave: Any, record: Callable[..., _Record], prefix: str = "") -> _Record:
+    """A dataclass whose fields are read from the attributes of a slave with the same names, after a prefix."""
     return record(**{each.name: getattr(slave, prefix + each.name) for each in fields(record)})  # type: ignore[arg-type]
 
 
-def show(slave: Any, values: NamedTuple) -> None:
-    """Set the outputs and locals that are called as fields of a named tuple to what these hold."""
+def set_fields(slave: Any, values: NamedTuple) -> None:
+    """Set the outputs and locals of a slave from the fields of a named tuple that have the same names."""
     for name in filter(slave._own.__contains__, values._fields):
         setattr(slave, name, getattr(values, name))

@@ -1,4 +1,4 @@
-"""Libraries that the C compiler of this machine makes of C files: made once, and kept in the user's cache."""
+"""Libraries compiled from C files by the C compiler of this machine, once, and kept in the user's cache."""
 
 import contextlib
 import functools
@@ -11,30 +11,30 @@ from pathlib import Path
 from typing import Any
 
 
-def kept(folder: str, sources: Mapping[str, bytes], how: Any, compiled: Callable[[], bytes]) -> Path:
-    """The library that `compiled` makes of `sources`, in the cache's `folder`; `how` is what else decides its content.
+def cached_library(folder: str, sources: Mapping[str, bytes], how: Any, compiled: Callable[[], bytes]) -> Path:
+    """The path of the library that `compiled` makes of `sources`, in the cache's `folder`.
 
-    Raises `OSError` where it cannot be kept, and what `compiled` raises.
+    `how`: all else that its content depends on. Raises `OSError` if it cannot be stored, and what `compiled` raises.
     """
-    path = _place(folder, sources, how)
+    path = _cache_path(folder, sources, how)
     if not path.is_file():
-        _keep(path, compiled())
+        _write(path, compiled())
     return path
 
 
-def content(folder: str, sources: Mapping[str, bytes], how: Any, compiled: Callable[[], bytes]) -> bytes:
-    """The bytes of such a library, where nothing can be kept too; raises what `compiled` raises."""
-    path = _place(folder, sources, how)
+def cached_content(folder: str, sources: Mapping[str, bytes], how: Any, compiled: Callable[[], bytes]) -> bytes:
+    """The bytes of such a library, also where the cache is not writable; raises what `compiled` raises."""
+    path = _cache_path(folder, sources, how)
     with contextlib.suppress(OSError):
         return path.read_bytes()
-    made = compiled()
+    library = compiled()
     with contextlib.suppress(OSError):
-        _keep(path, made)
-    return made
+        _write(path, library)
+    return library
 
 
-def _place(folder: str, sources: Mapping[str, bytes], how: Any) -> Path:
-    """By all that decides what is in it."""
+def _cache_path(folder: str, sources: Mapping[str, bytes], how: Any) -> Path:
+    """The path of a library: a hash of all that its content depends on."""
     import platformdirs
 
     cc = Path(shutil.which("cc") or "").resolve()
@@ -45,14 +45,14 @@ def _place(folder: str, sources: Mapping[str, bytes], how: Any) -> Path:
 
 @functools.cache
 def _processor() -> tuple[str, ...]:
-    """What this machine's processor can do: machines of a cluster share a cache, and differ in their instructions."""
-    about = Path("/proc/cpuinfo")
-    lines = about.read_text().splitlines() if about.is_file() else [platform.processor()]
+    """The instruction sets of this machine: machines of a cluster share a cache, but may have different processors."""
+    info = Path("/proc/cpuinfo")
+    lines = info.read_text().splitlines() if info.is_file() else [platform.processor()]
     return platform.machine(), *sorted({line for line in lines if line.lower().startswith(("flags", "features"))})
 
 
-def _keep(path: Path, content: bytes) -> None:
-    """Whole or not at all, whoever else makes it at the same time."""
+def _write(path: Path, content: bytes) -> None:
+    """Write a library atomically, since other processes may write it at the same time."""
     path.parent.mkdir(parents=True, exist_ok=True)
     fresh = path.with_name(f"{path.name}.{os.getpid()}")
     fresh.write_bytes(content)

@@ -1,7 +1,7 @@
 /* The library that a host on Linux opens as MODEL.so. The library of pythonfmu, which lies beside it, leaves the
-   symbols of Python open: in a host that is not Python it cannot even be opened. So this one finds a Python, opens it
-   for all to see, opens that library, and passes every call on. Before, it checks what pythonfmu does not: the GUID,
-   that texts are UTF-8, that the resources are where the URI says. */
+   symbols of Python undefined: a host that is not Python cannot even open it. So this one finds a Python, opens it
+   with global symbols, opens that library, and forwards every call. Before, it checks what pythonfmu does not: the
+   GUID, that texts are UTF-8, and that the resources are where the URI points. */
 
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -18,7 +18,7 @@
 
 #define EXPORT __attribute__((visibility("default")))
 
-enum { OLDEST_MINOR = 10, NEWEST_MINOR = 30, LONGEST = 4096 }; /* Python 3.10; what may yet come; of a path */
+enum { OLDEST_MINOR = 10, NEWEST_MINOR = 30, LONGEST = 4096 }; /* Python 3.10; future versions; length of a path */
 enum { ERROR = 3 };
 
 #define VARIABLE "QUADCOSIM_LIBPYTHON"
@@ -36,7 +36,7 @@ typedef struct {
     void *environment;
 } Callbacks;
 
-/* -- what is passed on ---------------------------------------------------------------------------------------- */
+/* -- forwarded calls ------------------------------------------------------------------------------------------ */
 
 #define VALUES(kind, type) \
     CALL(Get##kind, (void *c, References vr, size_t n, type *value), (c, vr, n, value)) \
@@ -103,16 +103,16 @@ void fmi2FreeInstance(void *c)
         opened.FreeInstance(c);
 }
 
-EXPORT void finalizePythonInterpreter(void); /* what a host that is Python calls before it ends */
+EXPORT void finalizePythonInterpreter(void); /* called by a host that is Python before it ends */
 void finalizePythonInterpreter(void)
 {
     if (opened.finalize)
         opened.finalize();
 }
 
-/* -- a Python --------------------------------------------------------------------------------------------------- */
+/* -- finding a Python ------------------------------------------------------------------------------------------- */
 
-static char problem[LONGEST + 512]; /* why there is none; written under the lock */
+static char problem[LONGEST + 512]; /* why none was found; written under the lock */
 
 static void *failed(Text format, ...)
 {
@@ -129,7 +129,7 @@ static void find(void *library, Text name, void *function)
     memcpy(function, &symbol, sizeof symbol); /* ISO C has no cast from object to function pointers */
 }
 
-/* The minor version of the Python that a library, or all that is in sight, is; 0 if it cannot run an FMU. */
+/* The minor version of the Python in a library, or in the global scope; 0 if it cannot run an FMU. */
 static int version_of(void *library, Text path)
 {
     Text (*version)(void);
@@ -146,8 +146,8 @@ static int version_of(void *library, Text path)
     return 0;
 }
 
-/* Whether PYTHONHOME, if it is set, is for that version: Python ends the process where it finds no standard library. */
-static int finds_its_home(int minor)
+/* Whether PYTHONHOME, if set, is for that version: Python ends the process if it finds no standard library. */
+static int home_is_valid(int minor)
 {
     static const Text places[] = {"lib/python3.%d/os.py", "lib64/python3.%d/os.py", "lib/python3%d.zip"};
     const Text home = getenv("PYTHONHOME");
@@ -166,7 +166,7 @@ static int finds_its_home(int minor)
 
 #define STARTED "QUADCOSIM_STARTED_PYTHON" /* the process, not a Python program, in which an FMU has started Python */
 
-/* Whether the host is a Python program; told at the first FMU, since that one starts Python where none runs. */
+/* Whether the host is a Python program; decided at the first FMU, which starts Python where none runs. */
 static int in_python_program(void)
 {
     char process[32];
@@ -182,13 +182,13 @@ static int in_python_program(void)
     return 0;
 }
 
-static void *opened_for_all(Text path)
+static void *open_globally(Text path)
 {
     void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     if (!library)
         return failed("%s", dlerror());
     const int minor = version_of(library, path);
-    if (!minor || !finds_its_home(minor)) {
+    if (!minor || !home_is_valid(minor)) {
         dlclose(library);
         return NULL;
     }
@@ -205,8 +205,8 @@ static int is_python(struct dl_phdr_info *info, size_t size, void *path)
     return 1;
 }
 
-/* What `python3` says of itself, line by line: where it is installed, and where its library may be. */
-static void ask_python(char *answer, size_t size)
+/* Where `python3` is installed and where its library may be, line by line, as it reports itself. */
+static void query_python(char *answer, size_t size)
 {
     static char program[] = "import os, sys, sysconfig\n"
                             "name = sysconfig.get_config_var('INSTSONAME') or ''\n"
@@ -240,10 +240,10 @@ static void *python_on_path(void)
     static wchar_t home[LONGEST];
     char answer[4 * LONGEST], *rest, *library;
     void *python = NULL, (*set_home)(const wchar_t *);
-    ask_python(answer, sizeof answer);
+    query_python(answer, sizeof answer);
     const Text prefix = strtok_r(answer, "\n", &rest);
     while (prefix && !python && (library = strtok_r(NULL, "\n", &rest)))
-        python = opened_for_all(library);
+        python = open_globally(library);
     if (python && !getenv("PYTHONHOME") && mbstowcs(home, prefix, LONGEST) < LONGEST) {
         find(python, "Py_SetPythonHome", &set_home); /* a python3 on PATH that is a shim would mislead it */
         if (set_home)
@@ -258,22 +258,22 @@ static void *python_of_the_system(void)
     char name[64];
     for (int minor = NEWEST_MINOR; !python && minor >= OLDEST_MINOR; minor--) {
         snprintf(name, sizeof name, "libpython3.%d.so.1.0", minor);
-        python = opened_for_all(name);
+        python = open_globally(name);
     }
     return python;
 }
 
-/* A Python that this process has, or else one that is told, on PATH or known to the loader of the system. */
-static int have_python(void)
+/* Ensure a Python: that of this process, or else one that is configured, on PATH or known to the system's loader. */
+static int ensure_python(void)
 {
     char path[LONGEST];
-    const Text told = getenv(VARIABLE);
+    const Text configured = getenv(VARIABLE);
     if (dlsym(RTLD_DEFAULT, "Py_GetVersion"))
         return version_of(RTLD_DEFAULT, "this process") != 0;
     if (dl_iterate_phdr(is_python, path))
-        return opened_for_all(path) != NULL;
-    if (told && *told)
-        return opened_for_all(told) != NULL;
+        return open_globally(path) != NULL;
+    if (configured && *configured)
+        return open_globally(configured) != NULL;
     if (python_on_path() || python_of_the_system())
         return 1;
     failed("no shared library of Python 3.%d or newer%s, neither of the python3 on PATH nor where libraries are "
@@ -286,7 +286,7 @@ static int have_python(void)
 
 static char folder[LONGEST]; /* of this library, with a slash at its end */
 
-__attribute__((constructor)) static void remember_the_folder(void)
+__attribute__((constructor)) static void store_folder(void)
 {
     Dl_info own;
     char path[LONGEST];
@@ -296,43 +296,43 @@ __attribute__((constructor)) static void remember_the_folder(void)
     }
 }
 
-static void *closing; /* pythonfmu's library, if it goes with this one */
+static void *closing; /* pythonfmu's library, if it is closed with this one */
 
-/* In a Python program, hosts unpack and load an FMU again for each instance: what is unloaded must be gone. In any
-   other, pythonfmu's library holds the Python that runs, so it stays. */
-__attribute__((destructor)) static void close_the_rest(void)
+/* In a Python program, hosts unpack and load an FMU again for each instance, so it must be unloaded completely. In any
+   other, pythonfmu's library owns the running Python, so it stays. */
+__attribute__((destructor)) static void close_pythonfmu(void)
 {
     if (!closing)
         return;
-    finalizePythonInterpreter(); /* pythonfmu frees a pointer twice as it is unloaded, unless it has let go before */
+    finalizePythonInterpreter(); /* otherwise pythonfmu frees a pointer twice as it is unloaded */
     dlclose(closing);
 }
 
-static int open_the_rest(void)
+static int open_pythonfmu(void)
 {
     char path[LONGEST + sizeof BESIDE];
     if (opened.Instantiate)
         return 1;
     const int in_python = in_python_program();
-    if (!have_python())
+    if (!ensure_python())
         return 0;
     snprintf(path, sizeof path, "%s%s", folder, BESIDE);
-    void *rest = dlopen(path, RTLD_NOW | RTLD_LOCAL | (in_python ? 0 : RTLD_NODELETE));
-    if (!rest)
+    void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL | (in_python ? 0 : RTLD_NODELETE));
+    if (!library)
         return failed("%s", dlerror()) != NULL;
-    closing = in_python ? rest : NULL;
-#define CALL(name, parameters, arguments) find(rest, "fmi2" #name, &opened.name);
+    closing = in_python ? library : NULL;
+#define CALL(name, parameters, arguments) find(library, "fmi2" #name, &opened.name);
     CALLS
 #undef CALL
-    find(rest, "fmi2FreeInstance", &opened.FreeInstance);
-    find(rest, "finalizePythonInterpreter", &opened.finalize);
-    find(rest, "fmi2Instantiate", &opened.Instantiate);
+    find(library, "fmi2FreeInstance", &opened.FreeInstance);
+    find(library, "finalizePythonInterpreter", &opened.finalize);
+    find(library, "fmi2Instantiate", &opened.Instantiate);
     return opened.Instantiate != NULL;
 }
 
-/* -- what the host gives ---------------------------------------------------------------------------------------- */
+/* -- arguments of the host -------------------------------------------------------------------------------------- */
 
-/* Whether a text is UTF-8, without surrogates and overlong forms: Python takes no other. */
+/* Whether a text is UTF-8, without surrogates and overlong forms: Python accepts no other. */
 static int is_utf8(Text text)
 {
     for (const unsigned char *at = (const unsigned char *)text; *at;) {
@@ -370,7 +370,7 @@ static void unescape(char *text)
     *to = '\0';
 }
 
-/* A file in the folder of the resources. */
+/* Open a file in the folder of the resources. */
 static FILE *resource(Text resources, Text name)
 {
     char path[LONGEST + 32];
@@ -378,7 +378,7 @@ static FILE *resource(Text resources, Text name)
     return fopen(path, "re");
 }
 
-static int holds_the_fmu(Text resources)
+static int has_fmu_resources(Text resources)
 {
     FILE *file = resource(resources, "slavemodule.txt");
     return file ? fclose(file) == 0 : 0;
@@ -394,12 +394,12 @@ static int find_resources(Text location, char *path)
         unescape(path);
     } else {
         snprintf(path, LONGEST, "%s", start);
-        if (!holds_the_fmu(path)) /* some hosts take off file:// and leave the escapes */
+        if (!has_fmu_resources(path)) /* some hosts remove file:// but not the escapes */
             unescape(path);
     }
     for (char *end = path + strlen(path); end > path + 1 && end[-1] == '/';)
         *--end = '\0';
-    return holds_the_fmu(path);
+    return has_fmu_resources(path);
 }
 
 static int is_guid(Text resources, Text guid, char *expected, int size)
@@ -419,7 +419,7 @@ static void *refuse(const Callbacks *callbacks, Text name, Text format, ...)
     va_start(arguments, format);
     vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
-    for (Text from = text; *from; from++) { /* a message is a format; without arguments, as pythonfmu's are */
+    for (Text from = text; *from; from++) { /* a message is a format without arguments, like pythonfmu's */
         *to++ = *from;
         if (*from == '%')
             *to++ = '%';
@@ -446,7 +446,7 @@ void *fmi2Instantiate(Text name, int kind, Text guid, Text location, const Callb
     if (!is_guid(path, guid, expected, sizeof expected))
         return refuse(callbacks, name, "GUID = %s: expected %s, that of this FMU", guid, expected);
     pthread_mutex_lock(&lock);
-    const int complete = open_the_rest();
+    const int complete = open_pythonfmu();
     memcpy(why, problem, sizeof why);
     pthread_mutex_unlock(&lock);
     if (!complete)

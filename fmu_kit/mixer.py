@@ -1,4 +1,4 @@
-"""Four motors on an X frame: the thrusts that make up a wrench, and the wrench that they make up.
+"""Four motors on an X frame: the thrusts for a wrench, and the wrench of the thrusts.
 
 Body frame forward-right-down, thrust along -z of the body, SI units.
 """
@@ -12,10 +12,10 @@ from fmu_kit.scalar import Scalar
 
 
 class Thrusts(NamedTuple):
-    """Of each motor [N], in the order of PX4 and ArduPilot.
+    """The thrust of each motor [N], in the order of PX4 and ArduPilot.
 
-    Seen from above, the first two turn anticlockwise, so that their drag turns the body to the right, and the others
-    clockwise.
+    Seen from above, the first two propellers turn anticlockwise, so that their drag turns the body to the right; the
+    others turn clockwise.
     """
 
     front_right: Scalar
@@ -26,17 +26,17 @@ class Thrusts(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Mixer:
-    """Where the motors are, at (±arm_x, ±arm_y), and what their propellers do."""
+    """The positions of the motors, (±arm_x, ±arm_y), and the drag of their propellers."""
 
     arm_x: float = 0.0
-    """[m], from the centre to a motor along x of the body; 0, as for all three: not known"""
+    """[m], from the centre to a motor along x of the body; 0 means unknown, here and below"""
     arm_y: float = 0.0
     """[m], along y"""
     drag_to_thrust: float = 0.0
-    """κ_τ [m], torque about z by thrust of a propeller"""
+    """κ_τ [m], torque about z per thrust of a propeller"""
 
     def thrusts(self, wrench: Wrench) -> Thrusts:
-        """What each motor has to give for a wrench, whatever it can."""
+        """The thrusts of the motors for a wrench, without limits."""
         thrust, torque = 0.25 * wrench.thrust, 0.25 * wrench.torque
         roll, pitch, yaw = torque.x / self.arm_y, torque.y / self.arm_x, torque.z / self.drag_to_thrust
         return Thrusts(
@@ -47,7 +47,7 @@ class Mixer:
         )
 
     def wrench(self, thrusts: tuple[Scalar, Scalar, Scalar, Scalar]) -> Wrench:
-        """What the motors exert on the body."""
+        """The wrench that the motors exert on the body."""
         front_right, rear_left, front_left, rear_right = thrusts
         return Wrench(
             front_right + rear_left + front_left + rear_right,

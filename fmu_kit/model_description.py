@@ -1,7 +1,7 @@
 """`modelDescription.xml` from the declarations of a slave.
 
-pythonfmu writes neither units, bounds, initial unknowns nor dependencies, and start values with 16
-digits only; here every number is written in its shortest exact form.
+pythonfmu writes no units, bounds, initial unknowns or dependencies, and start values with only 16 digits; here every
+number is written in its shortest exact form.
 """
 
 import datetime
@@ -14,20 +14,20 @@ from fmu_kit.units import DISPLAYED, base_unit_exponents
 from fmu_kit.variables import Variable
 
 PYTHON_REQUIRED = ">=3.10"
-"""The Pythons that run what an FMU bundles, as a version specifier; it is in every model description."""
+"""The version specifier of the Pythons that run what an FMU bundles; it is in every model description."""
 
 GUID_PLACEHOLDER = "guid-of-the-content"
-"""Stands where packaging writes the GUID, once it knows the content."""
+"""The placeholder that packaging replaces by the GUID of the content."""
 
 
 NATIVE_LOG_CATEGORIES = {"logStatusError": "All other failures."}
-"""Of an FMU without Python inside, beside those of its slave."""
+"""The log categories of an FMU without Python inside, beside those of its slave."""
 
 
 def to_xml(slave: Any, sources: Sequence[str] | None = None) -> Element:
-    """The FMI 2.0 description of a `Slave` class, its GUID still the placeholder.
+    """The FMI 2.0 description of a `Slave` class, with the placeholder as its GUID.
 
-    With `sources`, the files to compile, it is the one of an FMU without Python inside.
+    With `sources`, the files to compile, it describes an FMU without Python inside.
     """
     root = Element("fmiModelDescription", {"fmiVersion": "2.0", "guid": GUID_PLACEHOLDER, **about(slave)})
     kind = SubElement(
@@ -63,16 +63,16 @@ def to_xml(slave: Any, sources: Sequence[str] | None = None) -> Element:
     return root
 
 
-# -- of any version of FMI ----------------------------------------------------------------------------------
+# -- for any version of FMI ---------------------------------------------------------------------------------
 
 
 def about(slave: Any) -> dict[str, str]:
-    """What a description says of the model as a whole."""
-    whose = {name: getattr(slave, name) for name in ("author", "copyright", "license")}
+    """The attributes of a description that concern the model as a whole."""
+    attribution = {name: getattr(slave, name) for name in ("author", "copyright", "license")}
     return {
         "modelName": slave.__name__,
         "description": slave.description,
-        **{name: said for name, said in whose.items() if said},
+        **{name: text for name, text in attribution.items() if text},
         "generationTool": "quadcosim",
         "generationDateAndTime": generation_date(),
         "variableNamingConvention": "structured",
@@ -88,7 +88,7 @@ def generation_date() -> str:
 
 
 def add_units(root: Element, variables: tuple[Variable, ...]) -> None:
-    """The units of variables, by what they are in base units, and what they are displayed in."""
+    """Add the units of variables, in base units, with the units that they are displayed in."""
     definitions = SubElement(root, "UnitDefinitions")
     for name in sorted({v.unit for v in variables if v.unit is not None}):
         unit = SubElement(definitions, "Unit", name=name)
@@ -100,7 +100,7 @@ def add_units(root: Element, variables: tuple[Variable, ...]) -> None:
 
 
 def add_types(root: Element, variables: tuple[Variable, ...], add_type: Callable[[Element, str], Element]) -> None:
-    """The Enumerations of variables with their items; `add_type` adds what holds the items of one, by its name."""
+    """Add the Enumerations of variables with their items; `add_type` adds the element for the items of one, by name."""
     found = {v.declared_type: v.items for v in variables if v.declared_type is not None}
     if not found:
         return
@@ -112,14 +112,14 @@ def add_types(root: Element, variables: tuple[Variable, ...], add_type: Callable
 
 
 def add_log_categories(root: Element, descriptions: Mapping[str, str]) -> None:
-    """The categories of messages, by name with what they are for."""
+    """Add the log categories, by name with their descriptions."""
     categories = SubElement(root, "LogCategories")
     for name, description in descriptions.items():
         SubElement(categories, "Category", name=name, description=description)
 
 
 def add_experiment(root: Element, slave: Any) -> None:
-    """The default experiment of a slave."""
+    """Add the default experiment of a slave."""
     experiment = slave.default_experiment
     SubElement(
         root,
@@ -131,7 +131,7 @@ def add_experiment(root: Element, slave: Any) -> None:
 
 
 def attributes(variable: Variable, value_reference: int) -> dict[str, str]:
-    """What a variable is, whatever its type."""
+    """The attributes of a variable that do not depend on its type."""
     found = {
         "name": variable.name,
         "valueReference": str(value_reference),
@@ -145,7 +145,7 @@ def attributes(variable: Variable, value_reference: int) -> dict[str, str]:
 
 
 def type_attributes(variable: Variable) -> dict[str, str]:
-    """Declared type, start, quantity, units, bounds and usual size of a variable."""
+    """Declared type, start, quantity, units, bounds and nominal value of a variable."""
     numbers = {
         "start": variable.start if variable.has_start else None,
         "min": variable.minimum if variable.minimum is not None else variable.above,
@@ -159,11 +159,11 @@ def type_attributes(variable: Variable) -> dict[str, str]:
         "displayUnit": variable.displayed_in,
         **{name: None if number is None else _literal(number) for name, number in numbers.items()},
     }
-    return {name: said for name, said in found.items() if said is not None}
+    return {name: text for name, text in found.items() if text is not None}
 
 
 def initial_dependencies(slave: Any) -> dict[int, list[int]]:
-    """By the value reference of each output, those of what it depends on when initialisation ends, in their order."""
+    """For each output, the inputs and parameters on which it depends when initialisation ends, as value references."""
     names = [v.name for v in slave.variables]
     given = [i for i, v in enumerate(slave.variables) if v.is_settable]
     known = {i: slave.initial_dependencies(v.name) for i, v in enumerate(slave.variables) if v.causality == "output"}
@@ -181,7 +181,7 @@ def _literal(value: float | int | bool) -> str:
 
 
 def _add_structure(root: Element, slave: Any) -> None:
-    """FMI 2.0 names variables by their place in the list, from 1."""
+    """Add the model structure; FMI 2.0 refers to variables by their position in the list, from 1."""
     structure = SubElement(root, "ModelStructure")
     known = initial_dependencies(slave)
     listed = SubElement(structure, "Outputs")

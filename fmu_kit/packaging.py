@@ -1,12 +1,12 @@
-"""Packing a slave as an .fmu: same sources, same bytes, and no name that another FMU could answer to.
+"""Packing a slave as an .fmu: the same sources give the same bytes, and no module name can clash with another FMU's.
 
-At run time pythonfmu puts an FMU's `resources` first on `sys.path` and imports its module by name, in an
-interpreter that all FMUs and the host share. So everything that an FMU brings along, pythonfmu's own
-Python files and the entry script included, lives in one package whose name carries the hash of its
-content. That, and a reproducible archive, is why pythonfmu's builder is not used: it packs plain names
-and refuses a slave whose base class has been renamed. Its slave base and its binaries are used as they are.
+At run time pythonfmu puts an FMU's `resources` first on `sys.path` and imports its module by name, in an interpreter
+that all FMUs and the host share. So all Python that an FMU contains, pythonfmu's own and the entry script included,
+lies in one package whose name has the hash of its content. For that, and for a reproducible archive, pythonfmu's
+builder is not used: it packs plain names and refuses a slave whose base class has been renamed. Its slave base and its
+binaries are used unchanged.
 
-Packing imports the slave, so it runs in a process of its own: `python -m fmu_kit.packaging`.
+Packing imports the slave, so it runs in a separate process: `python -m fmu_kit.packaging`.
 """
 
 import hashlib
@@ -27,8 +27,8 @@ from xml.etree.ElementTree import Element, ParseError, fromstring, tostring
 
 from fmu_kit import archive, bundle, documentation, loader
 from fmu_kit.archive import ICONS, PAGE, SOURCE_HASH_FILE, VARIANT_FILE, content_guid, write_archive
-from fmu_kit.bundle import PackagingError, Target, bundled_sources, module_path, place, renamed
-from fmu_kit.documentation import Making
+from fmu_kit.bundle import PackagingError, Target, bundled_sources, module_path, path_in_bundle, rename_imports
+from fmu_kit.documentation import BuildNotes
 from fmu_kit.errors import FmuError
 from fmu_kit.failure import place_of
 from fmu_kit.model_description import GUID_PLACEHOLDER, PYTHON_REQUIRED, to_xml
@@ -49,10 +49,10 @@ import sys
 if sys.version_info < {oldest}:
     raise ImportError("{model}.fmu: expected Python {required}, found " + sys.version.split()[0])
 
-from {bundle}.fmu_kit.failure import keep
+from {bundle}.fmu_kit.failure import restore_reference
 from {bundle}.{module} import {model} as Model
 
-keep(globals())
+restore_reference(globals())
 
 
 class {model}(Model):
@@ -65,7 +65,7 @@ class {model}(Model):
 
 
 def source_hash(target: Target) -> str:
-    """The hash of all that decides the content of the FMU: its modules and other files, and the packaging itself."""
+    """The hash of all that the content of the FMU depends on: its modules and other files, and the packaging."""
     own = (
         Path(__file__),
         Path(archive.__file__),
@@ -80,7 +80,7 @@ def source_hash(target: Target) -> str:
 
 
 def hash_of(target: Target, packaging: Iterable[Path], facts: dict[str, str], unchanged: dict[str, bytes]) -> str:
-    """The hash of what a slave's modules are, of the files that pack it, of facts, and of what is packed as it is."""
+    """The hash of a slave's modules, of the packaging's files, of `facts`, and of the files packed unchanged."""
     digest = hashlib.sha256()
     texts = bundled_sources(target) | {_place_in_kit(path): _text(path) for path in packaging}
     texts |= {"tool": generation_tool(), **facts}
@@ -96,7 +96,7 @@ def _place_in_kit(path: Path) -> str:
 
 
 def origin(target: Target, digest: str) -> dict[str, bytes]:
-    """What an FMU says of where it comes from, by the place there: the hash of its sources; of what it is a variant."""
+    """The files, by path, that record an FMU's origin: the hash of its sources, and for a variant its slave."""
     files = {SOURCE_HASH_FILE: digest.encode()}
     if target.variant is not None:
         files[VARIANT_FILE] = json.dumps([f"{target.module}:{target.model}", target.variant.text]).encode()
@@ -104,31 +104,31 @@ def origin(target: Target, digest: str) -> dict[str, bytes]:
 
 
 def build(target: Target, folder: Path) -> Path:
-    """Write `folder`/Model.fmu, replacing it in one go, and return its path."""
+    """Write `folder`/Model.fmu, replacing it atomically, and return its path."""
     sources = bundled_sources(target)
     digest = source_hash(target)
     name = f"quadcosim_{digest[:16]}"
     entry = f"{name}_entry"
-    files = {f"resources/{name}/{path}": renamed(text, name, target).encode() for path, text in sources.items()}
+    files = {f"resources/{name}/{path}": rename_imports(text, name, target).encode() for path, text in sources.items()}
     files[f"resources/{name}/__init__.py"] = b""
     files[f"resources/{entry}.py"] = _entry(name, target).encode()
     files["resources/slavemodule.txt"] = entry.encode()
     files |= origin(target, digest)
     files |= _with_loader(unchanged_files(target), target.name)
-    making = Making(
+    notes = BuildNotes(
         needs=documentation.IN_PYTHON,
-        source=f"../resources/{name}/{place(target.module, target.root)}",
+        source=f"../resources/{name}/{path_in_bundle(target.module, target.root)}",
         status="fmi2Fatal",
         afterwards="After a failure, do not call the instance again: make a new one.",
     )
-    described(files, target, making, to_xml(slave_class(target)))
-    files[loader.GUID_FILE] = put_guid(files).encode()
-    return written(files, target, folder)
+    add_description(files, target, notes, to_xml(slave_class(target)))
+    files[loader.GUID_FILE] = insert_guid(files).encode()
+    return write_fmu(files, target, folder)
 
 
-def described(files: dict[str, bytes], target: Target, making: Making, description: Element) -> None:
+def add_description(files: dict[str, bytes], target: Target, notes: BuildNotes, description: Element) -> None:
     """Add the description and the page of a slave to the files of its FMU; raises `PackagingError` for dead links."""
-    page = documentation.to_html(slave_class(target), making, _well_formed_fragment(target))
+    page = documentation.to_html(slave_class(target), notes, _well_formed_fragment(target))
     files[PAGE] = page.encode()
     for link in documentation.files_linked(page):
         if posixpath.normpath(posixpath.join(posixpath.dirname(PAGE), link)) not in files:
@@ -140,15 +140,15 @@ def described(files: dict[str, bytes], target: Target, making: Making, descripti
     files["modelDescription.xml"] = text
 
 
-def put_guid(files: dict[str, bytes]) -> str:
-    """Put the GUID of the content into the description, and return it."""
+def insert_guid(files: dict[str, bytes]) -> str:
+    """Insert the GUID of the content into the description, and return it."""
     guid = content_guid(files)
     files["modelDescription.xml"] = files["modelDescription.xml"].replace(GUID_PLACEHOLDER.encode(), guid.encode())
     return guid
 
 
-def written(files: dict[str, bytes], target: Target, folder: Path) -> Path:
-    """Write the FMU, replacing it in one go, and return its path."""
+def write_fmu(files: dict[str, bytes], target: Target, folder: Path) -> Path:
+    """Write the FMU, replacing it atomically, and return its path."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{target.name}.fmu"
     temporary = path.with_suffix(f".{os.getpid()}.partial")
@@ -158,13 +158,13 @@ def written(files: dict[str, bytes], target: Target, folder: Path) -> Path:
 
 
 def _entry(bundle: str, target: Target) -> str:
-    """The module that pythonfmu runs; nothing in it is newer than the oldest Python that could load it."""
+    """The module that pythonfmu runs; its syntax is that of the oldest Python that could load it."""
     oldest = tuple(map(int, PYTHON_REQUIRED.removeprefix(">=").split(".")))
     return _ENTRY.format(bundle=bundle, module=target.entry, model=target.name, oldest=oldest, required=PYTHON_REQUIRED)
 
 
 def slave_class(target: Target) -> Any:
-    """The class; raises `PackagingError` if its module does not run, or if it does not say what it is and does."""
+    """The class; raises `PackagingError` if its module fails, or if the class is abstract or has no description."""
     try:
         slave = getattr(importlib.import_module(target.module), target.model, None)
     except Exception as error:
@@ -180,18 +180,18 @@ def slave_class(target: Target) -> Any:
 
 
 def _variant(slave: Any, variant: Variant) -> Any:
-    """The class with values that are fixed; raises `PackagingError` for those that it refuses."""
-    about = {"fixed": dict(variant.fixed), "description": variant.described(slave.__name__)}
+    """The class with fixed values; raises `PackagingError` for values that it refuses."""
+    attributes = {"fixed": dict(variant.fixed), "description": variant.describe(slave.__name__)}
     try:
-        made = type(variant.name, (slave,), {**about, "__module__": slave.__module__})
-        made(instance_name=variant.name)._take_parameters()
+        subclass = type(variant.name, (slave,), {**attributes, "__module__": slave.__module__})
+        subclass(instance_name=variant.name)._take_parameters()
     except FmuError as error:
         raise PackagingError(f"{variant.name}: {error}") from error
-    return made
+    return subclass
 
 
 def _binaries(model: str) -> dict[str, bytes]:
-    """pythonfmu's binaries, by their place in the FMU of `model`."""
+    """pythonfmu's binaries, by path in the FMU of `model`."""
     folder = module_path("pythonfmu").parent / "resources" / "binaries"
     return {
         f"binaries/{path.parent.name}/{model}{path.suffix}": path.read_bytes()
@@ -201,9 +201,9 @@ def _binaries(model: str) -> dict[str, bytes]:
 
 
 def _with_loader(files: dict[str, bytes], model: str) -> dict[str, bytes]:
-    """The files with the loader before pythonfmu's library for Linux; as they are where it cannot be compiled."""
+    """The files with the loader in front of pythonfmu's library for Linux; unchanged where it cannot be compiled."""
     try:
-        return loader.packed(files, model)
+        return loader.with_loader(files, model)
     except loader.LoaderError as error:
         print(
             f"{model}.fmu: packed without its loader ({error}); a host that is not Python must load Python itself",
@@ -213,14 +213,14 @@ def _with_loader(files: dict[str, bytes], model: str) -> dict[str, bytes]:
 
 
 def unchanged_files(target: Target) -> dict[str, bytes]:
-    """What goes into the FMU as it is, by its place there: binaries, licences, the slave's icon if it has one."""
+    """The files packed unchanged, by path in the FMU: binaries, licences, the slave's icon if it has one."""
     return {**_binaries(target.name), **licences_and_icon(target, pythonfmu=_license_of_pythonfmu())}
 
 
 def licences_and_icon(target: Target, version: int = 2, **others: str) -> dict[str, bytes]:
-    """The licence of quadcosim and those of others by name, a list of them, and the slave's icon if it has one.
+    """The licences, with a list of them, and the slave's icon if it has one, by path in an FMU of a version of FMI.
 
-    Each at its place in an FMU of a version of FMI.
+    `others`: the texts of licences beside that of quadcosim, by name.
     """
     texts = {"quadcosim": _text(Path(__file__).with_name("LICENSE")), **others}
     texts["license"] = "".join(f"{name}.txt: {_LICENCES[name]}\n" for name in texts) + _LICENCE_OF_THE_MODEL
@@ -231,10 +231,10 @@ def licences_and_icon(target: Target, version: int = 2, **others: str) -> dict[s
 
 
 def fragment_of(target: Target) -> str:
-    """The part of the documentation written by hand; empty if there is none.
+    """The hand-written part of the documentation; empty if there is none.
 
-    `<?include PATH?>` in it stands for a file that several may share: from the folder of the slave, or else of this
-    package.
+    `<?include PATH?>` in it is replaced by that file, which several slaves may share, from the folder of the slave or
+    else of this package.
     """
 
     def shared(found: re.Match[str]) -> str:
@@ -246,7 +246,7 @@ def fragment_of(target: Target) -> str:
 
 
 def _well_formed_fragment(target: Target) -> str:
-    """The same; raises `PackagingError` if the page would not be well-formed XML with it."""
+    """The hand-written part of the documentation; raises `PackagingError` if it is not well-formed XML."""
     fragment = fragment_of(target)
     try:
         fromstring(f"<body>{fragment}</body>")
@@ -256,12 +256,12 @@ def _well_formed_fragment(target: Target) -> str:
 
 
 def _text(path: Path) -> str:
-    """The text of a file, lines ending the same on every system."""
+    """The text of a file, with the same line ends on every system."""
     return path.read_text(encoding="utf-8")
 
 
 def _license_of_pythonfmu() -> str:
-    """Its licence, which must go with every copy of it."""
+    """The licence of pythonfmu, which must go with every copy of it."""
     distribution = importlib.metadata.distribution("pythonfmu")
     text = distribution.read_text("licenses/LICENSE") or distribution.read_text("LICENSE")
     if text is None:
@@ -272,7 +272,7 @@ def _license_of_pythonfmu() -> str:
 def main(arguments: list[str], build: Callable[[Target, Path], Path] = build) -> int:
     """`python -m fmu_kit.packaging FOLDER [--root ROOT] [--variant TEXT] MODULE:CLASS …`: build each, print its path.
 
-    ROOT is the folder in which modules are found before all others, TEXT that of a `Variant`.
+    ROOT is the folder that is searched for modules first, TEXT that of a `Variant`.
     """
     folder, *targets = arguments
     root, variant = None, None

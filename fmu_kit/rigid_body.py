@@ -1,4 +1,4 @@
-"""The rigid body (4)-(5), as pure functions of state and parameters: the plant's equations, and a controller's model.
+"""The rigid body (4)-(5), as pure functions of state and parameters, for the plant and for the model of a controller.
 
 Inertial frame north-east-down, body frame forward-right-down, thrust along -z of the body, SI units.
 """
@@ -13,7 +13,7 @@ from fmu_kit.scalar import FLOAT, Scalar, ScalarOps
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Body:
-    """A rigid body in a uniform field of gravity."""
+    """A rigid body in uniform gravity."""
 
     mass: float = 1.0
     """m [kg]"""
@@ -28,7 +28,7 @@ class Body:
 
 
 class Wrench(NamedTuple):
-    """What the propellers exert."""
+    """Thrust and torque of the propellers."""
 
     thrust: Scalar
     """T [N], along -z of the body"""
@@ -37,7 +37,7 @@ class Wrench(NamedTuple):
 
 
 class RigidState:
-    """Motion of the body, and equally its time derivative."""
+    """The motion of the body, or its time derivative."""
 
     __slots__ = ("angular_velocity", "position", "quaternion", "velocity")
 

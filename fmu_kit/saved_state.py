@@ -1,7 +1,7 @@
-"""What a saved state must look like before a slave takes it over: it may come from a file that was damaged or made up.
+"""Checks of a saved state before a slave restores it: it may come from a file that was damaged or forged.
 
-The native part of pythonfmu 0.7.0 reads values of other types than a variable's without looking, and cannot free
-the class after an exception while it makes or writes a state.
+The native part of pythonfmu 0.7.0 reads values without checking their types, and cannot free the class after an
+exception while it creates or writes a state.
 """
 
 import json
@@ -15,7 +15,7 @@ from fmu_kit.variables import Variable
 State = dict[str, Any]  # of JSON types only: it is serialised as JSON
 
 DEEPEST = 8
-"""Levels of lists and dictionaries in a state; the states of slaves have less than half of them."""
+"""Allowed levels of lists and dictionaries in a state; the states of slaves have less than half as many."""
 
 _KEPT: dict[str, tuple[type, ...]] = {
     "phase": (int,),
@@ -27,16 +27,16 @@ _KEPT: dict[str, tuple[type, ...]] = {
 }
 _INTEGERS = range(-(2**31), 2**31)
 _CHECKSUM, DAMAGED = "checksum", "damaged"
-"""Beside the parts of a state: the checksum in its bytes; that they have another one"""
+"""Keys beside the parts of a state: its checksum, and that the checksum does not match"""
 
 
-def serialised(state: State) -> bytes:
-    """The bytes of a state, with a checksum of it."""
+def serialise(state: State) -> bytes:
+    """The bytes of a state, with its checksum."""
     return json.dumps({_CHECKSUM: _checksum(state), **state}).encode("utf-8")
 
 
-def parsed(content: bytes) -> State:
-    """The state that was serialised; one that `expect_state` refuses if `content` is anything else. Never raises."""
+def deserialise(content: bytes) -> State:
+    """The state that was serialised, or one that `expect_state` refuses if `content` is anything else. Never raises."""
     try:
         state = json.loads(content.decode("utf-8"))
     except Exception:
@@ -48,7 +48,7 @@ def parsed(content: bytes) -> State:
 
 
 def expect_state(state: State, model: str, variables: Sequence[Variable]) -> None:
-    """Raise `FmuError` unless `state` has all that a slave saves, of the types that it saves."""
+    """Raise `FmuError` unless `state` has all parts that a slave saves, with the right types."""
     reals = [v for v in variables if v.type == "Real"]
     given = state.get("reals", ())
     found = (state.get("model"), len(given) if isinstance(given, list | tuple) else 0)
@@ -78,7 +78,7 @@ def _checksum(state: State) -> int:
 
 
 def _by_reference(pairs: Any) -> dict[int, Any]:
-    """Values by reference, from a list of pairs."""
+    """Values by value reference, from a list of pairs."""
     try:
         return {int(vr): value for vr, value in pairs}
     except (TypeError, ValueError, OverflowError):
@@ -86,7 +86,7 @@ def _by_reference(pairs: Any) -> dict[int, Any]:
 
 
 def _is_shallow(value: Any, levels: int) -> bool:
-    """Whether lists and dictionaries are nested in `levels` levels at most."""
+    """Whether lists and dictionaries are nested at most `levels` deep."""
     if not isinstance(value, list | dict):
         return True
     inner = value.values() if isinstance(value, dict) else value

@@ -1,8 +1,8 @@
-"""What the equations need of a scalar beyond arithmetic, so that they do not care which kind it is.
+"""The functions of scalars that the equations need beyond arithmetic, for any kind of scalar.
 
-Laws and dynamics are written once, on `+ - * / **` and the functions of a `ScalarOps`. An FMU passes
-`FLOAT` (the standard library); a batch of points passes the same functions of numpy, a derivation
-those of a computer-algebra system. Nothing here imports either.
+Laws and dynamics are written once, with `+ - * / **` and the functions of a `ScalarOps`. An FMU passes `FLOAT` (the
+standard library); a batch of points passes numpy's functions, a derivation those of a computer algebra system. This
+module imports neither.
 """
 
 import math
@@ -26,9 +26,9 @@ class ScalarOps:
     maximum: Callable[[Scalar, Scalar], Scalar]
     where: Callable[[Any, Scalar, Scalar], Scalar]
     all: Callable[[Any], Any]
-    """Whether a condition holds, as one truth value: at every point of a batch."""
+    """Whether a condition holds, as one truth value; for a batch, at every point."""
     resolution: float = 2.0**-53
-    """Of a number about 1: what rounding may change."""
+    """The rounding error of a number about 1."""
 
 
 FLOAT = ScalarOps(
@@ -42,16 +42,16 @@ FLOAT = ScalarOps(
     where=lambda condition, a, b: a if condition else b,
     all=bool,
 )
-"""Python floats, through the standard library."""
+"""Functions of Python floats, from the standard library."""
 
 
 _State = TypeVar("_State")
 
 
 def repeat(count: int, body: Callable[[int, _State], _State], state: _State) -> _State:
-    """`state = body(i, state)` for i = 0 … count - 1: a loop that becomes one in C where `count` is computed.
+    """`state = body(i, state)` for i = 0 … count - 1: a loop that remains a loop in C, where `count` may be computed.
 
-    `body` may depend on the state in no other way, and returns one of the same structure.
+    `body` must get the state only as its argument, and return one of the same structure.
     """
     for i in range(count):
         state = body(i, state)

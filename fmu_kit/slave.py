@@ -1,8 +1,8 @@
-"""The base of every slave: what FMI asks of an FMU and pythonfmu 0.7.0 leaves to its user.
+"""The base class of slaves: what FMI requires of an FMU and pythonfmu 0.7.0 leaves to its user.
 
-A model declares its variables and defines `step`; all else is for those that need it: `read_parameters`, `initialise`,
-and, for what it keeps beside the variables, `internal_state` and `restore`. This class keeps the values in a list,
-checks every call and turns any failure into one readable message.
+A model declares its variables and defines `step`. The other methods are optional: `read_parameters`, `initialise`, and,
+for state beside the variables, `internal_state` and `restore`. This class keeps the values in a list, checks every call
+and turns any failure into one readable message.
 """
 
 import contextlib
@@ -23,8 +23,8 @@ from pythonfmu.fmi2slave import Fmi2Slave
 from fmu_kit import model_description
 from fmu_kit.errors import DivergenceError, FmuError, require
 from fmu_kit.failure import Failure, printf_safe, report
-from fmu_kit.interface import Declared, declared_in, initial_values, variables_of
-from fmu_kit.saved_state import State, expect_state, parsed, serialised
+from fmu_kit.interface import Declaration, declarations_in, initial_values, variables_of
+from fmu_kit.saved_state import State, deserialise, expect_state, serialise
 from fmu_kit.scalar import FLOAT
 from fmu_kit.unloading import release_at_exit
 from fmu_kit.variables import INDEX, Variable
@@ -32,7 +32,7 @@ from fmu_kit.variants import Value
 
 
 class Phase(enum.IntEnum):
-    """Where in its life an instance is (FMI 2.0, section 4.2.4)."""
+    """The phase of an instance's life cycle (FMI 2.0, section 4.2.4)."""
 
     INSTANTIATED = 0
     INITIALIZATION = 1
@@ -42,20 +42,20 @@ class Phase(enum.IntEnum):
 
 
 TIME_TOLERANCE = 1e-9
-"""Relative, and of times below a second in seconds; masters add up times, or round them"""
+"""Relative; in seconds for times below one. Masters accumulate times, or round them"""
 
 _Method = TypeVar("_Method", bound=Callable[..., Any])
 
 
 def guarded(method: _Method) -> _Method:
-    """Let no exception of `method` out but as the readable failure of this instance."""
+    """Convert every exception of `method` into the readable failure of this instance."""
 
     @functools.wraps(method)
     def call(self: "Slave", *args: Any) -> Any:
         try:
             return method(self, *args)
         except Exception as error:
-            raise self._failed(error) from None
+            raise self._failure_of(error) from None
 
     return call  # type: ignore[return-value]
 
@@ -69,28 +69,28 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     """
 
     variables: ClassVar[tuple[Variable, ...]] = ()
-    """By value reference, Reals first."""
+    """The variables by value reference, Reals first."""
     fixed: ClassVar[Mapping[str, Value]] = {}
     """Parameters that are constants of the FMU, by their FMI names."""
     description: ClassVar[str]
-    """Of the FMU, in a line; the first of the docstring, unless told."""
+    """Of the FMU, in one line; default: the first sentence of the docstring."""
     initial_outputs_depend_on_inputs: ClassVar[bool | None] = None
-    """Whether the first outputs, those at the end of initialisation, depend on the inputs. Later ones never do.
-    Unless told, they do if the model defines `initialise`."""
+    """Whether the outputs at the end of initialisation depend on the inputs; later ones never do directly.
+    Default: they do if the model defines `initialise`."""
     initially_idle: ClassVar[frozenset[str]] = frozenset()
-    """Inputs and parameters on which not even the first outputs depend."""
+    """Inputs and parameters on which not even the initial outputs depend."""
 
-    usually: ClassVar[Mapping[str, float | int | bool]] = {}
-    """Parameters that a master which computes many runs in lanes sets, by name, where they differ from their starts:
-    the straight line of a step is that of a slave which has these."""
+    usual_parameters: ClassVar[Mapping[str, float | int | bool]] = {}
+    """Values of parameters, by name, that a master sets when it computes many runs in SIMD lanes, where they differ
+    from the start values: steps in lanes are optimised for these."""
 
     author: ClassVar[str] = ""
     license: ClassVar[str] = ""
     copyright: ClassVar[str] = ""
-    """Of the model; each is left out of the description of the FMU where it is empty."""
+    """Attribution of the model; empty texts are left out of the description of the FMU."""
     default_experiment = DefaultExperiment(start_time=0.0, stop_time=30.0, step_size=0.01)
-    # Those that messages carry. All other failures have none: the native part logs them itself, and hides them
-    # from a master that asks for categories.
+    # All other failures have no category: the native part logs them itself, and hides them from a master that selects
+    # categories.
     log_categories: ClassVar[dict[str, str]] = {
         "logStatusWarning": "What the user should know about how the FMU is used.",
         "divergence": "Failures because the closed loop diverged: a state that is not finite, "
@@ -105,10 +105,10 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             raise TypeError(
                 f"{cls.__name__}.variables: expected variables as attributes, as fmu_kit.interface has them"
             )
-        declared = declared_in(cls)
+        declared = declarations_in(cls)
         _expect_free_names(cls, declared)
         if declared == getattr(cls, "_declared", None) and "fixed" not in cls.__dict__:
-            return  # as its base has them: pythonfmu 0.7.0 keeps the class of each instance for ever, so it has little
+            return  # those of its base: pythonfmu 0.7.0 leaks the class of each instance, so it should be small
         cls.variables, cls._initial = _with_fixed(cls, variables_of(declared)), initial_values(declared)
         cls._index = {v.name: i for i, v in enumerate(cls.variables)}
         for i, variable in enumerate(cls.variables):
@@ -116,33 +116,33 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
                 raise TypeError(f"{cls.__name__}.{variable.name}: expected one variable of this name")
         for each in declared:
             setattr(cls, each.attribute, each.at(cls._index[each.first]))
-        cls._declared = declared_in(cls)
-        cls._own = tuple(each.attribute for each in declared if each.own)
+        cls._declared = declarations_in(cls)
+        cls._own = tuple(each.attribute for each in declared if each.set_by_slave)
         cls._real_count = sum(v.type == "Real" for v in cls.variables)
         cls._readable = frozenset(range(cls._real_count))
-        cls._given = frozenset(i for i, v in enumerate(cls.variables) if v.has_start)
+        cls._with_start = frozenset(i for i, v in enumerate(cls.variables) if v.has_start)
         cls._inputs = frozenset(i for i, v in enumerate(cls.variables) if v.causality == "input")
         cls._tunable = frozenset(i for i, v in enumerate(cls.variables) if v.variability == "tunable")
         chosen = [(i, v.name) for i, v in enumerate(cls.variables) if v.items and v.is_settable]
         cls._indices = {i: cls._index[f"{name}{INDEX}"] for i, name in chosen}
 
-    _declared: ClassVar[list[Declared]]
+    _declared: ClassVar[list[Declaration]]
     _own: ClassVar[tuple[str, ...]]
-    """The variables that a slave sets itself, as attributes."""
+    """The attributes that a slave sets itself."""
     _initial: ClassVar[dict[str, str]]
     _index: ClassVar[dict[str, int]]
     _real_count: ClassVar[int]
     _readable: ClassVar[frozenset[int]]
-    _given: ClassVar[frozenset[int]]
+    _with_start: ClassVar[frozenset[int]]
     _inputs: ClassVar[frozenset[int]]
     _tunable: ClassVar[frozenset[int]]
     _indices: ClassVar[dict[int, int]]
-    """of each Enumeration, the Integer beside it"""
+    """the Integer of each Enumeration"""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**{"instance_name": type(self).__name__, **kwargs})
-        # All imports are done: the host's import path is left as it was before pythonfmu added to it. In one
-        # call, which no other thread can come between; after a reset and while building there is nothing to remove.
+        # All imports are done: restore the host's import path, to which pythonfmu added. One call, which other threads
+        # cannot interrupt; after a reset and while building there is nothing to remove.
         with contextlib.suppress(ValueError):
             sys.path.remove(self.resources)
         release_at_exit(self.resources, type(self).__name__)
@@ -154,24 +154,23 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._phase = Phase.INSTANTIATED
         self._initialised = False
         self._start_time, self._stop_time = 0.0, math.inf
-        self._reached: float | None = None  # where the next step begins; None: anywhere, before the first
-        self._stale = True  # values were set that initialise() or step() has not seen yet
+        self._reached: float | None = None  # start time of the next step; None before the first: any
+        self._stale = True  # values were set that initialise() or step() has not read yet
         self._quickly_settable: frozenset[int] = frozenset()
         self._warned: list[str] = []
-        self._has_failed = False  # of this object, whatever phase a restored state says
-        self._known_attributes = 0  # how many there were when they were looked at last
-        self._of_the_base = frozenset(vars(self))
+        self._has_failed = False  # of this object, whatever the phase of a restored state
+        self._known_attributes = 0  # their number when they were last checked
+        self._base_attributes = frozenset(vars(self))
 
-    # -- what a model defines ---------------------------------------------------------------------------
+    # -- methods of a model ------------------------------------------------------------------------------
 
     def read_parameters(self) -> None:
-        """Take over the parameters, each within its own bounds; raise `FmuError` for what they are together."""
+        """Read the parameters, each already within its bounds; raise `FmuError` for invalid combinations."""
 
     def initialise(self, t: float) -> None:
         """Compute the outputs at the start time `t` [s]; may be called again before initialisation ends.
 
-        States are where they start when it is called. Unless a model says more, all other variables have their start
-        values.
+        States have their initial values when it is called. Default: all other variables keep their start values.
         """
 
     @abstractmethod
@@ -179,27 +178,27 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         """Advance from `t` to `t + h` [s] with the inputs held."""
 
     def internal_state(self) -> State:
-        """What a step depends on beyond the variables, in JSON types: nothing, unless a model says so."""
-        kept = sorted(vars(self).keys() - self._of_the_base - {"_of_the_base"})
+        """The state of the model beside its variables, in JSON types; default: none."""
+        kept = sorted(vars(self).keys() - self._base_attributes - {"_base_attributes"})
         if kept and type(self).read_parameters is Slave.read_parameters:
             raise FmuError(f"self.{kept[0]} is not saved: expected a Local instead, or internal_state and restore")
         return {}
 
     def restore(self, state: State) -> None:
-        """Put back what `internal_state` gave, after the variables have been put back."""
+        """Restore what `internal_state` returned, after the variables have been restored."""
 
     @classmethod
     def depends_initially(cls) -> bool:
         """Whether outputs depend on the inputs when initialisation ends."""
-        told = cls.initial_outputs_depend_on_inputs
-        return cls.initialise is not Slave.initialise if told is None else told
+        declared = cls.initial_outputs_depend_on_inputs
+        return cls.initialise is not Slave.initialise if declared is None else declared
 
     @classmethod
     def initial_dependencies(cls, output: str) -> frozenset[str]:
         """The inputs and parameters on which an output depends when initialisation ends.
 
-        Unless a model says more: a state, where nothing but this class initialises it, on where it starts; outputs of
-        a model that defines `initialise` on all parameters, and on all inputs if on any.
+        Default: a state depends on its initial value if the model does not define `initialise`; otherwise all outputs
+        depend on all parameters, and on all inputs if `depends_initially`.
         """
         if cls.initialise is Slave.initialise:
             return frozenset({cls._initial[output]} if output in cls._initial else ())
@@ -210,10 +209,10 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     @property
     def is_fresh(self) -> bool:
-        """Whether nobody steps it yet: then whoever made it may set its inputs and parameters by their names."""
+        """Whether initialisation has not begun: then inputs and parameters may be set as attributes."""
         return self._phase is Phase.INSTANTIATED
 
-    # -- messages, for the model ------------------------------------------------------------------------
+    # -- messages of the model --------------------------------------------------------------------------
 
     def warn_once(self, key: str, text: str) -> None:
         """Log a warning, the first time only."""
@@ -262,7 +261,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         return True
 
     def _advance(self, current_time: float, step_size: float) -> None:
-        """A step that comes when it should; what is written out as C for it begins here."""
+        """A step, its time already checked; the entry point of what is compiled to C."""
         if not (step_size > 0.0 and math.isfinite(current_time + step_size)):
             require(math.isfinite(current_time), "currentCommunicationPoint", current_time, "a finite time")
             require(False, "communicationStepSize", step_size, "a positive number of seconds")
@@ -270,7 +269,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             self._take_parameters()
         try:
             self.step(current_time, step_size)
-        except (ArithmeticError, ValueError) as error:  # a float left its range on the way to a result
+        except (ArithmeticError, ValueError) as error:  # a float left its range in a computation
             raise DivergenceError(f"at t = {current_time}: {error}, expected finite values") from error
 
     @guarded
@@ -281,7 +280,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     @guarded
     def get_real(self, vrs: list[int]) -> list[float]:
-        """fmi2GetReal; in initialisation mode, what was set can be read back before the rest is set too."""
+        """fmi2GetReal; in initialisation mode, values that were set can be read back before the others are set."""
         self._bring_up_to_date(vrs)
         if not self._readable.issuperset(vrs):
             raise self._wrong_type(vrs, "Real")
@@ -303,13 +302,13 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     @guarded
     def get_integer(self, vrs: list[int]) -> list[int]:
-        """fmi2GetInteger; it is for Enumerations too."""
+        """fmi2GetInteger; also for Enumerations."""
         self._bring_up_to_date(vrs)
         return [int(self._others[vr]) for vr in self._of_type(vrs, "Integer", "Enumeration")]
 
     @guarded
     def set_integer(self, vrs: list[int], values: list[int]) -> None:
-        """fmi2SetInteger; it is for Enumerations too."""
+        """fmi2SetInteger; also for Enumerations."""
         self._set_others(vrs, values, "Integer", "Enumeration")
 
     @guarded
@@ -325,7 +324,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     @guarded
     def get_string(self, vrs: list[int]) -> list[str]:
-        """fmi2GetString; there are no String variables, but some masters ask for none of them."""
+        """fmi2GetString; there are no String variables, but some masters call it with none."""
         self._of_type(vrs, "String")
         return []
 
@@ -362,7 +361,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._quickly_settable = self._inputs if self._phase is Phase.STEPPING else frozenset()
         self._initialised = state["internal"] is not None
         if self._initialised:
-            if not self._stale:  # else they are checked, and perhaps refused, when the next step begins
+            if not self._stale:  # else the next step checks them
                 self._check_parameters()
             self.read_parameters()
             try:
@@ -372,18 +371,18 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     @staticmethod
     def _fmu_state_to_bytes(state: State) -> bytes:
-        return serialised(state)
+        return serialise(state)
 
     @staticmethod
     def _fmu_state_from_bytes(content: bytes) -> State:
-        """Never raises: pythonfmu could not free the class after it; `_set_fmu_state` refuses what is no state."""
-        return parsed(content)
+        """Never raises, since pythonfmu could not free the class then; `_set_fmu_state` refuses what is not a state."""
+        return deserialise(content)
 
     def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
         """The model description; called when the FMU is built."""
         return model_description.to_xml(type(self))
 
-    # -- inside ---------------------------------------------------------------------------------------------
+    # -- internals ------------------------------------------------------------------------------------------
 
     def _initialise(self) -> None:
         self._take_parameters()
@@ -395,15 +394,15 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             raise DivergenceError(f"at initialisation: {error}, expected finite values") from error
 
     def _bring_up_to_date(self, vrs: list[int]) -> None:
-        """In initialisation mode, compute what is asked for anew if values were set that it has not seen."""
-        if self._stale and self._phase is Phase.INITIALIZATION and not self._given.issuperset(vrs):
+        """In initialisation mode, recompute the values to be read if others were set since they were computed."""
+        if self._stale and self._phase is Phase.INITIALIZATION and not self._with_start.issuperset(vrs):
             self._initialise()
 
     def _take_parameters(self) -> None:
         self._check_parameters()
         for place, index in self._indices.items():
-            given = self._others[index]
-            self._others[place] = FLOAT.where(given > 0, given, self._others[place])
+            number = self._others[index]
+            self._others[place] = FLOAT.where(number > 0, number, self._others[place])
         self.read_parameters()
         self._stale = False
 
@@ -419,7 +418,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     def _expect_in_time(self, t: float, h: float) -> None:
         """Raise `FmuError` for a step that does not begin where the last one ended, or that ends past the stop time.
 
-        What is not finite is not looked at here.
+        Times that are not finite are not checked here.
         """
         slack = TIME_TOLERANCE * max(1.0, abs(t), h)
         if self._reached is not None and abs(t - self._reached) > slack:
@@ -428,29 +427,29 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             raise FmuError(f"communicationStepSize = {h} from {t}: expected no step past stopTime = {self._stop_time}")
 
     def _expect_declared(self, again: Callable[[], None]) -> None:
-        """Raise `AttributeError` for an attribute that was set and is not declared, which is a slip of the pen.
+        """Raise `AttributeError` for an attribute that was set without being declared, probably by a typing error.
 
-        Where it was set is known by doing it `again`: to look at each attribute as it is set would slow all steps down.
+        The statement that sets it is found by running it `again`: checking each assignment would slow down all steps.
         """
-        slips = [name for name in vars(self) if self._is_slip(name)]
+        undeclared = [name for name in vars(self) if self._is_undeclared(name)]
         self._known_attributes = len(vars(self))
-        if slips:
+        if undeclared:
             type(self).__setattr__ = _set_declared  # type: ignore[method-assign, assignment]
             try:
                 again()
             finally:
                 del type(self).__setattr__
-            self._refuse_slip(slips[0])
+            self._raise_undeclared(undeclared[0])
 
-    def _is_slip(self, name: str) -> bool:
-        return not (name.startswith("_") or name in self._of_the_base or hasattr(type(self), name))
+    def _is_undeclared(self, name: str) -> bool:
+        return not (name.startswith("_") or name in self._base_attributes or hasattr(type(self), name))
 
-    def _refuse_slip(self, name: str) -> None:
+    def _raise_undeclared(self, name: str) -> None:
         own = ", ".join(self._own)
         raise AttributeError(f"self.{name}: no such variable; expected {own}, or a name that begins with _")
 
     def _settable(self, vr: int, *types: str) -> Variable:
-        """The variable of `vr`, of one of the types, if its value may be set now; raises `FmuError` if not."""
+        """The variable of `vr`; raises `FmuError` if it is not of one of the types, or must not be set now."""
         self._of_type([vr], *types)
         variable = self.variables[vr]
         if variable.variability == "constant":
@@ -479,7 +478,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         bad = [vr % 2**32 for vr in vrs if vr not in known]  # the native part passes them as signed numbers
         return FmuError(f"value reference {bad}: expected one of a {types[0]} variable ({expected})")
 
-    def _failed(self, error: Exception) -> Failure:
+    def _failure_of(self, error: Exception) -> Failure:
         failure = report(self, error, again=self._has_failed)
         self._has_failed = True
         self._phase = Phase.FAILED
@@ -488,7 +487,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
 
 def _with_fixed(slave: type[Slave], variables: tuple[Variable, ...]) -> tuple[Variable, ...]:
-    """The variables, some of them constants; raises `FmuError` for what cannot be fixed, or not at this value."""
+    """The variables, with the fixed ones as constants; raises `FmuError` for a name or a value that cannot be fixed."""
     fixed, names = dict(slave.fixed), {v.name: v for v in variables}
     for name, value in slave.fixed.items():
         beside = name.removesuffix(INDEX)
@@ -503,19 +502,19 @@ def _with_fixed(slave: type[Slave], variables: tuple[Variable, ...]) -> tuple[Va
 
 
 def _first_line(text: str) -> str:
-    """What a docstring begins with, in one line without its full stop."""
+    """The first paragraph of a docstring, in one line without its full stop."""
     return " ".join(text.strip().partition("\n\n")[0].split()).removesuffix(".")
 
 
 def _set_declared(slave: Slave, name: str, value: Any) -> None:
     """Set an attribute; raises `AttributeError` for one that is not declared."""
-    if slave._is_slip(name):
-        slave._refuse_slip(name)
+    if slave._is_undeclared(name):
+        slave._raise_undeclared(name)
     object.__setattr__(slave, name, value)
 
 
-def _expect_free_names(slave: type[Slave], declared: Iterable[Declared]) -> None:
-    """Raise `TypeError` for an attribute that every slave has for something else."""
+def _expect_free_names(slave: type[Slave], declared: Iterable[Declaration]) -> None:
+    """Raise `TypeError` for a variable whose name every slave already uses."""
     for each in declared:
         if hasattr(Slave, each.attribute) or each.attribute in (*Slave.__annotations__, *_OF_PYTHONFMU):
             raise TypeError(f"{slave.__name__}.{each.attribute}: every slave has this name; expected another one")

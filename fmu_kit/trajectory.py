@@ -1,7 +1,6 @@
 """The built-in reference trajectory and its exact derivatives up to snap.
 
-One file for two readers: controller FMUs bundle it, and the metrics import it, so that both mean the
-same P_d(t).
+Controller FMUs bundle this module and the metrics import it, so that both use the same P_d(t).
 """
 
 from dataclasses import dataclass, fields
@@ -26,18 +25,18 @@ class Reference:
     snap: Vec3 = ZERO
     """S_d [m/s⁴]"""
     yaw: Scalar = 0.0
-    """ψ_d [rad], of the nose, from x towards y"""
+    """ψ_d [rad], direction of the nose, from x towards y"""
     yaw_rate: Scalar = 0.0
     """dψ_d [rad/s]; its own rate is taken to be zero"""
 
     def turned(self, turned: Scalar) -> "Reference":
-        """The same motion, told in another convention for axes if it is `turned` (`fmu_kit.frames`)."""
+        """The same motion, in the other axes convention where `turned` holds (`fmu_kit.frames`)."""
         turns = {"yaw": yaw, "yaw_rate": about_z}
-        told = {each.name: turns.get(each.name, inertial) for each in fields(self)}
-        return Reference(**{name: turn(turned, getattr(self, name)) for name, turn in told.items()})
+        conversions = {each.name: turns.get(each.name, inertial) for each in fields(self)}
+        return Reference(**{name: turn(turned, getattr(self, name)) for name, turn in conversions.items()})
 
     def after(self, time: Scalar) -> "Reference":
-        """The desired motion `time` [s] later: its Taylor series, as far as there are terms."""
+        """The desired motion `time` [s] later, by its Taylor series up to snap."""
         v, a, j, s = self.velocity, self.acceleration, self.jerk, self.snap
         second, third, fourth = time / 2.0, time / 3.0, time / 4.0
         return Reference(
@@ -55,8 +54,7 @@ class Reference:
 class Trajectory:
     """P_d(t) = [a_x sin ωt cos ωt, a_y sin ωt, start_z + rate_z t], the paper's figure of eight (section V).
 
-    With ψ_d(t) = yaw + yaw_rate t. The defaults are the paper's, whose z points down, so that a positive `rate_z`
-    descends.
+    With ψ_d(t) = yaw + yaw_rate t. The defaults are the paper's, with z down, so that a positive `rate_z` descends.
     """
 
     amplitude_x: float = 4.0

@@ -68,15 +68,15 @@ QUANTITIES = {
     "mol": "AmountOfSubstance",
     "cd": "LuminousIntensity",
 }
-"""What is meant by a unit unless another quantity is said, in the words of `Modelica.Units.SI`."""
+"""The quantity of a unit if none is given, by its name in `Modelica.Units.SI`."""
 
 _DEGREES = math.degrees(1.0)
 DISPLAYED = {"rad": ("deg", _DEGREES), "rad/s": ("deg/s", _DEGREES), "rad/s2": ("deg/s2", _DEGREES)}
-"""By unit, the one that people read instead, and how many of it are one of that."""
+"""The display unit of a unit, and its factor: how many of it make one of that unit."""
 
 
 def base_unit_exponents(name: str) -> dict[str, int]:
-    """Exponents of the SI base units, those that are not zero; raises `ValueError` for what is no such name."""
+    """The non-zero exponents of the SI base units; raises `ValueError` for a name that is not a unit."""
     above, slash, below = name.partition("/")
     if below.startswith("(") and below.endswith(")"):
         below = below[1:-1]

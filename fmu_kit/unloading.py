@@ -1,8 +1,8 @@
-"""How an FMU leaves a host that is a Python program, without breaking its heap.
+"""Unloading an FMU from a host that is a Python program, without corrupting its heap.
 
-The library of pythonfmu 0.7.0 holds a static pointer. As the process ends, its destructor frees what it points
-to, and a function of the library that runs later releases it once more: now and then the host ends with
-SIGABRT, all work done. Once the pointer has been released by a call, both do nothing.
+The library of pythonfmu 0.7.0 has a static pointer. As the process ends, a destructor frees what it points to, and a
+function of the library that runs later releases it again: sometimes the host then ends with SIGABRT after its work.
+Once the pointer has been released by a call, both do nothing.
 """
 
 import atexit
@@ -14,9 +14,9 @@ _libraries: set[str] = set()
 
 
 def release_at_exit(resources: str | None, model: str) -> None:
-    """Have the library that runs this FMU let go before the process ends; called for every instance.
+    """Have the library of this FMU release its pointer before the process ends; called for every instance.
 
-    Not where Python was started by the library itself: there, letting go is to end Python.
+    Not where the library itself started Python, since releasing the pointer would end Python.
     """
     if resources is None or not sys.orig_argv or not sys.platform.startswith("linux"):
         return
@@ -26,11 +26,11 @@ def release_at_exit(resources: str | None, model: str) -> None:
 
 
 def _release() -> None:
-    import ctypes  # not sooner: where it cannot be imported, the FMU does without
+    import ctypes  # imported late: an FMU works without it where it is missing
 
     for library in _libraries:
         try:
             loaded = ctypes.CDLL(library, os.RTLD_NOLOAD)
-        except OSError:  # unloaded before the end, which does no harm
+        except OSError:  # already unloaded, which is harmless
             continue
         loaded.finalizePythonInterpreter()

@@ -1,4 +1,4 @@
-"""An FMI variable: all that is said of a slave from outside is derived from a list of them."""
+"""An FMI variable: all descriptions of a slave are derived from a list of them."""
 
 import enum
 import math
@@ -12,17 +12,17 @@ Causality = Literal["input", "output", "parameter", "local"]
 Variability = Literal["continuous", "discrete", "fixed", "tunable", "constant"]
 Type = Literal["Real", "Integer", "Boolean", "Enumeration"]
 INDEX = "_index"
-"""Behind the name of an Enumeration, in that of the Integer beside it"""
+"""The suffix by which the Integer of an Enumeration is named"""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Variable:
-    """One scalar variable of FMI 2.0; its value reference is its place in the slave's list.
+    """One scalar variable of FMI 2.0; its value reference is its position in the slave's list.
 
-    The type of `start` is the type of the variable; one that is a member of an `IntEnum` makes an Enumeration of the
-    members, named in lower case, for a parameter only. `minimum` and `maximum` are inclusive, `above` is an exclusive
-    lower bound; they are checked for parameters when initialisation ends. `nominal` is a usual size, `named_quantity`
-    what is measured where the unit alone does not say it. Inputs and outputs of one `terminal` are wired as one.
+    The type of `start` is the type of the variable; a member of an `IntEnum` makes an Enumeration of the members, named
+    in lower case, for a parameter only. `minimum` and `maximum` are inclusive, `above` is an exclusive lower bound;
+    these are checked for parameters when initialisation ends. `nominal` is a typical size, `named_quantity` the
+    quantity where it does not follow from the unit. Inputs and outputs of one `terminal` are connected together.
     """
 
     name: str
@@ -39,9 +39,9 @@ class Variable:
     terminal: str | None = None
 
     def __post_init__(self) -> None:
-        """Raise `TypeError` for an Enumeration whose range would not be checked."""
-        given = self.causality == "parameter" or self.variability == "constant"
-        if self.items and not (given and [*self.items.values()] == [*range(1, len(self.items) + 1)]):
+        """Raise `TypeError` for an Enumeration that is not a parameter, or whose items are not numbered from 1."""
+        is_parameter = self.causality == "parameter" or self.variability == "constant"
+        if self.items and not (is_parameter and [*self.items.values()] == [*range(1, len(self.items) + 1)]):
             raise TypeError(f"{self.name}: expected an Enumeration to be a parameter, its items 1, 2, …")
 
     @property
@@ -55,29 +55,29 @@ class Variable:
 
     @property
     def items(self) -> dict[str, int]:
-        """Of an Enumeration, its values by name, in their order; nothing for other types."""
+        """The values of an Enumeration by name, in order; empty for other types."""
         return (
             {item.name.lower(): int(item) for item in type(self.start)} if isinstance(self.start, enum.IntEnum) else {}
         )
 
     @property
     def declared_type(self) -> str | None:
-        """The name of the type that an Enumeration is of; None for other types."""
+        """The name of an Enumeration's type; None for other types."""
         return type(self.start).__name__ if self.items else None
 
     @property
     def quantity(self) -> str | None:
-        """What is measured; None where neither a name nor the unit says it."""
+        """The quantity, as named or as follows from the unit; None if unknown."""
         return self.named_quantity or QUANTITIES.get(self.unit or "")
 
     @property
     def displayed_in(self) -> str | None:
-        """The unit in which people read it; None: its own, as that of what has a name of its own."""
+        """The display unit; None where it is the unit itself, as for a variable with a named quantity."""
         return DISPLAYED[self.unit][0] if self.unit in DISPLAYED and self.named_quantity is None else None
 
     @property
     def is_settable(self) -> bool:
-        """Whether the value is given from outside."""
+        """Whether the value is set from outside."""
         return self.causality in ("input", "parameter")
 
     @property
@@ -86,7 +86,7 @@ class Variable:
         return self.is_settable or self.variability == "constant"
 
     def fixed_at(self, value: float | int | bool | str) -> "Variable":
-        """The parameter as a constant; raises `FmuError` for another variable, and a value that it cannot have."""
+        """The parameter as a constant; raises `FmuError` if it is not a parameter or the value is not allowed."""
         require(self.causality == "parameter", self.name, f"a variable with causality {self.causality}", "a parameter")
         known: float | int | bool | str = self.items.get(value, value) if isinstance(value, str) else value
         if isinstance(known, str) or isinstance(known, bool) != (self.type == "Boolean"):

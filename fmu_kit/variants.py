@@ -1,18 +1,18 @@
-"""A slave with values that are fixed when it is built: constants of its FMU, and what they turn off is gone."""
+"""A slave with values that are fixed when it is built: they are constants of its FMU, and unused code is left out."""
 
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 Value = float | int | bool | str
-"""Of a parameter; an Enumeration's by the name of its item, or its number"""
+"""The value of a parameter; for an Enumeration, the name of its item or its number"""
 MODULE = "quadcosim_variant"
-"""Of the source that an FMU has of it, beside those of the slave"""
+"""The module that defines the variant in its FMU, beside those of the slave"""
 
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """What is fixed, and what the FMU is called."""
+    """The fixed values of an FMU, and its name."""
 
     name: str
     fixed: tuple[tuple[str, Value], ...]
@@ -20,31 +20,31 @@ class Variant:
 
     @classmethod
     def of(cls, name: str, values: Mapping[str, Value]) -> "Variant":
-        """The one of values by name."""
+        """The variant with these values, by name."""
         return cls(name, tuple(sorted(values.items())))
 
     @classmethod
     def parse(cls, text: str) -> "Variant":
-        """What `text` gives."""
+        """The variant of a `text`."""
         name, values = json.loads(text)
         return cls.of(name, values)
 
     @property
     def text(self) -> str:
-        """As it is passed to another process."""
+        """The variant as it is passed to another process."""
         return json.dumps([self.name, dict(self.fixed)])
 
     def source(self, module: str, model: str) -> str:
-        """The module that defines it, made of a slave class."""
+        """The source of the module that derives it from a slave class."""
         return (
-            f'"""{self.name}: {model} with values that are fixed."""\n\n'
+            f'"""{self.name}: {model} with fixed values."""\n\n'
             f"from {module} import {model}\n\n\n"
             f"class {self.name}({model}):\n"
-            f"    description = {self.described(model)!r}\n"
+            f"    description = {self.describe(model)!r}\n"
             f"    fixed = {dict(self.fixed)!r}\n"
         )
 
-    def described(self, model: str) -> str:
-        """What it is, in a line."""
+    def describe(self, model: str) -> str:
+        """A description in one line."""
         listed = ", ".join(f"{name} = {value}" for name, value in self.fixed)
         return f"{model} with {listed or 'another name'}"

@@ -1,4 +1,4 @@
-"""Versions that an FMU carries. The project's own is in `pyproject.toml`; it is read from what was installed."""
+"""Versions that an FMU contains. The project's is set in `pyproject.toml` and read from the installed package."""
 
 import functools
 import importlib.metadata
@@ -14,12 +14,12 @@ def project_version() -> str:
 
 
 def generation_tool() -> str:
-    """What made an FMU, as model descriptions say it."""
+    """The generation tool that model descriptions name."""
     return f"{PROJECT} {project_version()}"
 
 
 def version_of(slave: type[Any]) -> str | None:
-    """The version that a slave says it has; else that of this project for a slave that comes with it; else None."""
+    """The version that a slave declares; else that of this project for a slave that comes with it; else None."""
     said = getattr(slave, "version", None)
     if said:
         return str(said)

@@ -7,7 +7,7 @@ from fmu_kit.algebra import Quaternion
 from fmu_kit.authors import AUTHOR, LICENSE
 from fmu_kit.errors import require, require_finite_state
 from fmu_kit.integrator import internal_steps, rk4_step
-from fmu_kit.interface import gathered
+from fmu_kit.interface import read_fields
 from fmu_kit.rigid_body import Body, RigidState, Wrench, acceleration, derivative, tilt
 from fmu_kit.saved_state import State
 from fmu_kit.scalar import FLOAT, repeat
@@ -41,8 +41,8 @@ class QuadrotorPlant(PlantInterface):
 
     def read_parameters(self) -> None:
         """Build the body, the wind, the payload and the actuators."""
-        self._body = gathered(self, Body)
-        self._wind, self._payload = gathered(self, Wind, "wind_"), gathered(self, Payload, "payload_")
+        self._body = read_fields(self, Body)
+        self._wind, self._payload = read_fields(self, Wind, "wind_"), read_fields(self, Payload, "payload_")
         self._actuators = self._read_actuators()
 
     def initialise(self, t: float) -> None:
@@ -103,7 +103,7 @@ class QuadrotorPlant(PlantInterface):
         self._state = RigidState(self.position, self.velocity, attitude, self.angular_velocity)
 
     def _read_actuators(self) -> Actuators:
-        lag, motors = self.actuator_time_constant, gathered(self, Motors, "motor_")
+        lag, motors = self.actuator_time_constant, read_fields(self, Motors, "motor_")
         highest, lowest = self.thrust_max, self.thrust_min
         require(lowest <= highest, "thrust_min", lowest, f"at most {highest}, the largest")
         box = Box(thrust_max=highest, thrust_min=lowest, torque_max=self.torque_max, time_constant=lag)

@@ -10,7 +10,7 @@ from controller_fmu.sampled import SampledController
 from controller_fmu.vehicle import Measurement
 from fmu_kit.algebra import Quaternion, Vec3
 from fmu_kit.errors import require, require_finite_state
-from fmu_kit.interface import gathered
+from fmu_kit.interface import read_fields
 from fmu_kit.saved_state import State
 from fmu_kit.trajectory import Reference
 
@@ -31,12 +31,12 @@ class CascadedController(SampledController, CascadeInterface):
     def read_parameters(self) -> None:
         """Take over the airframe and the loops."""
         super().read_parameters()
-        self._airframe = gathered(self, Airframe, "motor_")
+        self._airframe = read_fields(self, Airframe, "motor_")
         self._read_translation()
         self._attitude_loop = AttitudeLoop(
             gain=self.attitude_gain, yaw_weight=self.yaw_weight, rate_limit=self.rate_limit
         )
-        self._rate_loop = gathered(self, RateLoop, "rate_")
+        self._rate_loop = read_fields(self, RateLoop, "rate_")
 
     def initialise(self, t: float) -> None:
         """Hold the command for the initial inputs; nothing of them is remembered, as this is not a sample."""

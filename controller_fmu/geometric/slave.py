@@ -6,7 +6,7 @@ from controller_fmu.redesign.controller import RedesignedController
 from controller_fmu.vehicle import Measurement
 from fmu_kit import frames
 from fmu_kit.algebra import ZERO
-from fmu_kit.interface import Local, Parameter, gathered
+from fmu_kit.interface import Local, Parameter, read_fields
 from fmu_kit.trajectory import Reference
 
 _GAINS = Gains()
@@ -43,7 +43,7 @@ class GeometricController(ScaledGains, RedesignedController):
     def read_parameters(self) -> None:
         """Take over the gains."""
         super().read_parameters()
-        self._gains = gathered(self, Gains)
+        self._gains = read_fields(self, Gains)
 
     def evaluation(self, measurement: Measurement, reference: Reference, implicit: float) -> Evaluation:
         """Evaluate the law; it has no semi-implicit form."""

@@ -12,7 +12,7 @@ from controller_fmu.sampled import SHORTEST_PERIOD, SampledController
 from controller_fmu.vehicle import Measurement
 from fmu_kit.algebra import Vec3
 from fmu_kit.errors import require, require_finite_state
-from fmu_kit.interface import show
+from fmu_kit.interface import set_fields
 from fmu_kit.rigid_body import RigidState, Wrench
 from fmu_kit.saved_state import State
 from fmu_kit.trajectory import Reference
@@ -45,7 +45,7 @@ class RedesignedController(SampledController, RedesignInterface):
         """Evaluate the law and show it; raises `DivergenceError` if it has no finite command."""
         found = self.evaluation(measurement, reference, 0.0)
         require_finite_state((*_COMMAND, "energy"), (found.thrust, *found.torque, found.energy))
-        show(self, found)
+        set_fields(self, found)
 
     def read_parameters(self) -> None:
         """Take over the redesign too."""

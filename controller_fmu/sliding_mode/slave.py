@@ -6,7 +6,7 @@ from controller_fmu.sliding_mode.law import Evaluation, Gains, evaluate
 from controller_fmu.vehicle import Measurement
 from fmu_kit import frames
 from fmu_kit.algebra import ZERO
-from fmu_kit.interface import Local, Parameter, gathered
+from fmu_kit.interface import Local, Parameter, read_fields
 from fmu_kit.trajectory import Reference
 
 _GAINS = Gains()
@@ -67,7 +67,7 @@ class UnifiedController(RedesignedController, ScaledGains):
     def read_parameters(self) -> None:
         """Take over the gains."""
         super().read_parameters()
-        self._gains = gathered(self, Gains)
+        self._gains = read_fields(self, Gains)
 
     def evaluation(self, measurement: Measurement, reference: Reference, implicit: float) -> Evaluation:
         """Evaluate the law."""

@@ -15,6 +15,6 @@ def cached_library(folder: str, sources: Mapping[str, bytes], how: Any, compiled
     Raises `QuadcosimError` if it cannot be compiled or stored.
     """
     try:
-        return libraries.kept(folder, sources, how, compiled)
+        return libraries.cached_library(folder, sources, how, compiled)
     except (PackagingError, OSError) as error:
         raise QuadcosimError(str(error)) from error

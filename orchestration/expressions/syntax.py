@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from fmu_kit.syntax_trees import parsed_expression
+from fmu_kit.syntax_trees import parse_expression
 from orchestration.basics.errors import UsageError
 from orchestration.expressions.operators import OPERATORS
 
@@ -115,7 +115,7 @@ def parse_job_measures(text: str) -> Node:
     if not isinstance(text, str) or len(text) > LONGEST:
         raise UsageError(f"expected an expression of at most {LONGEST} characters")
     try:
-        tree = parsed_expression(text.strip())
+        tree = parse_expression(text.strip())
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         problem = error.msg if isinstance(error, SyntaxError) else type(error).__name__
         raise UsageError(f"{_short(text)}: expected an expression: {problem}") from None

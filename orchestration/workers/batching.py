@@ -9,7 +9,7 @@ from itertools import islice
 from typing import Any
 
 from orchestration.basics.errors import QuadcosimError
-from orchestration.engines.batch.kernels import lanes_here
+from orchestration.engines.batch.kernels import preferred_lanes
 from orchestration.engines.batch.shape import outline
 from orchestration.schedule.schedule_cache import timing
 from orchestration.workers.task import Chunk, RunTask
@@ -26,7 +26,7 @@ ON_GPU = 2**15
 
 def chunks(tasks: Iterable[RunTask], total: int, workers: int, on_gpu: bool = False) -> Iterator[RunTask | Chunk]:
     """Tasks in chunks, of which each of so many workers gets a few; those whose signals are kept by themselves."""
-    size = max(lanes_here(), min(CHUNK, total // (4 * workers) // lanes_here() * lanes_here()))
+    size = max(preferred_lanes(), min(CHUNK, total // (4 * workers) // preferred_lanes() * preferred_lanes()))
     size, order = (ON_GPU, ON_GPU) if on_gpu else (size, SORTED)
     waiting = iter(tasks)
     while some := list(islice(waiting, order)):

@@ -10,7 +10,17 @@ import pytest
 from fmu_kit.algebra import ZERO, Inertia, Quaternion, Vec3
 from fmu_kit.errors import FmuError
 from fmu_kit.failure import Failure
-from fmu_kit.interface import Declared, FixedParameter, Input, Local, Output, Parameter, State, gathered, show
+from fmu_kit.interface import (
+    Declaration,
+    FixedParameter,
+    Input,
+    Local,
+    Output,
+    Parameter,
+    State,
+    read_fields,
+    set_fields,
+)
 from fmu_kit.slave import Slave
 
 
@@ -186,7 +196,7 @@ class Found(NamedTuple):
 
 
 def test_parameters_are_gathered_by_the_fields_of_a_record_with_a_prefix():
-    assert gathered(Law(), Gains) == Gains(gain=2.0, first=1.5)
+    assert read_fields(Law(), Gains) == Gains(gain=2.0, first=1.5)
 
     class Prefixed(Slave):
         law_gain = Parameter("of x", "N/m", 3.0)
@@ -194,12 +204,12 @@ def test_parameters_are_gathered_by_the_fields_of_a_record_with_a_prefix():
 
         def step(self, t: float, h: float) -> None: ...
 
-    assert gathered(Prefixed(), Gains, "law_") == Gains(gain=3.0, first=4.0)
+    assert read_fields(Prefixed(), Gains, "law_") == Gains(gain=3.0, first=4.0)
 
 
 def test_outputs_are_shown_by_their_names_and_what_is_given_to_the_slave_stays():
     law = Law()
-    show(law, Found(0.75, 9.0, Vec3(1.0, 2.0, 3.0), 4.0))
+    set_fields(law, Found(0.75, 9.0, Vec3(1.0, 2.0, 3.0), 4.0))
     assert (law.angle, law.x, law.force) == (0.75, 0.0, Vec3(1.0, 2.0, 3.0))
 
 
@@ -317,7 +327,7 @@ def test_a_state_is_whole_without_a_word_of_the_law():
     assert (other.angle, other.samples) == (0.6, 1)
 
 
-def _named(name: str) -> Declared:
+def _named(name: str) -> Declaration:
     declared = Output("taken", "1")
     declared.__set_name__(Slave, name)
     return declared

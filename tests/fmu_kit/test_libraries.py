@@ -29,8 +29,8 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_what_was_compiled_is_kept_and_found_by_its_content(cache: Path) -> None:
     compiler = Compiler()
-    assert [libraries.content("made", SOURCES, "-O2", compiler) for _ in range(3)] == [b"library 1"] * 3
-    path = libraries.kept("made", dict(reversed(SOURCES.items())), "-O2", compiler)
+    assert [libraries.cached_content("made", SOURCES, "-O2", compiler) for _ in range(3)] == [b"library 1"] * 3
+    path = libraries.cached_library("made", dict(reversed(SOURCES.items())), "-O2", compiler)
     assert path.read_bytes() == b"library 1"
     assert [*cache.rglob("*.*")] == [path]
 
@@ -41,17 +41,20 @@ def test_another_source_option_compiler_or_processor_is_another_library(
 ) -> None:
     compiler = Compiler()
     for sources, how in ((SOURCES, "-O2"), (SOURCES, "-O1"), ({**SOURCES, "a.c": b"int a = 1;"}, "-O2")):
-        libraries.content("made", sources, how, compiler)
+        libraries.cached_content("made", sources, how, compiler)
     (tmp_path / "cc").touch()
     monkeypatch.setattr("shutil.which", lambda name: str(tmp_path / name))
-    assert libraries.content("made", SOURCES, "-O2", compiler) == b"library 4"
+    assert libraries.cached_content("made", SOURCES, "-O2", compiler) == b"library 4"
     monkeypatch.setattr(libraries, "_processor", lambda: ("x86_64", "flags : fpu"))
-    assert libraries.content("made", SOURCES, "-O2", compiler) == b"library 5"
+    assert libraries.cached_content("made", SOURCES, "-O2", compiler) == b"library 5"
 
 
 def test_where_nothing_can_be_kept_it_is_compiled_each_time(cache: Path) -> None:
     cache.write_text("no folder")
     compiler = Compiler()
-    assert [libraries.content("made", SOURCES, "-O2", compiler) for _ in range(2)] == [b"library 1", b"library 2"]
+    assert [libraries.cached_content("made", SOURCES, "-O2", compiler) for _ in range(2)] == [
+        b"library 1",
+        b"library 2",
+    ]
     with pytest.raises(OSError, match="quadcosim"):
-        libraries.kept("made", SOURCES, "-O2", compiler)
+        libraries.cached_library("made", SOURCES, "-O2", compiler)

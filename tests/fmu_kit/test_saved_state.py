@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from controller_fmu.sliding_mode.slave import UnifiedController
 from fmu_kit.failure import Failure
-from fmu_kit.saved_state import DEEPEST, parsed, serialised
+from fmu_kit.saved_state import DEEPEST, deserialise, serialise
 from fmu_kit.slave import Slave
 from plant_fmu.slave import QuadrotorPlant
 from tests.slaves import assert_fails
@@ -25,13 +25,13 @@ def saved(model: type[Slave]) -> Any:
     slave.enter_initialization_mode()
     slave.exit_initialization_mode()
     slave.do_step(0.0, 0.01)
-    return parsed(model._fmu_state_to_bytes(slave._get_fmu_state()))
+    return deserialise(model._fmu_state_to_bytes(slave._get_fmu_state()))
 
 
 def restored(model: type[Slave], state: Any) -> Slave:
     """A new instance that has taken over the state from its bytes."""
     slave = model(instance_name="restored")
-    slave._set_fmu_state(model._fmu_state_from_bytes(serialised(state)))
+    slave._set_fmu_state(model._fmu_state_from_bytes(serialise(state)))
     return slave
 
 
@@ -49,21 +49,21 @@ def nested(levels: int) -> bytes:
     "content", [b"[" * 1000, nested(1000), nested(900), nested(DEEPEST), b'{"a": ' + b"9" * 5000 + b"}", b"\xff", b"7"]
 )
 def test_bytes_that_no_slave_has_saved_are_an_empty_state(content: bytes) -> None:
-    assert parsed(content) == {}
+    assert deserialise(content) == {}
 
 
 def test_nesting_that_is_allowed_is_read() -> None:
-    assert parsed(nested(DEEPEST - 1)) != {}
+    assert deserialise(nested(DEEPEST - 1)) != {}
 
 
 @pytest.mark.parametrize("model", MODELS)
 def test_a_flipped_bit_of_the_bytes_is_refused_or_changes_nothing(model: type[Slave]) -> None:
     state, refused = saved(model), 0
-    content = serialised(state)
+    content = serialise(state)
     for place in range(len(content)):
         flipped = bytearray(content)
         flipped[place] ^= 1 << place % 8
-        if (found := parsed(bytes(flipped))) != state:
+        if (found := deserialise(bytes(flipped))) != state:
             refused += 1
             slave = model(instance_name="damaged")
             assert_fails(lambda: slave._set_fmu_state(found), "FMU state (")  # noqa: B023
@@ -71,10 +71,10 @@ def test_a_flipped_bit_of_the_bytes_is_refused_or_changes_nothing(model: type[Sl
 
 
 def test_a_state_whose_checksum_is_another_is_refused_in_words() -> None:
-    content = serialised(saved(QuadrotorPlant)).replace(b"9.81", b"9.91")
+    content = serialise(saved(QuadrotorPlant)).replace(b"9.81", b"9.91")
     slave = QuadrotorPlant(instance_name="damaged")
     words = "FMU state (its bytes): expected them as they were serialised, their checksum is another"
-    assert_fails(lambda: slave._set_fmu_state(parsed(content)), words)
+    assert_fails(lambda: slave._set_fmu_state(deserialise(content)), words)
 
 
 @pytest.mark.parametrize(
@@ -152,7 +152,7 @@ def test_a_state_damaged_anywhere_is_refused_or_gives_values_that_can_be_read(da
     else:
         inner[last] = data.draw(VALUES)
     slave = model(instance_name="damaged")
-    content = model._fmu_state_from_bytes(serialised(state))
+    content = model._fmu_state_from_bytes(serialise(state))
     model._fmu_state_to_bytes(content)
     try:
         slave._set_fmu_state(content)
@@ -168,4 +168,4 @@ def test_a_state_damaged_anywhere_is_refused_or_gives_values_that_can_be_read(da
 
 @given(st.binary(max_size=60) | VALUES.map(lambda value: json.dumps(value).encode()))
 def test_no_bytes_make_the_reader_raise(content: bytes) -> None:
-    assert isinstance(parsed(content), dict)
+    assert isinstance(deserialise(content), dict)

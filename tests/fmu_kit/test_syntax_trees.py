@@ -1,6 +1,6 @@
 import ast
 
-from fmu_kit.syntax_trees import parsed, statements
+from fmu_kit.syntax_trees import parse_module, statements
 
 NESTED = """
 import a
@@ -38,7 +38,7 @@ v = lambda w: w if x else y
 
 
 def test_statements_are_those_of_the_whole_tree_in_its_order() -> None:
-    tree = parsed(NESTED)
+    tree = parse_module(NESTED)
     whole = [node for node in ast.walk(tree) if isinstance(node, (ast.stmt, ast.excepthandler, ast.match_case))]
     assert list(statements(tree)) == whole
     assert sum(isinstance(node, (ast.Import, ast.ImportFrom)) for node in whole) == 14

@@ -29,7 +29,7 @@ def odd_plant(tmp_path_factory: pytest.TempPathFactory) -> Path:
     loaded = FixedParameter("whether they are on board", start=False)
     acceleration = """
     replace(sources / "plant_fmu" / "interface.py", "    acceleration = ", declared)
-    body = "gathered(self, Body)"
+    body = "read_fields(self, Body)"
     heavier = f"{body}.with_mass(self.mass + 0.1 * self.cargo * self.loaded)"
     replace(sources / "plant_fmu" / "slave.py", body, heavier)
     return build(sources, folder, "QuadrotorPlant")

@@ -10,7 +10,7 @@ import pytest
 from fmpy.validation import validate_fmu
 
 from fmu_kit.errors import FmuError
-from fmu_kit.interface import Declared, FixedParameter, Input
+from fmu_kit.interface import Declaration, FixedParameter, Input
 from fmu_kit.slave import Slave
 from orchestration.building import fmus
 from orchestration.checks.validation.validator import validate
@@ -192,6 +192,6 @@ def test_its_type_and_its_range_follow_from_the_items() -> None:
 
 
 @pytest.mark.parametrize("declared", [FixedParameter(start=Gapped.ONE), Input(start=Mode.TURNED)])
-def test_items_with_gaps_and_enumerations_that_are_no_parameters_are_refused(declared: Declared) -> None:
+def test_items_with_gaps_and_enumerations_that_are_no_parameters_are_refused(declared: Declaration) -> None:
     with pytest.raises(TypeError, match="m: expected an Enumeration to be a parameter, its items 1, 2"):
         type("Chooses", (Slave,), {"m": declared})

@@ -1,1 +1,1 @@
-"""What a traced slave is written as: C for one FMU, for lanes, for a microcontroller; tables, descriptions of FMI."""
+"""Generated code of a traced slave: C for an FMU, for SIMD lanes, for a microcontroller; tables; FMI descriptions."""

@@ -1,4 +1,4 @@
-"""A program as C: one function for each method, in words as near to the Python as C has."""
+"""A program as C: one function for each method, with the names of the Python."""
 
 from __future__ import annotations
 
@@ -9,7 +9,17 @@ from collections import Counter
 from collections.abc import Container, Iterable, Mapping
 from typing import ClassVar
 
-from fmu_kit.compiler.trace.statements import TANGENT, Block, Call, Function, Place, Statement, each_of, ends, used_by
+from fmu_kit.compiler.trace.statements import (
+    TANGENT,
+    Block,
+    Call,
+    Function,
+    Place,
+    Statement,
+    all_statements,
+    ends,
+    used_symbols,
+)
 from fmu_kit.compiler.trace.symbols import Kind, Symbol, TraceError, closure, integer_of, node, value_of
 from fmu_kit.compiler.trace.tracing import Program
 
@@ -25,7 +35,7 @@ _CALLED = {
 }  # fmt: skip
 _OF_BITS = ("bit_and", "bit_or", "bit_xor")
 _SIGNED_ZEROS = ("neg", "mul", "mod", "floordiv", "floor", "ceil")
-"""Operations that may give a zero with a sign, of real numbers."""
+"""Operations on real numbers that may give a signed zero."""
 _WIDE_COMPARED = {
     "lt": ("less", False, False),
     "ge": ("less", False, True),
@@ -34,16 +44,16 @@ _WIDE_COMPARED = {
     "eq": ("equal", False, False),
     "ne": ("equal", False, True),
 }
-"""Of each comparison, by which it is done, whether the other way round, and whether it is the contrary"""
+"""Comparisons of wide numbers: the function, whether its operands are swapped, whether its result is negated"""
 _LONGEST_PART = 60
-"""of an expression that stands within another, in characters"""
+"""length of an expression within another, in characters"""
 _FORMATS = {"g": "general", "e": "exponential", "f": "fixed"}
 ERRORS = ("FmuError", "DivergenceError", "ZeroDivisionError", "OverflowError", "ValueError")
-"""What a function may end with; the place here, from 1 on, is what it returns."""
+"""The errors of a function; it returns their position here, from 1 on."""
 
 
 def c_code(program: Program) -> str:
-    """The functions of a program, each after those that it calls."""
+    """The functions of a program in C, each after those that it calls."""
     names = place_names(program.places)
     return "\n\n".join(FunctionWriter(function, program, names).text() for function in program.functions) + "\n"
 
@@ -59,7 +69,7 @@ def place_names(places: Iterable[Place]) -> dict[str, str]:
 
 
 class FunctionWriter:
-    """Writes one function, for an FMU: its memory is one array, and its messages are full of numbers."""
+    """Writes one function for an FMU, whose memory is an array and whose messages contain numbers."""
 
     def __init__(self, function: Function, program: Program, places: dict[str, str]) -> None:
         self.function = function
@@ -73,13 +83,13 @@ class FunctionWriter:
         self.parameters: list[str] = []
         for name in function.names:
             self.parameters.append(_unused(f"p_{identifier(name)}", self.parameters))
-        self.used = used_by(each_of(function.body), self._named)
+        self.used = used_symbols(all_statements(function.body), self._named)
         self.uses = Counter(id(arg) for symbol in self.used.values() for arg in symbol.args)
-        self.uses.update(id(symbol) for each in each_of(function.body) for symbol in self._named(each))
-        self.gives: dict[int, set[tuple[str, int]]] = {}
+        self.uses.update(id(symbol) for each in all_statements(function.body) for symbol in self._named(each))
+        self.definitions: dict[int, set[tuple[str, int]]] = {}
 
     def text(self) -> str:
-        """The function."""
+        """The function in C."""
         f = self.function
         for symbol, name in zip(f.parameters, self.parameters):
             self.scopes[0][id(symbol)] = name
@@ -99,16 +109,16 @@ class FunctionWriter:
         return doc + head + "\n".join([*(f"    {line}" for line in (*before, *self.declared)), *self.lines[0]]) + "\n}"
 
     type: ClassVar = "int"
-    """what the function returns: 0, or what it has failed with"""
+    """type of the returned status: 0, or the number of an error"""
     first: ClassVar[tuple[str, ...]] = ("Instance *m",)
     """its first parameters"""
     through: str = "return 0;"
-    """its end, if it comes to that"""
+    """the statement at its end"""
 
-    # -- what is made use of ---------------------------------------------------------------------------------
+    # -- used symbols ----------------------------------------------------------------------------------------
 
     def _named(self, each: Statement) -> tuple[Symbol, ...]:
-        """The symbols that a statement names itself, as far as it is written."""
+        """The symbols that a statement uses directly, as far as it is written."""
         return each.symbols
 
     def _named_in(self, block: Block) -> list[Symbol]:
@@ -122,10 +132,10 @@ class FunctionWriter:
     # -- memory ----------------------------------------------------------------------------------------------
 
     always: ClassVar[tuple[str, ...]] = ("v",)
-    """what is there even where a function makes no use of it"""
+    """variables that may be unused in a function"""
 
     def _memory(self) -> list[str]:
-        """What the names are, by which a function reaches its memory."""
+        """The declarations through which a function accesses its memory."""
         read = {symbol.data[0] for symbol in self.used.values() if symbol.op == "load"}
         tangents = any(name.startswith(TANGENT) for name in read | self.function.stores)
         return [
@@ -156,7 +166,7 @@ class FunctionWriter:
         return name
 
     def _pin(self, symbol: Symbol) -> str:
-        """The variable of what a statement gives its value; declared where the function begins."""
+        """The variable of a symbol that statements assign; it is declared at the start of the function."""
         if id(symbol) not in self.pinned:
             name = self.pinned[id(symbol)] = self._name("y")
             unknown = "q_known(0)" if symbol.kind == "bool" else self.zero
@@ -166,7 +176,7 @@ class FunctionWriter:
     # -- values ----------------------------------------------------------------------------------------------
 
     def value(self, symbol: Symbol) -> str:
-        """The name of a value, computed here if it is not yet known here."""
+        """The name of a value; it is computed here unless it is known."""
         for scope in reversed(self.scopes):
             if id(symbol) in scope:
                 return scope[id(symbol)]
@@ -197,7 +207,7 @@ class FunctionWriter:
         return f"q_select({name}, {self._everywhere('1.0')}, {self.zero})" if symbol.kind == "bool" else name
 
     def _lanes(self, symbol: Symbol) -> str:
-        """A value as the argument of a function: a constant in all lanes."""
+        """A value as an argument of a function; constants are broadcast to all lanes."""
         text = self._real(symbol)
         is_number = symbol.op == "constant" and symbol.kind != "bool" and text.strip("(-")[0].isdigit()
         return self._everywhere(text) if is_number else text
@@ -205,11 +215,11 @@ class FunctionWriter:
     zero: ClassVar[str] = "0.0"
 
     def _everywhere(self, number: str) -> str:
-        """A known number where a variable could be."""
+        """A constant in the type of a variable."""
         return number
 
     def _as(self, kind: Kind, symbol: Symbol) -> str:
-        """A value as what is of a kind is set to it."""
+        """A value converted to a kind."""
         return self.value(symbol) if kind == "bool" else self._lanes(symbol)
 
     def _expression(self, symbol: Symbol) -> str:
@@ -221,7 +231,7 @@ class FunctionWriter:
         return self._of_reals(symbol)
 
     def _of_wide(self, symbol: Symbol) -> str:
-        """An operation on whole numbers, or one that gives them, of more bits than a real number has."""
+        """An operation with operands or result that are whole numbers of more bits than a real number has."""
         op, given = symbol.op, [self._wide(arg) for arg in symbol.args]
         if op in ("narrow", "beyond"):
             return f"{'q_narrow' if op == 'narrow' else 'q_wide_beyond'}({given[0]})"
@@ -233,7 +243,7 @@ class FunctionWriter:
         return text if symbol.kind == "wide" else f"q_narrow({text})"
 
     def _wide(self, symbol: Symbol) -> str:
-        """A whole number as one of many bits."""
+        """A whole number in its wide form."""
         if symbol.op == "constant":
             high, low = divmod(integer_of(symbol) % 2**128, 2**64)
             return f"q_wide_known({high:#x}u, {low:#x}u)"
@@ -265,7 +275,7 @@ class FunctionWriter:
 
     @staticmethod
     def _other_of_the_pair(symbol: Symbol) -> Symbol:
-        """The cosine to a sine, the sine to a cosine."""
+        """The cosine for a sine, the sine for a cosine."""
         return node("cos" if symbol.op == "sin" else "sin", symbol.args, "real")
 
     def _pair(self, angle: Symbol) -> str:
@@ -297,41 +307,41 @@ class FunctionWriter:
         self._line("}")
 
     def _hoist(self, then: Block, otherwise: Block, rest: Block) -> None:
-        """Compute before a branch what is needed in more than one of its ways, or in one and after it."""
+        """Compute before a branch what is needed in both of its blocks, or in one and after it."""
         a, b, after = (closure(self._named_in(block)) for block in (then, otherwise, rest))
         several = {key for key in {**a, **b} if (key in a) + (key in b) + (key in after) > 1}
-        self._compute_unless_given_in({**a, **b}, (*then, *otherwise), several)
+        self._compute_unless_defined_in({**a, **b}, (*then, *otherwise), several)
 
-    def _compute_unless_given_in(self, needed: Mapping[int, Symbol], block: Block, chosen: Container[int]) -> None:
-        """Compute now what does not depend on what gets its value in a block, or in a loop that is to come.
+    def _compute_unless_defined_in(self, needed: Mapping[int, Symbol], block: Block, chosen: Container[int]) -> None:
+        """Compute now the symbols that do not depend on assignments in a block, or in a later loop.
 
-        Of what is `needed`, each after its operands, those that are `chosen`.
+        `needed`: the symbols, each after its operands; only those that are `chosen` are computed.
         """
-        given, waiting = self._given_in(block), set[int]()
+        defined, waiting = self._definitions_in(block), set[int]()
         for key, symbol in needed.items():
             operands = () if symbol.op == "phi" else symbol.args
-            own = self._is_of_loop_to_come(symbol) or _giver(symbol) in given
-            if own or any(id(operand) in waiting for operand in operands):
+            is_later = self._is_of_later_loop(symbol) or _definition_of(symbol) in defined
+            if is_later or any(id(operand) in waiting for operand in operands):
                 waiting.add(key)
             elif key in chosen and symbol.args and not self._is_known(symbol):
                 self.value(symbol)
 
-    def _is_of_loop_to_come(self, symbol: Symbol) -> bool:
+    def _is_of_later_loop(self, symbol: Symbol) -> bool:
         return symbol.op in ("index", "variable") and not any(id(symbol) in scope for scope in self.scopes)
 
-    def _given_in(self, block: Block) -> set[tuple[str, int]]:
-        """What the statements of a block give their values to, as `_giver` has it."""
+    def _definitions_in(self, block: Block) -> set[tuple[str, int]]:
+        """The definitions in a block, in the form of `_definition_of`."""
         found: set[tuple[str, int]] = set()
         for each in block:
-            if id(each) not in self.gives:
-                inner = self._given_in(tuple(itertools.chain(*each.blocks)))
+            if id(each) not in self.definitions:
+                inner = self._definitions_in(tuple(itertools.chain(*each.blocks)))
                 inner.add(("loop", id(each)))
                 if each.op == "assign":
                     inner.add(("choice", id(each.symbols[0])))
                 if each.op == "call":
                     inner.add(("call", self.program.versions[each.data.memory, each]))
-                self.gives[id(each)] = inner
-            found |= self.gives[id(each)]
+                self.definitions[id(each)] = inner
+            found |= self.definitions[id(each)]
         return found
 
     def _inner(self, block: Block) -> None:
@@ -345,7 +355,7 @@ class FunctionWriter:
             self._set(target, self._as(target.kind, value))
 
     def _set(self, symbol: Symbol, value: str) -> None:
-        """Give a symbol the value that it has from here on."""
+        """Assign a value to a symbol."""
         self._line(f"{self._pin(symbol)} = {value};")
 
     def _store(self, each: Statement, rest: Block) -> None:
@@ -363,7 +373,7 @@ class FunctionWriter:
         self.declared += [f"q_real {name}[{call.function.results}] = {{{self.zero}}};" for name in results]
         status = self._name("status")
         self._called(each, [*given, *results], status)
-        for symbol in self._coming_of(each):
+        for symbol in self._values_after(each):
             if symbol.op == "failed":
                 self._set(symbol, self._has_failed(status, 1 + ERRORS.index(symbol.data[0])))
             elif symbol.op == "result":
@@ -373,7 +383,7 @@ class FunctionWriter:
                 self._set(symbol, self._load(symbol))
 
     def _called(self, each: Statement, given: list[str], status: str) -> None:
-        """Call a function; go on only if it did not fail, or if it is asked whether it did."""
+        """Call a function; return its error unless the caller handles it."""
         callee = each.data.function
         text = f"{c_name(callee.name)}({', '.join(['m', *given])})"
         self._line(f"const int {status} = {text};" if callee.raises else f"{text};")
@@ -383,21 +393,21 @@ class FunctionWriter:
     def _has_failed(self, status: str, number: int) -> str:
         return f"{status} == {number}"
 
-    def _coming_of(self, call: Statement) -> list[Symbol]:
-        """What is made use of that is known after a call: its results, how it failed, what it has changed."""
+    def _values_after(self, call: Statement) -> list[Symbol]:
+        """The used symbols that a call defines: its results, its errors, and the memory that it has changed."""
         version = self.program.versions[call.data.memory, call]
         mine = {s.data: s for s in self.used.values() if s.op in ("result", "failed", "load") and s.data[1] == version}
         return list(mine.values())
 
     def _is_caught(self, call: Statement) -> bool:
-        return any(symbol.op == "failed" for symbol in self._coming_of(call))
+        return any(symbol.op == "failed" for symbol in self._values_after(call))
 
     def _loop(self, each: Statement, rest: Block) -> None:
         depth, (body,) = each.data, each.blocks
         size = (len(each.symbols) - 1) // 2
         count, starts, nexts = each.symbols[0], each.symbols[1 : 1 + size], each.symbols[1 + size :]
         needed = closure([*self._named_in(body), *nexts])
-        self._compute_unless_given_in(needed, body, needed)
+        self._compute_unless_defined_in(needed, body, needed)
         states = []
         for start in starts:
             states.append(self._name("s"))
@@ -416,7 +426,7 @@ class FunctionWriter:
         for symbol in self.used.values():
             if symbol.op != "outcome" or symbol.data[1] is not each:
                 continue
-            if len(self.scopes) > 1:  # it may be done in another branch too, and asked for after both
+            if len(self.scopes) > 1:  # it may be in several branches, and used after them
                 self._set(symbol, states[symbol.data[0]])
             else:
                 self.scopes[-1][id(symbol)] = states[symbol.data[0]]
@@ -426,7 +436,7 @@ class FunctionWriter:
         return f"{index} < {last}"
 
     def _round(self, body: Block, states: list[str], nexts: tuple[Symbol, ...]) -> None:
-        """What a loop does each time."""
+        """One round of a loop."""
         self._block(body)
         for state, name in zip(states, [self._as(symbol.kind, symbol) for symbol in nexts]):
             self._line(f"{state} = {name};")
@@ -472,12 +482,12 @@ class FunctionWriter:
 
 
 def identifier(name: str) -> str:
-    """A name in the letters, digits and underscores that every compiler takes."""
+    """A name of ASCII letters, digits and underscores."""
     return "".join(c if c.isascii() else f"u{ord(c):04x}" for c in re.sub(r"\W+", "_", name))
 
 
 def _unused(name: str, used: Iterable[str]) -> str:
-    """A name, with underscores behind it if something else has it."""
+    """A name, with underscores appended if it is already used."""
     taken = set(used)
     while name in taken:
         name += "_"
@@ -485,7 +495,7 @@ def _unused(name: str, used: Iterable[str]) -> str:
 
 
 def c_name(name: str) -> str:
-    """The name of a function of the model in C: with a prefix that no word and no other function there has."""
+    """The name of a function of the model in C, with a prefix that avoids conflicts."""
     of = name.removeprefix(TANGENT)
     return f"{'model' if of == name else 'tangents'}_{identifier(of)}"
 
@@ -498,11 +508,11 @@ KEYWORDS = frozenset({
     "operator", "private", "protected", "public", "template", "this", "throw", "true", "typename", "using", "virtual",
     "linux", "unix", "I", "NAN", "INFINITY", "NULL",
 })  # fmt: skip
-"""Words of C and C++ that are none of Python, and what headers and compilers give another meaning."""
+"""Keywords of C and C++ that are not keywords of Python, and names defined by headers and compilers."""
 
 
 def c_string(text: str) -> str:
-    """A text as C writes it."""
+    """A text as a string literal of C."""
     escaped = "".join(
         c if 32 <= ord(c) < 127 and c not in '"\\?' else "".join(f"\\{byte:03o}" for byte in c.encode()) for c in text
     )
@@ -525,8 +535,8 @@ def _constant(symbol: Symbol) -> str:
     return f"({value!r})" if value < 0 or repr(value).startswith("-") else repr(value)
 
 
-def _giver(symbol: Symbol) -> tuple[str, int] | None:
-    """What gives a symbol its value, if a statement does."""
+def _definition_of(symbol: Symbol) -> tuple[str, int] | None:
+    """The statement that defines a symbol, if any."""
     if symbol.op == "phi":
         return "choice", id(symbol)
     if symbol.op == "outcome":
@@ -537,7 +547,7 @@ def _giver(symbol: Symbol) -> tuple[str, int] | None:
 
 
 def _unknown_below(symbol: Symbol, is_known: object) -> list[Symbol]:
-    """What must be computed for a symbol, in order."""
+    """The unknown symbols that must be computed for a symbol, in order."""
     found: dict[int, Symbol] = {}
     stack: list[tuple[Symbol, bool]] = [(symbol, False)]
     while stack:

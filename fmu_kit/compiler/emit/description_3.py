@@ -1,4 +1,4 @@
-"""`modelDescription.xml` of FMI 3.0, from the declarations of a slave: what that of FMI 2.0 says, in its words."""
+"""`modelDescription.xml` of FMI 3.0 from the declarations of a slave, with the same content as that of FMI 2.0."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from fmu_kit.model_description import GUID_PLACEHOLDER, NATIVE_LOG_CATEGORIES
 from fmu_kit.variables import Variable
 
 TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration"}
-"""Of variables, by their names in FMI 2.0"""
+"""Types of variables, by their names in FMI 2.0"""
 
 
 def to_xml(slave: Any) -> Element:
-    """The FMI 3.0 description of a `Slave` class without Python inside, its token still the placeholder.
+    """The FMI 3.0 description of a `Slave` class without Python inside, with the placeholder as its token.
 
     Variables have the value references that they have in FMI 2.0; the independent variable comes after them.
     """
@@ -56,7 +56,7 @@ def _variable(variable: Variable, value_reference: int) -> Element:
 
 
 def _time(value_reference: int) -> Element:
-    """The independent variable; without a unit it is in seconds."""
+    """The independent variable, in seconds, the default."""
     return Element(
         "Float64",
         name="time",

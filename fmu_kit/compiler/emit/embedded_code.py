@@ -1,4 +1,4 @@
-"""A program as C for a microcontroller: its memory is a struct with names, its messages are numbers."""
+"""A program as C for a microcontroller: its memory is a struct with named fields, its messages are numbers."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from fmu_kit.compiler.trace.tracing import Program
 from fmu_kit.variables import Variable
 
 GROUPS = {"input": "in", "output": "out", "parameter": "par", "local": "local", None: "kept"}
-"""The part of the struct that variables lie in, by their causality; None: what the model keeps beside them."""
+"""The part of the struct for variables of a causality; None: for what the model keeps beside them."""
 _LARGEST, _SMALLEST = 3.4028234663852886e38, 1.1754943508222875e-38
 
 
 @dataclass(kw_only=True)
-class Words:
-    """What may be said, instead of being written while it runs: each text has a number."""
+class MessageTable:
+    """The numbers of messages, which replace texts at run time."""
 
     errors: list[str] = field(default_factory=list)
     """by status, from 1 on"""
@@ -30,14 +30,14 @@ class Words:
     """by key"""
 
     def status(self, text: str) -> int:
-        """The status that stands for a text."""
+        """The status of a text."""
         if text not in self.errors:
             self.errors.append(text)
         return 1 + self.errors.index(text)
 
 
 def fields(program: Program) -> dict[str, str]:
-    """Where each place lies in the struct, as `par.mass`; constants are not in it."""
+    """The field of the struct for each place, such as `par.mass`; constants have none."""
     found: dict[str, str] = {}
     constants = {v.name for v in program.slave.variables if v.variability == "constant"}
     for place in program.places:
@@ -53,16 +53,16 @@ def fields(program: Program) -> dict[str, str]:
     return found
 
 
-def functions(program: Program, words: Words, *, single: bool) -> str:
-    """The functions of a program; what they may say is noted in `words`."""
+def functions(program: Program, messages: MessageTable, *, single: bool) -> str:
+    """The functions of a program; their messages are added to `messages`."""
     places = fields(program)
-    written = (_StructWriter(function, program, places, words).text() for function in program.functions)
+    written = (_StructWriter(function, program, places, messages).text() for function in program.functions)
     text = "\n\n".join(written) + "\n"
     return in_single(text) if single else text
 
 
 def in_single(text: str) -> str:
-    """C with its real numbers in single precision; what is larger or smaller than any is the largest or smallest."""
+    """C with its real numbers in single precision, clamped to its largest and smallest magnitudes."""
 
     def rounded(found: re.Match[str]) -> str:
         return found[0] if found[0].startswith("/*") else single_number(float(found[0]))
@@ -71,7 +71,7 @@ def in_single(text: str) -> str:
 
 
 def single_number(value: float) -> str:
-    """A number as C writes it in single precision: the nearest one, in the digits that it needs."""
+    """The nearest number in single precision, as a literal of C with the fewest digits."""
     size = min(max(abs(value), _SMALLEST), _LARGEST) if value else 0.0
     nearest = c_float(size).value
     digits = next(text for n in range(1, 10) if c_float(float(text := f"{nearest:.{n}g}")).value == nearest)
@@ -80,14 +80,14 @@ def single_number(value: float) -> str:
 
 
 class _StructWriter(FunctionWriter):
-    """Writes one function, for a microcontroller."""
+    """Writes one function for a microcontroller."""
 
     always: ClassVar[tuple[str, ...]] = ("m",)
     first: ClassVar[tuple[str, ...]] = ("q_model *m",)
 
-    def __init__(self, function: object, program: Program, places: dict[str, str], words: Words) -> None:
+    def __init__(self, function: object, program: Program, places: dict[str, str], messages: MessageTable) -> None:
         super().__init__(function, program, places)  # type: ignore[arg-type]
-        self.words = words
+        self.messages = messages
 
     def _memory(self) -> list[str]:
         return []
@@ -97,17 +97,17 @@ class _StructWriter(FunctionWriter):
 
     def _warn(self, each: Statement, rest: Block) -> None:
         key, words = each.data
-        self.words.warnings[key] = _plain(words)
+        self.messages.warnings[key] = _plain(words)
         self._line(f"m->warnings |= {1 << self.program.warnings.index(key)}u; /* {comment(key)} */")
 
     def _raise(self, each: Statement, rest: Block) -> None:
         kind, words = each.data
         number = 1 + ERRORS.index(kind)
-        if ("failure",) in words:  # of which the status is known
+        if ("failure",) in words:  # its status is already set
             self._line(f"return {number};")
             return
         text = _plain(words)
-        self._line(f"return q_fail(m, {self.words.status(text)}, {number}); /* {comment(text)} */")
+        self._line(f"return q_fail(m, {self.messages.status(text)}, {number}); /* {comment(text)} */")
 
 
 def _plain(words: Iterable[str | tuple[str]]) -> str:
@@ -116,12 +116,12 @@ def _plain(words: Iterable[str | tuple[str]]) -> str:
 
 
 def comment(text: str) -> str:
-    """A text as it can stand in a comment."""
+    """A text that is valid in a comment of C."""
     return " ".join(text.replace("*/", "* /").replace("/*", "/ *").split())
 
 
-def described(variable: Variable) -> str:
-    """What a variable is, by the words of the slave."""
+def describe(variable: Variable) -> str:
+    """The description of a variable, with its unit and bounds."""
     unit = f" [{variable.unit}]" if variable.unit else ""
     kind = {"Real": "", "Integer": "an integer; ", "Boolean": "0 or 1; ", "Enumeration": ""}[variable.type]
     _, _, bounds = variable.bounds.rpartition("a finite value")

@@ -1,4 +1,4 @@
-"""The versions of FMI that a slave is written out for, and what differs between them."""
+"""The versions of FMI for which C is generated, and their differences."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ class Standard:
     main: str
     """the file to compile; it includes the others"""
     describe: Callable[[Any, str], Element]
-    """the model description of a slave class, from it and the file to compile"""
+    """makes the model description of a slave class, from it and the file to compile"""
     beside: Callable[[Any, str], Mapping[str, bytes]]
-    """files that say how to compile and how to wire a slave class, from it and the file to compile"""
+    """makes the other description files, by path, from the slave class and the file to compile"""
     calls: Mapping[str, str]
-    """the functions that a phase may refuse, by what instance.h calls them"""
+    """the functions that a phase may refuse, by their names in instance.h"""
     types: Mapping[str, str]
-    """whose functions get and set values of a type: that type's name, by what FMI 2.0 calls the first"""
+    """by type of FMI 2.0: the type in the names of the functions that get and set its values"""
 
 
 def _build_description(model: str, main: str) -> Element:
@@ -88,4 +88,4 @@ STANDARDS = {
         },
     ),
 }
-"""By version"""
+"""By version of FMI"""

@@ -1,16 +1,16 @@
-"""`terminalsAndIcons.xml` of FMI 3.0: what of a slave is wired as one."""
+"""`terminalsAndIcons.xml` of FMI 3.0: variables of a slave that are connected together."""
 
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
 TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
-"""Its place in an FMU."""
+"""Its path in an FMU."""
 
 
 def to_xml(slave: Any) -> Element | None:
-    """The terminals of a `Slave` class; None for one that has none.
+    """The terminals of a `Slave` class; None if it has none.
 
-    Two of one name fit together by the names of their variables (matching rule plug).
+    Two terminals of one name are connected by the names of their variables (matching rule plug).
     """
     names = dict.fromkeys(v.terminal for v in slave.variables if v.terminal is not None)
     if not names:

@@ -1,1 +1,1 @@
-"""Into what goes out: compilers of C, archives, the hash of the sources, lanes as a library."""
+"""Packaging: C compilers, archives, the hash of the sources, libraries for SIMD lanes."""

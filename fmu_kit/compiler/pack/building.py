@@ -1,6 +1,6 @@
 """Packing a slave as an .fmu without Python inside: C from its sources, and a library compiled from that.
 
-Packing imports the slave, so it runs in a process of its own: `python -m fmu_kit.compiler.pack.building`.
+Packing imports the slave, so it runs in a separate process: `python -m fmu_kit.compiler.pack.building`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pathlib import Path
 
 from fmu_kit import libraries, packaging
 from fmu_kit.archive import NATIVE_TABLES
-from fmu_kit.bundle import PackagingError, Target, bundled_sources, place
+from fmu_kit.bundle import PackagingError, Target, bundled_sources, path_in_bundle
 from fmu_kit.compiler.emit.c_code import c_code
 from fmu_kit.compiler.emit.lane_code import lane_code
 from fmu_kit.compiler.emit.standards import STANDARDS, Standard
@@ -33,20 +33,20 @@ from fmu_kit.compiler.pack.c_compiler import (
 )
 from fmu_kit.compiler.pack.freshness import source_hash
 from fmu_kit.compiler.passes.derivatives import with_tangents
-from fmu_kit.compiler.passes.precomputing import precomputed
+from fmu_kit.compiler.passes.precomputing import precompute
 from fmu_kit.compiler.passes.straightening import straightened
 from fmu_kit.compiler.runtime import FOLDER
 from fmu_kit.compiler.trace.symbols import TraceError
 from fmu_kit.compiler.trace.tracing import Program, trace
-from fmu_kit.documentation import Making
+from fmu_kit.documentation import BuildNotes
 from fmu_kit.model_description import GUID_PLACEHOLDER
-from fmu_kit.packaging import described, licences_and_icon, origin, put_guid, slave_class, written
+from fmu_kit.packaging import add_description, insert_guid, licences_and_icon, origin, slave_class, write_fmu
 
 BESIDE = ("instance.h", "integers.h", "lanes.c", "lanes.h", "mathematics.h", "text.h")
-"""What lies beside the file to compile, the same for every slave."""
+"""Source files beside the file to compile, the same for every slave."""
 TABLES = NATIVE_TABLES.rpartition("/")[2]
 UNOPTIMISED = """
-/* Derivatives are computed at initialisation, if at all, and are most of the text: a compiler need not work at them. */
+/* Derivatives are most of the code but are computed only during initialisation: they need no optimisation. */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC push_options
 #pragma GCC optimize("O0")
@@ -58,10 +58,10 @@ OPTIMISED = """
 #endif
 """
 _OF_LIBRARY = ("-O1",)
-"""Steps are as fast as with -O2, for what is written is straight and its constants are known; compiling takes less."""
+"""Compiles faster than -O2, and steps are as fast: the generated code is already simple."""
 _NEEDS = FOLDER / "needs.html"
 _PYTHON = "python"
-"""Where in the documentation the Python is from which the C was written."""
+"""The folder of the documentation with the Python from which the C was generated."""
 
 
 def build(
@@ -72,14 +72,14 @@ def build(
     systems: Sequence[str] = (),
     mathematics: Mathematics = "own",
 ) -> Path:
-    """Write `folder`/Model.fmu of FMI 2.0 or 3.0, replacing it in one go, and return its path.
+    """Write `folder`/Model.fmu of FMI 2.0 or 3.0, replacing it atomically, and return its path.
 
-    With a library for each of `systems`, by zig; without any, for this machine, by its compiler. That one can have the
-    mathematics of libm: then it has, on this machine, the bits of the slave in Python, for comparing the two.
+    It has a library for each of `systems`, compiled by zig; without any, one for this machine, by its compiler. The
+    latter can use the mathematics of libm, to be compared on this machine with the slave in Python, bit for bit.
     """
     standard = STANDARDS[version]
     try:
-        program = precomputed(trace(slave_class(target), modules_of(target)))
+        program = precompute(trace(slave_class(target), modules_of(target)))
         sources = c_sources(program, GUID_PLACEHOLDER, standard)
     except TraceError as error:
         raise PackagingError(f"{target.name}: {error}") from error
@@ -88,15 +88,15 @@ def build(
     files |= {f"documentation/{_PYTHON}/{path}": text.encode() for path, text in _python_sources(target).items()}
     files |= licences_and_icon(target, version)
     files |= origin(target, source_hash(target, version))
-    making = Making(
+    notes = BuildNotes(
         version=version,
         needs=_NEEDS,
-        source=f"{_PYTHON}/{place(target.module, target.root)}",
+        source=f"{_PYTHON}/{path_in_bundle(target.module, target.root)}",
         status=f"fmi{version}Error",
         afterwards="After a failure, reset the instance, set it to a state that was saved before, or free it.",
     )
-    described(files, target, making, standard.describe(slave_class(target), standard.main))
-    guid = put_guid(files)
+    add_description(files, target, notes, standard.describe(slave_class(target), standard.main))
+    guid = insert_guid(files)
     sources = {**sources, TABLES: sources[TABLES].replace(GUID_PLACEHOLDER.encode(), guid.encode())}
     files[NATIVE_TABLES] = sources[TABLES]
     compiled: dict[str, bytes] = {}
@@ -106,30 +106,30 @@ def build(
     for system in systems:
         compiled |= compiled_for(system, sources, standard.main, version)
     files |= {library_path(system, target.name): library for system, library in compiled.items()}
-    return written(files, target, folder)
+    return write_fmu(files, target, folder)
 
 
 def library(sources: dict[str, bytes], main: str, mathematics: Mathematics = "own") -> bytes:
-    """The library of a slave for this machine, from the sources of its FMU; compiled only if it is not in the cache."""
+    """The library of a slave for this machine, from the sources of its FMU or from the cache."""
     compile_ = functools.partial(compiled_here, sources, main, mathematics=mathematics, options=_OF_LIBRARY)
-    return libraries.content("native", sources, (OPTIONS, _OF_LIBRARY, main, mathematics), compile_)
+    return libraries.cached_content("native", sources, (OPTIONS, _OF_LIBRARY, main, mathematics), compile_)
 
 
 def c_sources(program: Program, guid: str, standard: Standard) -> dict[str, bytes]:
-    """The sources of an FMU, by the names of their files."""
+    """The sources of an FMU, by file name."""
     fixed = {name: (FOLDER / name).read_bytes() for name in (standard.main, *BESIDE)}
     derivatives = with_tangents(program, program.initialise)
-    made = {
+    generated = {
         "places.h": places(program),
         TABLES: tables(program, guid, standard),
         "functions.h": f"{c_code(program)}\n{UNOPTIMISED}\n{c_code(derivatives)}\n{OPTIMISED}\n",
         "lane_functions.h": lane_code(program, straightened(program)),
     }
-    return {**fixed, **{name: text.encode() for name, text in made.items()}}
+    return {**fixed, **{name: text.encode() for name, text in generated.items()}}
 
 
 def modules_of(target: Target) -> list[types.ModuleType]:
-    """The modules that a slave is made of, its own and those of the kit; they are imported."""
+    """The modules of a slave, its own and those of the kit; they are imported."""
     names = [
         path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
         for path in _python_sources(replace(target, variant=None))
@@ -138,27 +138,27 @@ def modules_of(target: Target) -> list[types.ModuleType]:
 
 
 def _python_sources(target: Target) -> dict[str, str]:
-    """The modules that a slave is made of, its own and those of the kit, by their paths."""
+    """The sources of a slave, its own and those of the kit, by path."""
     return {path: text for path, text in bundled_sources(target).items() if not path.startswith("pythonfmu")}
 
 
 def main(arguments: list[str]) -> int:
     """`python -m fmu_kit.compiler.pack.building [--fmi VERSION] [--target SYSTEM,…] FOLDER …`.
 
-    The rest as in `fmu_kit.packaging`.
+    The other arguments are those of `fmu_kit.packaging`.
     """
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("--fmi", type=int, choices=STANDARDS, default=2)
     parser.add_argument("--target")
-    given, others = parser.parse_known_args(arguments)
+    options, others = parser.parse_known_args(arguments)
     try:
-        systems = () if given.target is None else targets_of(given.target)
+        systems = () if options.target is None else targets_of(options.target)
     except PackagingError as error:
         print(error, file=sys.stderr)
         return 1
-    return packaging.main(others, functools.partial(build, version=given.fmi, systems=systems))
+    return packaging.main(others, functools.partial(build, version=options.fmi, systems=systems))
 
 
 if __name__ == "__main__":
-    gc.disable()  # a tenth of the time of a process that ends before there is much to collect
+    gc.disable()  # a tenth of the time of this short process
     sys.exit(main(sys.argv[1:]))

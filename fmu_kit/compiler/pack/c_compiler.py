@@ -1,4 +1,4 @@
-"""From C to a library: by the C compiler of this machine, or by zig for other systems as well."""
+"""Compiling C to a library, by the C compiler of this machine or by zig for any system."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ OPTIONS = (
     "-s",
 )
 FOR_THIS_PROCESSOR = ("-mcpu=native",) if platform.machine() in ("aarch64", "arm64") else ("-march=native",)
-"""Not for a library that is passed on."""
-_LINUX = ("-Wl,--build-id=none",)  # nothing that differs from one build to the next
+"""Not for a library that is distributed."""
+_LINUX = ("-Wl,--build-id=none",)  # nothing that differs between builds
 
 TARGETS = {
     "linux64": {"x86_64-linux": "x86_64-linux-gnu.2.17"},
@@ -29,21 +29,21 @@ TARGETS = {
     "win64": {"x86_64-windows": "x86_64-windows-gnu"},
     "darwin64": {"x86_64-darwin": "x86_64-macos.11.0", "aarch64-darwin": "aarch64-macos.11.0"},
 }
-"""The systems that zig builds for: their names in FMI 3.0, and what zig calls them."""
+"""The systems for which zig compiles: their names in FMI 3.0, and in zig."""
 _ONLY_IN_3 = ("linux-aarch64",)
-"""Systems that FMI 2.0 has no names of its own for: it takes those of FMI 3.0 (FMI 2.0.4, section 2.3)"""
+"""Systems without a name in FMI 2.0, which uses those of FMI 3.0 (FMI 2.0.4, section 2.3)"""
 _CROSS = {"linux-aarch64": "aarch64-linux-gnu-gcc"}
-"""Other compilers for a system, where there is no zig"""
+"""Other compilers for a system, used without zig"""
 _SUFFIXES = {"windows": ".dll", "win64": ".dll", "darwin": ".dylib", "darwin64": ".dylib"}
 
 
 Mathematics = Literal["own", "libm"]
-"""Where the elementary functions come from: the same bits everywhere, or those of CPython on this machine."""
+"""The elementary functions: own, with the same bits on every system, or libm's, as CPython uses on this machine."""
 _MATHEMATICS: dict[Mathematics, tuple[str, ...]] = {"own": (), "libm": ("-DQUADCOSIM_LIBM", "-lm")}
 
 
 def host_platform(version: int = 2) -> str | None:
-    """The name that a version of FMI has for the system of this machine, if an FMU can be compiled for it here."""
+    """The name of this machine's system in a version of FMI, if an FMU can be compiled for it here."""
     machine = platform.machine()
     if sys.platform != "linux" or machine not in ("x86_64", "aarch64"):
         return None
@@ -51,12 +51,12 @@ def host_platform(version: int = 2) -> str | None:
 
 
 def library_path(system: str, model: str) -> str:
-    """Where the library for a system is in an FMU, by its name in the version of FMI."""
+    """The path of the library for a system in an FMU; the system is named as in the version of FMI."""
     return f"binaries/{system}/{model}{_SUFFIXES.get(system.rpartition('-')[2], '.so')}"
 
 
 def targets_of(text: str) -> tuple[str, ...]:
-    """The systems named in a list with commas, or all; raises `PackagingError` naming them for any other."""
+    """The systems of a comma-separated list, or all; raises `PackagingError` listing them for an unknown one."""
     given = tuple(TARGETS) if text == "all" else tuple(text.split(","))
     for target in given:
         if target not in TARGETS:
@@ -65,7 +65,7 @@ def targets_of(text: str) -> tuple[str, ...]:
 
 
 def compiler() -> str:
-    """The path of this machine's C compiler; raises `PackagingError`, saying what to install if there is none."""
+    """The path of this machine's C compiler; raises `PackagingError`, naming what to install, if there is none."""
     cc = shutil.which("cc")
     if cc is None:
         raise PackagingError(
@@ -78,7 +78,7 @@ def compiler() -> str:
 def compiled_here(
     sources: dict[str, bytes], main: str, *, mathematics: Mathematics = "own", options: Sequence[str] = ()
 ) -> bytes:
-    """The library for this machine that the file `main` among the sources is compiled to, by its compiler `cc`.
+    """The library for this machine, compiled from the file `main` among the sources by its compiler `cc`.
 
     Raises `PackagingError` without a compiler.
     """
@@ -86,10 +86,10 @@ def compiled_here(
 
 
 def compiled_for(target: str, sources: dict[str, bytes], main: str, version: int = 2) -> dict[str, bytes]:
-    """The libraries for a system of `TARGETS`, by the names that a version of FMI has for it; zig compiles them.
+    """The libraries for a system of `TARGETS`, compiled by zig, by the names of the system in a version of FMI.
 
-    In FMI 2.0 they are one for macOS, whatever the processor. Raises `PackagingError`, saying what to install without
-    zig, or another compiler for the system.
+    For macOS in FMI 2.0 there is one for all processors. Raises `PackagingError`, naming what to install, without zig
+    or another compiler for the system.
     """
     options = [*OPTIONS, *(_LINUX if target.startswith("linux") else ())]
     slices = {
@@ -103,7 +103,7 @@ def compiled_for(target: str, sources: dict[str, bytes], main: str, version: int
 
 
 def _compiler_for(target: str, called: str) -> list[str]:
-    """The command that compiles for a system, which zig calls so."""
+    """The command that compiles for a system; `called` is its name in zig."""
     if importlib.util.find_spec("ziglang") is not None:
         return [sys.executable, "-m", "ziglang", "cc", "-target", called]
     other = shutil.which(_CROSS.get(target, ""))
@@ -120,17 +120,17 @@ def _compiled(command: list[str], sources: dict[str, bytes], main: str, after: S
             [*command, main, "-o", "library", *after], cwd=folder, capture_output=True, text=True, check=False
         )
         if done.returncode != 0:
-            said = done.stderr.strip().splitlines() or ["no output"]
-            raise PackagingError(f"{command[0]}: {next((line for line in said if 'error' in line), said[-1])}")
+            lines = done.stderr.strip().splitlines() or ["no output"]
+            raise PackagingError(f"{command[0]}: {next((line for line in lines if 'error' in line), lines[-1])}")
         return Path(folder, "library").read_bytes()
 
 
 _FAT_MAGIC, _ALIGNMENT = 0xCAFEBABE, 14
-"""Of a universal binary; each library in it begins at a multiple of 2 to that power."""
+"""Constants of a universal binary; each library in it begins at a multiple of 2 to the power of the alignment."""
 
 
 def universal(libraries: Sequence[bytes]) -> bytes:
-    """One library for macOS of several, each for one kind of processor: a header that says where each begins."""
+    """A universal library for macOS of several, each for one kind of processor, behind a header of their offsets."""
     size = 1 << _ALIGNMENT
     header, body, offset = struct.pack(">II", _FAT_MAGIC, len(libraries)), b"", size
     for library in libraries:

@@ -1,6 +1,6 @@
 """A slave as two files in C for a microcontroller: Model.h and Model.c.
 
-Writing them imports the slave, so it runs in a process of its own: `python -m fmu_kit.compiler.pack.embedded`.
+Writing them imports the slave, so it runs in a separate process: `python -m fmu_kit.compiler.pack.embedded`.
 """
 
 from __future__ import annotations
@@ -14,13 +14,21 @@ from string import Template
 from fmu_kit import packaging
 from fmu_kit.bundle import PackagingError, Target
 from fmu_kit.compiler.emit.c_code import c_name, c_string
-from fmu_kit.compiler.emit.embedded_code import GROUPS, Words, comment, described, fields, functions, single_number
+from fmu_kit.compiler.emit.embedded_code import (
+    GROUPS,
+    MessageTable,
+    comment,
+    describe,
+    fields,
+    functions,
+    single_number,
+)
 from fmu_kit.compiler.emit.inlined_header import inlined_header
 from fmu_kit.compiler.emit.tables import start_of
 from fmu_kit.compiler.pack.building import modules_of
-from fmu_kit.compiler.passes.precomputing import precomputed
+from fmu_kit.compiler.passes.precomputing import precompute
 from fmu_kit.compiler.runtime import FOLDER
-from fmu_kit.compiler.trace.memory import name_of_kept
+from fmu_kit.compiler.trace.memory import attribute_name
 from fmu_kit.compiler.trace.symbols import TraceError
 from fmu_kit.compiler.trace.tracing import Program, trace
 from fmu_kit.packaging import slave_class
@@ -30,13 +38,13 @@ _TITLES = {
     "in": "Inputs: set them before each step.",
     "out": "Outputs.",
     "par": "Parameters: set them between init and start.",
-    "local": "What the model computes on its way, to be looked at.",
-    "kept": "What the model keeps from call to call: not to be touched.",
+    "local": "Internal values of the model, to be read.",
+    "kept": "The state of the model between calls: not to be changed.",
 }
 _MEMCPY = """#include <float.h>
 #include <stdint.h>
 #if defined(__GNUC__)
-#define memcpy __builtin_memcpy /* of eight bytes: a move, also where -ffreestanding makes a call of it */
+#define memcpy __builtin_memcpy /* of eight bytes: a move, also under -ffreestanding */
 #else
 #include <string.h>
 #endif
@@ -49,13 +57,13 @@ _PRECISION = {
 
 
 def write(target: Target, folder: Path, *, single: bool = False) -> Path:
-    """Write Model.h and Model.c into `folder`; the path of the latter. Raises `PackagingError` saying what cannot be.
+    """Write Model.h and Model.c into `folder`; returns the path of the latter. Raises `PackagingError`.
 
-    `single`: in single precision, with the functions of libm; else in double precision, with those of its own.
+    `single`: in single precision, with the functions of libm; otherwise in double precision, with its own functions.
     """
     slave = slave_class(target)
     try:
-        program = precomputed(trace(slave, modules_of(target), digits=24 if single else 53))
+        program = precompute(trace(slave, modules_of(target), digits=24 if single else 53))
         header, source = files(program, single=single)
     except TraceError as error:
         raise PackagingError(f"{target.name}: {error}") from error
@@ -68,12 +76,12 @@ def write(target: Target, folder: Path, *, single: bool = False) -> Path:
 
 def files(program: Program, *, single: bool) -> tuple[str, str]:
     """The header and the source of a program."""
-    words = Words()
-    early = words.status(f"{program.model}_step before start: expected {program.model}_start first")
-    twice = words.status(f"{program.model}_start after start: expected {program.model}_init first")
-    never = words.status("t = ...: expected a finite start time")
-    inputs = _refusals(program, words)
-    model_functions = functions(program, words, single=single)
+    messages = MessageTable()
+    early = messages.status(f"{program.model}_step before start: expected {program.model}_start first")
+    twice = messages.status(f"{program.model}_start after start: expected {program.model}_init first")
+    never = messages.status("t = ...: expected a finite start time")
+    inputs = _refusals(program, messages)
+    model_functions = functions(program, messages, single=single)
     known: dict[str, str] = {
         "model": program.model,
         "version": f" {version}" if (version := version_of(program.slave)) else "",
@@ -85,14 +93,14 @@ def files(program: Program, *, single: bool) -> tuple[str, str]:
         "early": str(early),
         "twice": str(twice),
         "never": str(never),
-        "start_time": fields(program)[name_of_kept(("_start_time",))],
+        "start_time": fields(program)[attribute_name(("_start_time",))],
         "initialise": c_name(program.initialise.name),
         "do_step": c_name(program.do_step.name),
     }
     header = {
         "groups": _groups(program, known["real"]),
-        "warnings": _warnings(program, words),
-        "changed": _changed(program, whole=False),
+        "warnings": _warnings(program, messages),
+        "changed": _apply_function(program, whole=False),
     }
     source = {
         "includes": _INCLUDES[single],
@@ -100,8 +108,8 @@ def files(program: Program, *, single: bool) -> tuple[str, str]:
         "functions": model_functions,
         "inputs": inputs,
         "starts": _starts(program, single),
-        "changed": _changed(program, whole=True),
-        "texts": "".join(f"    {c_string(text)},\n" for text in ("no error", *words.errors)),
+        "changed": _apply_function(program, whole=True),
+        "texts": "".join(f"    {c_string(text)},\n" for text in ("no error", *messages.errors)),
     }
     return (
         Template((FOLDER / "embedded.h").read_text("utf-8")).substitute(known, **header),
@@ -119,7 +127,7 @@ def _groups(program: Program, precision: str) -> str:
         lines = []
         for place in found:
             name = f"{places[place.name].removeprefix(f'{group}.')};"
-            words = "" if place.reference is None else f" /* {described(program.slave.variables[place.reference])} */"
+            words = "" if place.reference is None else f" /* {describe(program.slave.variables[place.reference])} */"
             lines.append(f"        {precision} {f'{name:<{widest}}{words}'.rstrip()}\n")
         if lines:
             parts.append(f"    /* {_TITLES[group]} */\n    struct {{\n{''.join(lines)}    }} {group};\n")
@@ -140,23 +148,23 @@ def _starts(program: Program, single: bool) -> str:
     return "".join(lines)
 
 
-def _refusals(program: Program, words: Words) -> str:
-    """What looks at each input: an FMU refuses what is not finite."""
+def _refusals(program: Program, messages: MessageTable) -> str:
+    """The checks of the inputs, which like in an FMU must be finite."""
     places = fields(program)
     lines = []
     for variable in program.slave.variables:
         if variable.causality == "input" and variable.type == "Real":
-            status = words.status(f"{variable.name} = ...: expected a finite value")
+            status = messages.status(f"{variable.name} = ...: expected a finite value")
             lines.append(f"    if (!q_isfinite(m->{places[variable.name]})) return {status};\n")
     return "".join(lines)
 
 
-def _warnings(program: Program, words: Words) -> str:
+def _warnings(program: Program, messages: MessageTable) -> str:
     """The bits of the warnings."""
     lines = [
-        f"    {program.model.upper()}_{_constant(key)} = {1 << bit}, /* {comment(words.warnings[key])} */\n"
+        f"    {program.model.upper()}_{_constant(key)} = {1 << bit}, /* {comment(messages.warnings[key])} */\n"
         for bit, key in enumerate(program.warnings)
-        if key in words.warnings
+        if key in messages.warnings
     ]
     return f"/* The bits of `warnings`. */\nenum {{\n{''.join(lines)}}};\n\n" if lines else ""
 
@@ -165,14 +173,14 @@ def _constant(key: str) -> str:
     return "".join(c if c.isalnum() and c.isascii() else "_" for c in key).upper()
 
 
-def _changed(program: Program, *, whole: bool) -> str:
-    """What takes over parameters that were tuned, where there are any."""
+def _apply_function(program: Program, *, whole: bool) -> str:
+    """The function that applies tuned parameters, if the model has any."""
     if not any(variable.variability == "tunable" for variable in program.slave.variables):
         return ""
     head = f"void {program.model}_changed({program.model} *c)"
     if not whole:
         return f"/* After tunable parameters were set between steps: the next step takes them over. */\n{head};\n\n"
-    return f"{head}\n{{\n    c->{fields(program)[name_of_kept(('_stale',))]} = 1;\n}}\n\n"
+    return f"{head}\n{{\n    c->{fields(program)[attribute_name(('_stale',))]} = 1;\n}}\n\n"
 
 
 def main(arguments: list[str]) -> int:

@@ -1,4 +1,4 @@
-"""Whether a native FMU is of today's sources: the hash that it carries, computed without importing any slave."""
+"""The hash by which a native FMU is recognised as up to date, computed without importing any slave."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ _COMPILER = Path(compiler.__file__).parent
 
 
 def source_hash(target: Target, version: int = 2) -> str:
-    """The hash of all that decides what the FMU of a version of FMI does: its modules, and all that writes C.
+    """The hash of all that the FMU of a version of FMI depends on: its modules and the code generator.
 
-    Not of the compiler: every one makes a library that gives the same bits.
+    The C compiler is not part of it: all of them make libraries that give the same bits.
     """
     own = sorted(path for path in _COMPILER.rglob("*") if path.suffix in (".py", ".c", ".h", ".html"))
     return hash_of(target, [*own, TEMPLATE], {"version": str(version)}, licences_and_icon(target, version))

@@ -1,4 +1,4 @@
-"""The lanes of a native FMU: its sources compiled so that vector registers hold several runs (`lanes.c` says how)."""
+"""The SIMD lanes of a native FMU: its sources compiled so that vector registers hold several runs (see `lanes.c`)."""
 
 from __future__ import annotations
 
@@ -14,35 +14,35 @@ from fmu_kit.bundle import PackagingError
 from fmu_kit.compiler.pack.c_compiler import FOR_THIS_PROCESSOR, Mathematics, compiled_here, compiler
 
 MAIN = "lanes.c"
-"""Of the sources of an FMU, what is compiled."""
+"""The file to compile among the sources of an FMU."""
 MOST_LANES = 64
 _REGISTERS = {"__AVX512DQ__": 8, "__AVX__": 4}
-"""How many doubles a vector register has, by what a compiler says of the processor; else there are 2."""
+"""Doubles in a vector register, by predefined macro of the compiler; without these, 2."""
 
 
 @functools.cache
-def lanes_here() -> int:
-    """How many runs this machine best computes at once: as many as a vector register has doubles.
+def preferred_lanes() -> int:
+    """The best number of lanes on this machine: the doubles in a vector register.
 
-    Raises `PackagingError`, saying what to install if there is no compiler.
+    Raises `PackagingError`, naming what to install, if there is no compiler.
     """
     command = [compiler(), *FOR_THIS_PROCESSOR, "-dM", "-E", "-x", "c", "-"]
-    told = subprocess.run(command, input="", capture_output=True, text=True, check=False).stdout
-    known = set(re.findall(r"#define (\w+)", told))
+    macros = subprocess.run(command, input="", capture_output=True, text=True, check=False).stdout
+    known = set(re.findall(r"#define (\w+)", macros))
     return next((lanes for name, lanes in _REGISTERS.items() if name in known), 2)
 
 
 def compiled_lanes(
     sources: Mapping[str, bytes], lanes: int | None = None, *, mathematics: Mathematics = "own"
 ) -> bytes:
-    """The library with which the slave that an FMU has in `sources` (by name) is computed in lanes, for this machine.
+    """The library for this machine that computes the slave of an FMU's `sources`, by name, in lanes.
 
-    `lanes` is 1 or a power of two up to 64; without it there are as many as `lanes_here`. Raises `PackagingError`
-    for sources without lanes, and without a compiler, saying what to install.
+    `lanes` is 1 or a power of two up to 64; default: `preferred_lanes`. Raises `PackagingError` for sources without
+    lanes, and, naming what to install, without a compiler.
     """
     if MAIN not in sources:
         raise PackagingError(f"sources of the FMU: expected {MAIN}, as in those of quadcosim build --native")
-    count = lanes_here() if lanes is None else lanes
+    count = preferred_lanes() if lanes is None else lanes
     if count not in (2**k for k in range(7)):
         raise PackagingError(f"lanes = {lanes}: expected 1 or a power of two up to {MOST_LANES}")
     options = (*FOR_THIS_PROCESSOR, f"-DQUADCOSIM_LANES={count}", "-Wno-psabi")
@@ -50,31 +50,31 @@ def compiled_lanes(
 
 
 class Lanes:
-    """A library of `compiled_lanes`, loaded; its functions take addresses of arrays, as `lanes.c` describes them."""
+    """A loaded library of `compiled_lanes`; its functions take addresses of arrays, as described in `lanes.c`."""
 
     def __init__(self, library: Path) -> None:
         self._library: Any = ctypes.CDLL(str(library))
         self.lanes: int = self._library.quadcosim_lanes()
         self.places: int = self._library.quadcosim_places()
-        """of the memory: each has a double for every lane"""
+        """number of places of the memory, each with a double for every lane"""
         self.variables: int = self._library.quadcosim_variables()
-        """how many places, from the first one, are variables, by their value references"""
+        """number of variables, which are the first places, by value reference"""
         self.divergence: int = self._library.quadcosim_divergence()
-        """the status of a lane that has diverged"""
+        """status of a lane that has diverged"""
 
     @property
     def line(self) -> tuple[int, int]:
-        """How many steps were tried as a straight line (`passes/straightening.py`), and how many of them left it."""
+        """The numbers of steps tried as a straight line (`passes/straightening.py`), and of those that left it."""
         tried, left = ctypes.c_int64(), ctypes.c_int64()
         self._library.quadcosim_line(ctypes.byref(tried), ctypes.byref(left))
         return tried.value, left.value
 
     def begin(self, memory: int) -> None:
-        """Put the start values into all lanes of a memory."""
+        """Set all lanes of a memory to the start values."""
         self._library.quadcosim_begin(*map(ctypes.c_void_p, (memory,)))
 
     def initialise(self, memory: int, active: int, start_time: int, status: int) -> None:
-        """Take over what was set, and compute outputs at the start time [s]."""
+        """Initialise from the values that were set, and compute the outputs at the start time [s]."""
         self._library.quadcosim_initialise(*map(ctypes.c_void_p, (memory, active, start_time, status)))
 
     def do_step(self, memory: int, active: int, t: int, h: int, status: int) -> None:

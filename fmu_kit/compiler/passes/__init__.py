@@ -1,1 +1,1 @@
-"""From statements to statements: derivatives, what follows from parameters alone, and a step as one straight line."""
+"""Transformations of programs: derivatives, precomputing of parameters, and a step as straight-line code."""

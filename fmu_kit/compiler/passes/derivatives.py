@@ -1,7 +1,7 @@
-"""Derivatives of a program by algorithmic differentiation of its graph, forward: with each value goes its tangent.
+"""Derivatives of a program by forward algorithmic differentiation of its graph: each value gets a tangent.
 
-A tangent is how fast a value changes along one direction of what it is computed from. The functions with tangents do
-what those of the program do, on parameters, memory and results that all have a tangent; conditions have none.
+A tangent is the directional derivative of a value along one direction of the inputs. The functions with tangents do
+what those of the program do; parameters, memory and results have tangents, conditions have none.
 """
 
 from __future__ import annotations
@@ -15,29 +15,29 @@ from fmu_kit.compiler.trace.symbols import Symbol, TraceError, constant, lifted,
 from fmu_kit.compiler.trace.tracing import Program
 
 Rule = Callable[[Symbol, tuple[Symbol, ...], tuple[Any, ...]], Any]
-"""The tangent of a value, from the value, what it is computed from, and the tangents of that; None is zero"""
+"""The tangent of a value, from the value, its operands and their tangents; None is zero"""
 
 
 def tangent_place(name: str) -> str:
-    """The name of the place of the tangent of what lies in a place."""
+    """The name of the place with the tangent of a place."""
     return f"{TANGENT}{name}"
 
 
 def with_tangents(program: Program, root: Function) -> Program:
-    """The program that computes `root` and its derivatives: `initialise` and `do_step` of it are both that."""
-    made = _Differentiation(program)
-    function = made.function(root)
+    """The program that computes `root` and its derivatives, both as `initialise` and as `do_step`."""
+    differentiation = _Differentiation(program)
+    function = differentiation.function(root)
     return replace(
         program,
-        functions=tuple(made.functions),
+        functions=tuple(differentiation.functions),
         initialise=function,
         do_step=function,
-        versions={**program.versions, **made.versions},
+        versions={**program.versions, **differentiation.versions},
     )
 
 
 class _Differentiation:
-    """The functions with tangents, as far as they are made."""
+    """Makes the functions with tangents."""
 
     def __init__(self, program: Program) -> None:
         self.program = program
@@ -46,7 +46,7 @@ class _Differentiation:
         self._made: dict[Function, Function] = {}
 
     def function(self, f: Function) -> Function:
-        """`f` with tangents: of its parameters, after them, and of its results, after them."""
+        """`f` with tangents, which follow its parameters and its results."""
         if f not in self._made:
             body = _Body(self, f)
             self._made[f] = replace(
@@ -64,7 +64,7 @@ class _Differentiation:
 
 
 class _Body:
-    """One function with tangents: its symbols anew, each with its tangent."""
+    """Makes the body of one function with tangents."""
 
     def __init__(self, whole: _Differentiation, function: Function) -> None:
         self.whole = whole
@@ -76,7 +76,7 @@ class _Body:
     # -- statements --------------------------------------------------------------------------------------------
 
     def block(self, block: Block) -> Block:
-        """The statements of a block, and those for the tangents."""
+        """The statements of a block with those of the tangents."""
         return tuple(made for each in block for made in getattr(self, f"_{each.op}")(each))
 
     def _if(self, each: Statement) -> Iterable[Statement]:
@@ -162,7 +162,7 @@ class _Body:
         if symbol.op == "outcome":
             k, loop = data
             size = (len(loop.symbols) - 1) // 2
-            if loop not in self.loops:  # of a branch that is to come
+            if loop not in self.loops:  # in a later branch
                 self._loop(loop)
             made = self.loops[loop]
             value = node("outcome", (), symbol.kind, (k, made))
@@ -196,7 +196,7 @@ def _number(tangent: Any) -> Symbol:
     return constant(0.0) if tangent is None else lifted(tangent)
 
 
-# -- the rules, one for each operation: values are symbols, tangents are symbols or None ------------------------------
+# -- the rules of the operations: values are symbols, tangents are symbols or None ------------------------------------
 
 
 def _plus(a: Any, b: Any) -> Any:
@@ -220,7 +220,7 @@ def _of(name: str, *args: Symbol) -> Symbol:
 
 
 def _by(slope: Callable[[Symbol, Symbol], Any]) -> Rule:
-    """Of a function of one value: its slope, from its value and where."""
+    """The rule of a function of one operand; `slope` computes its derivative from result and operand."""
     return lambda y, x, d: _times(d[0], slope(y, x[0]))
 
 
@@ -236,7 +236,7 @@ def _sign(x: Symbol) -> Symbol:
     return _of("copysign", constant(1.0), x)
 
 
-def _root_of_rest(x: Symbol) -> Symbol:
+def _root_of_complement(x: Symbol) -> Symbol:
     """sqrt(1 - x²)."""
     return _of("sqrt", _minus(1.0, _square(x)))
 
@@ -258,7 +258,7 @@ def _joined(y: Symbol, x: tuple[Symbol, ...], d: tuple[Any, ...]) -> Any:
 
 
 def _direction(y: Symbol, x: tuple[Symbol, ...], d: tuple[Any, ...]) -> Any:
-    """Of atan2(a, b): (b da - a db) / (a² + b²)."""
+    """The tangent of atan2(a, b): (b da - a db) / (a² + b²)."""
     a, b = x
     size = node("add", (_square(a), _square(b)), "real")
     return _over(_plus(_times(d[0], b), _negative(_times(d[1], a))), size)
@@ -286,8 +286,8 @@ _RULES: dict[str, Rule] = {
     "cos": _by(lambda y, x: node("neg", (_of("sin", x),), "real")),
     "tan": _by(lambda y, x: node("add", (constant(1.0), _square(y)), "real")),
     "tanh": _by(lambda y, x: _minus(1.0, _square(y))),
-    "asin": lambda y, x, d: _over(d[0], _root_of_rest(x[0])),
-    "acos": lambda y, x, d: _negative(_over(d[0], _root_of_rest(x[0]))),
+    "asin": lambda y, x, d: _over(d[0], _root_of_complement(x[0])),
+    "acos": lambda y, x, d: _negative(_over(d[0], _root_of_complement(x[0]))),
     "atan": lambda y, x, d: _over(d[0], node("add", (constant(1.0), _square(x[0])), "real")),
     "atan2": _direction,
 }  # fmt: skip

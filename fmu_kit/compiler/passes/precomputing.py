@@ -1,6 +1,6 @@
-"""What follows from parameters alone is computed when they are taken over, not in every step.
+"""Precomputing of values that depend on parameters alone: when these are read, and not in every step.
 
-The same operations on the same numbers, so the same bits; only when they are done is another matter.
+The operations and their numbers are the same, so the bits are too; only the time of computing differs.
 """
 
 from __future__ import annotations
@@ -12,19 +12,19 @@ from fmu_kit.compiler.trace.symbols import Symbol, closure, node
 from fmu_kit.compiler.trace.tracing import Program
 
 TAKING = "take_parameters"
-"""The function in which parameters are taken over."""
+"""The function that reads the parameters."""
 _CHEAP = frozenset(
     {"add", "sub", "mul", "neg", "abs", "lt", "le", "gt", "ge", "eq", "ne", "and", "or", "not", "select"}
 )
 
 
-def precomputed(program: Program) -> Program:
-    """The program with a place for each costly value that follows from parameters alone."""
+def precompute(program: Program) -> Program:
+    """The program with a place for each costly value that depends on parameters alone."""
     taking, before = _taking(program)
     whole = _Precomputing(program, fixed_places(program))
     whole.made.update({f: f for f in before})
     for f in _others(program, before):
-        if f not in (program.initialise, program.do_step):  # in these, the parameters are taken over
+        if f not in (program.initialise, program.do_step):  # these read the parameters
             whole.function(f)
     if not whole.places:
         return program
@@ -48,7 +48,7 @@ def precomputed(program: Program) -> Program:
 
 
 def fixed_places(program: Program) -> frozenset[str]:
-    """The places that hold the same from when the parameters are taken over until they are again."""
+    """The places that change only when the parameters are read."""
     taking, before = _taking(program)
     changed = {name for f in _others(program, before) for name in _stored_directly(f.body)}
     parameters = {v.name for v in program.slave.variables if v.causality == "parameter"}
@@ -56,7 +56,7 @@ def fixed_places(program: Program) -> frozenset[str]:
 
 
 def _taking(program: Program) -> tuple[Function, set[Function]]:
-    """The function in which parameters are taken over; it and those that it calls."""
+    """The function that reads the parameters; and it together with those that it calls."""
     (taking,) = (f for f in program.functions if f.name == TAKING)
     return taking, _called_by(taking) | {taking}
 
@@ -86,19 +86,19 @@ def _stored_directly(block: Block) -> set[str]:
 
 
 class _Precomputing:
-    """The functions that read what was computed before, as far as they are made."""
+    """Makes the functions that read precomputed values."""
 
     def __init__(self, program: Program, fixed: frozenset[str]) -> None:
         self.program = program
         self.fixed = fixed
         self.places: dict[Symbol, tuple[Place, Symbol]] = {}
-        """by a value, as it is at the end of the taking: its place, and the value"""
+        """place and value, by the value as at the end of `TAKING`"""
         self.versions: dict[tuple[int, Statement], int] = {}
         self.made: dict[Function, Function] = {}
         self._kinds: dict[int, tuple[bool, bool]] = {}
 
     def function(self, f: Function) -> Function:
-        """`f`, with what it calls, reading what was computed before."""
+        """`f`, with the functions that it calls, reading precomputed values."""
         if f not in self.made:
             for symbol in closure(symbols_of(f.body)).values():
                 self._know(symbol)
@@ -108,17 +108,17 @@ class _Precomputing:
         return self.made[f]
 
     def place_of(self, value: Symbol) -> Place:
-        """Where a value is kept."""
+        """The place of a precomputed value."""
         if value not in self.places:
             self.places[value] = (Place(f"self.computed.{len(self.places) + 1}", value.kind, None), value)
         return self.places[value][0]
 
-    def is_worth_it(self, symbol: Symbol) -> bool:
-        """Whether a value follows from parameters alone, with more than a few sums and products in it."""
+    def is_precomputable(self, symbol: Symbol) -> bool:
+        """Whether a value depends on parameters alone, and needs more than a few sums and products."""
         return symbol.kind != "wide" and self._kinds.get(id(symbol)) == (True, True)
 
     def _know(self, symbol: Symbol) -> None:
-        """Note whether a value follows from parameters alone, and whether it is costly; of its operands it is noted."""
+        """Record whether a value depends on parameters alone, and whether it is costly, given this for its operands."""
         below = [self._kinds[id(arg)] for arg in symbol.args] if symbol.op != "phi" else [(False, False)]
         fixed = all(of for of, _ in below)
         costly = bool(below) and (symbol.op not in _CHEAP or any(of for _, of in below))
@@ -133,7 +133,7 @@ def _calls(block: Block) -> list[Function]:
 
 
 class _Body:
-    """One function, its symbols anew."""
+    """Makes the body of one function that reads precomputed values."""
 
     def __init__(self, whole: _Precomputing, function: Function) -> None:
         self.whole = whole
@@ -142,7 +142,7 @@ class _Body:
         self._loops: dict[Statement, Statement] = {}
 
     def block(self, block: Block) -> Block:
-        """The statements of a block."""
+        """The rewritten statements of a block."""
         return tuple(self._made(each) for each in block)
 
     def _made(self, each: Statement) -> Statement:
@@ -160,7 +160,7 @@ class _Body:
         return made
 
     def value(self, symbol: Symbol) -> Symbol:
-        """A symbol in the function as it is made."""
+        """The symbol of the rewritten function."""
         waiting = [symbol]
         while waiting:  # not by recursion: the graph is deep
             one = waiting[-1]
@@ -180,17 +180,17 @@ class _Body:
             return self._known[id(symbol)]
         if symbol.op == "outcome":
             k, loop = symbol.data
-            made = self._loops[loop] if loop in self._loops else self._made(loop)  # of a branch that is to come
+            made = self._loops[loop] if loop in self._loops else self._made(loop)  # in a later branch
             return node("outcome", (), symbol.kind, (k, made))
         if not symbol.args:
             return symbol
-        if self._after_taking and self.whole.is_worth_it(symbol):
+        if self._after_taking and self.whole.is_precomputable(symbol):
             return node("load", (), symbol.kind, (self.whole.place_of(_as_read(symbol, 0)).name, 0))
         return None
 
 
 def _as_read(symbol: Symbol, version: int) -> Symbol:
-    """A value that follows from parameters alone, computed from this version of the memory."""
+    """A value that depends on parameters alone, computed from this version of the memory."""
     if symbol.op == "load":
         return node("load", (), symbol.kind, (symbol.data[0], version))
     args = [_as_read(arg, version) for arg in symbol.args]

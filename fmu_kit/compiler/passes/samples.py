@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from fmu_kit.compiler.passes.precomputing import TAKING
-from fmu_kit.compiler.trace.memory import Memory, name_of_kept
-from fmu_kit.compiler.trace.statements import each_of
+from fmu_kit.compiler.trace.memory import Memory, attribute_name
+from fmu_kit.compiler.trace.statements import all_statements
 from fmu_kit.compiler.trace.symbols import Symbol, value_of
 from fmu_kit.compiler.trace.tracing import Program
 from fmu_kit.compiler.trace.tree import is_number, leaves
@@ -52,8 +52,8 @@ def _state(slave: type[Slave], drawn: random.Random, size: float) -> State:
     step = float(slave.default_experiment.step_size) / drawn.choice((1.0, 10.0, 11.0, 13.0))
     made, t = slave(instance_name="sample"), 0.0
     for variable in made.variables:
-        if variable.causality == "parameter" and variable.name in slave.usually:
-            setattr(made, variable.name, slave.usually[variable.name])
+        if variable.causality == "parameter" and variable.name in slave.usual_parameters:
+            setattr(made, variable.name, slave.usual_parameters[variable.name])
     made._phase = Phase.INITIALIZATION
     _set_inputs(made, drawn, size)
     made._initialise()
@@ -84,7 +84,7 @@ def _near_its_start(variable: Variable, drawn: random.Random, size: float) -> fl
 
 def _name(made: Slave, path: tuple[Any, ...]) -> str:
     is_variable = path[0] in ("_reals", "_others") and len(path) > 1
-    return made.variables[path[1]].name if is_variable else name_of_kept(path)
+    return made.variables[path[1]].name if is_variable else attribute_name(path)
 
 
 class Values:
@@ -93,7 +93,9 @@ class Values:
     def __init__(self, program: Program, states: Sequence[State]) -> None:
         self.states = states
         taking = [f for f in program.functions if f.name == TAKING]
-        self._computed = {each.data: each.symbols[0] for f in taking for each in each_of(f.body) if each.op == "store"}
+        self._computed = {
+            each.data: each.symbols[0] for f in taking for each in all_statements(f.body) if each.op == "store"
+        }
         """what is computed when parameters are taken over, by its place"""
         self._known: dict[int, list[float]] = {}
 

@@ -1,6 +1,6 @@
-"""The C that every slave has: headers, the functions of FMI 2.0 and 3.0, and what a microcontroller has instead."""
+"""The C that all slaves share: headers, the functions of FMI 2.0 and 3.0, and templates for microcontrollers."""
 
 from pathlib import Path
 
 FOLDER = Path(__file__).parent
-"""Where it lies"""
+"""The folder of these files"""

@@ -9,7 +9,7 @@ $mathematics
 /* -- the model ---------------------------------------------------------------------------------------------------- */
 
 #if defined(__GNUC__)
-#pragma GCC diagnostic ignored "-Wunused-variable" /* values that a message alone would show */
+#pragma GCC diagnostic ignored "-Wunused-variable" /* values that only a message would use */
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 #endif
 
@@ -22,7 +22,7 @@ Q_ONE int q_fail(q_model *m, int status, int kind)
 }
 
 $functions
-/* -- what is called from outside ----------------------------------------------------------------------------------- */
+/* -- the interface ------------------------------------------------------------------------------------------------ */
 
 static int refused_input(const q_model *m)
 {

@@ -1,4 +1,4 @@
-/* A slave for hosts of FMI 2.0: the functions of the standard, each by one of instance.h. */
+/* A slave for hosts of FMI 2.0: the functions of the standard, each implemented by one of instance.h. */
 
 typedef int Truth;
 
@@ -16,8 +16,8 @@ struct Host {
     void *environment;
 };
 
-/* A message is a printf format, and some hosts fill none in: percent signs are doubled, and there are no arguments. */
-static void tell(const Instance *m, Status status, Text category, Text message)
+/* A message is a printf format, which some hosts do not fill in: percent signs are doubled, and it has no arguments. */
+static void send_message(const Instance *m, Status status, Text category, Text message)
 {
     char format[2 * LONGEST_TEXT], *to = format;
     if (!m->host->logger)
@@ -31,7 +31,7 @@ static void tell(const Instance *m, Status status, Text category, Text message)
     m->host->logger(m->host->environment, m->name, status, category, format);
 }
 
-/* -- life ------------------------------------------------------------------------------------------------------- */
+/* -- life cycle ------------------------------------------------------------------------------------------------- */
 
 EXPORT Text fmi2GetTypesPlatform(void);
 Text fmi2GetTypesPlatform(void) { return "default"; }
@@ -70,7 +70,7 @@ CALL(SetupExperiment, int has_tolerance, double tolerance, double start_time, in
 {
     INSTANCE;
     (void)has_tolerance, (void)tolerance;
-    return take_times(m, start_time, has_stop, stop);
+    return set_times(m, start_time, has_stop, stop);
 }
 
 PLAIN(EnterInitializationMode)
@@ -154,7 +154,7 @@ CALL(SetFMUstate, void *state)
 CALL(FreeFMUstate, void **state)
 {
     INSTANCE;
-    return forget(state);
+    return free_state(state);
 }
 
 CALL(SerializedFMUstateSize, void *state, size_t *size)
@@ -185,7 +185,7 @@ CALL(GetDirectionalDerivative, References z, size_t nz, References v, size_t nv,
     return derive(m, z, nz, v, nv, dv, dz);
 }
 
-/* -- what FMI asks for and this FMU does not offer ---------------------------------------------------------------- */
+/* -- functions that this FMU does not offer ----------------------------------------------------------------------- */
 
 CALL(SetRealInputDerivatives, References vr, size_t n, const int *order, const double *value)
 {

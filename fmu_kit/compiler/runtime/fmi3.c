@@ -1,4 +1,4 @@
-/* A slave for hosts of FMI 3.0: the functions of the standard, each by one of instance.h.
+/* A slave for hosts of FMI 3.0: the functions of the standard, each implemented by one of instance.h.
 
    For co-simulation, without event mode, clocks and early return. */
 
@@ -11,7 +11,7 @@ typedef bool Truth;
 
 #define FMI(name) fmi3##name
 
-enum { TIME = VARIABLES }; /* the independent variable, after the others */
+enum { TIME = VARIABLES }; /* the independent variable, after all others */
 
 struct Host {
     void (*log)(void *environment, Status status, Text category, Text message);
@@ -23,13 +23,13 @@ typedef struct {
     Host host;
 } Whole;
 
-static void tell(const Instance *m, Status status, Text category, Text message)
+static void send_message(const Instance *m, Status status, Text category, Text message)
 {
     if (m->host->log)
         m->host->log(m->host->environment, status, category, message);
 }
 
-/* -- life ------------------------------------------------------------------------------------------------------- */
+/* -- life cycle ------------------------------------------------------------------------------------------------- */
 
 EXPORT Text fmi3GetVersion(void);
 Text fmi3GetVersion(void) { return "3.0"; }
@@ -96,7 +96,7 @@ CALL(EnterInitializationMode, bool has_tolerance, double tolerance, double start
 {
     INSTANCE;
     (void)has_tolerance, (void)tolerance;
-    return take_times(m, start_time, has_stop, stop) == OK ? enter_initialization(m) : ERROR;
+    return set_times(m, start_time, has_stop, stop) == OK ? enter_initialization(m) : ERROR;
 }
 
 PLAIN(ExitInitializationMode)
@@ -138,7 +138,7 @@ static Status are_as_many(Instance *m, size_t references, size_t values)
     return refuse_with(m, "nValues: expected as many values as value references, for all variables are scalars", "", "");
 }
 
-/* The Reals, and the time among them wherever it is asked for. */
+/* Get Reals, among which may be the time. */
 static Status get_reals_and_time(Instance *m, References vr, size_t n, double *value)
 {
     for (size_t from = 0, to; from < n; from = to + 1) {
@@ -172,7 +172,7 @@ ACCESS(Int32, get_integers, set_integers, int32_t)
 ACCESS(Boolean, get_booleans, set_booleans, bool)
 ACCESS(Int64, get_enumerations, set_enumerations, int64_t)
 
-/* Of types that no variable has; some hosts ask for none of them. */
+/* Functions of types that no variable has; some hosts call them with no references. */
 #define NO_VARIABLES(name, ...) \
     CALL(name, References vr, size_t n, __VA_ARGS__) \
     { \
@@ -185,7 +185,7 @@ ACCESS(Int64, get_enumerations, set_enumerations, int64_t)
     NO_VARIABLES(Set##kind, const ctype *values, size_t n_values)
 
 #if defined(__GNUC__)
-#pragma GCC diagnostic ignored "-Wunused-parameter" /* of functions that refuse, whatever they are given */
+#pragma GCC diagnostic ignored "-Wunused-parameter" /* of functions that refuse all calls */
 #endif
 
 NONE_OF(Float32, float)
@@ -226,7 +226,7 @@ CALL(SetFMUState, void *state)
 CALL(FreeFMUState, void **state)
 {
     INSTANCE;
-    return forget(state);
+    return free_state(state);
 }
 
 CALL(SerializedFMUStateSize, void *state, size_t *size)
@@ -259,7 +259,7 @@ CALL(GetDirectionalDerivative, References z, size_t nz, References v, size_t nv,
     return derive(m, z, nz, v, nv, dv, dz);
 }
 
-/* -- what FMI asks for and this FMU does not offer ---------------------------------------------------------------- */
+/* -- functions that this FMU does not offer ----------------------------------------------------------------------- */
 
 #define NOT_OFFERED(name) refuse_with(m, "fmi3" #name ": not offered by this FMU", "", "")
 #define WITHOUT(name, ...) \
@@ -288,7 +288,7 @@ WITHOUT_PLAIN(EnterEventMode)
 WITHOUT_PLAIN(EnterStepMode)
 WITHOUT_PLAIN(EvaluateDiscreteStates)
 
-/* Of model exchange and scheduled execution: some hosts look for every function of the standard. */
+/* Functions of model exchange and scheduled execution: some hosts require every function of the standard. */
 WITHOUT(SetTime, double t)
 WITHOUT(SetContinuousStates, const double *x, size_t n)
 WITHOUT(GetContinuousStates, double *x, size_t n)

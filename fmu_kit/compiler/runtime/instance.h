@@ -1,12 +1,11 @@
-/* A slave as any version of FMI for co-simulation asks for it: calls in their order, values, states, messages.
+/* An instance of a slave for any version of FMI for co-simulation: order of calls, values, states, messages.
 
-   places.h, tables.h and functions.h, which lie beside this file, have what differs from slave to slave: what it keeps,
-   what it says of its variables, and what it computes. They are written by quadcosim from the slave's Python; nothing
-   here depends on what the model is. An instance is one piece of memory, made by `create` and never grown; nothing is shared between
-   instances.
+   places.h, tables.h and functions.h beside this file are specific to the slave: its memory, its variables, and its
+   computations. quadcosim generates them from the slave's Python; nothing here depends on the model. An instance is
+   one piece of memory, made by `create` and never grown; instances share nothing.
 
-   The file of a version of FMI includes this one, and has the functions that a host calls. Before that it defines
-   Truth, the type of a Boolean; after it Host, what the host has given to an instance, and `tell`. */
+   The file of a version of FMI includes this one, and has the functions that a host calls. Before the include it
+   defines Truth, the type of a Boolean; after it Host, the callbacks of the host, and `send_message`. */
 
 #include <stdlib.h>
 #include <string.h>
@@ -35,24 +34,24 @@ typedef struct Host Host;
 
 static const Text categories[CATEGORIES] = {"logStatusWarning", "logStatusError", "divergence"};
 
-/* Whose state it is. */
+/* The FMU to which a state belongs. */
 typedef struct {
     char format[16], guid[48], model[64];
     int reals;
 } Owner;
 
-/* What is saved as the state: all that a step depends on. */
+/* The saved state: all that a step depends on. */
 typedef struct {
     Owner owner;
     double memory[PLACES];
     double time;     /* of the last communication point */
-    double reached;  /* where the next step begins; not a number: anywhere, before the first */
-    double stop;     /* past which there is no step; infinite if none is defined */
-    unsigned warned; /* bits of the warnings that were given */
+    double reached;  /* start time of the next step; not a number before the first: any */
+    double stop;     /* stop time; infinite if none is defined */
+    unsigned warned; /* bits of the warnings that were sent */
     Phase phase;
 } State;
 
-/* Its bytes, as they are given to a host. */
+/* Its bytes, for the host. */
 typedef struct {
     State state;
     uint64_t checksum;
@@ -62,8 +61,8 @@ typedef struct {
     State state;
     char failure[LONGEST_TEXT]; /* why the last call failed */
     char draft[LONGEST_TEXT];   /* a message that is being written */
-    q_text text;                /* the same, as text.h has it */
-    Text name;                  /* behind the instance, in the same piece of memory */
+    q_text text;                /* the draft as a text of text.h */
+    Text name;                  /* stored behind the instance, in the same piece of memory */
     const Host *host;
     int logs[CATEGORIES];
     double *tangents; /* of the memory, while derivatives are computed */
@@ -71,13 +70,13 @@ typedef struct {
 
 /* -- messages --------------------------------------------------------------------------------------------------- */
 
-/* Give a message to the host. */
-static void tell(const Instance *m, Status status, Text category, Text message);
+/* Send a message to the host. */
+static void send_message(const Instance *m, Status status, Text category, Text message);
 
-static void log_if_wanted(const Instance *m, Status status, Category category, Text message)
+static void log_message(const Instance *m, Status status, Category category, Text message)
 {
     if (m->logs[category])
-        tell(m, status, categories[category], message);
+        send_message(m, status, categories[category], message);
 }
 
 static void text_begin(Instance *m) { m->text = q_text_in(m->draft, sizeof m->draft); }
@@ -91,7 +90,7 @@ static int fail(Instance *m, int error)
     return error;
 }
 
-Q_ONE void warn(Instance *m) { log_if_wanted(m, WARNING, LOG_WARNING, m->draft); }
+Q_ONE void warn(Instance *m) { log_message(m, WARNING, LOG_WARNING, m->draft); }
 
 #include "functions.h"
 
@@ -99,7 +98,7 @@ Q_ONE void warn(Instance *m) { log_if_wanted(m, WARNING, LOG_WARNING, m->draft);
 static Status refuse(Instance *m, int error)
 {
     m->state.phase = FAILED;
-    log_if_wanted(m, ERROR, error == DIVERGENCE ? LOG_DIVERGENCE : LOG_ERROR, m->failure);
+    log_message(m, ERROR, error == DIVERGENCE ? LOG_DIVERGENCE : LOG_ERROR, m->failure);
     return ERROR;
 }
 
@@ -131,19 +130,19 @@ static Status expect(Instance *m, Call call)
     return refusal ? refuse_with(m, refusal, "", "") : OK;
 }
 
-/* All categories, or those that are asked for. */
-static Status set_logging(Instance *m, int on, size_t n, const Text *asked)
+/* Switch some categories, or all if none are named. */
+static Status set_logging(Instance *m, int on, size_t n, const Text *selected)
 {
     for (int k = 0; k < CATEGORIES; k++) {
         m->logs[k] = on && n == 0;
         for (size_t i = 0; i < n; i++)
-            if (asked[i] && strcmp(asked[i], categories[k]) == 0)
+            if (selected[i] && strcmp(selected[i], categories[k]) == 0)
                 m->logs[k] = on;
     }
     return OK;
 }
 
-/* -- life ------------------------------------------------------------------------------------------------------- */
+/* -- life cycle ------------------------------------------------------------------------------------------------- */
 
 static Owner owner(void)
 {
@@ -164,7 +163,7 @@ static void begin(Instance *m)
     m->state.phase = INSTANTIATED;
 }
 
-/* An instance, in memory of a size that may have more behind it; NULL if there is none. */
+/* An instance, at the start of memory of this size or more; NULL if there is no memory. */
 static Instance *create(size_t size, Text name, int logs)
 {
     Instance *m = calloc(1, size + strlen(name) + 1);
@@ -176,7 +175,7 @@ static Instance *create(size_t size, Text name, int logs)
     return m;
 }
 
-static Status take_times(Instance *m, double t, int has_stop, double stop)
+static Status set_times(Instance *m, double t, int has_stop, double stop)
 {
     if (expect(m, SETUP_EXPERIMENT) != OK)
         return ERROR;
@@ -209,7 +208,7 @@ static Status exit_initialization(Instance *m)
     return OK;
 }
 
-/* A step begins where the last one ended, and does not end past the stop time; as `_expect_in_time` has it. */
+/* A step begins where the last one ended, and does not end past the stop time; mirrors `_expect_in_time`. */
 static Status expect_in_time(Instance *m, double t, double h)
 {
     const double size = h > q_fabs(t) ? h : q_fabs(t), slack = TIME_TOLERANCE * (size > 1.0 ? size : 1.0);
@@ -258,7 +257,7 @@ static Status refuse_references(Instance *m, References vr, size_t n, Type type)
     return refuse(m, 0);
 }
 
-static int are_of(References vr, size_t n, Type type)
+static int have_type(References vr, size_t n, Type type)
 {
     for (size_t i = 0; i < n; i++)
         if (vr[i] >= VARIABLES || types[vr[i]] != type)
@@ -266,7 +265,7 @@ static int are_of(References vr, size_t n, Type type)
     return 1;
 }
 
-/* In initialisation mode, compute what is asked for anew if values were set that it has not seen. */
+/* In initialisation mode, recompute the values to be read if others were set since they were computed. */
 static int bring_up_to_date(Instance *m, References vr, size_t n)
 {
     if (m->state.phase != INITIALIZATION || m->state.memory[KEPT_STALE] == 0.0)
@@ -277,11 +276,11 @@ static int bring_up_to_date(Instance *m, References vr, size_t n)
     return 0;
 }
 
-/* Before a value is set: whether it may be now. */
-static Status settle(Instance *m, unsigned vr, Type type)
+/* Whether a value may be set now. */
+static Status expect_settable(Instance *m, unsigned vr, Type type)
 {
     Text refusal;
-    if (!are_of(&vr, 1, type))
+    if (!have_type(&vr, 1, type))
         return refuse_references(m, &vr, 1, type);
     if ((refusal = refused_setting[vr][m->state.phase]))
         return refuse_with(m, refusal, "", "");
@@ -290,9 +289,9 @@ static Status settle(Instance *m, unsigned vr, Type type)
     return OK;
 }
 
-static double as_it_is(double x) { return x; }
+static double as_real(double x) { return x; }
 
-/* What a model has computed may be beyond what the interface can pass. */
+/* A computed value may be beyond the range of the interface. */
 static int as_int(double x) { return x >= 2147483647.0 ? 2147483647 : x > -2147483648.0 ? (int)x : -2147483647 - 1; }
 
 #define GET(name, type, ctype, converted) \
@@ -301,7 +300,7 @@ static int as_int(double x) { return x >= 2147483647.0 ? 2147483647 : x > -21474
         int error = bring_up_to_date(m, vr, n); \
         if (error) \
             return refuse(m, error); \
-        if (!are_of(vr, n, type)) \
+        if (!have_type(vr, n, type)) \
             return refuse_references(m, vr, n, type); \
         for (size_t i = 0; i < n; i++) \
             value[i] = (ctype)converted(m->state.memory[vr[i]]); \
@@ -312,14 +311,14 @@ static int as_int(double x) { return x >= 2147483647.0 ? 2147483647 : x > -21474
     static Status set_##name(Instance *m, References vr, size_t n, const ctype *value) \
     { \
         for (size_t i = 0; i < n; i++) { \
-            if (settle(m, vr[i], type) != OK) \
+            if (expect_settable(m, vr[i], type) != OK) \
                 return ERROR; \
             m->state.memory[vr[i]] = number; \
         } \
         return OK; \
     }
 
-GET(reals, REAL, double, as_it_is)
+GET(reals, REAL, double, as_real)
 GET(integers, INTEGER, int, as_int)
 GET(booleans, BOOLEAN, Truth, as_int)
 SET(integers, INTEGER, int, value[i])
@@ -328,7 +327,7 @@ SET(booleans, BOOLEAN, Truth, value[i] != 0)
 static Status set_reals(Instance *m, References vr, size_t n, const double *value)
 {
     for (size_t i = 0; i < n; i++) {
-        if (settle(m, vr[i], REAL) != OK)
+        if (expect_settable(m, vr[i], REAL) != OK)
             return ERROR;
         if (!q_isfinite(value[i]))
             return refuse_numbers(m, 1, &value[i], bad_value[vr[i]]);
@@ -339,7 +338,7 @@ static Status set_reals(Instance *m, References vr, size_t n, const double *valu
 
 /* -- states ------------------------------------------------------------------------------------------------------ */
 
-/* A text of bytes that may be anything. */
+/* Make a printable text of arbitrary bytes. */
 static void make_printable(char *text, size_t size)
 {
     text[size - 1] = '\0';
@@ -348,8 +347,8 @@ static void make_printable(char *text, size_t size)
             *text = '?';
 }
 
-/* Whether bytes begin as a state of this FMU does; else they are refused in the words of the slave. */
-static Status expect_own(Instance *m, const void *bytes, size_t size)
+/* Whether bytes begin like a state of this FMU; otherwise refuse them with the message of the slave in Python. */
+static Status expect_own_state(Instance *m, const void *bytes, size_t size)
 {
     const Owner mine = m->state.owner;
     Owner found;
@@ -383,13 +382,13 @@ static Status save(Instance *m, void **state)
 
 static Status restore(Instance *m, const void *state)
 {
-    if (expect_own(m, state, state ? sizeof(State) : 0) != OK)
+    if (expect_own_state(m, state, state ? sizeof(State) : 0) != OK)
         return ERROR;
     memcpy(&m->state, state, sizeof(State));
     return OK;
 }
 
-static Status forget(void **state)
+static Status free_state(void **state)
 {
     if (state) {
         free(*state);
@@ -398,7 +397,7 @@ static Status forget(void **state)
     return OK;
 }
 
-/* Another one for every other byte, and with bytes swapped or lost all but surely (FNV-1a, 64 bits). */
+/* A checksum that changes with any single byte, and almost certainly with swapped or lost bytes (FNV-1a, 64 bits). */
 static uint64_t checksum_of(const State *state)
 {
     const unsigned char *bytes = (const unsigned char *)state;
@@ -410,19 +409,19 @@ static uint64_t checksum_of(const State *state)
 
 static Status to_bytes(Instance *m, const void *state, void *bytes, size_t size)
 {
-    Serialised given;
-    if (!state || size < sizeof given)
+    Serialised serialised;
+    if (!state || size < sizeof serialised)
         return refuse_with(m, "FMU state: expected one, and room for its bytes", "", "");
-    memcpy(&given.state, state, sizeof given.state);
-    given.checksum = checksum_of(&given.state);
-    memcpy(bytes, &given, sizeof given);
+    memcpy(&serialised.state, state, sizeof serialised.state);
+    serialised.checksum = checksum_of(&serialised.state);
+    memcpy(bytes, &serialised, sizeof serialised);
     return OK;
 }
 
 static Status from_bytes(Instance *m, const void *bytes, size_t size, void **state)
 {
     Serialised found;
-    if (expect_own(m, bytes, size) != OK)
+    if (expect_own_state(m, bytes, size) != OK)
         return ERROR;
     if (size != sizeof found)
         return refuse_with(m, "FMU state (its bytes): expected all of them", "", "");
@@ -439,15 +438,15 @@ static Status from_bytes(Instance *m, const void *bytes, size_t size, void **sta
 
 /* -- derivatives ------------------------------------------------------------------------------------------------- */
 
-/* While initialising, outputs are computed from what was set; between steps they stay as they are, whatever is set. */
+/* During initialisation, outputs depend on the values that were set; between steps they depend on nothing. */
 static Status derive(Instance *m, References z, size_t nz, References v, size_t nv, const double *dv, double *dz)
 {
     double tangents[PLACES] = {0.0};
     Instance copy;
     int error;
-    if (!are_of(z, nz, REAL))
+    if (!have_type(z, nz, REAL))
         return refuse_references(m, z, nz, REAL);
-    if (!are_of(v, nv, REAL))
+    if (!have_type(v, nv, REAL))
         return refuse_references(m, v, nv, REAL);
     if (m->state.phase == INITIALIZATION) {
         copy = *m;
@@ -466,7 +465,7 @@ static Status derive(Instance *m, References z, size_t nz, References v, size_t 
 
 /* -- the functions that a host calls ----------------------------------------------------------------------------- */
 
-/* Of a version of FMI that calls its functions FMI(…). */
+/* The version of FMI defines FMI(name), the full name of a function. */
 #define CALL(name, ...) \
     EXPORT Status FMI(name)(void *c, __VA_ARGS__); \
     Status FMI(name)(void *c, __VA_ARGS__)

@@ -1,9 +1,9 @@
-/* Whole numbers of 128 bits within an expression, in every lane: exact where a double is not.
+/* Whole numbers of 128 bits within an expression, in every SIMD lane: exact where a double is not.
 
-   A whole number that is kept, passed on or looked at is a q_real, smaller than Q_WHOLE, so that it is exact. Between
-   two such there may be larger ones, as in (n * 1103515245 + 12345) % 2147483648. Two's complement in two unsigned
-   halves, for compilers without integers of 128 bits; nothing here is undefined, whatever lies in a lane that
-   is not computed. */
+   A whole number that is stored, passed or compared is a q_real, smaller than Q_WHOLE, so that it is exact. Within an
+   expression there may be larger ones, as in (n * 1103515245 + 12345) % 2147483648. Two's complement in two unsigned
+   halves, for compilers without integers of 128 bits; no operation is undefined, whatever the content of inactive
+   lanes. */
 
 #ifndef QUADCOSIM_INTEGERS_H
 #define QUADCOSIM_INTEGERS_H
@@ -48,7 +48,7 @@ Q_ONE int q_int128_less(q_int128 a, q_int128 b) {
 
 Q_ONE int q_int128_equal(q_int128 a, q_int128 b) { return a.high == b.high && a.low == b.low; }
 
-/* Of numbers without a sign, the second not zero. */
+/* Of unsigned numbers, the second not zero. */
 Q_ONE q_int128 q_int128_quotient(q_int128 a, q_int128 b) {
     q_int128 rest = {0, 0}, quotient = {0, 0};
     if (!a.high && !b.high) return (q_int128){a.low / b.low, 0};
@@ -63,7 +63,7 @@ Q_ONE q_int128 q_int128_quotient(q_int128 a, q_int128 b) {
     return quotient;
 }
 
-/* Python's a // b; 0 by zero, which is refused before it is asked for. */
+/* Python's a // b; 0 for division by zero, which is refused before. */
 Q_ONE q_int128 q_int128_floordiv(q_int128 a, q_int128 b) {
     const q_int128 one = {1, 0};
     q_int128 quotient;
@@ -101,7 +101,7 @@ Q_ONE q_wide q_wide_of(q_real x) {
     return a;
 }
 
-/* As a q_real, where it is not beyond one. */
+/* As a q_real, if it is not too large. */
 Q_ONE q_real q_narrow(q_wide a) {
     q_real x = q_all(0);
     for (int k = 0; k < QUADCOSIM_LANES; k++) {

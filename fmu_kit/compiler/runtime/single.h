@@ -1,5 +1,5 @@
-/* The functions of mathematics.h in single precision, by those of libm: for a microcontroller that computes with
-   floats in hardware, and with doubles only in software. They have the bits of that libm. */
+/* The functions of mathematics.h in single precision, by those of libm: for a microcontroller with floats in hardware,
+   but doubles only in software. Their bits are those of that libm. */
 
 #ifndef QUADCOSIM_SINGLE_H
 #define QUADCOSIM_SINGLE_H
@@ -9,7 +9,7 @@
 #include <stdint.h>
 
 #if defined(__FAST_MATH__)
-#error "quadcosim: compile without -ffast-math, which makes what is not a number go unnoticed"
+#error "quadcosim: compile without -ffast-math, under which NaN cannot be detected"
 #endif
 
 #define Q_ONE static inline __attribute__((unused))
@@ -19,7 +19,7 @@
 #endif
 
 #define QUADCOSIM_LANES 1
-#define Q_WHOLE ((int64_t)1 << FLT_MANT_DIG) /* whole numbers smaller than it are exact, and so is what rounds to one */
+#define Q_WHOLE ((int64_t)1 << FLT_MANT_DIG) /* whole numbers below it are exact, also as results of rounding */
 
 typedef float q_real;
 typedef int q_mask;

@@ -1,8 +1,8 @@
-/* Texts as Python writes them: numbers by repr, by format and by str, put one after another into a given array.
+/* Texts as Python formats them: numbers by repr, format and str, appended to an array.
 
    No allocation, no libm, no locale: the digits come from integers of 1280 bits, in which every double and its
-   neighbours are exact (Steele and White, 1990; Burger and Dybvig, 1996). A text that does not fit ends with its last
-   whole character. */
+   neighbours are exact (Steele and White, 1990; Burger and Dybvig, 1996). A text that does not fit is cut at a whole
+   character. */
 
 #ifndef QUADCOSIM_TEXT_H
 #define QUADCOSIM_TEXT_H
@@ -40,7 +40,7 @@ Q_TEXT_FUNCTION void q_text_add(q_text *text, const char *characters, size_t cou
     memcpy(text->start + text->length, characters, count);
     text->length += count;
     text->start[text->length] = '\0';
-    if (full) text->size = text->length + 1; /* what follows is not put behind a gap */
+    if (full) text->size = text->length + 1; /* nothing is appended after a cut */
 }
 
 Q_TEXT_FUNCTION void q_text_string(q_text *text, const char *string) { q_text_add(text, string, strlen(string)); }
@@ -102,7 +102,7 @@ Q_TEXT_FUNCTION void q_integer_times_power_of_ten(q_integer *a, int power) {
 
 /* The sign of a + b - c. */
 Q_TEXT_FUNCTION int q_integer_compare_sum(const q_integer *a, const q_integer *b, const q_integer *c) {
-    int64_t difference = 0; /* of the limbs so far, carried down: it decides as soon as no lower limb can make it up */
+    int64_t difference = 0; /* of the limbs so far: it decides once lower limbs cannot compensate it */
     for (int k = (a->count > c->count ? a->count : c->count); k >= 0; k--) {
         difference = difference * ((int64_t)1 << 32) + (k < a->count ? a->limb[k] : 0);
         difference += (int64_t)(k < b->count ? b->limb[k] : 0) - (int64_t)(k < c->count ? c->limb[k] : 0);
@@ -112,7 +112,7 @@ Q_TEXT_FUNCTION int q_integer_compare_sum(const q_integer *a, const q_integer *b
     return difference < 0 ? -1 : 0;
 }
 
-/* a / b, below 10, of which a keeps the rest. The highest limb of b is from 2^27 to 2^28, and a has no more limbs. */
+/* a / b, below 10; a becomes the remainder. The highest limb of b is from 2^27 to 2^28, and a has no more limbs. */
 Q_TEXT_FUNCTION int q_integer_divide(q_integer *a, const q_integer *b) {
     const q_integer zero = {0, {0}};
     int digit = 0;
@@ -163,7 +163,7 @@ Q_TEXT_FUNCTION void q_decimal_shift(q_decimal *number, int bits) {
     q_integer_shift(&number->below, bits);
 }
 
-/* Without `shortest` the neighbours are left away; with it, what rounds to the next power of ten is there already. */
+/* Without `shortest` the neighbours are left out; with it, a number that rounds up to a power of ten has its point. */
 Q_TEXT_FUNCTION void q_decimal_of(q_decimal *number, double value, int shortest) {
     uint64_t bits;
     memcpy(&bits, &value, sizeof bits);
@@ -191,7 +191,7 @@ Q_TEXT_FUNCTION void q_decimal_of(q_decimal *number, double value, int shortest)
     q_integer_shift(&number->unit, shift);
 }
 
-/* The shortest digits that are read as this positive number, of those the nearest to it. */
+/* The shortest digits that are read as this positive number, and of these the nearest. */
 Q_TEXT_FUNCTION void q_shortest_digits(q_digits *digits, double value) {
     const q_integer zero = {0, {0}};
     q_decimal number;
@@ -210,7 +210,7 @@ Q_TEXT_FUNCTION void q_shortest_digits(q_digits *digits, double value) {
     } while (!low && !high);
 }
 
-/* A positive number rounded to so many digits, or so many after its point; a tie to the even digit. */
+/* A positive number rounded to so many digits, or so many after its point; ties to even. */
 Q_TEXT_FUNCTION void q_rounded_digits(q_digits *digits, double value, int wanted, int after_point) {
     q_decimal number;
     q_decimal_of(&number, value, 0);
@@ -222,7 +222,7 @@ Q_TEXT_FUNCTION void q_rounded_digits(q_digits *digits, double value, int wanted
         q_decimal_times_power_of_ten(&number, 1);
         digits->digit[digits->count++] = (char)('0' + q_integer_divide(&number.rest, &number.unit));
     }
-    if (wanted < 0) return; /* below a half of the last place */
+    if (wanted < 0) return; /* below half of the last place */
     const int half = q_integer_compare_sum(&number.rest, &number.rest, &number.unit);
     int last = wanted - 1;
     if (half < 0 || (half == 0 && (last < 0 || digits->digit[last] % 2 == 0))) return;
@@ -230,7 +230,7 @@ Q_TEXT_FUNCTION void q_rounded_digits(q_digits *digits, double value, int wanted
     if (last >= 0) {
         digits->digit[last]++;
     } else {
-        digits->digit[0] = '1'; /* and zeros, of which those that are not there are written as such */
+        digits->digit[0] = '1'; /* followed by zeros, which are implied */
         digits->count += digits->count == 0;
         digits->point++;
     }
@@ -259,7 +259,7 @@ Q_TEXT_FUNCTION void q_text_scientific(q_text *text, const q_digits *digits, int
     q_text_integer(text, exponent < 0 ? -exponent : exponent);
 }
 
-/* The sign, and all of a number that has no digits; 0 where digits have to follow, of `size`. */
+/* Append the sign, and `nan` or `inf`; returns 0 if the digits of `size` have to follow. */
 Q_TEXT_FUNCTION int q_text_sign_or_name(q_text *text, double value, double *size) {
     uint64_t bits;
     memcpy(&bits, &value, sizeof bits);

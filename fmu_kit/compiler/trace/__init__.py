@@ -1,1 +1,1 @@
-"""A slave's Python run on symbols: statements, memory, and the paths that it can take."""
+"""Tracing: a slave's Python is run on symbols, along all paths, which gives statements over its memory."""

@@ -1,14 +1,14 @@
-"""How large whole numbers may become: C has no integers without an end, as Python has."""
+"""Bounds of whole numbers: in C, unlike in Python, they have a limited size."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 Span = tuple[int, int]
-"""The smallest and the largest whole number that a value may be"""
+"""The smallest and the largest whole number that a value may have"""
 
 BITS = 127
-"""Of a whole number within an expression, beside its sign."""
+"""The bits of a whole number within an expression, without its sign."""
 
 
 def size(span: Span) -> int:
@@ -17,7 +17,7 @@ def size(span: Span) -> int:
 
 
 def span_of(op: str, *of: Span) -> Span:
-    """What an operation on whole numbers may give, by what it may be given."""
+    """The span of the result of an operation on whole numbers, from the spans of its operands."""
     return _SPANS[op](*of)
 
 
@@ -37,8 +37,8 @@ def _quotient(a: Span, b: Span) -> Span:
     return -size(a), size(a)
 
 
-def _rest(a: Span, b: Span) -> Span:
-    """Of a division: it has the sign of the divisor."""
+def _remainder(a: Span, b: Span) -> Span:
+    """The span of a remainder, which has the sign of the divisor."""
     return min(b[0] + 1, 0), max(b[1] - 1, 0)
 
 
@@ -59,7 +59,7 @@ _SPANS: dict[str, Callable[..., Span]] = {
     "neg": _negative,
     "abs": lambda a: (0, size(a)),
     "floordiv": _quotient,
-    "mod": _rest,
+    "mod": _remainder,
     "bit_and": _common_bits,
     "bit_or": _of_bits,
     "bit_xor": _of_bits,

@@ -1,4 +1,4 @@
-"""What a slave keeps from call to call: its variables, and the attributes that its model sets."""
+"""The memory of a slave between calls: its variables, and the attributes that its model sets."""
 
 from __future__ import annotations
 
@@ -13,65 +13,65 @@ from fmu_kit.compiler.trace.tree import (
     Path,
     Snapshot,
     children,
-    copied,
+    deep_copy,
     difference,
     is_number,
     leaves,
-    mapped,
+    map_leaves,
+    path_text,
     shape,
-    written,
 )
 from fmu_kit.slave import Slave
 
 _KINDS: dict[str, Kind] = {"Real": "real", "Integer": "int", "Boolean": "bool", "Enumeration": "int"}
 _TYPES: dict[Kind, str] = {"real": "a float", "int": "an integer", "bool": "a truth value"}
-KEPT_BY_THE_BASE = ("_reals", "_others", "_stale", "_start_time")
+BASE_STATE = ("_reals", "_others", "_stale", "_start_time")
 
 
-def name_of_kept(path: Path) -> str:
-    """The name of a place beside the variables, as a model writes it."""
-    return f"self{written(path)}"
+def attribute_name(path: Path) -> str:
+    """The name of a place that is not a variable, as a model writes it."""
+    return f"self{path_text(path)}"
 
 
 @dataclass(frozen=True)
-class Settled:
-    """What of a slave's memory is known from tracing it before."""
+class KnownMemory:
+    """Facts about a slave's memory from an earlier trace."""
 
     constants: Mapping[str, Symbol] = field(default_factory=dict)
-    """what lies in places that hold one value"""
+    """the values of places that are never changed"""
     unread: frozenset[str] = frozenset()
-    """places beside the variables that nothing depends on"""
+    """places other than variables that nothing depends on"""
 
     def needs_no_place(self, place: Place) -> bool:
-        """Whether it is beside the variables, and nobody reads it."""
+        """Whether a place is not a variable, and is constant or never read."""
         return place.reference is None and (place.name in self.constants or place.name in self.unread)
 
 
 class Memory:
     """The memory of one slave while it is traced: every number in it has a place with a name."""
 
-    def __init__(self, slave: Any, kinds: Mapping[str, Kind], settled: Settled = Settled()) -> None:
+    def __init__(self, slave: Any, kinds: Mapping[str, Kind], known: KnownMemory = KnownMemory()) -> None:
         self.slave = slave
-        self.settled = settled
+        self.known = known
         self.places: dict[str, Place] = {}
         self._names: dict[Path, str] = {}
         self._kinds = kinds
-        """of places, as far as they are known from tracing the slave before"""
+        """of places, as far as known from an earlier trace"""
         self.first_kinds: dict[str, Kind] = {}
-        """of places, as they were when they were first seen"""
+        """of places, when first seen"""
         self.written: dict[str, Symbol] = {}
-        """what lies in each place now, as far as it has been written"""
+        """the current value of each place, as far as it has been written"""
         self.version = 0
-        """of the memory: another one after each call"""
+        """of the memory; each call makes a new one"""
         self.versions: dict[tuple[int, Statement], int] = {}
-        """after each call, by the one before it and the call"""
+        """version after each call, by the one before it and the call"""
         self._joined: dict[tuple[int, int, int], int] = {}
-        self._base = _attributes_of_the_base() - set(KEPT_BY_THE_BASE)
+        self._base = _attributes_of_the_base() - set(BASE_STATE)
 
     # -- the attributes -----------------------------------------------------------------------------------------
 
     def attributes(self) -> dict[str, Any]:
-        """Those that are memory, by name."""
+        """The attributes that are memory, by name."""
         return {name: value for name, value in vars(self.slave).items() if name not in self._base}
 
     def _set_attributes(self, values: dict[str, Any]) -> None:
@@ -81,14 +81,14 @@ class Memory:
             setattr(self.slave, name, value)
 
     def expect_as_before(self, before: dict[str, Any], now: dict[str, Any], when: str, *, may_add: bool) -> None:
-        """Raise `TraceError` if what is kept is, but for its numbers, not what it was: a trace holds for one form."""
+        """Raise `TraceError` if the memory changed in more than its numbers: a trace is valid for one structure."""
         for name, value in now.items():
             if hasattr(type(self.slave), name):
                 raise TraceError(f"self.{name} hides the one of its class: expected another name, set by initialise")
             if name not in before and not may_add:
                 raise TraceError(f"self.{name} is first set {when}: expected it set by initialise")
             if name in before and shape(before[name]) != shape(value):
-                what = "what is kept" if name in KEPT_BY_THE_BASE else f"self.{name}"
+                what = "what is kept" if name in BASE_STATE else f"self.{name}"
                 found = difference({name: before[name]}, {name: value}, self.name)
                 raise TraceError(
                     f"{what} changes {when} in more than numbers: {found}; expected one form from the beginning on"
@@ -96,19 +96,19 @@ class Memory:
         for name in before.keys() - now.keys():
             raise TraceError(f"self.{name} is deleted {when}: expected it to stay")
 
-    def snapshot(self, args: Any, kwargs: Any) -> _Held:
-        """What is held now, in the memory and in the arguments of a call."""
-        return _Held(self, args, kwargs)
+    def snapshot(self, args: Any, kwargs: Any) -> _MemoryState:
+        """The current state of the memory and of the arguments of a call."""
+        return _MemoryState(self, args, kwargs)
 
     def view(self, roots: Any) -> tuple[Any, dict[Path, int]]:
-        """A copy of all that is held, and which object holds what, by path."""
+        """A copy of the memory and of `roots`, and the identity of the object at each path."""
         everything = {"self": self.attributes(), "arguments": roots}
         holders: dict[Path, int] = {}
         _note_holders(everything, (), holders)
-        return copied(everything), holders
+        return deep_copy(everything), holders
 
     def install(self, view: Any, holders: dict[Path, int], roots: Any) -> None:
-        """Hold what a view says: in the objects that are there, where all paths left the same ones."""
+        """Set the memory to a view, keeping the objects that all paths left in place."""
         live = {"self": self.attributes(), "arguments": roots}
         grafted = _graft(live, view, (), holders)
         self._set_attributes(grafted["self"])
@@ -121,15 +121,15 @@ class Memory:
         if found is None:
             first, *rest = path
             is_variable = first in ("_reals", "_others") and rest
-            found = self._names[path] = self.slave.variables[rest[0]].name if is_variable else name_of_kept(path)
+            found = self._names[path] = self.slave.variables[rest[0]].name if is_variable else attribute_name(path)
         return found
 
     def name_in_view(self, path: Path) -> str:
-        """The name of what lies in a view, or in what a function returns."""
-        return self.name(path[1:]) if path[:1] == ("self",) else f"it{written(path)}"
+        """The name of a part of a view, or of a returned value."""
+        return self.name(path[1:]) if path[:1] == ("self",) else f"it{path_text(path)}"
 
     def place(self, path: Path, symbol: Symbol) -> Place:
-        """The place of a path, made when it is first seen."""
+        """The place of a path; it is created when first seen."""
         name = self.name(path)
         found = self.places.get(name)
         reference = path[1] if path[0] in ("_reals", "_others") else None
@@ -152,7 +152,7 @@ class Memory:
         return found
 
     def enter(self) -> None:
-        """Forget all values: at the start of a function the memory holds whatever it holds."""
+        """Forget all values: at the start of a function the content of the memory is unknown."""
         self.written = {}
         self.version = 0
 
@@ -163,36 +163,36 @@ class Memory:
             loaded = self.written[place.name] = self._read(place, 0)
             return loaded
 
-        self._set_attributes({name: mapped(value, load, (name,)) for name, value in self.attributes().items()})
+        self._set_attributes({name: map_leaves(value, load, (name,)) for name, value in self.attributes().items()})
 
     def _read(self, place: Place, version: int) -> Symbol:
-        """What is read of a place, in a version of the memory."""
-        if place.name in self.settled.constants:
-            return self.settled.constants[place.name]
+        """The symbol for the value of a place in a version of the memory."""
+        if place.name in self.known.constants:
+            return self.known.constants[place.name]
         return node("load", (), place.kind, (place.name, version))
 
-    def flushed(self) -> Block:
-        """The stores that bring the memory up to date."""
+    def flush(self) -> Block:
+        """The stores of all values that were changed."""
         stores = []
         for path, leaf in leaves(self.attributes()):
             if not is_number(leaf):
                 continue
             symbol = lifted(leaf)
             place = self.place(path, symbol)
-            if self.written.get(place.name) is not symbol and not self.settled.needs_no_place(place):
+            if self.written.get(place.name) is not symbol and not self.known.needs_no_place(place):
                 stores.append(statement("store", (symbol,), place.name))
                 self.written[place.name] = symbol
         return tuple(stores)
 
-    def returned(self, exit_view: dict[str, Any], stores: Iterable[str], before: dict[str, Symbol]) -> None:
-        """After a call: what it stored is read anew, all else is as it was before."""
+    def update_after_call(self, exit_view: dict[str, Any], stores: Iterable[str], before: dict[str, Symbol]) -> None:
+        """Update after a call: places that it stored are read anew, all others are unchanged."""
         stored = frozenset(stores)
 
         def now(path: Path, leaf: Any) -> Any:
             if not is_number(leaf):
                 return leaf
             place = self.place(path, lifted(leaf))
-            if place.name in stored or self.settled.needs_no_place(place):
+            if place.name in stored or self.known.needs_no_place(place):
                 self.written[place.name] = self._read(place, self.version)
             elif place.name not in before:
                 raise TraceError(f"{place.name}: set on some paths only")
@@ -201,14 +201,14 @@ class Memory:
             return self.written[place.name]
 
         self.written = dict(self.written)
-        self._set_attributes({name: mapped(value, now, (name,)) for name, value in exit_view.items()})
+        self._set_attributes({name: map_leaves(value, now, (name,)) for name, value in exit_view.items()})
 
     def next_version(self, call: Statement) -> int:
         """The version after a call."""
         return self.versions.setdefault((self.version, call), self._unused())
 
     def joined(self, condition: Symbol, a: int, b: int) -> int:
-        """The version after two paths that left different ones."""
+        """The version after two paths with different versions."""
         return self._joined.setdefault((id(condition), a, b), self._unused())
 
     def _unused(self) -> int:
@@ -216,13 +216,13 @@ class Memory:
 
 
 def _attributes_of_the_base() -> frozenset[str]:
-    """What an instance of the base class has of its own; the rest is what the model keeps."""
+    """The attributes of an instance of the base class; all others are set by the model."""
     bare = type("Bare", (Slave,), {"step": None})
     return frozenset(vars(bare(instance_name="bare")))
 
 
-class _Held:
-    """A state of the memory, to go back to."""
+class _MemoryState:
+    """A state of the memory that can be restored."""
 
     def __init__(self, memory: Memory, args: Any, kwargs: Any) -> None:
         self._memory = memory
@@ -231,7 +231,7 @@ class _Held:
         self._objects = Snapshot(*self._attributes.values(), args, kwargs)
 
     def restore(self) -> None:
-        """Go back to it."""
+        """Restore it."""
         self._objects.restore()
         self._memory._set_attributes(self._attributes)
         self._memory.written, self._memory.version = dict(self._written), self._version
@@ -247,7 +247,7 @@ def _note_holders(value: Any, path: Path, found: dict[Path, int]) -> None:
 
 
 def _graft(live: Any, new: Any, path: Path, holders: dict[Path, int]) -> Any:
-    """`new`, but in the objects of `live` where these are what all paths left."""
+    """`new`, but in the objects of `live` where all paths left these in place."""
     if type(new) in USUAL_LEAVES or not children(new):
         return new
     held = dict(children(live)) if type(live) is type(new) else {}

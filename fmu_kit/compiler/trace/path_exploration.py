@@ -1,7 +1,7 @@
-"""What a slave does, path by path, put together to functions.
+"""Exploration of all paths through a slave's code, and merging them to functions.
 
-Code that is run on symbols takes one way wherever it asks whether a condition holds. So it is run again for the
-other way, until all have been taken; then the paths are merged where they meet again: at the end of each function.
+Code that is run on symbols takes one branch wherever it tests a condition. So it is run again for the other branch,
+until all have been taken; then the paths are merged where they meet again: at the end of each function.
 """
 
 from __future__ import annotations
@@ -16,51 +16,51 @@ from pathlib import Path
 from typing import Any
 
 from fmu_kit.compiler.trace.memory import Memory
-from fmu_kit.compiler.trace.statements import Block, Call, Function, Statement, branched, statement
+from fmu_kit.compiler.trace.statements import Block, Call, Function, Statement, branch, statement
 from fmu_kit.compiler.trace.symbols import (
     Kind,
     Piece,
     Symbol,
     TraceError,
-    at_rest,
     common_kind,
+    decided,
     hooks,
     lifted,
     node,
     pieces,
     select,
-    settled,
+    storable,
     token,
     truth,
 )
 from fmu_kit.compiler.trace.tree import (
     bare_leaves,
     difference,
-    expect_no_twins,
+    expect_no_aliases,
     expect_unchanged,
     is_number,
     leaves,
-    mapped,
+    map_leaves,
     shape,
 )
 from fmu_kit.errors import DivergenceError, FmuError
-from fmu_kit.failure import is_of_a_model
+from fmu_kit.failure import is_model_code
 
 
 class _EndedError(BaseException):
-    """This path ends in an error of the FMU, wherever it is."""
+    """Unwinds a path that ends in an error of the FMU."""
 
 
 @dataclass(frozen=True)
 class _Fork:
-    """Where a path asked whether a condition holds."""
+    """A point at which a path tested a condition."""
 
     condition: Symbol
 
 
 @dataclass
 class _Path:
-    """One run of the code, with the ways that it is told to take first."""
+    """One run of the code; `script` has the branches to take first."""
 
     script: tuple[bool, ...]
     known: dict[int, bool]
@@ -70,7 +70,7 @@ class _Path:
 
 @dataclass(frozen=True)
 class _Leaf:
-    """How a path ended, other than in an error."""
+    """The end of a path that did not fail."""
 
     value: Any
     view: Any
@@ -86,7 +86,7 @@ class _Tree:
 
 
 class Explorer:
-    """Records what is done on the path that is being run, and explores them all."""
+    """Records the statements of the current path, and explores all paths."""
 
     def __init__(self, memory: Memory) -> None:
         self.memory = memory
@@ -97,36 +97,36 @@ class Explorer:
         self._catches = False
         self._traced: dict[Any, tuple[Function, Any, Any]] = {}
 
-    def listen(self) -> None:
-        """Have the symbols tell this explorer."""
+    def install_hooks(self) -> None:
+        """Have the symbols call this explorer."""
         hooks.decide = self._decide
         hooks.fail_if = self.fail_if
-        hooks.effects = lambda: sum(_has_effect(each) for each in _statements(self._now.entries))
+        hooks.effects = lambda: sum(_has_effect(each) for each in _statements(self._current.entries))
         hooks.is_running = lambda: self._path is not None
 
-    # -- what happens on a path -----------------------------------------------------------------------------
+    # -- statements of a path -------------------------------------------------------------------------------
 
-    def add(self, *done: Statement) -> None:
-        """The next statements of this path."""
-        self._now.entries += done
+    def add(self, *statements: Statement) -> None:
+        """Append statements to this path."""
+        self._current.entries += statements
 
     def fail_if(self, condition: Any, error: Exception) -> None:
-        """The next statement: an error, if the condition holds."""
-        condition = settled(condition)
+        """Append a statement: an error, if the condition holds."""
+        condition = decided(condition)
         if condition is True:
             raise error
-        known = self._now.known
+        known = self._current.known
         if condition is not False and known.get(id(condition)) is not False:
-            self.add(*branched(truth(condition), (_raise(error),), ()))
+            self.add(*branch(truth(condition), (_raise(error),), ()))
             known[id(condition)] = False
 
     def warn(self, key: str, text: str) -> None:
-        """The next statement: a warning, the first time only."""
+        """Append a statement: a warning, the first time only."""
         found = pieces(text)
         self.add(statement("warn", _values(found), (key, _words(found))))
 
     @property
-    def _now(self) -> _Path:
+    def _current(self) -> _Path:
         if self._path is None:
             raise TraceError("a computed value is used outside of a call that is traced")
         return self._path
@@ -134,22 +134,22 @@ class Explorer:
     def _decide(self, condition: Symbol) -> bool:
         if condition.op == "not":
             return not self._decide(condition.args[0])
-        path = self._now
+        path = self._current
         if id(condition) in path.known:
             return path.known[id(condition)]
         at = len(path.taken)
-        _expect_an_end(at)
-        way = path.script[at] if at < len(path.script) else True
-        path.taken.append(way)
-        path.known[id(condition)] = way
+        _expect_termination(at)
+        branch_taken = path.script[at] if at < len(path.script) else True
+        path.taken.append(branch_taken)
+        path.known[id(condition)] = branch_taken
         path.entries.append(_Fork(condition))
-        return way
+        return branch_taken
 
     # -- all paths through a piece of code ---------------------------------------------------------------------
 
     def region(self, function: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
-        """Call a function so that the paths through it are one when it returns."""
-        outer = self._now
+        """Call a function, merging the paths through it."""
+        outer = self._current
         held = self.memory.snapshot(args, kwargs)
         block, leaf, forked = self._explored(lambda: function(*args, **kwargs), (args, kwargs), held.restore)
         outer.entries += block
@@ -212,7 +212,7 @@ class Explorer:
 
     def _leaf(self, value: Any, roots: Any) -> _Leaf:
         view, holders = self.memory.view(roots)
-        value, view = _kept(value), _kept(view)
+        value, view = _storable(value), _storable(view)
         return _Leaf(value, view, holders, dict(self.memory.written), self.memory.version)
 
     def _merged(self, tree: _Tree) -> tuple[Block, _Leaf | None]:
@@ -226,14 +226,14 @@ class Explorer:
             merge = _Merge(condition, self.memory, bool(block_a or block_b))
             leaf = merge.leaf(a, b)
             block_a, block_b = (*block_a, *merge.then), (*block_b, *merge.otherwise)
-        return (*tree.block, *branched(condition, block_a, block_b)), leaf
+        return (*tree.block, *branch(condition, block_a, block_b)), leaf
 
     # -- functions -----------------------------------------------------------------------------------------------
 
     def call(self, method: Callable[..., Any], of: Callable[..., Any], arguments: dict[str, Any]) -> Any:
-        """Call a method of the slave, `of` of its class, which becomes a function of its own."""
+        """Call a method of the slave, `of` of its class, which becomes a separate function."""
         memory = self.memory
-        self.add(*memory.flushed())
+        self.add(*memory.flush())
         given = [lifted(leaf) for _, leaf in leaves(arguments) if is_number(leaf)]
         before = dict(memory.written)
         key = (of, shape(arguments), shape(memory.attributes()))
@@ -247,19 +247,19 @@ class Explorer:
             memory.version = after
         if exit_view is None:
             raise _EndedError
-        memory.returned(exit_view, function.stores, before)
+        memory.update_after_call(exit_view, function.stores, before)
         if self._catches:
             for kind in sorted(function.raises):
                 if node("failed", (), "bool", (kind, after)):
                     raise error_class(kind)(token(node("failure", (), "real"), "failure"))
         numbers = [leaf for _, leaf in leaves(returned) if is_number(leaf)]
         results = iter([node("result", (), lifted(leaf).kind, (k, after)) for k, leaf in enumerate(numbers)])
-        return mapped(returned, lambda _, leaf: next(results) if is_number(leaf) else leaf)
+        return map_leaves(returned, lambda _, leaf: next(results) if is_number(leaf) else leaf)
 
     def function(
         self, method: Callable[..., Any], name: str, arguments: dict[str, Any], *, catches: bool = False
     ) -> tuple[Function, Any, Any]:
-        """A method, traced on parameters in place of the numbers given to it; what it leaves, and what it returns."""
+        """A method, traced on parameters in place of its numeric arguments; the memory after it, and its result."""
         memory, outer, caught = self.memory, self._path, self._catches
         held, written, version = memory.snapshot(arguments, ()), memory.written, memory.version
         names: list[str] = []
@@ -270,8 +270,8 @@ class Explorer:
             names.append(".".join(map(str, path)))
             return node("parameter", (), lifted(leaf).kind, len(names) - 1)
 
-        given = mapped(arguments, parameter)
-        told = leaves(given)
+        given = map_leaves(arguments, parameter)
+        leaves_before = leaves(given)
         memory.enter()
         start = memory.snapshot(given, ())
         self._path, self._catches = None, catches
@@ -289,22 +289,22 @@ class Explorer:
         results: list[Symbol] = []
         if leaf is not None:
             memory.install(leaf.view, leaf.holders, given)
-            expect_unchanged(told, given, name)
+            expect_unchanged(leaves_before, given, name)
             memory.written, memory.version = dict(leaf.written), leaf.version
             exit_view, value = memory.attributes(), leaf.value
-            expect_no_twins(exit_view)
+            expect_no_aliases(exit_view)
             results = [lifted(leaf) for leaf in bare_leaves(value) if is_number(leaf)]
-            block = (*block, *memory.flushed(), statement("return", results))
+            block = (*block, *memory.flush(), statement("return", results))
         held.restore()
         memory.written, memory.version = written, version
         parameters = tuple(lifted(leaf) for _, leaf in leaves(given) if is_number(leaf))
         return (
-            self._kept_function(name.lstrip("_"), method, (parameters, tuple(names)), block, len(results)),
+            self._interned_function(name.lstrip("_"), method, (parameters, tuple(names)), block, len(results)),
             exit_view,
             value,
         )
 
-    def _kept_function(
+    def _interned_function(
         self, name: str, method: Any, head: tuple[tuple[Symbol, ...], tuple[str, ...]], block: Block, results: int
     ) -> Function:
         parameters, names = head
@@ -328,9 +328,9 @@ class Explorer:
     # -- loops -----------------------------------------------------------------------------------------------------
 
     def repeat(self, count: Any, body: Callable[[Any, Any], Any], state: Any) -> Any:
-        """`state = body(i, state)` for i = 0 … count - 1, where the count is computed."""
+        """`state = body(i, state)` for i = 0 … count - 1, where the count may be computed."""
         depth = self._depth
-        self.add(*self.memory.flushed())  # what the body calls finds it in the memory
+        self.add(*self.memory.flush())  # the functions that the body calls read the memory
         starts = [lifted(leaf) for _, leaf in leaves(state) if is_number(leaf)]
         kinds = [start.kind for start in starts]
         while True:
@@ -340,7 +340,7 @@ class Explorer:
                 break
             kinds = widened
         loop = statement("loop", (lifted(count), *starts, *nexts), depth, (block,))
-        self._now.entries.append(loop)
+        self._current.entries.append(loop)
         return _with_numbers(state, "outcome", kinds, loop)
 
     def _looped(self, body: Callable[[Any, Any], Any], state: Any) -> tuple[Block, list[Symbol]]:
@@ -367,19 +367,19 @@ class Explorer:
 
 
 MOST_PATHS = 2000
-"""Through one function; more take minutes."""
+"""Limit of the paths through one function; more would take minutes."""
 MOST_ROUNDS = 200
-"""Of a `while` that asks for computed values: such a loop has no end while it is traced."""
+"""Limit of the rounds of a `while` with a computed condition: such a loop does not end while it is traced."""
 _TOO_MANY = f"more than {MOST_PATHS} paths: expected fewer conditions that depend on each other"
 
 
-def _expect_an_end(forks: int) -> None:
-    """Raise `TraceError` on a path that has come to so many forks that it will hardly end."""
+def _expect_termination(forks: int) -> None:
+    """Raise `TraceError` on a path with so many forks that it is unlikely to end."""
     if forks >= MOST_PATHS:
         raise TraceError(_TOO_MANY)
     if forks and forks % MOST_ROUNDS == 0:
         frame = inspect.currentframe()
-        while frame is not None and not is_of_a_model(frame.f_code.co_filename):
+        while frame is not None and not is_model_code(frame.f_code.co_filename):
             frame = frame.f_back
         if frame is not None and any(frame.f_lineno in loop for loop in _loops_in(frame.f_code.co_filename)):
             rounds = f"more than {MOST_ROUNDS} rounds by a computed condition"
@@ -388,14 +388,14 @@ def _expect_an_end(forks: int) -> None:
 
 @functools.cache
 def _loops_in(path: str) -> tuple[range, ...]:
-    """The lines of each `while` in a file."""
+    """The lines of each `while` loop in a file."""
     tree = ast.parse(Path(path).read_text("utf-8"))
     loops = [each for each in ast.walk(tree) if isinstance(each, ast.While)]
     return tuple(range(loop.lineno, (loop.end_lineno or loop.lineno) + 1) for loop in loops)
 
 
 class _Merge:
-    """Two ends of paths that meet again."""
+    """The merge of two paths at their ends."""
 
     def __init__(self, condition: Symbol, memory: Memory, branches: bool) -> None:
         self.condition = condition
@@ -405,7 +405,7 @@ class _Merge:
         self.otherwise: list[Statement] = []
 
     def leaf(self, a: _Leaf, b: _Leaf) -> _Leaf:
-        """What holds after both."""
+        """The merged end."""
         version = a.version if a.version == b.version else self.memory.joined(self.condition, a.version, b.version)
         return _Leaf(
             self.value(a.value, b.value, "what is returned"),
@@ -425,10 +425,10 @@ class _Merge:
             other = next(others)
             return self.number(leaf, other) if is_number(leaf) else leaf
 
-        return mapped(a, either)
+        return map_leaves(a, either)
 
     def number(self, a: Any, b: Any) -> Any:
-        """The number that is `a` on the one path and `b` on the other."""
+        """The number that is `a` on one path and `b` on the other."""
         left, right = lifted(a), lifted(b)
         if left is right:
             return a
@@ -436,30 +436,30 @@ class _Merge:
             return select(self.condition, a, b)
         if isinstance(a, bool) and isinstance(b, bool):
             return select(self.condition, a, b)
-        made = node("phi", (self.condition, left, right), common_kind(left, right))
-        if not any(each.symbols[0] is made for each in self.then):
-            self.then.append(statement("assign", (made, left)))
-            self.otherwise.append(statement("assign", (made, right)))
-        return made
+        merged = node("phi", (self.condition, left, right), common_kind(left, right))
+        if not any(each.symbols[0] is merged for each in self.then):
+            self.then.append(statement("assign", (merged, left)))
+            self.otherwise.append(statement("assign", (merged, right)))
+        return merged
 
 
 def _numbered(name: str) -> Iterator[str]:
-    """Names of functions that come from one method."""
+    """Names for the functions traced from one method."""
     return itertools.chain((name,), (f"{name}__{k}" for k in itertools.count(2)))
 
 
-def _kept(value: Any) -> Any:
-    """A value whose whole numbers can be kept, where there are larger ones in it."""
+def _storable(value: Any) -> Any:
+    """A value with its wide whole numbers narrowed, so that they can be stored."""
     if any(isinstance(leaf, Symbol) and leaf.kind == "wide" for leaf in bare_leaves(value)):
-        return mapped(value, lambda _, leaf: at_rest(leaf) if isinstance(leaf, Symbol) else leaf)
+        return map_leaves(value, lambda _, leaf: storable(leaf) if isinstance(leaf, Symbol) else leaf)
     return value
 
 
 def _with_numbers(state: Any, op: str, kinds: list[Kind], of: Any) -> Any:
-    """A state with other numbers: those of a loop, by their places."""
+    """A state whose numbers are replaced by those of a loop."""
     data = [(of, k) if op == "variable" else (k, of) for k in range(len(kinds))]
     numbers = iter([node(op, (), kind, where) for kind, where in zip(kinds, data)])
-    return mapped(state, lambda _, leaf: next(numbers) if is_number(leaf) else leaf)
+    return map_leaves(state, lambda _, leaf: next(numbers) if is_number(leaf) else leaf)
 
 
 def _is_same(a: Any, b: Any) -> bool:
@@ -485,7 +485,7 @@ _CLASSES: dict[str, type[Exception]] = {
 
 
 def error_class(name: str) -> type[Exception]:
-    """The class of an error by its name."""
+    """The error class of a name."""
     return _CLASSES[name]
 
 
@@ -507,7 +507,7 @@ def _words(text: list[Piece]) -> tuple[str | tuple[str], ...]:
 
 
 def _has_effect(each: Statement) -> bool:
-    """Whether a statement may fail, warn, or change what is kept; a store brings to memory what was changed before."""
+    """Whether a statement may fail, warn, or change the memory; a store only writes what was changed before."""
     if each.op == "call":
         function: Function = each.data.function
         return bool(function.stores or function.raises) or any(map(_has_effect, function.body))

@@ -1,6 +1,6 @@
-"""Statements: what a traced function does, in order; the values that it computes lie in the graph of symbols.
+"""Statements: the effects of a traced function, in order; the values that it computes are in the graph of symbols.
 
-Statements are interned as symbols are, so that two paths that do the same do identical statements.
+Statements are interned like symbols, so that two paths that do the same have identical statements.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from fmu_kit.compiler.trace.symbols import Kind, Symbol, both, closure, either, 
 Block = tuple["Statement", ...]
 
 TANGENT = "tangent of "
-"""Before the name of a place, in that of the place of its tangent"""
+"""The prefix of the name of a place in the name of its tangent's place"""
 
 
 class Statement:
-    """One thing that is done.
+    """One statement.
 
     | op | symbols | data | blocks |
     |---|---|---|---|
@@ -26,7 +26,7 @@ class Statement:
     | `assign` | what, value | | |
     | `store` | value | name of the place | |
     | `call` | arguments | `Call` | |
-    | `loop` | count, starts, what they are in the loop, what they are next | depth | body |
+    | `loop` | count, initial values, next values | depth | body |
     | `warn` | values in the text | key, text | |
     | `raise` | values in the text | class of the error, text | |
     | `return` | values | | |
@@ -45,7 +45,7 @@ _interned: dict[Any, Statement] = {}
 
 
 def statement(op: str, symbols: Sequence[Symbol] = (), data: Any = None, blocks: tuple[Block, ...] = ()) -> Statement:
-    """The one statement of these parts."""
+    """The interned statement of these parts."""
     key = (op, tuple(map(id, symbols)), data, tuple(tuple(map(id, block)) for block in blocks))
     found = _interned.get(key)
     if found is None:
@@ -53,8 +53,8 @@ def statement(op: str, symbols: Sequence[Symbol] = (), data: Any = None, blocks:
     return found
 
 
-def branched(condition: Any, then: Block, otherwise: Block) -> Block:
-    """Either of two blocks; what both end with is done once, after them."""
+def branch(condition: Any, then: Block, otherwise: Block) -> Block:
+    """The choice between two blocks; statements with which both end are moved behind it."""
     if isinstance(condition, bool):
         return then if condition else otherwise
     common = 0
@@ -68,21 +68,21 @@ def branched(condition: Any, then: Block, otherwise: Block) -> Block:
         condition, then, otherwise = negation(condition), otherwise, ()
     if len(then) == 1 and then[0].op == "if" and then[0].blocks[1] == otherwise:  # if a: (if b: X else Y) else Y
         inner = then[0]
-        return (*branched(both(condition, inner.symbols[0]), inner.blocks[0], otherwise), *tail)
+        return (*branch(both(condition, inner.symbols[0]), inner.blocks[0], otherwise), *tail)
     if len(then) == 1 and then[0].op == "if" and then[0].blocks == (otherwise, ()):  # if a: (if b: X) else X
-        return (*branched(either(negation(condition), then[0].symbols[0]), otherwise, ()), *tail)
+        return (*branch(either(negation(condition), then[0].symbols[0]), otherwise, ()), *tail)
     if len(otherwise) == 1 and otherwise[0].op == "if" and otherwise[0].blocks == (then, ()):  # if a: X elif b: X
-        return (*branched(either(condition, otherwise[0].symbols[0]), then, ()), *tail)
+        return (*branch(either(condition, otherwise[0].symbols[0]), then, ()), *tail)
     if len(otherwise) == 1 and otherwise[0].op == "if" and otherwise[0].blocks[0] == then:  # if a: X elif b: X else Y
         inner, nots = otherwise[0], negation(condition)
-        return (*branched(both(nots, negation(inner.symbols[0])), inner.blocks[1], then), *tail)
-    if ends(then) and otherwise:  # nothing comes after a raise: the rest need not stand in a branch
+        return (*branch(both(nots, negation(inner.symbols[0])), inner.blocks[1], then), *tail)
+    if ends(then) and otherwise:  # nothing follows a raise: the rest needs no branch
         return (statement("if", (condition,), None, (then, ())), *otherwise, *tail)
     return (statement("if", (condition,), None, (then, otherwise)), *tail)
 
 
 def ends(block: Block) -> bool:
-    """Whether nothing that follows a block is ever done."""
+    """Whether a block always ends the function."""
     return bool(block) and (
         block[-1].op in ("raise", "return")
         or (block[-1].op == "if" and ends(block[-1].blocks[0]) and ends(block[-1].blocks[1]))
@@ -91,12 +91,12 @@ def ends(block: Block) -> bool:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a value stays from call to call: a variable of the FMU, or what the model keeps beside them."""
+    """A place of the memory: a variable of the FMU, or a number that the model keeps beside them."""
 
     name: str
     kind: Kind
     reference: int | None
-    """value reference of a variable; None: kept by the model"""
+    """value reference of a variable; None for a number kept by the model"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,11 +109,11 @@ class Function:
     """of the parameters"""
     body: Block
     results: int
-    """how many values it returns"""
+    """number of values that it returns"""
     stores: frozenset[str]
-    """names of the places that it changes, with those of what it calls"""
+    """names of the places that it or a function that it calls changes"""
     raises: frozenset[str]
-    """classes of the errors that it ends with, its own and of what it calls"""
+    """classes of the errors that it or a function that it calls raises"""
     doc: str = ""
 
 
@@ -126,18 +126,18 @@ class Call:
     """version of the memory before it"""
 
 
-def each_of(block: Block) -> Iterator[Statement]:
-    """The statements of a block, each before those inside of it."""
+def all_statements(block: Block) -> Iterator[Statement]:
+    """The statements of a block, each before those inside it."""
     for each in block:
         yield each
         for inner in each.blocks:
-            yield from each_of(inner)
+            yield from all_statements(inner)
 
 
-def used_by(
+def used_symbols(
     statements: Iterable[Statement], named_by: Callable[[Statement], Sequence[Symbol]] = lambda each: each.symbols
 ) -> dict[int, Symbol]:
-    """The symbols that statements make use of, other than to choose between values that nobody asks for."""
+    """The symbols that statements use, without those assigned only to merged values that are not used."""
     assigned: dict[int, list[Symbol]] = {}
     named: list[Symbol] = []
     for each in statements:
@@ -154,7 +154,7 @@ def used_by(
 
 
 def symbols_of(block: Block) -> list[Symbol]:
-    """Every symbol that the statements of a block name themselves."""
+    """The symbols that the statements of a block use directly."""
     found: list[Symbol] = []
     for each in block:
         found += each.symbols

@@ -1,4 +1,4 @@
-"""What stands in for `math`, some built-in functions and `FLOAT` in the modules of a slave while it is traced."""
+"""Replacements for `math`, some built-in functions and `FLOAT` in the modules of a slave while it is traced."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from fmu_kit.compiler.trace.symbols import (
     TraceError,
     both,
     either,
+    error_raised_by,
     hooks,
     is_known,
     lifted,
     node,
     power,
-    raised,
     select,
     truth,
     whole,
@@ -34,30 +34,30 @@ from fmu_kit.compiler.trace.symbols import (
 
 
 def _always_defined(name: str) -> Callable[[Any], Any]:
-    """A function that Python computes for every float."""
+    """A function that is defined for every float."""
     return lambda x: getattr(math, name)(x) if is_known(x) else node(name, (lifted(x),), "real")
 
 
 def _defined(name: str, outside: Callable[[Any], Any], example: float) -> Callable[[Any], Any]:
-    """A function that Python refuses to compute outside of where it is defined."""
+    """A function that raises an error outside its domain."""
 
     def function(x: Any) -> Any:
         if is_known(x):
             return getattr(math, name)(x)
-        hooks.fail_if(outside(x), raised(lambda: getattr(math, name)(example)))
+        hooks.fail_if(outside(x), error_raised_by(lambda: getattr(math, name)(example)))
         return node(name, (lifted(x),), "real")
 
     return function
 
 
 def _bounded(name: str) -> Callable[[Any], Any]:
-    """A function whose result may be too large for a float."""
+    """A function that may overflow."""
 
     def function(x: Any) -> Any:
         if is_known(x):
             return getattr(math, name)(x)
         result = node(name, (lifted(x),), "real")
-        hooks.fail_if(both(isinf(result), isfinite(x)), raised(lambda: getattr(math, name)(1e4)))
+        hooks.fail_if(both(isinf(result), isfinite(x)), error_raised_by(lambda: getattr(math, name)(1e4)))
         return result
 
     return function
@@ -82,9 +82,9 @@ def _rounded(name: Any) -> Callable[[Any], Any]:
 
 
 _POWER_ERRORS = PowerErrors(
-    zero=raised(lambda: math.pow(0.0, -1.0)),
-    negative=raised(lambda: math.pow(-1.0, 0.5)),
-    large=raised(lambda: math.pow(10.0, 400.0)),
+    zero=error_raised_by(lambda: math.pow(0.0, -1.0)),
+    negative=error_raised_by(lambda: math.pow(-1.0, 0.5)),
+    large=error_raised_by(lambda: math.pow(10.0, 400.0)),
 )
 
 
@@ -109,11 +109,11 @@ MATH: Mapping[str, Any] = {
     "isinf": isinf,
     "isnan": isnan,
 }
-"""What may be computed; of all else of `math`, only known values are taken."""
+"""Functions of computed values; all others of `math` accept only known values."""
 
 
 class _Math(types.ModuleType):
-    """Stands in for the module `math`."""
+    """The replacement of the module `math`."""
 
     def __init__(self) -> None:
         super().__init__("math")
@@ -130,20 +130,20 @@ def _condition(value: Any) -> Any:
 
 def _any(values: Iterable[Any]) -> Any:
     found: Any = False
-    for value in _of_which_none_fails("any", values):
+    for value in _without_effects("any", values):
         found = either(found, _condition(value))
     return found
 
 
 def _all(values: Iterable[Any]) -> Any:
     found: Any = True
-    for value in _of_which_none_fails("all", values):
+    for value in _without_effects("all", values):
         found = both(found, _condition(value))
     return found
 
 
-def _of_which_none_fails(name: str, values: Iterable[Any]) -> Iterator[Any]:
-    """The values; Python computes none after the one that decides, so only the first may fail or change anything."""
+def _without_effects(name: str, values: Iterable[Any]) -> Iterator[Any]:
+    """The values; since Python stops at the one that decides, only the first may fail or have effects."""
     decided, before = False, 0
     for value in values:
         if decided and hooks.effects() != before:
@@ -153,7 +153,7 @@ def _of_which_none_fails(name: str, values: Iterable[Any]) -> Iterator[Any]:
 
 
 def _extreme(name: str, better: Callable[[Any, Any], Any]) -> Callable[..., Any]:
-    """min or max: the first of the best, as Python's."""
+    """min or max: the first of equal values, as in Python."""
 
     def function(*values: Any, **options: Any) -> Any:
         given = list(values[0]) if len(values) == 1 else list(values)
@@ -180,7 +180,7 @@ def _sum(values: Iterable[Any], start: Any = 0) -> Any:
 
 
 class _Converting(type):
-    """Of the classes that stand in for `float`, `int` and `bool`."""
+    """The metaclass of the replacements of `float`, `int` and `bool`."""
 
     kind: str
 
@@ -203,7 +203,7 @@ class _Converting(type):
 
 
 def _refused(name: str, instead: str) -> Callable[..., Any]:
-    """Stands in for a function that does what an FMU in C does not."""
+    """The replacement of a function that an FMU in C cannot have."""
 
     def refuse(*values: Any, **options: Any) -> Any:
         raise TraceError(f"{name}(): expected {instead}")
@@ -211,8 +211,8 @@ def _refused(name: str, instead: str) -> Callable[..., Any]:
     return refuse
 
 
-class _Outside(types.ModuleType):
-    """Stands in for a module whose answers do not follow from what it is asked."""
+class _NonDeterministic(types.ModuleType):
+    """The replacement of a module whose results do not depend on the arguments alone."""
 
     def __getattr__(self, name: str) -> Any:
         return _refused(f"{self.__name__}.{name}", "what follows from the variables and from time alone")
@@ -240,10 +240,10 @@ BUILTINS: Mapping[str, Any] = {
 
 
 def _sign(x: Any) -> Any:
-    return FLOAT_AS_IT_IS.sign(x) if is_known(x) else select(truth(x), MATH["copysign"](1.0, x), 0.0)
+    return PLAIN_FLOAT.sign(x) if is_known(x) else select(truth(x), MATH["copysign"](1.0, x), 0.0)
 
 
-FLOAT_AS_IT_IS = dataclasses.replace(scalar.FLOAT)
+PLAIN_FLOAT = dataclasses.replace(scalar.FLOAT)
 SCALARS: Mapping[str, Any] = {
     **{name: MATH[name] for name in ("sqrt", "tanh", "sin", "cos", "atan2")},
     "sign": _sign,
@@ -255,9 +255,9 @@ SCALARS: Mapping[str, Any] = {
 
 @contextlib.contextmanager
 def installed(modules: Iterable[types.ModuleType], extra: Mapping[Any, Any]) -> Iterator[None]:
-    """Put them into these modules, and `extra`, functions by what they stand in for, wherever one is named there."""
+    """Install the replacements in these modules, and `extra`, functions by what they replace, under all their names."""
     undone: list[tuple[dict[str, Any], dict[str, Any], list[str]]] = []
-    by_identity: dict[int, Any] = {id(module): _Outside(module.__name__) for module in (random, time)}
+    by_identity: dict[int, Any] = {id(module): _NonDeterministic(module.__name__) for module in (random, time)}
     by_identity |= {id(math): _Math(), **{id(getattr(math, name)): f for name, f in MATH.items()}}
     by_identity.update({id(function): stand_in for function, stand_in in extra.items()})
     scalars = {**SCALARS, "resolution": 2.0**-hooks.digits}

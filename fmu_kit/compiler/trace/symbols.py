@@ -1,8 +1,8 @@
-"""Symbols: what a slave computes with while it is traced, and the graph of operations that it leaves.
+"""Symbols: the numbers with which a slave computes while it is traced, nodes of a graph of operations.
 
-A symbol is a node of the graph. Nodes are interned: the same operation on the same operands is the same object, so
-that nothing is computed twice and two paths through the code can be compared. No operation is rearranged or
-simplified: every one is the operation of Python floats, in their order, so that C gives the same bits.
+Nodes are interned: the same operation on the same operands is the same object, so that nothing is computed twice and
+two paths through the code can be compared. No operation is reordered or simplified: each is the operation of Python
+floats, so that C gives the same bits.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from fmu_kit.compiler.trace import integers
 from fmu_kit.errors import FmuError
 
 Kind = Literal["real", "int", "wide", "bool"]
-"""A whole number is `int` where C can keep it as a real number, and `wide` within an expression, where it is larger"""
+"""A whole number is `int` where C can store it as a real number, and `wide` within an expression, where it is larger"""
 
 
 class TraceError(Exception):
-    """The code does what cannot be traced; the text says what, and what to do instead."""
+    """The code cannot be traced; the text says why, and what to do instead."""
 
     place: str | None = None
-    """file and line, where it is another than the line that is being run"""
+    """file and line, if it is not the line that is being run"""
 
 
 class Symbol:
-    """A number that is not known before the FMU runs."""
+    """A number that is not known until the FMU runs."""
 
     __slots__ = ("args", "data", "kind", "op")
 
@@ -106,7 +106,7 @@ class Symbol:
         return other >> _known_bits(other, self)
 
     def __xor__(self, other: Any) -> Any:
-        return _of_bits(lambda a, b: node("ne", (lifted(a), lifted(b)), "bool"), "bit_xor", self, other)
+        return _bitwise(lambda a, b: node("ne", (lifted(a), lifted(b)), "bool"), "bit_xor", self, other)
 
     __rxor__ = __xor__
 
@@ -131,12 +131,12 @@ class Symbol:
         return _comparison("ne", self, other)
 
     def __and__(self, other: Any) -> Any:
-        return _of_bits(both, "bit_and", self, other)
+        return _bitwise(both, "bit_and", self, other)
 
     __rand__ = __and__
 
     def __or__(self, other: Any) -> Any:
-        return _of_bits(either, "bit_or", self, other)
+        return _bitwise(either, "bit_or", self, other)
 
     __ror__ = __or__
 
@@ -146,10 +146,10 @@ class Symbol:
         return negation(self) if self.kind == "bool" else -self - 1
 
     def __bool__(self) -> bool:
-        condition = settled(truth(self))
+        condition = decided(truth(self))
         return condition if isinstance(condition, bool) else hooks.decide(condition)
 
-    # -- what would lose the symbol --------------------------------------------------------------------------
+    # -- conversions that would lose the symbol----------------------------------------------------------------------
 
     def __float__(self) -> float:
         raise TraceError(
@@ -200,18 +200,18 @@ class Symbol:
 
 
 class Hooks:
-    """What symbols tell the explorer of the path on which they come up."""
+    """Callbacks of symbols to the explorer of the current path."""
 
     decide: Callable[[Symbol], bool]
-    """which way the path goes where this condition is asked for"""
+    """the branch that the path takes at a condition"""
     fail_if: Callable[[Any, Exception], None]
-    """this error is raised if the condition holds"""
+    """adds an error that is raised if the condition holds"""
     effects: Callable[[], int]
-    """how much has been done on this path that fails, warns, or changes what is kept"""
+    """number of statements on this path that may fail, warn, or change the memory"""
     is_running: Callable[[], bool] = staticmethod(lambda: False)
-    """whether a path is being run: code of a slave, and none of ours"""
+    """whether a path is being run: code of a slave, not of the compiler"""
     digits: int = 53
-    """of the real numbers that are traced for: whole numbers of so many bits are exact"""
+    """bits of the real numbers for which the slave is traced: whole numbers of so many bits are exact"""
 
 
 hooks = Hooks()
@@ -222,7 +222,7 @@ _interned: dict[Any, Symbol] = {}
 
 
 def node(op: str, args: Sequence[Symbol], kind: Kind, data: Any = None) -> Symbol:
-    """The one node of this operation on these operands."""
+    """The interned node of this operation on these operands."""
     if op in _DECIDED and all(arg.op == "constant" for arg in args):
         return constant(_DECIDED[op](*map(_as_computed, args)))
     key = (op, tuple(map(id, args)), kind, data)
@@ -239,11 +239,11 @@ _DECIDED: dict[str, Callable[..., bool]] = {
     "and": lambda a, b: bool(a and b),
     "or": lambda a, b: bool(a or b),
 }
-"""What is decided of constants while the slave is traced; arithmetic is left to C, whose bits count"""
+"""Conditions on constants are evaluated while the slave is traced; arithmetic is left to C"""
 
 
 def _as_computed(symbol: Symbol) -> float:
-    """The number of a constant, as it will be in the C that is written."""
+    """The number of a constant, rounded as in the generated C."""
     value = integer_of(symbol) if symbol.kind == "wide" else value_of(symbol)
     return value if hooks.digits >= 53 else c_float(value).value
 
@@ -262,16 +262,16 @@ def value_of(symbol: Symbol) -> float:
 
 
 def integer_of(symbol: Symbol) -> int:
-    """The whole number of a constant that is no float."""
+    """The whole number of a constant that is not a float."""
     return int(symbol.data if symbol.kind == "wide" else value_of(symbol))
 
 
 def lifted(value: Any) -> Symbol:
-    """A symbol as it can be kept, a number as a constant; raises `TraceError` for what is neither."""
+    """A symbol in its storable form, or a number as a constant; raises `TraceError` for anything else."""
     if isinstance(value, Symbol):
-        return at_rest(value)
+        return storable(value)
     if isinstance(value, bool | int | float):
-        return at_rest(constant(value))
+        return storable(constant(value))
     raise TraceError(f"{type(value).__name__}: expected a number")
 
 
@@ -281,29 +281,29 @@ def is_known(*values: Any) -> bool:
 
 
 def truth(value: Symbol) -> Symbol:
-    """Whether a value counts as true."""
-    value = _as_it_is(value)
+    """The truth value of a symbol."""
+    value = _rounded_as_stored(value)
     return value if value.kind == "bool" else node("ne", (value, constant(0 if value.kind == "wide" else 0.0)), "bool")
 
 
-def settled(condition: Any) -> Any:
-    """A condition; true or false where it is a constant."""
+def decided(condition: Any) -> Any:
+    """A condition, as True or False if it is a constant."""
     if isinstance(condition, Symbol) and condition.op == "constant":
         return bool(value_of(condition))
     return condition
 
 
 def negation(condition: Any) -> Any:
-    """Not, of a condition."""
-    condition = settled(condition)
+    """Logical not of a condition."""
+    condition = decided(condition)
     if is_known(condition):
         return not condition
     return condition.args[0] if condition.op == "not" else node("not", (truth(condition),), "bool")
 
 
 def both(a: Any, b: Any) -> Any:
-    """And, of conditions."""
-    a, b = settled(a), settled(b)
+    """Logical and of conditions."""
+    a, b = decided(a), decided(b)
     for one, other in ((a, b), (b, a)):
         if is_known(one):
             return other if one else False
@@ -311,8 +311,8 @@ def both(a: Any, b: Any) -> Any:
 
 
 def either(a: Any, b: Any) -> Any:
-    """Or, of conditions."""
-    a, b = settled(a), settled(b)
+    """Logical or of conditions."""
+    a, b = decided(a), decided(b)
     for one, other in ((a, b), (b, a)):
         if is_known(one):
             return True if one else other
@@ -321,7 +321,7 @@ def either(a: Any, b: Any) -> Any:
 
 def select(condition: Any, a: Any, b: Any) -> Any:
     """`a` where the condition holds, else `b`; both are computed."""
-    condition = settled(condition)
+    condition = decided(condition)
     if is_known(condition):
         return a if condition else b
     if is_known(a, b) and isinstance(a, bool) and isinstance(b, bool):
@@ -331,7 +331,7 @@ def select(condition: Any, a: Any, b: Any) -> Any:
 
 
 def common_kind(a: Symbol, b: Symbol) -> Kind:
-    """The kind of what is either of two."""
+    """The kind of a value that is one of two."""
     if a.kind == b.kind:
         return a.kind
     return "real" if "real" in (a.kind, b.kind) else "int"
@@ -341,13 +341,13 @@ def whole(op: Literal["floor", "ceil"], x: Symbol) -> Symbol:
     """math.floor, math.ceil: an integer."""
     if x.kind != "real":
         return x
-    hooks.fail_if(node("isnan", (x,), "bool"), raised(lambda: int(float("nan"))))
-    hooks.fail_if(node("isinf", (x,), "bool"), raised(lambda: int(float("inf"))))
+    hooks.fail_if(node("isnan", (x,), "bool"), error_raised_by(lambda: int(float("nan"))))
+    hooks.fail_if(node("isinf", (x,), "bool"), error_raised_by(lambda: int(float("inf"))))
     return node(op, (x,), "wide")
 
 
-def raised(call: Callable[[], object]) -> Exception:
-    """The error that Python itself raises."""
+def error_raised_by(call: Callable[[], object]) -> Exception:
+    """The error that a call raises in Python."""
     try:
         call()
     except Exception as error:
@@ -359,9 +359,11 @@ def _are_integers(*values: Any) -> bool:
     return not any(isinstance(each, float) or (isinstance(each, Symbol) and each.kind == "real") for each in values)
 
 
-def _beside_a_float(value: Any) -> Symbol:
-    """An operand of an operation of floats: Python makes a float of it first."""
-    return constant(float(value)) if is_known(value) and not isinstance(value, bool) else lifted(_as_it_is(value))
+def _as_float_operand(value: Any) -> Symbol:
+    """An operand of a float operation, which Python converts to a float first."""
+    return (
+        constant(float(value)) if is_known(value) and not isinstance(value, bool) else lifted(_rounded_as_stored(value))
+    )
 
 
 def _arithmetic(op: str, a: Any, b: Any) -> Any:
@@ -369,22 +371,24 @@ def _arithmetic(op: str, a: Any, b: Any) -> Any:
         return NotImplemented
     if _are_integers(a, b):
         return whole_number(op, a, b)
-    return node(op, (_beside_a_float(a), _beside_a_float(b)), "real")
+    return node(op, (_as_float_operand(a), _as_float_operand(b)), "real")
 
 
 def _checked(op: str, a: Any, b: Any) -> Any:
-    """An operation that Python refuses for some operands."""
+    """An operation that raises an error for some operands."""
     if not (isinstance(a, Symbol | float | int) and isinstance(b, Symbol | float | int)):
         return NotImplemented
     if op == "pow":
         if _are_integers(a, b):
             return _integer_power(a, b)
-        return power(_beside_a_float(a), _beside_a_float(b), _POWER_ERRORS)
+        return power(_as_float_operand(a), _as_float_operand(b), _POWER_ERRORS)
     zero: Any = _comparison("eq", b, 0.0 if not _are_integers(b) else 0)
-    hooks.fail_if(zero, raised((lambda: 1 // 0) if _are_integers(a, b) else _DIVISIONS[op]))
+    hooks.fail_if(zero, error_raised_by((lambda: 1 // 0) if _are_integers(a, b) else _DIVISIONS[op]))
     if _are_integers(a, b) and op != "div":
         return whole_number(op, a, b)
-    return node(op, (lifted(a), lifted(b)) if _are_integers(a, b) else (_beside_a_float(a), _beside_a_float(b)), "real")
+    return node(
+        op, (lifted(a), lifted(b)) if _are_integers(a, b) else (_as_float_operand(a), _as_float_operand(b)), "real"
+    )
 
 
 _DIVISIONS: dict[str, Callable[[], object]] = {
@@ -395,7 +399,7 @@ _DIVISIONS: dict[str, Callable[[], object]] = {
 
 
 class PowerErrors(NamedTuple):
-    """What is raised for zero to a negative power, a negative number to a broken one, and too large a result."""
+    """Errors for zero to a negative power, a negative number to a fractional power, and an overflow."""
 
     zero: Exception
     negative: Exception
@@ -403,10 +407,10 @@ class PowerErrors(NamedTuple):
 
 
 _POWER_ERRORS = PowerErrors(
-    raised(lambda: 0.0 ** float("-1")),
-    # Python goes on with a complex number, which no variable takes
+    error_raised_by(lambda: 0.0 ** float("-1")),
+    # Python returns a complex number, which no variable can hold
     ValueError("a negative number to a power that is no integer"),
-    raised(lambda: 10.0 ** float("400")),
+    error_raised_by(lambda: 10.0 ** float("400")),
 )
 
 
@@ -417,8 +421,8 @@ def power(base: Symbol, exponent: Symbol, errors: PowerErrors) -> Symbol:
         negative: Any = known is not None or exponent < 0.0
         hooks.fail_if(both(base == 0.0, negative), errors.zero)
     if known is None or not known.is_integer():
-        broken: Any = known is not None or node("ne", (exponent, node("floor", (exponent,), "real")), "bool")
-        hooks.fail_if(both(base < 0.0, broken), errors.negative)
+        fractional: Any = known is not None or node("ne", (exponent, node("floor", (exponent,), "real")), "bool")
+        hooks.fail_if(both(base < 0.0, fractional), errors.negative)
     result = node("pow", (base, exponent), "real")
     finite = both(
         node("isfinite", (base,), "bool"), True if known is not None else node("isfinite", (exponent,), "bool")
@@ -433,39 +437,39 @@ def _comparison(op: str, a: Any, b: Any) -> Any:
     if is_known(a, b):
         return getattr(operator, op)(a, b)
     if not _are_integers(a, b):
-        return node(op, (_compared_with_a_float(a), _compared_with_a_float(b)), "bool")
-    left, right = _as_it_is(_operand(a)), _as_it_is(_operand(b))
+        return node(op, (_as_compared_with_float(a), _as_compared_with_float(b)), "bool")
+    left, right = _rounded_as_stored(_operand(a)), _rounded_as_stored(_operand(b))
     if "wide" in (left.kind, right.kind):
-        left, right = _within_an_expression(left), _within_an_expression(right)
+        left, right = _wide_operand(left), _wide_operand(right)
     return node(op, (left, right), "bool")
 
 
-def _compared_with_a_float(value: Any) -> Symbol:
-    """Python compares an integer with a float as they are: one that is known may be as large as a float can be."""
-    return constant(float(value)) if is_known(value) and float(value) == value else lifted(_as_it_is(value))
+def _as_compared_with_float(value: Any) -> Symbol:
+    """An operand compared with a float, without rounding: a known integer may be as large as a float."""
+    return constant(float(value)) if is_known(value) and float(value) == value else lifted(_rounded_as_stored(value))
 
 
-# -- whole numbers: those at rest are real numbers in C, and exact; between two of them there may be larger ones -----
+# -- whole numbers: stored ones are exact real numbers in C; within an expression they may be larger -----------------
 
 _spans: dict[int, integers.Span] = {}
-"""of whole numbers that are computed here and now; all others are at rest"""
+"""of whole numbers computed within expressions; all others are stored ones"""
 
 
 def whole_number(op: str, *values: Any) -> Symbol:
-    """What an operation on whole numbers gives; raises `TraceError` where it is too large even within an expression."""
-    operands = tuple(_within_an_expression(_operand(value)) for value in values)
-    if not _is_within_an_expression(op, operands):
-        operands = tuple(each if each.op == "constant" else at_rest(each) for each in operands)
-    if not _is_within_an_expression(op, operands):
+    """The result of an operation on whole numbers; raises `TraceError` if it is too large even within an expression."""
+    operands = tuple(_wide_operand(_operand(value)) for value in values)
+    if not _is_in_range(op, operands):
+        operands = tuple(each if each.op == "constant" else storable(each) for each in operands)
+    if not _is_in_range(op, operands):
         raise TraceError(f"an integer of more than {integers.BITS} bits: expected smaller ones, by % in between")
     span = integers.span_of(op, *map(_span, operands))
-    made = node(op, operands, "int" if _fits(span) else "wide")
-    _spans[id(made)] = span
-    return made
+    result = node(op, operands, "int" if _fits(span) else "wide")
+    _spans[id(result)] = span
+    return result
 
 
-def at_rest(symbol: Symbol) -> Symbol:
-    """A symbol as it can be kept; the step fails where it is too large for that."""
+def storable(symbol: Symbol) -> Symbol:
+    """A symbol in the form in which it can be stored; the step fails if its value is too large for that."""
     if symbol.kind != "wide":
         return symbol
     if symbol.op == "constant":
@@ -475,7 +479,7 @@ def at_rest(symbol: Symbol) -> Symbol:
             f"an integer of {integers.size(_span(symbol)).bit_length()} bits: expected {_SMALL.format(hooks.digits)}"
         )
     if symbol.op in (*_ROUNDED, "add", "sub", "mul") and all(arg.kind != "wide" for arg in symbol.args):
-        kept = node(symbol.op, symbol.args, "int")  # what rounds to a smaller one has not been rounded
+        kept = node(symbol.op, symbol.args, "int")  # exact: a result that rounds to a smaller number was not rounded
         too_large = _is_too_large(kept)
     else:
         kept = node("narrow", (symbol,), "int")
@@ -484,7 +488,7 @@ def at_rest(symbol: Symbol) -> Symbol:
     return kept
 
 
-def _is_within_an_expression(op: str, operands: Iterable[Symbol]) -> bool:
+def _is_in_range(op: str, operands: Iterable[Symbol]) -> bool:
     return integers.size(integers.span_of(op, *map(_span, operands))).bit_length() <= integers.BITS
 
 
@@ -504,17 +508,17 @@ def _fits(span: integers.Span) -> bool:
 
 
 _ROUNDED = ("floor", "ceil")
-"""Operations that give whole numbers of any size, which are real numbers in C, and exact."""
+"""Operations that give whole numbers of any size, exact as real numbers in C."""
 
 
-def _as_it_is(value: Any) -> Any:
-    """What has been rounded, where nothing is computed with it but as with a float."""
+def _rounded_as_stored(value: Any) -> Any:
+    """The result of floor or ceil as a real number, where it is used only like a float."""
     return node(value.op, value.args, "int") if isinstance(value, Symbol) and value.op in _ROUNDED else value
 
 
-def _within_an_expression(symbol: Symbol) -> Symbol:
+def _wide_operand(symbol: Symbol) -> Symbol:
     """An operand of an operation on whole numbers."""
-    return at_rest(node(symbol.op, symbol.args, "wide")) if symbol.op in _ROUNDED else symbol
+    return storable(node(symbol.op, symbol.args, "wide")) if symbol.op in _ROUNDED else symbol
 
 
 def _operand(value: Any) -> Symbol:
@@ -544,7 +548,7 @@ def _integer_power(base: Any, exponent: Any) -> Any:
 
 
 def _known_bits(value: Any, bits: Any) -> int:
-    """By how much a whole number is shifted."""
+    """The number of bits by which a whole number is shifted."""
     if not _are_integers(value, bits):
         raise TraceError("<< or >> of a float: expected integers")
     if not is_known(bits):
@@ -554,8 +558,8 @@ def _known_bits(value: Any, bits: Any) -> int:
     return int(bits)
 
 
-def _of_bits(of_conditions: Callable[[Any, Any], Any], op: str, a: Any, b: Any) -> Any:
-    """&, | or ^: of conditions, or of the bits of whole numbers."""
+def _bitwise(of_conditions: Callable[[Any, Any], Any], op: str, a: Any, b: Any) -> Any:
+    """&, | or ^, of conditions or of the bits of whole numbers."""
     if not _are_integers(a, b) or not isinstance(b, Symbol | int):
         return NotImplemented
     if all(isinstance(each, bool) or (isinstance(each, Symbol) and each.kind == "bool") for each in (a, b)):
@@ -564,9 +568,9 @@ def _of_bits(of_conditions: Callable[[Any, Any], Any], op: str, a: Any, b: Any) 
 
 
 def closure(symbols: Iterable[Symbol]) -> dict[int, Symbol]:
-    """All symbols that some are computed from where they are, by identity, each after its operands.
+    """All symbols from which some are computed, by identity, each after its operands.
 
-    Not so what is either of two values: the statement that makes the choice names them.
+    The operands of merged values (phi) are not included: the statements that assign them use them.
     """
     found: dict[int, Symbol] = {}
     for start in symbols:
@@ -582,7 +586,7 @@ def closure(symbols: Iterable[Symbol]) -> dict[int, Symbol]:
     return found
 
 
-# -- text: where a value stands in a message ---------------------------------------------------------------------
+# -- texts: values within messages -------------------------------------------------------------------------------
 
 OPENING, CLOSING = "\x02", "\x03"
 _NAMES: dict[Kind, str] = {"int": "an integer", "real": "a float", "bool": "a truth value"}
@@ -591,12 +595,12 @@ _tokens: list[tuple[Symbol, str]] = []
 _numbers: dict[tuple[int, str], int] = {}
 
 Piece = str | tuple[Symbol, str]
-"""A part of a text: words, or a value and how it is formatted."""
+"""A part of a text: words, or a value and its format."""
 
 
 def token(symbol: Symbol, spec: str) -> str:
-    """What stands in a text for a value; raises `TraceError` for a format that C does not know."""
-    symbol = at_rest(_as_it_is(symbol))
+    """The marker of a value in a text; raises `TraceError` for a format that the C runtime does not have."""
+    symbol = storable(_rounded_as_stored(symbol))
     known = {"int": r"d?", "real": r"(\.\d+)?g|\.\d+[ef]|", "bool": ""}[symbol.kind]
     if spec != "failure" and not re.fullmatch(known, spec):
         raise TraceError(
@@ -610,7 +614,7 @@ def token(symbol: Symbol, spec: str) -> str:
 
 
 def pieces(text: str) -> list[Piece]:
-    """A text, taken apart at the values that stand in it."""
+    """A text split at the values in it."""
     first, *rest = text.split(OPENING)
     found: list[Piece] = [first] if first else []
     for part in rest:

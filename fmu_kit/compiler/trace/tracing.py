@@ -1,7 +1,7 @@
-"""A slave, run on symbols: from its class to a program of functions.
+"""Tracing a slave: from its class to a program of functions.
 
-Whatever branches is put together again where it returns. So the functions of the slave's modules that branch are
-wrapped while it is traced; each method of the slave becomes a function of its own.
+Paths are merged where a function returns. So the functions of the slave's modules that branch are wrapped while it is
+traced; each method of the slave becomes a separate function.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from pythonfmu.fmi2slave import Fmi2Slave
 
 from fmu_kit import scalar
 from fmu_kit.compiler.trace import symbolic_builtins as stand_ins
-from fmu_kit.compiler.trace.memory import Memory, Settled, name_of_kept
+from fmu_kit.compiler.trace.memory import KnownMemory, Memory, attribute_name
 from fmu_kit.compiler.trace.path_exploration import Explorer
-from fmu_kit.compiler.trace.statements import Function, Place, Statement, each_of, used_by
+from fmu_kit.compiler.trace.statements import Function, Place, Statement, all_statements, used_symbols
 from fmu_kit.compiler.trace.symbols import Kind, Symbol, TraceError, constant, hooks
 from fmu_kit.compiler.trace.tree import leaves
 from fmu_kit.failure import place_of
@@ -32,25 +32,25 @@ from fmu_kit.slave import Phase, Slave
 _BASE_METHODS = ("_take_parameters", "_check_parameters")
 _UNTRACED = ("internal_state", "restore", "to_xml")
 _OPEN = frozenset({"__init__", "read_parameters", "initialise", "step", "internal_state", "restore", "to_xml"})
-"""What a slave may define of the methods that its base class has."""
+"""The methods of the base class that a slave may override."""
 MOST_WARNINGS = 32
-"""Of a slave, by their keys; each is a bit of its state."""
+"""Limit of the warnings of a slave; each key is a bit of its state."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Program:
-    """What a slave does, as functions over its memory."""
+    """A traced slave: functions over its memory."""
 
     model: str
     slave: type[Slave]
     places: tuple[Place, ...]
-    """the variables by value reference, then what the model keeps"""
+    """the variables by value reference, then the other numbers that the model keeps"""
     functions: tuple[Function, ...]
     """each after those that it calls"""
     initialise: Function
-    """compute the outputs at the start time; no parameters"""
+    """computes the outputs at the start time; no parameters"""
     do_step: Function
-    """advance; parameters t, h [s]"""
+    """advances by a step; parameters t, h [s]"""
     warnings: tuple[str, ...]
     """keys of the warnings that are given once"""
     versions: Mapping[tuple[int, Statement], int]
@@ -58,35 +58,35 @@ class Program:
 
 
 def trace(slave: type[Slave], modules: list[types.ModuleType], *, digits: int = 53) -> Program:
-    """The program of a slave class that is defined, with all that it uses, in `modules`.
+    """The program of a slave class; `modules` are its own and all that it uses.
 
-    `digits`: of the real numbers that it will compute with, in bits; whole numbers of so many are exact.
-    Raises `TraceError` naming the line that does what cannot be traced.
+    `digits`: bits of the real numbers with which it will compute; whole numbers of so many bits are exact.
+    Raises `TraceError` naming the line that cannot be traced.
     """
     hooks.digits = digits
     kinds: dict[str, Kind] = {}
     fixed = {v.name: constant(v.start) for v in slave.variables if v.variability == "constant"}
-    settled = Settled(fixed)
+    known = KnownMemory(fixed)
     while True:
-        memory = Memory(slave(instance_name="traced"), kinds, settled)
+        memory = Memory(slave(instance_name="traced"), kinds, known)
         try:
             program = _traced(slave, modules, memory)
         except Exception as error:
             raise TraceError(f"{_place(error)}{error}") from error
         found = {name: place.kind for name, place in memory.places.items() if place.reference is None}
         same = all(kinds.get(name, memory.first_kinds[name]) == kind for name, kind in found.items())
-        more = _settled(program, settled) if fixed else settled
-        if same and more == settled:
+        more = _known_after(program, known) if fixed else known
+        if same and more == known:
             return program
-        kinds = found  # a place that held an integer first and a float later holds a float: once more, with that
-        settled = more  # and what follows from what is fixed, and what nothing depends on then
+        kinds = found  # trace again: a place with first an integer, later a float is a float
+        known = more  # and constants and unread places that follow from fixed values
 
 
-def _settled(program: Program, before: Settled) -> Settled:
-    """What is known of the memory of a program, of which some was known before."""
-    first = {name_of_kept(path) for path, _ in leaves(Memory(program.slave(instance_name="new"), {}).attributes())}
+def _known_after(program: Program, before: KnownMemory) -> KnownMemory:
+    """What is known of the memory after a trace, in addition to what was known before."""
+    first = {attribute_name(path) for path, _ in leaves(Memory(program.slave(instance_name="new"), {}).attributes())}
     kept = {place.name: place for place in program.places if place.reference is None and place.name not in first}
-    each = [each for function in program.functions for each in each_of(function.body)]
+    each = [each for function in program.functions for each in all_statements(function.body)]
     stored: dict[str, set[Symbol]] = {}
     for store in each:
         if store.op == "store":
@@ -95,15 +95,15 @@ def _settled(program: Program, before: Settled) -> Settled:
     constants = {
         name: value for name, value in single.items() if (value.op, value.kind) == ("constant", kept[name].kind)
     }
-    return Settled({**before.constants, **constants}, before.unread | (kept.keys() - _read(each, kept.keys())))
+    return KnownMemory({**before.constants, **constants}, before.unread | (kept.keys() - _read(each, kept.keys())))
 
 
 def _read(statements: Sequence[Statement], kept: Collection[str]) -> set[str]:
-    """The places that something depends on other than what lies in places that nothing depends on."""
+    """The places that are read, other than to compute places that are themselves not read."""
     found: set[str] = set()
     while True:
         counting = [each for each in statements if each.op != "store" or each.data not in kept or each.data in found]
-        loaded = {symbol.data[0] for symbol in used_by(counting).values() if symbol.op == "load"}
+        loaded = {symbol.data[0] for symbol in used_symbols(counting).values() if symbol.op == "load"}
         if loaded <= found:
             return found
         found |= loaded
@@ -112,7 +112,7 @@ def _read(statements: Sequence[Statement], kept: Collection[str]) -> set[str]:
 def _traced(slave: type[Slave], modules: list[types.ModuleType], memory: Memory) -> Program:
     instance = memory.slave
     explorer = Explorer(memory)
-    explorer.listen()
+    explorer.install_hooks()
     warnings: list[str] = []
 
     def warn_once(self: Slave, key: str, text: str) -> None:
@@ -124,13 +124,13 @@ def _traced(slave: type[Slave], modules: list[types.ModuleType], memory: Memory)
 
     _expect_no_override(slave)
     with _wrapped(slave, modules, explorer, warn_once):
-        made = memory.attributes()
+        before = memory.attributes()
         initialise, after, _ = explorer.function(
             lambda: Slave._initialise(instance), "enter_stepping", {}, catches=True
         )
         if after is None:
             raise TraceError(f"{slave.__name__}.initialise fails whatever it is given")
-        memory.expect_as_before(made, after, "when it is initialised", may_add=True)
+        memory.expect_as_before(before, after, "when it is initialised", may_add=True)
         memory._set_attributes(after)
         instance._phase = Phase.STEPPING
         step = functools.partial(Slave._advance, instance)
@@ -140,7 +140,7 @@ def _traced(slave: type[Slave], modules: list[types.ModuleType], memory: Memory)
         memory.expect_as_before(after, stepped, "in a step", may_add=False)
     variables = {place.reference: place for place in memory.places.values() if place.reference is not None}
     beside = [place for place in memory.places.values() if place.reference is None]
-    kept = [place for place in beside if not memory.settled.needs_no_place(place)]
+    kept = [place for place in beside if not memory.known.needs_no_place(place)]
     return Program(
         model=slave.__name__,
         slave=slave,
@@ -154,7 +154,7 @@ def _traced(slave: type[Slave], modules: list[types.ModuleType], memory: Memory)
 
 
 def _expect_no_override(slave: type[Slave]) -> None:
-    """Raise `TraceError` for a method that answers to FMI itself, which only the base class may."""
+    """Raise `TraceError` if the slave overrides a method of the base class that implements FMI."""
     for cls in slave.__mro__[: slave.__mro__.index(Slave)]:
         for name in vars(cls):
             if name in vars(Slave) and name not in _OPEN and (name == "_initialise" or callable(vars(Slave)[name])):
@@ -172,7 +172,7 @@ def _place(error: Exception) -> str:
 def _wrapped(
     slave: type[Slave], modules: list[types.ModuleType], explorer: Explorer, warn_once: Callable[..., None]
 ) -> Iterator[None]:
-    """Have every function that branches, and every method of the slave, tell the explorer."""
+    """Wrap every function that branches, and every method of the slave, by calls of the explorer."""
     lineage = slave.__mro__[: slave.__mro__.index(Slave)]
     changed: list[tuple[type, str, Any]] = []
     extra: dict[Any, Any] = {scalar.repeat: explorer.repeat}
@@ -262,7 +262,7 @@ def _untraceable(function: Callable[..., Any]) -> TraceError | None:
 
 
 def _expect_traceable(function: Callable[..., Any]) -> None:
-    """Raise `TraceError` for a function that does what paths cannot be told from."""
+    """Raise `TraceError` for a function with statements that cannot be traced."""
     error = _untraceable(function)
     if error is not None:
         raise error
@@ -278,7 +278,7 @@ def _tree_of(function: Callable[..., Any]) -> ast.AST:
 
 @functools.cache
 def _branches(function: Callable[..., Any]) -> bool:
-    """Whether a function takes one of several ways, or does what cannot be traced."""
+    """Whether a function branches, or has statements that cannot be traced."""
     if _untraceable(function) is not None:
         return True
     for each in ast.walk(_tree_of(function)):

@@ -1,4 +1,4 @@
-"""Values inside values: the numbers in tuples, lists, dictionaries and objects, by the path to each."""
+"""Nested values: the numbers in tuples, lists, dictionaries and objects, by the path to each."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fmu_kit.compiler.trace.symbols import Symbol, TraceError
 
 Path = tuple[Any, ...]
 USUAL_LEAVES = frozenset({Symbol, float, int, bool, str, bytes, type(None)})
-"""Classes, of most of what is held: to be looked for before anything is called"""
+"""The most frequent classes of leaves, tested first for speed"""
 _NUMBERS = frozenset({Symbol, float, int, bool})
 _LEAVES = (*USUAL_LEAVES, type, enum.Enum)
 _OPAQUE = (set, bytearray, array.array, collections.deque, random.Random, Iterator)
@@ -25,14 +25,14 @@ _NONE: dict[str, Any] = {}
 
 
 def is_number(value: Any) -> bool:
-    """Whether a leaf is a number, known or not."""
+    """Whether a leaf is a number, known or a symbol."""
     return type(value) in _NUMBERS or (isinstance(value, Symbol | float | int) and not isinstance(value, enum.Enum))
 
 
 def children(value: Any) -> list[tuple[Any, Any]]:
-    """What a value holds, with the key of each; nothing for a leaf.
+    """The parts of a value, each with its key; empty for a leaf.
 
-    Raises `TraceError` for what may hold something that is not seen.
+    Raises `TraceError` for a value whose parts cannot be inspected.
     """
     form = _form(type(value))  # type: ignore[arg-type]  # mypy takes a class for what has no hash
     if form == "leaf":
@@ -49,7 +49,7 @@ def children(value: Any) -> list[tuple[Any, Any]]:
 
 @functools.cache
 def _form(cls: type) -> Literal["leaf", "object", "dict", "opaque", "sequence", "named"]:
-    """How what is of a class holds others."""
+    """How values of a class hold their parts."""
     if issubclass(cls, _LEAVES) or any("__call__" in vars(each) for each in cls.__mro__):
         return "leaf"
     if issubclass(cls, _OPAQUE):
@@ -67,7 +67,7 @@ def attributes(value: Any) -> list[str]:
 
 @functools.cache
 def _slots(cls: type) -> tuple[str, ...]:
-    """The names of the slots of a class and those that it is made of."""
+    """The names of the slots of a class and its bases."""
     named = [vars(each).get("__slots__", ()) for each in cls.__mro__]
     found = [name for slots in named for name in ((slots,) if isinstance(slots, str) else slots)]
     return tuple(name for name in found if not name.startswith("__"))
@@ -106,7 +106,7 @@ def bare_leaves(value: Any) -> Iterator[Any]:
 
 
 def shape(value: Any) -> Any:
-    """What a value is apart from its numbers: two of one shape can be merged."""
+    """The structure of a value without its numbers: values of one shape can be merged."""
     if is_number(value):
         return "number"
     inside = children(value)
@@ -115,62 +115,62 @@ def shape(value: Any) -> Any:
     return (type(value), tuple((key, shape(child)) for key, child in inside))
 
 
-def written(path: Path) -> str:
-    """A path as a model writes it, behind what it begins at."""
+def path_text(path: Path) -> str:
+    """A path as a model writes it, without the name at which it begins."""
     names = [isinstance(part, str) and part.isidentifier() for part in path]
     return "".join(f".{part}" if is_name else f"[{part!r}]" for part, is_name in zip(path, names))
 
 
 def difference(a: Any, b: Any, name: Callable[[Path], str]) -> str:
-    """In what two values differ beside their numbers; `name` has the words for where."""
+    """The first difference of two values other than in numbers; `name` names its place."""
     one, other = dict(leaves(a)), dict(leaves(b))
     for path in [*one, *other]:
         if path not in one or path not in other or shape(one[path]) != shape(other[path]):
-            found = (_in_words(each[path]) if path in each else "absent" for each in (one, other))
+            found = (_describe(each[path]) if path in each else "absent" for each in (one, other))
             return f"{name(path)} is {' and '.join(found)}"
     return "their types"
 
 
-def _in_words(leaf: Any) -> str:
+def _describe(leaf: Any) -> str:
     return "a number" if is_number(leaf) else repr(leaf)
 
 
-def mapped(value: Any, change: Callable[[Path, Any], Any], path: Path = ()) -> Any:
+def map_leaves(value: Any, change: Callable[[Path, Any], Any], path: Path = ()) -> Any:
     """A copy of a value with every leaf replaced."""
     inside = children(value)
     if not inside:
         return change(path, value)
     new = [
-        (key, change((*path, key), child) if type(child) in USUAL_LEAVES else mapped(child, change, (*path, key)))
+        (key, change((*path, key), child) if type(child) in USUAL_LEAVES else map_leaves(child, change, (*path, key)))
         for key, child in inside
     ]
     return _rebuilt(value, new)
 
 
 def _rebuilt(value: Any, new: list[tuple[Any, Any]]) -> Any:
-    """A value of the same class that holds something else."""
+    """A value of the same class with other parts."""
     if isinstance(value, list):
         return [child for _, child in new]
     if isinstance(value, tuple):
         return type(value)(*(child for _, child in new)) if hasattr(value, "_fields") else tuple(c for _, c in new)
     if isinstance(value, dict):
         return dict(new)
-    made = copy.copy(value)
+    copied_object = copy.copy(value)
     for key, child in new:
-        object.__setattr__(made, key, child)
-    return made
+        object.__setattr__(copied_object, key, child)
+    return copied_object
 
 
-def copied(value: Any) -> Any:
+def deep_copy(value: Any) -> Any:
     """A copy of a value, down to its leaves."""
     inside = children(value)
     if not inside:
         return value
-    return _rebuilt(value, [(key, child if type(child) in USUAL_LEAVES else copied(child)) for key, child in inside])
+    return _rebuilt(value, [(key, child if type(child) in USUAL_LEAVES else deep_copy(child)) for key, child in inside])
 
 
-def mutable_objects(value: Any, found: dict[int, Any]) -> None:
-    """Everything in a value that may be changed in place, by identity."""
+def collect_mutables(value: Any, found: dict[int, Any]) -> None:
+    """Collect all mutable objects in a value, by identity."""
     inside = children(value)
     if isinstance(value, tuple):
         pass
@@ -180,11 +180,11 @@ def mutable_objects(value: Any, found: dict[int, Any]) -> None:
         found[id(value)] = value
     for _, child in inside:
         if type(child) not in USUAL_LEAVES:
-            mutable_objects(child, found)
+            collect_mutables(child, found)
 
 
-def expect_no_twins(value: Any) -> None:
-    """Raise `TraceError` if one object that may be changed lies in two places: in C it would be two."""
+def expect_no_aliases(value: Any) -> None:
+    """Raise `TraceError` if one mutable object is in two places: in C they would be separate."""
     places: dict[int, Path] = {}
 
     def note(value: Any, path: Path) -> None:
@@ -192,7 +192,7 @@ def expect_no_twins(value: Any) -> None:
             children(value) and not isinstance(value, tuple) and not _is_frozen(value)
         ):
             if id(value) in places:
-                one, other = (f"self{written(each)}" for each in (places[id(value)], path))
+                one, other = (f"self{path_text(each)}" for each in (places[id(value)], path))
                 raise TraceError(f"{one} and {other} are one {type(value).__name__}: expected one of its own")
             places[id(value)] = path
         for key, child in children(value):
@@ -203,7 +203,7 @@ def expect_no_twins(value: Any) -> None:
 
 
 def expect_unchanged(before: Sequence[tuple[Path, Any]], given: Any, name: str) -> None:
-    """Raise `TraceError` if what a method of this name was given has other leaves now: in C that would be a copy."""
+    """Raise `TraceError` if a method of this name changed its arguments: in C these are copies."""
     for one, other in itertools.zip_longest(before, leaves(given)):
         if one is None or other is None or one[0] != other[0] or not _are_same(one[1], other[1]):
             path = (one or other)[0]
@@ -227,16 +227,16 @@ def _is_frozen(value: Any) -> bool:
 
 
 class Snapshot:
-    """What some values hold, to be put back into them."""
+    """The content of mutable objects, to be restored."""
 
     def __init__(self, *roots: Any) -> None:
         found: dict[int, Any] = {}
         for root in roots:
-            mutable_objects(root, found)
+            collect_mutables(root, found)
         self._held = [(value, _content(value)) for value in found.values()]
 
     def restore(self) -> None:
-        """Put everything back, in place."""
+        """Restore all objects in place."""
         for value, content in self._held:
             if isinstance(value, list):
                 value[:] = content

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from fmu_kit.syntax_trees import parsed
+from fmu_kit.syntax_trees import parse_module
 
 ENTRY = "resources/slavemodule.txt"
 _MODULES = (".py", ".so", ".pyd")
@@ -34,7 +34,7 @@ def read(files: Mapping[str, bytes]) -> PythonSources | None:
     for name in files:
         if name.startswith("resources/") and name.endswith(".py"):
             try:
-                imports |= set(_needed(parsed(files[name])))
+                imports |= set(_needed(parse_module(files[name])))
             except (SyntaxError, ValueError) as error:
                 problems.append(f"{name}: not Python {sys.version_info[0]}.{sys.version_info[1]}: {error}")
     beyond = imports - bundled - sys.stdlib_module_names

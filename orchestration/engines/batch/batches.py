@@ -10,7 +10,7 @@ import numpy as np
 from orchestration.basics.simulator import Floats
 from orchestration.engines.batch.batch import NOTHING, Batch, BatchResult, Columns, Group
 from orchestration.engines.batch.combining import combined
-from orchestration.engines.batch.kernels import lanes_here
+from orchestration.engines.batch.kernels import preferred_lanes
 from orchestration.engines.batch.shape import Shape, outline
 from orchestration.engines.structures import structures
 from orchestration.engines.watch import watch
@@ -50,7 +50,7 @@ class Batches:
 
     def __init__(self, flier: Callable[[Shape, ScheduleCache], Flier] = Batch) -> None:
         self._schedules = ScheduleCache()
-        self._lanes = lanes_here()
+        self._lanes = preferred_lanes()
         self._flier = flier
         self._shapes: dict[Hashable, tuple[Shape, Flier]] = {}
 

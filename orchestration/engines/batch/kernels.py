@@ -11,7 +11,7 @@ from typing import Any
 from fmu_kit.bundle import PackagingError
 from fmu_kit.compiler.pack.c_compiler import FOR_THIS_PROCESSOR, OPTIONS, compiled_here
 from fmu_kit.compiler.pack.lanes import MAIN, Lanes, compiled_lanes
-from fmu_kit.compiler.pack.lanes import lanes_here as lanes_of_fmus
+from fmu_kit.compiler.pack.lanes import preferred_lanes as lanes_of_fmus
 from fmu_kit.compiler.runtime import FOLDER
 from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.basics.libraries import cached_library
@@ -24,7 +24,7 @@ FILES = (Path(__file__).with_name("batch.c"), INSTANTS, HEADER, FOLDER / "lanes.
 _SOURCES = "sources/"
 
 
-def lanes_here() -> int:
+def preferred_lanes() -> int:
     """How many runs this machine flies at once in one thread; raises `QuadcosimError` without a compiler."""
     try:
         return lanes_of_fmus()

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from orchestration.basics.identity import IdentityCache
 from orchestration.engines import initial
 from orchestration.engines.batch.code import Written, written
-from orchestration.engines.batch.kernels import Kernel, batch, component, lanes_here
+from orchestration.engines.batch.kernels import Kernel, batch, component, preferred_lanes
 from orchestration.engines.batch.writing import Kind, Leaf
 from orchestration.engines.board import Board
 from orchestration.engines.channel import of_each
@@ -320,6 +320,6 @@ def expect_lanes(system: System, models: Mapping[str, Model]) -> None:
 
     Raises `UsageError` for one that cannot be, naming what it lacks; `QuadcosimError` without a compiler.
     """
-    shape = Shape(system=system, models=models, lanes=lanes_here())
+    shape = Shape(system=system, models=models, lanes=preferred_lanes())
     assert shape.kernels
     assert shape.library

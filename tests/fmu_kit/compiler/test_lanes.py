@@ -15,8 +15,8 @@ from fmu_kit.compiler.emit.c_code import ERRORS
 from fmu_kit.compiler.emit.standards import STANDARDS
 from fmu_kit.compiler.pack.building import c_sources, modules_of
 from fmu_kit.compiler.pack.c_compiler import FOR_THIS_PROCESSOR, OPTIONS
-from fmu_kit.compiler.pack.lanes import compiled_lanes, lanes_here
-from fmu_kit.compiler.passes.precomputing import precomputed
+from fmu_kit.compiler.pack.lanes import compiled_lanes, preferred_lanes
+from fmu_kit.compiler.passes.precomputing import precompute
 from fmu_kit.compiler.trace.tracing import trace
 from fmu_kit.packaging import slave_class
 from fmu_kit.variables import Variable
@@ -56,7 +56,7 @@ def _given(rng: np.random.Generator, variables: list[Variable], causality: str, 
 def in_lanes(sources: dict[str, bytes], lanes: int, folder: Path) -> None:
     """The sources as `lanes.so`, which is that of the engine where it has the same in as many lanes."""
     how = (OPTIONS, FOR_THIS_PROCESSOR, lanes)
-    content = libraries.content("lanes", sources, how, lambda: compiled_lanes(sources, lanes))
+    content = libraries.cached_content("lanes", sources, how, lambda: compiled_lanes(sources, lanes))
     (folder / "lanes.so").write_bytes(content)
 
 
@@ -77,7 +77,7 @@ def test_in_a_lane_are_the_bits_of_the_fmu(model: str, tmp_path: Path) -> None:
 def test_whatever_a_slave_does_it_does_in_lanes(name: str, tmp_path: Path) -> None:
     compiler("cc")
     target = Target.parse(f"tests.fmu_kit.compiler.probes:{name}")
-    program = precomputed(trace(slave_class(target), modules_of(target)))
+    program = precompute(trace(slave_class(target), modules_of(target)))
     compiled(program, tmp_path / "alone.so", "own")
     in_lanes(c_sources(program, GUID, STANDARDS[2]), PROBES[name], tmp_path)
     assert _come_to(tmp_path, target, GUID) > {0}
@@ -90,7 +90,7 @@ def _come_to(folder: Path, target: Target, guid: str) -> set[int]:
     together = Together(folder / "lanes.so")
     types = [variable.type.replace("Enumeration", "Integer") for variable in variables]
     alone = [Alone.made(folder / "alone.so", together.lanes.places, types, guid) for _ in range(together.count)]
-    usual = (slave_class(target).usually, 0.0, 0.0, (0.0,))
+    usual = (slave_class(target).usual_parameters, 0.0, 0.0, (0.0,))
     unusual: tuple[Mapping[str, float], float, float, tuple[float, ...]] = ({}, 0.3, 0.02, (0.0, 0.5, -1.0))
     found = {
         status for flight in (usual, unusual, unusual) * 6 for status in _fly(together, alone, variables, rng, *flight)
@@ -108,7 +108,7 @@ def _fly(
     alone: list[Alone],
     variables: list[Variable],
     rng: np.random.Generator,
-    usually: Mapping[str, float | int | bool],
+    usual_parameters: Mapping[str, float | int | bool],
     changed: float,
     strange: float,
     starts: Sequence[float],
@@ -118,7 +118,9 @@ def _fly(
     A share `changed` of the parameters is not what it is at the start, a share `strange` of what is given anything.
     Lanes start at one of `starts` [s].
     """
-    usual = {k: usually[variable.name] for k, variable in enumerate(variables) if variable.name in usually}
+    usual = {
+        k: usual_parameters[variable.name] for k, variable in enumerate(variables) if variable.name in usual_parameters
+    }
     together.begin()
     for lane, instance in enumerate(alone):
         instance.fmu.reset()
@@ -171,6 +173,6 @@ def test_lanes_are_refused_by_name() -> None:
 
 def test_without_a_compiler_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "")
-    lanes_here.cache_clear()
+    preferred_lanes.cache_clear()
     with pytest.raises(PackagingError, match="install one"):
-        lanes_here()
+        preferred_lanes()

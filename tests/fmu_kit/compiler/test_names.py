@@ -15,7 +15,7 @@ from fmu_kit.compiler.pack.building import c_sources, modules_of
 from fmu_kit.compiler.pack.c_compiler import compiled_here
 from fmu_kit.compiler.pack.embedded import write
 from fmu_kit.compiler.pack.lanes import compiled_lanes
-from fmu_kit.compiler.passes.precomputing import precomputed
+from fmu_kit.compiler.passes.precomputing import precompute
 from fmu_kit.compiler.runtime import FOLDER
 from fmu_kit.compiler.trace.tracing import trace
 from fmu_kit.packaging import slave_class
@@ -118,7 +118,7 @@ def test_a_slave_may_call_its_own_what_it_likes(target: Target, tmp_path: Path) 
     assert compiled_here(sources, STANDARDS[3].main, options=("-O0",))
     assert compiled_lanes(sources, 2)
     expected = answers(InPython(cls(instance_name="names")), {}, [{}] * 3)
-    path = compiled(precomputed(program), tmp_path / "names.so", "libm")
+    path = compiled(precompute(program), tmp_path / "names.so", "libm")
     assert answers(InC.made(cls, path), {}, [{}] * 3) == expected
 
 

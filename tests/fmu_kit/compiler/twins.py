@@ -14,7 +14,7 @@ from fmu_kit.compiler.emit.standards import STANDARDS
 from fmu_kit.compiler.pack import building
 from fmu_kit.compiler.pack.building import c_sources, modules_of
 from fmu_kit.compiler.pack.c_compiler import Mathematics
-from fmu_kit.compiler.passes.precomputing import precomputed
+from fmu_kit.compiler.passes.precomputing import precompute
 from fmu_kit.compiler.trace.tracing import Program, trace
 from fmu_kit.packaging import slave_class
 from fmu_kit.slave import Slave
@@ -27,7 +27,7 @@ Answer = tuple[str, ...]
 
 def library(target: Target, folder: Path) -> Path:
     """The library of a slave that is written out as C, on the libm that CPython takes."""
-    return compiled(precomputed(trace(slave_class(target), modules_of(target))), folder / f"{target.model}.so", "libm")
+    return compiled(precompute(trace(slave_class(target), modules_of(target))), folder / f"{target.model}.so", "libm")
 
 
 def compiled(program: Program, path: Path, mathematics: Mathematics) -> Path:

@@ -87,7 +87,7 @@ def test_where_no_lanes_can_be_had_the_next_engine_flies_the_same_and_it_is_said
     def none() -> int:
         raise QuadcosimError("no compiler")
 
-    monkeypatch.setattr(shape, "lanes_here", none)
+    monkeypatch.setattr(shape, "preferred_lanes", none)
     found = quadcosim.fly(SHORT, {X: [0.0, 1.0]}, record=RECORDED)
     assert (found.engine, found.reason) == ("compiled", "no compiler")
     assert list(found) == list(lanes)

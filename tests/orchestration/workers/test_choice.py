@@ -39,7 +39,7 @@ def test_an_engine_by_name_flies_the_fmus_that_were_asked_for(native: bool) -> N
 
 
 def test_without_lanes_native_twins_fly_and_it_is_said_why(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shape, "lanes_here", no_compiler)
+    monkeypatch.setattr(shape, "preferred_lanes", no_compiler)
     found = chosen("auto", False, first)
     assert found == Chosen(native=True, in_lanes=False, engine=None, reason="no compiler")
     assert str(found) == "engine compiled: native FMUs, one run at a time (no compiler)"
