@@ -26,7 +26,7 @@ from orchestration.requests.ranges import paths_in
 from orchestration.requests.request import RequestLike, request_of
 from orchestration.stability.delay_bounds import SampledLoop, certain_jitter
 from orchestration.stability.known_loops import rested
-from orchestration.stability.linear_loop import at_rest
+from orchestration.stability.loop_at_rest import at_rest
 from orchestration.system.distribution import lowest
 from orchestration.system.placement import messages_by_connection, tasks_of
 from orchestration.system.request import Request, errors_in_own_terms, system_of

@@ -11,8 +11,14 @@ import numpy as np
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
 from orchestration.schedule.plan import Plan
-from orchestration.stability.linear_loop import AtRest
-from orchestration.stability.matrices import Matrices, depends_on_step, in_continuous_time, of_samples, told_by_outputs
+from orchestration.stability.loop_at_rest import AtRest
+from orchestration.stability.matrices import (
+    Matrices,
+    depends_on_step,
+    in_continuous_time,
+    in_output_coordinates,
+    of_samples,
+)
 from orchestration.stability.operating_point import true_period
 from orchestration.system.connection import Connection
 from orchestration.system.model import System
@@ -69,7 +75,7 @@ def loop_of(rest: AtRest) -> Loop:
         tangent = rest.tangents[name]
         if component.sampling is not None:
             found = of_samples(tangent, component.sampling.period)
-            components[name] = told_by_outputs(found, found.A)
+            components[name] = in_output_coordinates(found, found.A)
             varies = rest.simulation.instances[name].model.varies_step
             if not varies or depends_on_step(tangent, component.sampling.period):
                 minds.add(name)
@@ -78,7 +84,7 @@ def loop_of(rest: AtRest) -> Loop:
             found, unfit = in_continuous_time(tangent, min(component.step, period))
             if unfit is not None:
                 raise UsageError(f"{name}: {unfit}, so it is no linear system in continuous time")
-            components[name] = told_by_outputs(found, expm(found.A * period))
+            components[name] = in_output_coordinates(found, expm(found.A * period))
     for x in system.connections:
         for start, end in zip(x.start, x.end):
             known = (components[x.sender].outputs, components[x.receiver].inputs)

@@ -14,9 +14,9 @@ import numpy as np
 
 from orchestration.basics.errors import SimulatorError, UsageError
 from orchestration.exact.linear import Continuous, Sampled
-from orchestration.stability.linear_loop import AtRest
 from orchestration.stability.linearised_component import Tangent
-from orchestration.stability.matrices import BLURRED, depends_on_step, in_continuous_time, of_samples, whole
+from orchestration.stability.loop_at_rest import AtRest
+from orchestration.stability.matrices import INEXACT, depends_on_step, in_continuous_time, of_samples, whole_nanoseconds
 from orchestration.system.times import NANOSECONDS
 
 LARGE_PULSE, SMALL_PULSE = 1.0, 1e-3
@@ -65,7 +65,16 @@ def _cache_key(loop: AtRest, name: str) -> tuple[object, ...]:
     """All that the matrices of a component depend on."""
     component = json.dumps(asdict(loop.simulation.system.components[name]), default=str, sort_keys=True)
     rest = loop.rest_of(name)
-    return name, component, loop.begun[name], rest.inputs, rest.held.tobytes(), rest.outputs, rest.time, loop.period
+    return (
+        name,
+        component,
+        loop.saved_states[name],
+        rest.inputs,
+        rest.held.tobytes(),
+        rest.outputs,
+        rest.time,
+        loop.period,
+    )
 
 
 def _identified(loop: AtRest, name: str) -> IdentifiedComponent:
@@ -75,7 +84,7 @@ def _identified(loop: AtRest, name: str) -> IdentifiedComponent:
     if component.sampling is not None:
         part = Sampled(**vars(of_samples(tangent, step)), depends_on_step=depends_on_step(tangent, step))
     else:
-        matrices, unfit = in_continuous_time(tangent, step, DIFFERS if is_linear else BLURRED)
+        matrices, unfit = in_continuous_time(tangent, step, DIFFERS if is_linear else INEXACT)
         part = Continuous(**vars(matrices), step=tangent.derivatives, unfit=unfit)
     method = "saved states, to rounding" if is_linear else "saved states, by differences"
     return IdentifiedComponent(part=part, method=method, accuracy=max(ROUNDING, discrepancy), tangent=tangent)
@@ -85,11 +94,11 @@ def _tangent_by_pulses(loop: AtRest, name: str, step: float) -> tuple[Tangent, b
     """A component by suitable pulses, whether it is linear, and the accuracy of its responses."""
     with suppress(UsageError, SimulatorError, ValueError, np.linalg.LinAlgError):  # it accepts no large pulses
         large = loop.tangent(name, LARGE_PULSE)
-        discrepancy = large.missed_by(SMALL_PULSE, step)
+        discrepancy = large.prediction_error(SMALL_PULSE, step)
         if discrepancy <= SAME:
             return large, True, discrepancy
     small = loop.tangent(name, loop.pulse)
-    return small, False, small.missed_by(LARGER * loop.pulse, step)
+    return small, False, small.prediction_error(LARGER * loop.pulse, step)
 
 
 def _informative_step(loop: AtRest, name: str) -> float:
@@ -99,4 +108,4 @@ def _informative_step(loop: AtRest, name: str) -> float:
         return component.sampling.period
     if not loop.simulation.instances[name].model.varies_step:
         return component.step or 0.0
-    return whole(float(loop.period) / NANOSECONDS / 4.0)
+    return whole_nanoseconds(float(loop.period) / NANOSECONDS / 4.0)

@@ -13,8 +13,8 @@ from orchestration.exact.linear import Components
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.reuse import Instances
 from orchestration.runs.prepared import prepared
-from orchestration.stability.linear_loop import AtRest, watching
 from orchestration.stability.linearised_component import Tangent
+from orchestration.stability.loop_at_rest import AtRest, tracing_loader
 from orchestration.stability.operating_point import deterministic
 from orchestration.system.model import System
 from orchestration.system.paths import changed
@@ -45,14 +45,14 @@ def initial_state_of(
         name: one if one.sampling is None else replace(one, sampling=replace(one.sampling, offset=0.0))
         for name, one in calm.components.items()
     }
-    with prepared(replace(calm, components=prompt), load=watching(instances)) as run:
+    with prepared(replace(calm, components=prompt), load=tracing_loader(instances)) as run:
         run.master.initialise()
         if run.master.divergence is not None:
             raise UsageError(f"it diverges at its initialisation: {run.master.divergence}")
         saved = {name: instance.save() for name, instance in run.instances.items()}
         outputs = {name: _outputs(run.instances[name], part.outputs) for name, part in parts.items()}
         received = [channel.received.copy() for channel in run.master.channels]
-    for name, state in loop.begun.items():
+    for name, state in loop.saved_states.items():
         loop.simulation.instances[name].restore(state)
     rest = {name: _outputs(loop.simulation.instances[name], part.outputs) for name, part in parts.items()}
     received_at_rest = [channel.received for channel in loop.simulation.master.channels]

@@ -31,7 +31,7 @@ from orchestration.expressions.syntax import Call
 from orchestration.fmi.model import Model
 from orchestration.fmi.reuse import Instances
 from orchestration.schedule.plan import Plan
-from orchestration.stability.linear_loop import Beside, at_rest
+from orchestration.stability.loop_at_rest import ExtraSignals, at_rest
 from orchestration.stability.operating_point import true_period
 from orchestration.system.model import System
 from orchestration.system.paths import changed
@@ -134,8 +134,8 @@ class Loops:
         noise = _white_noise(system, simulated=self.simulated)
         models = {name: self._models[component.fmu] for name, component in system.components.items()}
         objectives, initial_state = ObjectiveMeans(system, models), None
-        beside = Beside(moved=tuple(noise), seen=objectives.outputs)
-        with at_rest(system, self._instances, beside=beside, models=models) as loop:
+        extra = ExtraSignals(inputs=tuple(noise), outputs=objectives.outputs)
+        with at_rest(system, self._instances, extra=extra, models=models) as loop:
             objectives.expand_about(loop)
             known = self._identifier.of(loop)
             parts = {name: one.part for name, one in known.items()}

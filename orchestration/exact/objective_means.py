@@ -8,7 +8,7 @@ from orchestration.basics.errors import UsageError
 from orchestration.exact.objectives import Mean, evaluated, inlined_objectives, integrand, means_of, quadratic
 from orchestration.expressions.syntax import Call, names
 from orchestration.fmi.model import Model
-from orchestration.stability.linear_loop import AtRest
+from orchestration.stability.loop_at_rest import AtRest
 from orchestration.system.model import System
 from orchestration.system.references import AT_REST
 from orchestration.system.source import Source
@@ -40,7 +40,7 @@ class ObjectiveMeans:
 
     def expand_about(self, loop: AtRest) -> None:
         """Expand the means as polynomials about the point where the loop rests."""
-        for name, state in loop.begun.items():
+        for name, state in loop.saved_states.items():
             loop.simulation.instances[name].restore(state)
         rest = {
             signal: float(loop.simulation.instances[component_of(signal)].get(variable_of(signal)))

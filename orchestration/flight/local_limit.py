@@ -12,7 +12,7 @@ from orchestration.flight.plant_step import NotSmooth
 from orchestration.quadrotor.quantities import range_of
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.requests.ranges import Varied
-from orchestration.stability.known_loops import Local
+from orchestration.stability.known_loops import LocalLimit
 from orchestration.stability.local_limit import about_rest
 from orchestration.system.distribution import lowest
 from orchestration.system.model import System
@@ -33,17 +33,17 @@ class AboutHover:
         """The system of a scenario at hover."""
         return at_hover(cast(Scenario, request))
 
-    def local_limits(self, varied: Varied, span: Range) -> Local:
+    def local_limits(self, varied: Varied, span: Range) -> LocalLimit:
         """The local limit of a quantity: of the loop about hover where that applies, else as for any system."""
         scenario = cast(Scenario, varied.request)
         if varied.of in ("jitter", "loss"):
-            return Local(reason=f"linear theory has no local limit of {varied.of}")
+            return LocalLimit(reason=f"linear theory has no local limit of {varied.of}")
         why = "the loop about hover is for period and delay only"
         try:
             if varied.of in KNOWN:
                 return about_hover(scenario, varied.of)
         except NotSmooth as error:
-            return Local(reason=f"no local limit: {error}")
+            return LocalLimit(reason=f"no local limit: {error}")
         except UsageError as error:
             why = str(error)
         return _without_hover_loop(scenario, varied, span, why)
@@ -75,7 +75,7 @@ def radius(loop: HoverLoop, scenario: Scenario, of: str, value: float) -> float:
     return loop.spectral_radius(period, delay)
 
 
-def about_hover(scenario: Scenario, of: str) -> Local:
+def about_hover(scenario: Scenario, of: str) -> LocalLimit:
     """The local limits of the quadrotor in period or delay, inside its boundary layer and just outside of it.
 
     Raises `UsageError` for a scenario without a linear loop about hover.
@@ -85,7 +85,7 @@ def about_hover(scenario: Scenario, of: str) -> Local:
     loop = HoverLoop.of(scenario)
     edge = at_edge(scenario)
     limit = local_limit(loop, scenario, of)
-    return Local(
+    return LocalLimit(
         limit=limit,
         outside=None if edge is None else local_limit(loop.with_law(edge), edge, of),
         method=HOVER,
@@ -94,12 +94,12 @@ def about_hover(scenario: Scenario, of: str) -> Local:
     )
 
 
-def _without_hover_loop(scenario: Scenario, varied: Varied, span: Range, why: str) -> Local:
+def _without_hover_loop(scenario: Scenario, varied: Varied, span: Range, why: str) -> LocalLimit:
     """The local limit of the quadrotor as of any other system, with the reason `why`."""
     try:
         hover = at_hover(scenario)
     except UsageError as error:
-        return Local(reason=f"no local limit: {error}")
+        return LocalLimit(reason=f"no local limit: {error}")
     found = about_rest(lambda value: changed(hover, dict.fromkeys(varied.paths, value)), span)
     if found.method is None:
         return replace(found, reason=f"{found.reason} ({why})")

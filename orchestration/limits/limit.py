@@ -21,7 +21,7 @@ from orchestration.requests.ranges import Varied, default_quantity, search_range
 from orchestration.requests.request import RequestLike, request_of
 from orchestration.results import html
 from orchestration.results.criterion import edge, judged
-from orchestration.stability.known_loops import Local
+from orchestration.stability.known_loops import LocalLimit
 from orchestration.stability.local_limit import local_limits
 from orchestration.system.chance import has_random_timing, is_random
 from orchestration.system.request import Request, errors_in_own_terms, system_of
@@ -170,14 +170,14 @@ def _checked(request: Request, of: str, confidence: float) -> tuple[Varied, File
     return varied, files_of(varied.system)
 
 
-def _local(varied: Varied, span: Range, files: Files) -> Local:
+def _local(varied: Varied, span: Range, files: Files) -> LocalLimit:
     try:
         return computed(files.fmus.values(), local_limits, varied, span)
     except LostError as error:
-        return Local(reason=f"no local limit: {error}")
+        return LocalLimit(reason=f"no local limit: {error}")
 
 
-def _mean_square(varied: Varied, span: Range, files: Files, local: Local) -> MeanSquareLimit:
+def _mean_square(varied: Varied, span: Range, files: Files, local: LocalLimit) -> MeanSquareLimit:
     """Noise alone is added to a loop that it does not change: means of squares then have no end where errors grow."""
     if local.limit is not None and not has_random_timing(varied.at(span.last)):
         return MeanSquareLimit(limit=local.limit)
@@ -233,7 +233,9 @@ def _flown(near: Request, pool: RunEvaluator) -> Continuous:
     return Continuous(period=CONTINUOUS, outcome=metrics["outcome"], settling_time=metrics["settling_time"])
 
 
-def _note(span: Range, bracket: Bracket | None, trials: Evaluator, refuted: float | None, found: Local) -> list[str]:
+def _note(
+    span: Range, bracket: Bracket | None, trials: Evaluator, refuted: float | None, found: LocalLimit
+) -> list[str]:
     local = found.limit
     if bracket is None:
         parts = [f"good throughout the range, to {span.last:g}{span.unit}"]

@@ -1,11 +1,11 @@
-"""How much delay that varies a linear loop stands for certain, and by which it is lost: bounds beside what is flown.
+"""The varying delay that a linear loop certainly tolerates, and one by which it becomes unstable.
 
 The loop: a plant dx = A x + B u in continuous time, its state sampled every `period`, the command u = F x held from its
-arrival to the next. A command that was sensed at t arrives at t + d + δ, with any δ in [0, J] of its own.
+arrival to the next. A command from the sample at t arrives at t + d + δ, with any δ in [0, J], different for each.
 
-For certain: C.-Y. Kao, B. Lincoln, Simple stability criteria for systems with time-varying delays, Automatica 40 (2004)
-1429-1434, theorem 3, a small-gain bound, here for several commands that travel together, with singular values in place
-of magnitudes: stable for every sequence of δ if, with N = J/T, g its fractional part and n its whole one,
+Certainly tolerated: C.-Y. Kao, B. Lincoln, Simple stability criteria for systems with time-varying delays, Automatica
+40 (2004) 1429-1434, theorem 3, a small-gain bound, here for several commands that travel together, with singular values
+in place of magnitudes: stable for every sequence of δ if, with N = J/T, g its fractional part and n its whole one,
 
     σ( S [F P(j(ω + 2πk)/T)]_k ) < 1 / (Ñ |e^jω - 1|) for all ω in (0, π],    Ñ² = n² + 2 n g + g,
 
@@ -27,14 +27,14 @@ from orchestration.basics.simulator import Floats
 Complexes = npt.NDArray[np.complex128]
 
 FREQUENCIES = 800
-"""at which the bound is looked at, from `LOWEST` to π by period"""
+"""at which the bound is evaluated, from `LOWEST` to π by period"""
 LOWEST = 1e-4
 ALIASES = 40
-"""to each side; those beyond are B/(jω), which has a sum"""
+"""to each side; those beyond are B/(jω), whose sum is known"""
 LONGEST = 4
-"""samples after which the delays that are tried repeat"""
+"""samples after which the tried sequences of delays repeat"""
 SCAN = 16
-"""values of the jitter at which each of them is tried, before the first that is too much is narrowed down"""
+"""values of the jitter at which each of them is tried, before the first unstable one is bisected"""
 _INSTANT = 1e-9
 """of a period"""
 
@@ -50,7 +50,7 @@ class SampledLoop:
     delay: float = 0.0
 
     def held(self, duration: float) -> tuple[Floats, Floats]:
-        """State after `duration` [s] by the state and the held command before."""
+        """The state after `duration` [s], by the state and the held command before."""
         n, m = self.B.shape
         from scipy.linalg import expm
 
@@ -76,7 +76,7 @@ def _gains(loop: SampledLoop, omega: Floats) -> Floats:
     aliased = omega[:, None] + 2.0 * math.pi * np.arange(-ALIASES, ALIASES + 1)
     each = _response(loop, aliased / T)
     power = (each @ each.conj().swapaxes(-1, -2)).sum(axis=1)
-    beyond = 2.0 * (T / (2.0 * math.pi)) ** 2 / (ALIASES + 0.5)  # Σ 1/ω² of those that are left out
+    beyond = 2.0 * (T / (2.0 * math.pi)) ** 2 / (ALIASES + 0.5)  # Σ 1/ω² of the aliases left out
     power += beyond * (loop.F @ loop.B) @ (loop.F @ loop.B).T
     sensitivity = np.linalg.inv(identity - _sampled_response(loop, omega))
     whole = sensitivity @ power @ sensitivity.conj().swapaxes(-1, -2)
@@ -105,15 +105,15 @@ def _sampled_response(loop: SampledLoop, omega: Floats) -> Complexes:
 
 
 def _periods(bound: float) -> float:
-    """The N of which Ñ is `bound`."""
+    """The N whose Ñ is `bound`."""
     whole = math.floor(bound)
     return whole + (bound**2 - whole**2) / (2 * whole + 1)
 
 
 def breaking_jitter(loop: SampledLoop, limit: float) -> tuple[float, tuple[float, ...]] | None:
-    """The least J [s] up to `limit` found to be too much, and the shares of it that the delays go through in turn.
+    """The least J [s] found up to `limit` that makes the loop unstable, and the fractions of J of the delays in turn.
 
-    Delays that repeat after at most `LONGEST` samples, each d or d + J. None: none of them makes the loop unstable.
+    Sequences of delays repeat after at most `LONGEST` samples, each delay d or d + J. None: none makes it unstable.
     """
     best, found = limit, None
     for pattern in _patterns():
@@ -130,7 +130,7 @@ def _fails(loop: SampledLoop, pattern: tuple[float, ...], jitter: float) -> bool
 
 
 def _patterns() -> list[tuple[float, ...]]:
-    """Zeros and ones that repeat, each once: neither the turn of another nor made of shorter ones."""
+    """Sequences of zeros and ones that repeat, none a rotation of another or a repetition of a shorter one."""
     found = []
     for length in range(1, LONGEST + 1):
         for pattern in itertools.product((0.0, 1.0), repeat=length):
@@ -141,7 +141,7 @@ def _patterns() -> list[tuple[float, ...]]:
 
 
 def _radius(loop: SampledLoop, late: Sequence[float]) -> float:
-    """The spectral radius of one turn of delays d + `late` [s], by sample: arrivals never overtake each other."""
+    """The spectral radius over one turn of delays d + `late` [s], by sample: arrivals never overtake each other."""
     T, n, m = loop.period, len(loop.A), len(loop.F)
     count = len(late)
     oldest = math.ceil((loop.delay + max(late)) / T - _INSTANT) + 1  # commands before this sample's that may matter

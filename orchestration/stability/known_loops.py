@@ -1,4 +1,4 @@
-"""Loops whose local limits are known better than those of any system, by the kind of their request."""
+"""Loops with a better local limit than the one for any system, by the kind of their request."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Local:
-    """A local limit, None where there is none, and why."""
+class LocalLimit:
+    """A local limit; None: there is none, for a reason."""
 
     limit: float | None = None
     outside: float | None = None
@@ -33,15 +33,15 @@ class KnownLoop(Protocol):
     def at_rest(self, request: Request) -> System:
         """The system of a request at its operating point."""
 
-    def local_limits(self, varied: Varied, span: Range) -> Local:
-        """The local limit of a quantity, by whatever is known of the loop."""
+    def local_limits(self, varied: Varied, span: Range) -> LocalLimit:
+        """The local limit of a quantity."""
 
     def radius_over(self, request: Request, of: str) -> Callable[[float], float] | None:
-        """The spectral radius over a quantity; None for one that the loop is not known over. Raises `UsageError`."""
+        """The spectral radius as a function of a quantity; None for an unsupported quantity. Raises `UsageError`."""
 
 
 LOOPS: Registry[KnownLoop] = Registry()
-"""Rooms above enter theirs"""
+"""filled by the rooms above"""
 
 
 def rested(request: Request) -> System:

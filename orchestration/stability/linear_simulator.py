@@ -1,4 +1,4 @@
-"""Linear simulators, which a master steps in the place of FMUs."""
+"""Linear simulators, which a master steps in place of FMUs."""
 
 from collections.abc import Sequence
 
@@ -7,8 +7,8 @@ import numpy as np
 from orchestration.basics.simulator import Floats, Transfer
 
 
-class Linear:
-    """A linear simulator that begins at rest: what it holds, and exchanges with a master."""
+class LinearSimulator:
+    """A linear simulator that begins at rest: its state, and its exchange with a master."""
 
     def __init__(self, inputs: Sequence[str], outputs: Sequence[str], states: int) -> None:
         self.inputs, self.outputs = tuple(inputs), tuple(outputs)
@@ -17,7 +17,7 @@ class Linear:
         self.output: Floats = np.zeros(len(outputs))
 
     def reader(self, names: Sequence[str], into: Floats) -> Transfer:
-        """As `Simulator`; what is no Real stays."""
+        """As `Simulator`; variables that are no Reals are not read."""
         chosen = [(i, self.outputs.index(name)) for i, name in enumerate(names) if name in self.outputs]
         to, places = [i for i, _ in chosen], [place for _, place in chosen]
 
@@ -27,7 +27,7 @@ class Linear:
         return read
 
     def writer(self, names: Sequence[str], source: Floats) -> Transfer:
-        """As `Simulator`; what is no Real is left out."""
+        """As `Simulator`; variables that are no Reals are not written."""
         chosen = [(i, self.inputs.index(name)) for i, name in enumerate(names) if name in self.inputs]
         of, places = [i for i, _ in chosen], [place for _, place in chosen]
 
@@ -37,10 +37,10 @@ class Linear:
         return write
 
     def enter_initialization(self, start: float, stop: float) -> None:
-        """At rest it is already."""
+        """It is at rest already."""
 
     def exit_initialization(self) -> None:
-        """At rest it is already."""
+        """It is at rest already."""
 
     def step(self, t: float, h: float) -> None:
         """As `Simulator`."""
@@ -51,18 +51,18 @@ class Linear:
         return np.concatenate([self.state, self.input]).tobytes()
 
     def restore(self, state: bytes) -> None:
-        """Put them back."""
+        """Restore them."""
         self.state[:], self.input[:] = np.split(np.frombuffer(state), [len(self.state)])
 
 
-class Opened(Linear):
-    """In the place of a component: it says what it is told to, and keeps what it heard when it was stepped last."""
+class OpenPort(LinearSimulator):
+    """Replaces a component: it outputs `sent`, and keeps in `received` its inputs at its last step."""
 
     def __init__(self, inputs: Sequence[str], outputs: Sequence[str]) -> None:
         super().__init__(inputs, outputs, states=0)
-        self.said: Floats = np.zeros(len(outputs))
-        self.heard: Floats = np.zeros(len(inputs))
+        self.sent: Floats = np.zeros(len(outputs))
+        self.received: Floats = np.zeros(len(inputs))
 
     def step(self, t: float, h: float) -> None:
         """As `Simulator`."""
-        self.heard[:], self.output[:] = self.input, self.said
+        self.received[:], self.output[:] = self.input, self.sent

@@ -1,4 +1,4 @@
-"""A system about its operating point, cut open at one component: that component, and all else as it sees it."""
+"""A system about its operating point, cut open at one component: that component, and the rest of the loop."""
 
 from dataclasses import dataclass
 
@@ -9,9 +9,10 @@ from orchestration.fmi.reuse import Instances
 from orchestration.requests.request import RequestLike, request_of
 from orchestration.runs.replacement import component_named
 from orchestration.stability.known_loops import rested
-from orchestration.stability.linear_loop import AtRest, at_rest, map_of
-from orchestration.stability.linear_simulator import Opened
+from orchestration.stability.linear_simulator import OpenPort
+from orchestration.stability.loop_at_rest import AtRest, at_rest
 from orchestration.stability.operating_point import true_period
+from orchestration.stability.period_map import period_map
 from orchestration.stability.state_space import StateSpace, reduced
 from orchestration.system.request import errors_in_own_terms
 from orchestration.system.times import NANOSECONDS
@@ -19,27 +20,27 @@ from orchestration.system.times import NANOSECONDS
 
 @dataclass(frozen=True, kw_only=True)
 class Linearised:
-    """A loop about its operating point, as two linear systems that are each other's inputs and outputs."""
+    """A loop about its operating point, as two linear systems in feedback."""
 
     name: str
     """Of the component at which it is cut open."""
     component: StateSpace
-    """That component: what it measures in, what it commands out."""
+    """That component: inputs are its measurements, outputs its commands."""
     rest: StateSpace
-    """All else, from sample to sample: its command in, what it measures at the next sample out, with holds, delays and
-    the other components in between."""
+    """The rest of the loop, from sample to sample: inputs are the commands, outputs the measurements at the next
+    sample, with holds, delays and the other components in between."""
 
 
 def linearise(asked: RequestLike, component: str | None = None) -> Linearised:
-    """The loop of a system, or a scenario, about its operating point, cut open at a component that is sampled.
+    """The loop of a system, or a scenario, about its operating point, cut open at a sampled component.
 
-    Without a `component` at the only one that is sampled. A system rests where its file has `[operating_point]`, else
-    where it begins; a scenario hovers. Jitter, loss, noise and quantisation are left out, delays, holds and the order
-    of exchange are in. States are coordinates without a meaning of their own: those of `rest` are the ones that the
-    command moves and the measurement shows.
+    Default `component`: the only sampled one. A system rests at the `[operating_point]` of its file, else at its
+    initial conditions; a scenario hovers. Jitter, loss, noise and quantisation are left out, delays, holds and the
+    order of exchange are included. States are coordinates without physical meaning: those of `rest` are controllable
+    from the command and observable from the measurement.
 
-    Raises `UsageError` where nothing rests there, for FMUs that cannot save their state, and for a component that is
-    not sampled, or more often than another one.
+    Raises `UsageError` for a system that does not rest there, for FMUs that cannot save their state, and for a
+    component that is not sampled, or is sampled more often than another one.
     """
     request = request_of(asked)
     instances = Instances()
@@ -48,22 +49,22 @@ def linearise(asked: RequestLike, component: str | None = None) -> Linearised:
             system = rested(request)
             name = component_named(system, component, "at which to cut the loop open")
             if system.components[name].sampling is None:
-                raise UsageError(f"component: {name}: expected one that is sampled")
+                raise UsageError(f"component: {name}: expected a sampled component")
             with at_rest(system, instances) as loop:
-                return _opened(loop, name)
+                return _cut_open(loop, name)
     finally:
         instances.close()
 
 
-def _opened(loop: AtRest, name: str) -> Linearised:
+def _cut_open(loop: AtRest, name: str) -> Linearised:
     sampling, tangent = loop.simulation.system.components[name].sampling, loop.tangents[name]
     assert sampling is not None
     if true_period(sampling) != loop.period:
         raise UsageError(
             f"component: {name}: expected the only rate of the system, or the slowest, which others divide"
         )
-    port, dt = Opened(tangent.inputs, tangent.outputs), float(loop.period) / NANOSECONDS
-    whole = map_of(loop, {name: port})
+    port, dt = OpenPort(tangent.inputs, tangent.outputs), float(loop.period) / NANOSECONDS
+    whole = period_map(loop, {name: port})
     size = len(whole) - len(port.inputs)
     A, B, C = reduced(whole[:size, :size], whole[:size, size:], whole[size:, :size])
     by_state, by_input = tangent.derivatives(sampling.period)

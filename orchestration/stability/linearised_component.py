@@ -1,9 +1,9 @@
 """A component about a point where it rests, as a linear simulator: its derivatives, measured through saved states.
 
-What an FMU saves is opaque. So a state near rest is made by a pulse on an input, and known by what the outputs do
-afterwards, the inputs at rest again: those are its coordinates, reduced by their singular values to as many as there
-are. What no input moves, or no output shows, is no part of a loop. Restored to such states, the component shows the
-derivatives of a step of any length.
+The saved state of an FMU is opaque. So states near rest are produced by pulses on inputs, and identified by the outputs
+afterwards, the inputs at rest again: these are its coordinates, reduced by their singular values to as many as there
+are. States that are not controllable from inputs, or not observable from outputs, are no part of a loop. Restored to
+such states, the component shows the derivatives of a step of any length.
 """
 
 from collections.abc import Sequence
@@ -14,30 +14,30 @@ import numpy as np
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
 from orchestration.fmi.instance import Instance
-from orchestration.stability.linear_simulator import Linear
+from orchestration.stability.linear_simulator import LinearSimulator
 from orchestration.system.times import NANOSECONDS
 
 PULSE = 1e-6
 """of an input, both ways: of its value, or absolute where that is smaller than 1"""
 LARGEST = 1e4
-"""of an output by the pulse: what that may make of it; later outputs are not looked at"""
+"""of an output by the pulse: the largest response; later outputs are ignored"""
 NOISE = 100.0 * np.finfo(float).eps
-"""of an output, likewise: what rounding may make of it"""
-SEEN = 1e-11
-"""of the largest singular value: what is smaller is none"""
+"""of an output, likewise: the effect of rounding"""
+OBSERVABLE = 1e-11
+"""of the largest singular value: smaller ones count as 0"""
 TURN = 1e-3
-"""of the answer to a pulse on all inputs: what may differ from sample to sample"""
+"""of the response to a pulse on all inputs: the difference allowed from sample to sample"""
 FEWEST = 6
-"""points of the ladder at which states are made at least"""
+"""points of the ladder at which states are produced at least"""
 LATER = 4
-"""steps over which answers to pulses of several sizes are compared"""
+"""steps over which responses to pulses of several sizes are compared"""
 LINEAR = 1e-6
-"""of what a state makes of outputs, or absolute where that is smaller than 1: what the derivatives may miss of it"""
+"""of the outputs from a state, or absolute where these are smaller than 1: the error allowed of the derivatives"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Rest:
-    """An instance that has come to rest, and what was done to it last."""
+    """An instance at rest, with its last inputs and time."""
 
     fmu: Instance
     inputs: tuple[str, ...]
@@ -45,9 +45,9 @@ class Rest:
     held: Floats
     """their values"""
     outputs: tuple[str, ...]
-    """Reals that a connection takes"""
+    """Reals that a connection reads"""
     time: float
-    """at which it is to be stepped next, in its own seconds"""
+    """of its next step, by its own clock [s]"""
 
 
 @dataclass(frozen=True)
@@ -60,26 +60,26 @@ _Pair = tuple[_State, _State]
 """A state after a pulse up, and after one down"""
 
 
-class Tangent(Linear):
+class Tangent(LinearSimulator):
     """A component about rest; as a `Simulator` it is linear, and begins at rest.
 
-    `ladder` are the lengths of the steps [s] that make and tell states; where the component takes steps of a `unit`
-    only, whole numbers of it. Raises `UsageError` for a component of which these show less than there is.
+    `ladder` are the lengths of the steps [s] that produce and identify states; where the component only takes steps of
+    a `unit`, whole numbers of it. Raises `UsageError` for a component that has more states than these show.
     """
 
     def __init__(self, rest: Rest, ladder: Sequence[float], pulse: float = PULSE, *, unit: float | None = None) -> None:
-        super().__init__(rest.inputs, rest.outputs, states=0)  # of which there are more, once they are found
+        super().__init__(rest.inputs, rest.outputs, states=0)  # set below, once they are found
         self.unit, self._fmu = unit, rest.fmu
-        self._held, self._given = rest.held, rest.held.copy()
-        self._write = rest.fmu.writer(rest.inputs, self._given)
-        self._found: Floats = np.zeros(len(rest.outputs))
-        self._read = rest.fmu.reader(rest.outputs, self._found)
+        self._held, self._inputs_now = rest.held, rest.held.copy()
+        self._write = rest.fmu.writer(rest.inputs, self._inputs_now)
+        self._outputs_now: Floats = np.zeros(len(rest.outputs))
+        self._read = rest.fmu.reader(rest.outputs, self._outputs_now)
         self._pulse = pulse * np.maximum(1.0, np.abs(rest.held))
         self._largest = LARGEST * pulse
         self._time = rest.time
         self._rest = _State(rest.fmu.save(), rest.time)
         self._read()
-        self._weight = np.maximum(1.0, np.abs(self._found))
+        self._weight = np.maximum(1.0, np.abs(self._outputs_now))
         self._ladder = list(ladder)
         self._known: dict[int, tuple[Floats, Floats]] = {}
         self._expect_one_rate()
@@ -87,39 +87,39 @@ class Tangent(Linear):
         self.state = np.zeros(self._axes.shape[1])
 
     def step(self, t: float, h: float) -> None:
-        """The same at any time."""
+        """As `Simulator`; the same at any time."""
         by_state, by_input = self.derivatives(h)
         found = by_state @ self.state + by_input @ self.input
         self.output[:] = found[: len(self.output)]
         self.state[:] = found[len(self.output) :]
 
     def _expect_one_rate(self) -> None:
-        """Raise `UsageError` where samples answer a pulse differently: there are loops of several rates in it."""
+        """Raise `UsageError` where the response differs from sample to sample: the component has several rates."""
         if len(set(self._ladder)) > 1:  # no samples
             return
         rest, first, h = self._rest, None, self._ladder[0]
         for _ in self._ladder:
-            struck = self._outputs_after(rest, self._held + self._pulse, [h])[0]
-            calm, rest = self._stepped(rest, self._held, h)
-            answer = (struck - calm) / PULSE
-            first = answer if first is None else first
-            if np.abs(answer - first).max(initial=0.0) > TURN * max(1.0, np.abs(first).max(initial=0.0)):
-                raise UsageError(f"{self._fmu.name}: answers a pulse at some samples otherwise than at others")
+            perturbed = self._outputs_after(rest, self._held + self._pulse, [h])[0]
+            unperturbed, rest = self._stepped(rest, self._held, h)
+            response = (perturbed - unperturbed) / PULSE
+            first = response if first is None else first
+            if np.abs(response - first).max(initial=0.0) > TURN * max(1.0, np.abs(first).max(initial=0.0)):
+                raise UsageError(f"{self._fmu.name}: responds to a pulse differently from sample to sample")
 
-    # -- what it is made of --------------------------------------------------------------------------------------
+    # -- coordinates --------------------------------------------------------------------------------------------
 
     def _find_coordinates(self) -> None:
-        """As many points of the ladder as show states, and so many of these as have coordinates of their own."""
-        made, before, rank = [self._struck()], 0, 0
+        """Produce states at points of the ladder until no further coordinates appear."""
+        sets, before, rank = [self._pulse_responses()], 0, 0
         fewest = max([FEWEST, *(self._dead_points(i) + 2 for i in range(len(self.inputs)))])
         for shown in range(1, len(self._ladder) + 1):
             self._shown = shown
-            columns = [self._futures(pairs) for pairs in made]
-            while (len(made) < fewest or not _is_spanned(columns)) and len(made) < len(self._ladder):
-                later = self._coasted(made[-1], self._ladder[len(made)])
+            columns = [self._futures(pairs) for pairs in sets]
+            while (len(sets) < fewest or not _is_spanned(columns)) and len(sets) < len(self._ladder):
+                later = self._after_free_motion(sets[-1], self._ladder[len(sets)])
                 if later is None:
                     break
-                made.append(later)
+                sets.append(later)
                 columns.append(self._futures(later))
             futures = np.column_stack(columns)
             rank = _rank(futures)
@@ -127,19 +127,19 @@ class Tangent(Linear):
                 break
             before = rank
         if 0 < rank == min(futures.shape):
-            raise UsageError(f"{self._fmu.name}: has more states than {len(made)} pulses and {self._shown} steps tell")
-        self._choose([pair for pairs in made for pair in pairs], futures, rank)
+            raise UsageError(f"{self._fmu.name}: has more states than {len(sets)} pulses and {self._shown} steps show")
+        self._choose([pair for pairs in sets for pair in pairs], futures, rank)
 
     def _choose(self, pairs: Sequence[_Pair], futures: Floats, rank: int) -> None:
         """The coordinates that `futures` span, and states that span them."""
         self._axes = np.linalg.svd(futures, full_matrices=False)[0][:, :rank]
         coordinates = self._axes.T @ futures
-        chosen = _furthest_apart(coordinates, rank)
+        chosen = _most_independent(coordinates, rank)
         self._pairs = [pairs[i] for i in chosen]
         self._inverse = np.linalg.inv(coordinates[:, chosen]) if rank else np.zeros((0, 0))
 
     def derivatives(self, h: float) -> tuple[Floats, Floats]:
-        """Of the outputs after a step of `h` [s] and of the coordinates then: by coordinates, and by inputs."""
+        """Derivatives of the outputs and coordinates after a step of `h` [s], by coordinates and by inputs."""
         key = round(h * NANOSECONDS)
         if key not in self._known:
             by_pair = [self._difference([self._stepped(s, self._held, h) for s in pair]) for pair in self._pairs]
@@ -153,30 +153,30 @@ class Tangent(Linear):
             self._known[key] = after @ self._inverse, moved
         return self._known[key]
 
-    def missed_by(self, pulse: float, h: float) -> float:
-        """How far answers to pulses of another size are from what it says, of the largest of each output.
+    def prediction_error(self, pulse: float, h: float) -> float:
+        """The error of the predicted responses to pulses of another size, relative to the largest of each output.
 
         Over a step of `h` [s], and over the next ones, the inputs at rest again.
         """
         by_state, by_input = self.derivatives(h)
         count, sizes = len(self.outputs), pulse * np.maximum(1.0, np.abs(self._held))
-        said, state = [by_input[:count]], by_input[count:]
+        predicted, state = [by_input[:count]], by_input[count:]
         for _ in range(LATER):
-            said.append(by_state[:count] @ state)
+            predicted.append(by_state[:count] @ state)
             state = by_state[count:] @ state
-        told = np.zeros((LATER + 1, count, len(self.inputs)))
+        measured = np.zeros((LATER + 1, count, len(self.inputs)))
         for i, unit in enumerate(np.diag(sizes)):
-            struck = [self._stepped(self._rest, self._held + sign * unit, h) for sign in (1, -1)]
-            later = [self._outputs_after(state, self._held, [h] * LATER) for _, state in struck]
-            up, down = (np.vstack([first, rest]) for (first, _), rest in zip(struck, later))
-            told[:, :, i] = (up - down) / (2.0 * sizes[i])
-        scale = np.abs(told).max(axis=(0, 2), initial=0.0)[:, None]
-        return float((np.abs(told - np.array(said)) / np.maximum(scale, 1e-300)).max(initial=0.0))
+            perturbed = [self._stepped(self._rest, self._held + sign * unit, h) for sign in (1, -1)]
+            later = [self._outputs_after(state, self._held, [h] * LATER) for _, state in perturbed]
+            up, down = (np.vstack([first, rest]) for (first, _), rest in zip(perturbed, later))
+            measured[:, :, i] = (up - down) / (2.0 * sizes[i])
+        scale = np.abs(measured).max(axis=(0, 2), initial=0.0)[:, None]
+        return float((np.abs(measured - np.array(predicted)) / np.maximum(scale, 1e-300)).max(initial=0.0))
 
     def coordinates_of(self, saved: bytes, time: float) -> Floats:
-        """The coordinates of a saved state, to be stepped next at `time` [s], as its deviation from rest.
+        """The coordinates of a saved state as its deviation from rest; the next step is at `time` [s].
 
-        Raises `UsageError` for one that no input makes, or from which the component is not linear.
+        Raises `UsageError` for one that no input reaches, or from which the component is not linear.
         """
         state, h = _State(saved, time), self._ladder[0]
         found: Floats = self._axes.T @ self._deviation(state)
@@ -184,11 +184,11 @@ class Tangent(Linear):
         at_rest, _ = self._stepped(self._rest, self._held, h)
         seen = [self._deviation(state), outputs - at_rest, self._axes.T @ self._deviation(later)]
         predicted = np.concatenate([self._axes @ found, self.derivatives(h)[0] @ found])
-        missed = np.abs(np.concatenate(seen) - predicted).max(initial=0.0)
-        if not missed <= LINEAR * max(1.0, np.abs(predicted).max(initial=0.0)):
+        error = np.abs(np.concatenate(seen) - predicted).max(initial=0.0)
+        if not error <= LINEAR * max(1.0, np.abs(predicted).max(initial=0.0)):
             raise UsageError(
-                f"{self._fmu.name}: does not begin as a linear one about its operating point: expected initial values "
-                "that its inputs could have made, near to it"
+                f"{self._fmu.name}: its initial state is not linear about its operating point: expected initial values "
+                "near it that its inputs could reach"
             )
         return found
 
@@ -203,13 +203,13 @@ class Tangent(Linear):
         return outputs, _State(self._fmu.save(), self._time)
 
     def _difference(self, both: Sequence[tuple[Floats, _State]]) -> Floats:
-        """Outputs and coordinates after a step, by the unit of what was done up and down."""
+        """Outputs and coordinates after a step, per unit of the pulse up and down."""
         (up, after_up), (down, after_down) = both
         future = self._axes.T @ self._future((after_up, after_down))
         found: Floats = np.concatenate([(up - down) / (2.0 * PULSE), future])
         return found
 
-    def _struck(self) -> list[_Pair]:
+    def _pulse_responses(self) -> list[_Pair]:
         """For each input the states after a pulse on it over the first step of the ladder."""
         return [
             (self._stepped(self._rest, self._pulses(i, 1), h)[1], self._stepped(self._rest, self._pulses(i, -1), h)[1])
@@ -217,16 +217,16 @@ class Tangent(Linear):
         ]
 
     def _dead_points(self, i: int) -> int:
-        """How many points of the ladder pass before an input is answered; 0 for one that never is."""
+        """The number of points of the ladder before an output responds to an input; 0 if none does."""
         for most in (FEWEST, len(self._ladder)):
             up, down = (self._outputs_after(self._rest, self._pulses(i, s), self._ladder[:most]) for s in (1, -1))
-            answered = (np.abs(up - down) / self._weight > NOISE).any(axis=1)
-            if answered.any():
-                return int(np.argmax(answered))
+            responds = (np.abs(up - down) / self._weight > NOISE).any(axis=1)
+            if responds.any():
+                return int(np.argmax(responds))
         return 0
 
-    def _coasted(self, pairs: Sequence[_Pair], h: float) -> list[_Pair] | None:
-        """The states `h` [s] later, the inputs at rest; None if one has become large."""
+    def _after_free_motion(self, pairs: Sequence[_Pair], h: float) -> list[_Pair] | None:
+        """The states `h` [s] later, the inputs at rest; None if one has become too large."""
         later = []
         for pair in pairs:
             (up, after_up), (down, after_down) = (self._stepped(state, self._held, h) for state in pair)
@@ -253,7 +253,7 @@ class Tangent(Linear):
     def _outputs_after(self, start: _State, held: Floats, steps: Sequence[float]) -> Floats:
         """Shape (steps, outputs); the inputs are `held` over all steps."""
         self._fmu.restore(start.saved)
-        self._time, self._given[:] = start.time, held
+        self._time, self._inputs_now[:] = start.time, held
         self._write()
         found: Floats = np.zeros((len(steps), len(self.outputs)))
         for k, h in enumerate(steps):
@@ -262,12 +262,12 @@ class Tangent(Linear):
                 self._fmu.step(self._time, h / count)
                 self._time += h / count
             self._read()
-            found[k] = self._found
+            found[k] = self._outputs_now
         return found
 
 
 def _is_spanned(columns: Sequence[Floats]) -> bool:
-    """Whether the last states have not added a coordinate."""
+    """Whether the last states have added no coordinate."""
     return _rank(np.column_stack(columns)) == _rank(np.column_stack(columns[:-2]))
 
 
@@ -275,11 +275,11 @@ def _rank(futures: Floats) -> int:
     if not futures.size:
         return 0
     values = np.linalg.svd(futures, compute_uv=False)
-    return int((values > max(SEEN * values[0], NOISE * np.sqrt(futures.size) / PULSE)).sum())
+    return int((values > max(OBSERVABLE * values[0], NOISE * np.sqrt(futures.size) / PULSE)).sum())
 
 
-def _furthest_apart(columns: Floats, count: int) -> list[int]:
-    """So many columns that span what all do, shape (n, m): each the longest beyond those before (QR with pivoting)."""
+def _most_independent(columns: Floats, count: int) -> list[int]:
+    """Columns that span the space of all, shape (n, m), by QR with pivoting: each the longest beyond those before."""
     rest, chosen = columns.copy(), list[int]()
     for _ in range(count):
         longest = int(np.argmax(np.linalg.norm(rest, axis=0)))

@@ -1,4 +1,4 @@
-"""Local limits: where what is small about an operating point ceases to decay."""
+"""Local limits: where small deviations from an operating point cease to decay."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -7,7 +7,7 @@ from orchestration.basics.bisection import Range, first_failure
 from orchestration.basics.errors import SimulatorError, UsageError
 from orchestration.fmi.reuse import Instances
 from orchestration.requests.ranges import Varied
-from orchestration.stability.known_loops import LOOPS, Local
+from orchestration.stability.known_loops import LOOPS, LocalLimit
 from orchestration.stability.linearised_component import PULSE
 from orchestration.stability.monodromy import growth_of_loop
 from orchestration.stability.operating_point import NotAnEquilibriumError
@@ -17,34 +17,34 @@ from orchestration.system.model import System
 LOOP = "spectral radius of the sampled loop about the operating point, by differences through saved states"
 LOOP_FINER, TWINS_FINER = 0.01, 0.2
 """of the tolerance of the measured limit"""
-TWINS = "growth of the difference of twin runs from the operating point, one of them struck by a pulse"
+TWINS = "growth of the difference of twin runs from the operating point, one of them perturbed by a pulse"
 OTHER_PULSE = 4.0
-"""by which pulses differ whose limits are compared"""
+"""factor of the second pulse, whose growth is compared"""
 
 Growth = Callable[[float], float]
-"""Of what is small, by the value of the quantity [1/s]"""
+"""Growth rate of small deviations by the value of the quantity [1/s]"""
 
 
-def local_limits(varied: Varied, span: Range) -> Local:
+def local_limits(varied: Varied, span: Range) -> LocalLimit:
     """The local limit of a quantity, through saved states where the FMUs have them, else by perturbed twin runs.
 
-    Better, where more is known of the loop.
+    A kind of request in `LOOPS` has its own method.
     """
     known = LOOPS.of(varied.request.kind)
     if known is not None:
         return known.local_limits(varied, span)
     if not varied.system.operating_point:
-        return Local(reason="no local limit: the system file names no operating_point")
+        return LocalLimit(reason="no local limit: the system file names no operating_point")
     return about_rest(varied.at, span)
 
 
-def about_rest(at: Callable[[float], System], span: Range) -> Local:
-    """The local limit of any system, `at` each value of the quantity."""
+def about_rest(at: Callable[[float], System], span: Range) -> LocalLimit:
+    """The local limit of any system; `at` makes the system for a value of the quantity."""
     instances = Instances()
     try:
         return _through_saved_states(at, span, instances)
     except NotAnEquilibriumError as error:
-        return Local(reason=f"no local limit: {error}")
+        return LocalLimit(reason=f"no local limit: {error}")
     except (UsageError, SimulatorError) as error:
         why = str(error)
     finally:
@@ -53,14 +53,14 @@ def about_rest(at: Callable[[float], System], span: Range) -> Local:
     try:
         found = _by_twins(at, span, instances)
     except (UsageError, SimulatorError) as error:
-        return Local(reason=f"no local limit: {error}")
+        return LocalLimit(reason=f"no local limit: {error}")
     finally:
         instances.close()
-    return replace(found, method=f"{TWINS}, as saved states do not serve: {why}")
+    return replace(found, method=f"{TWINS}, as saved states do not suffice: {why}")
 
 
-def _through_saved_states(at: Callable[[float], System], span: Range, instances: Instances) -> Local:
-    """Its accuracy is what other pulses would make of it, beside the bracket."""
+def _through_saved_states(at: Callable[[float], System], span: Range, instances: Instances) -> LocalLimit:
+    """Its accuracy includes the effect of another pulse size."""
     growths: dict[float, float] = {}
 
     def growth(value: float) -> float:
@@ -72,20 +72,20 @@ def _through_saved_states(at: Callable[[float], System], span: Range, instances:
         return found
     below, above = (max(v for v in growths if v < found.limit), min(v for v in growths if v > found.limit))
     slope = (growths[above] - growths[below]) / (above - below)
-    apart = abs(growth_of_loop(at(below), instances, OTHER_PULSE * PULSE) - growths[below])
-    return replace(found, accuracy=found.accuracy + apart / slope)
+    difference = abs(growth_of_loop(at(below), instances, OTHER_PULSE * PULSE) - growths[below])
+    return replace(found, accuracy=found.accuracy + difference / slope)
 
 
-def _by_twins(at: Callable[[float], System], span: Range, instances: Instances) -> Local:
+def _by_twins(at: Callable[[float], System], span: Range, instances: Instances) -> LocalLimit:
     return _first_growth(lambda value: growth_of(at(value), instances).rate, span, TWINS_FINER, TWINS)
 
 
-def _first_growth(growth: Growth, span: Range, finer: float, method: str) -> Local:
-    """Where what is small first grows, up through the scan, and bisected."""
+def _first_growth(growth: Growth, span: Range, finer: float, method: str) -> LocalLimit:
+    """The first value at which small deviations grow, by a scan and bisection."""
     width = span.tolerance * finer
     bracket = first_failure(lambda value: growth(value) > 0.0, span.values(), width)
     if bracket is None or bracket.good is None:
-        return Local(
-            method=method, reason=f"what is small {'decays' if bracket is None else 'grows'} throughout the range"
+        return LocalLimit(
+            method=method, reason=f"small deviations {'decay' if bracket is None else 'grow'} throughout the range"
         )
-    return Local(limit=0.5 * (bracket.good + bracket.bad), method=method, accuracy=width, reason="")
+    return LocalLimit(limit=0.5 * (bracket.good + bracket.bad), method=method, accuracy=width, reason="")

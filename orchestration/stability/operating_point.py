@@ -1,4 +1,4 @@
-"""A system at its operating point: nothing random, nothing rounded, and whether it rests there."""
+"""A system at its operating point, without randomness and quantisation, and whether it rests there."""
 
 import math
 from collections.abc import Sequence
@@ -19,17 +19,17 @@ from orchestration.system.sampling import Sampling
 from orchestration.system.times import exact_nanoseconds
 
 AT_REST = 1e-6
-"""what may move in the first periods of the run that nothing strikes"""
-TOGETHER = 20
-"""longest periods, after which sampled components are due together again at the latest"""
+"""change allowed in the first periods of the unperturbed run"""
+LONGEST_HYPERPERIOD = 20
+"""of sampled components, in longest periods"""
 
 
 class NotAnEquilibriumError(UsageError):
-    """The operating point is none, whatever the method."""
+    """The operating point is no equilibrium, whatever the method."""
 
 
 def deterministic(system: System) -> System:
-    """`system` at its operating point, punctual and without loss, noise, quantisation and objectives."""
+    """`system` at its operating point, without jitter, loss, noise, quantisation and objectives."""
     chosen = changed(system, system.operating_point)
     return replace(
         chosen,
@@ -68,16 +68,16 @@ def _punctual(component: Component) -> Component:
 
 
 def longest_period(system: System) -> Fraction:
-    """Of all sampled components, or the longest step where none is sampled [ns]."""
+    """The longest period of sampled components, or the longest step where none is sampled [ns]."""
     return max(_periods(system))
 
 
-def common_period(system: System) -> Fraction | None:
-    """The time after which all sampled components are due together again [ns]; None: not within `TOGETHER`."""
+def hyperperiod_of(system: System) -> Fraction | None:
+    """The hyperperiod of all sampled components [ns]; None: none within `LONGEST_HYPERPERIOD`."""
     periods = _periods(system)
     denominator = math.lcm(*(period.denominator for period in periods))
-    together = Fraction(math.lcm(*(int(period * denominator) for period in periods)), denominator)
-    return together if together <= TOGETHER * max(periods) else None
+    hyperperiod = Fraction(math.lcm(*(int(period * denominator) for period in periods)), denominator)
+    return hyperperiod if hyperperiod <= LONGEST_HYPERPERIOD * max(periods) else None
 
 
 def _periods(system: System) -> list[Fraction]:
@@ -87,7 +87,7 @@ def _periods(system: System) -> list[Fraction]:
 
 
 def true_period(sampling: Sampling) -> Fraction:
-    """Of a component whose clock may be fast or slow [ns]."""
+    """The period of a component whose clock may be fast or slow [ns]."""
     return exact_nanoseconds(sampling.period) / Fraction(repr(float(sampling.clock_ratio)))
 
 
@@ -103,16 +103,16 @@ def latest_offset(system: System) -> Fraction:
     )
 
 
-def exchanged(system: System) -> Sequence[str]:
+def exchanged_signals(system: System) -> Sequence[str]:
     """The signals that connections carry."""
     return tuple(dict.fromkeys(start for x in system.connections for start in x.start))
 
 
 def expect_rest(system: System, calm: Floats) -> None:
-    """Raise `NotAnEquilibriumError` for a signal of `exchanged` that moves; rows a period apart, shape (n, signals)."""
+    """Raise `NotAnEquilibriumError` for an exchanged signal that changes; rows a period apart, shape (n, signals)."""
     moved = np.abs(calm - calm[0]).max(axis=0) / np.maximum(1.0, np.abs(calm[0]))
     worst = int(moved.argmax())
     if moved[worst] > AT_REST:
         raise NotAnEquilibriumError(
-            f"the operating point is not at rest: {exchanged(system)[worst]} moves by {moved[worst]:.2g}"
+            f"the operating point is not at rest: {exchanged_signals(system)[worst]} moves by {moved[worst]:.2g}"
         )

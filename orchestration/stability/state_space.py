@@ -1,4 +1,4 @@
-"""A linear system in discrete time, and what of a larger one its inputs move and its outputs show."""
+"""A linear system in discrete time, and the controllable and observable part of a larger one."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from orchestration.basics.extras import explains_missing
 from orchestration.basics.simulator import Floats
 
 SAMPLES = (*range(32), 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024)
-"""at which a system is struck and looked at, as far as it stays small"""
+"""of impulse responses, as long as they stay small"""
 LARGEST = 1e6
-"""of what a pulse may make of it, by what it makes at first"""
-SEEN = 1e-7
-"""of the largest singular value between inputs and outputs, each by its own unit: what is smaller is none"""
+"""of a response, relative to the first"""
+MINIMAL = 1e-7
+"""of the largest singular value between inputs and outputs, each by its own unit: smaller ones count as 0"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,9 +33,9 @@ class StateSpace:
     dt: float
     """From sample to sample [s]."""
     inputs: tuple[str, ...]
-    """What the entries of u are, in the units of the FMU."""
+    """The entries of u, in the units of the FMU."""
     outputs: tuple[str, ...]
-    """What those of y are."""
+    """The entries of y."""
 
     def __repr__(self) -> str:
         sizes = f"{len(self.inputs)} inputs, {len(self.A)} states, {len(self.outputs)} outputs"
@@ -43,7 +43,7 @@ class StateSpace:
 
     @explains_missing
     def to_control(self) -> Any:
-        """The same as a `StateSpace` of python-control, whose names have underlines for dots.
+        """The same as a `StateSpace` of python-control, whose names have underscores for dots.
 
         Raises `QuadcosimError` where that is not installed.
         """
@@ -54,22 +54,22 @@ class StateSpace:
 
 
 def reduced(A: Floats, B: Floats, C: Floats) -> tuple[Floats, Floats, Floats]:
-    """The part of a system that its inputs move and its outputs show, in balanced coordinates.
+    """The controllable and observable part of a system, in balanced coordinates.
 
-    By the singular values of what the outputs are after pulses on the inputs (Ho and Kalman), over a finite time, so
-    that it need not be stable.
+    By the singular values of the impulse responses (Ho and Kalman), over a finite time, so that the system need not be
+    stable.
     """
     if not (B.any() and C.any()):
         return np.zeros((0, 0)), np.zeros((0, B.shape[1])), np.zeros((C.shape[0], 0))
     made, shown = _powers(A, B), _powers(A.T, C.T)
     responses = np.concatenate([abs(C @ state).max(axis=1, keepdims=True) for state in made], axis=1).max(axis=1)
     weight = np.tile(np.where(responses > 0.0, responses, 1.0), len(shown))
-    reached, seen = np.hstack(made), np.hstack(shown).T / weight[:, None]
-    left, values, right = np.linalg.svd(seen @ reached, full_matrices=False)
-    rank = int((values > SEEN * values[0]).sum())
+    reachable, observable = np.hstack(made), np.hstack(shown).T / weight[:, None]
+    left, values, right = np.linalg.svd(observable @ reachable, full_matrices=False)
+    rank = int((values > MINIMAL * values[0]).sum())
     root = np.sqrt(values[:rank])
-    back = reached @ right[:rank].T / root
-    onto = (left[:, :rank] / root).T @ seen
+    back = reachable @ right[:rank].T / root
+    onto = (left[:, :rank] / root).T @ observable
     return onto @ A @ back, onto @ B, C @ back
 
 

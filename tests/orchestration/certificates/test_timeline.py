@@ -14,7 +14,7 @@ from orchestration.certificates.family import Family
 from orchestration.certificates.parts import Loop, loop_of
 from orchestration.certificates.timeline import BOXES, DELAY, JITTER, LATENCY, LOSS, START, Timeline, Varying
 from orchestration.fmi.reuse import Instances
-from orchestration.stability.linear_loop import at_rest
+from orchestration.stability.loop_at_rest import at_rest
 from orchestration.stability.monodromy import growth_of_loop
 from orchestration.system.model import System
 from orchestration.system.paths import changed

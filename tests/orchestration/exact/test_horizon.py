@@ -137,7 +137,7 @@ def test_a_start_at_which_a_component_is_not_linear_is_refused_by_name() -> None
         servo, objectives={"cost": "mean(servo.angle ** 2)"},
         operating_point={**dict.fromkeys(("components.servo.parameters.initial.angle", speed), 0.0), constant: 2.0},
     )  # fmt: skip
-    with pytest.raises(UsageError, match=r"servo: does not begin as a linear one about its operating point"):
+    with pytest.raises(UsageError, match=r"servo: its initial state is not linear about its operating point"):
         expect(driven, horizon=1.0)
 
 

@@ -32,7 +32,7 @@ from orchestration.quadrotor.fmu_choice import FmuChoice, Record
 from orchestration.quadrotor.wiring import COMMAND
 from orchestration.requests.ranges import Varied
 from orchestration.runs.prepared import prepared
-from orchestration.stability.known_loops import Local
+from orchestration.stability.known_loops import LocalLimit
 from orchestration.stability.local_limit import local_limits
 from orchestration.system.distribution import lowest
 from orchestration.system.model import System
@@ -429,14 +429,14 @@ def stubbed(monkeypatch: pytest.MonkeyPatch) -> type[StubPool]:
     monkeypatch.setattr(limits, "RunEvaluator", StubPool)
     monkeypatch.setattr(limits, "local_limits", known_local_limits)
     monkeypatch.setattr(limits, "mean_square_limit", lambda *given: MeanSquareLimit(reason="not looked for"))
-    monkeypatch.setattr(local, "about_rest", lambda at, span: Local(reason="not looked for"))
+    monkeypatch.setattr(local, "about_rest", lambda at, span: LocalLimit(reason="not looked for"))
     return StubPool
 
 
-_KNOWN: dict[str, Local] = {}
+_KNOWN: dict[str, LocalLimit] = {}
 
 
-def known_local_limits(varied: Varied, span: Range) -> Local:
+def known_local_limits(varied: Varied, span: Range) -> LocalLimit:
     """Those of linear theory, once for the many tests with the same scenario."""
     key = f"{varied.of} {varied.request}"
     if key not in _KNOWN:

@@ -105,7 +105,7 @@ def test_what_no_input_moves_and_no_output_shows_is_left_out() -> None:
 @pytest.mark.parametrize(
     ("name", "component", "said"),
     [
-        ("double_integrator", "plant", r"^component: plant: expected one that is sampled$"),
+        ("double_integrator", "plant", r"^component: plant: expected a sampled component$"),
         ("double_integrator", "contoller", r"^component: contoller: did you mean controller\?"),
         ("four_components", None, r"^component: expected the one at which to cut the loop open, as 3 are"),
     ],

@@ -11,7 +11,7 @@ from quadcosim import UsageError
 
 
 class Line:
-    """An FMU in spirit: what goes in comes out some samples later, and decays on the way."""
+    """A stub of an FMU: its input is its output some samples later, and decays in between."""
 
     name = "line"
 
@@ -45,51 +45,51 @@ def tangent(fmu: Any, points: int) -> Tangent:
     return Tangent(Rest(fmu=fmu, inputs=("u",), held=np.zeros(1), outputs=("y",), time=0.0), [1.0] * points)
 
 
-def answers(simulator: Any, samples: int) -> list[float]:
-    """What comes out after each step of a pulse of 1 over the first."""
-    given, found, heard = np.zeros(1), np.zeros(1), []
-    write, read = simulator.writer(("u",), given), simulator.reader(("y",), found)
+def responses(simulator: Any, samples: int) -> list[float]:
+    """The output after each step of a pulse of 1 over the first."""
+    pulse, output, outputs = np.zeros(1), np.zeros(1), []
+    write, read = simulator.writer(("u",), pulse), simulator.reader(("y",), output)
     for k in range(samples):
-        given[0] = k == 0
+        pulse[0] = k == 0
         write()
         simulator.step(float(k), 1.0)
         read()
-        heard.append(float(found[0]))
-    return heard
+        outputs.append(float(output[0]))
+    return outputs
 
 
 @pytest.mark.parametrize("samples", [1, 2, 5, 8, 20])
 def test_a_dead_time_within_the_ladder_is_a_state_for_each_sample(samples: int) -> None:
     measured = tangent(Line(samples), 32)
     assert len(measured.state) == samples - 1
-    assert answers(measured, samples + 3) == pytest.approx(answers(Line(samples), samples + 3), abs=1e-8)
+    assert responses(measured, samples + 3) == pytest.approx(responses(Line(samples), samples + 3), abs=1e-8)
 
 
-def test_more_states_than_the_ladder_tells_apart_are_refused_by_name() -> None:
+def test_more_states_than_the_ladder_shows_are_refused_by_name() -> None:
     with pytest.raises(UsageError, match="line: has more states than"):
         tangent(Line(6), 5)
 
 
 class Bent(Line):
-    """One that takes the cube of what goes in, too."""
+    """One that adds the cube of its input."""
 
     def step(self, t: float, h: float) -> None:
         self.kept = np.concatenate([[self.u + self.u**3], 0.9 * self.kept[:-1]])
 
 
 @pytest.mark.parametrize("samples", [1, 3])
-def test_answers_to_larger_pulses_are_missed_by_what_is_not_linear(samples: int) -> None:
-    assert tangent(Line(samples), 32).missed_by(1.0, 1.0) < 1e-9
+def test_the_error_of_responses_to_larger_pulses_is_the_nonlinear_part(samples: int) -> None:
+    assert tangent(Line(samples), 32).prediction_error(1.0, 1.0) < 1e-9
     bent = tangent(Bent(samples), 32)
-    assert bent.missed_by(0.1, 1.0) == pytest.approx(0.01 / 1.01, rel=1e-6)
-    assert bent.missed_by(1e-5, 1.0) < 1e-9
+    assert bent.prediction_error(0.1, 1.0) == pytest.approx(0.01 / 1.01, rel=1e-6)
+    assert bent.prediction_error(1e-5, 1.0) < 1e-9
 
 
 def test_states_are_saved_and_put_back() -> None:
     measured = tangent(Line(3), 8)
-    answers(measured, 1)
+    responses(measured, 1)
     kept = measured.save()
-    later = answers(measured, 4)
+    later = responses(measured, 4)
     measured.restore(kept)
-    assert answers(measured, 4) == later
+    assert responses(measured, 4) == later
     assert np.any(np.array(later) != 0.0)

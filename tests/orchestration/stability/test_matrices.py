@@ -8,9 +8,9 @@ import pytest
 from scipy.linalg import expm
 
 from orchestration.fmi.reuse import Instances
-from orchestration.stability.linear_loop import at_rest
 from orchestration.stability.linearised_component import Tangent
-from orchestration.stability.matrices import depends_on_step, in_continuous_time, of_samples, told_by_outputs
+from orchestration.stability.loop_at_rest import at_rest
+from orchestration.stability.matrices import depends_on_step, in_continuous_time, in_output_coordinates, of_samples
 from tests.examples.common import example
 
 
@@ -24,7 +24,7 @@ def tangents() -> Iterator[dict[str, Any]]:
 
 def test_a_double_integrator_has_its_matrices(tangents: dict[str, Tangent]) -> None:
     found, unfit = in_continuous_time(tangents["plant"], 0.05)
-    found = told_by_outputs(found, expm(0.05 * found.A))
+    found = in_output_coordinates(found, expm(0.05 * found.A))
     assert unfit is None
     assert pytest.approx(np.array([[0.0, 1.0], [0.0, 0.0]]), abs=1e-9) == found.A
     assert pytest.approx(np.array([[0.0], [1.0]]), abs=1e-9) == found.B
@@ -40,7 +40,7 @@ def test_a_law_without_memory_is_its_gains(tangents: dict[str, Tangent]) -> None
 
 
 class Stepped:
-    """In the place of a tangent."""
+    """A stub of a tangent."""
 
     outputs, inputs, unit = ("y",), ("u",), None
 
@@ -58,10 +58,10 @@ class Stepped:
 OSCILLATOR = np.array([[0.0, 3.0, 0.0], [-3.0, -0.2, 1.0], [0.0, 0.0, 0.0]])
 
 
-def test_what_one_output_does_not_tell_it_tells_a_period_later() -> None:
+def test_a_state_that_an_output_does_not_show_is_shown_a_period_later() -> None:
     tangent: Any = Stepped(OSCILLATOR, feedthrough=0.5)
     found, unfit = in_continuous_time(tangent, 0.1)
-    found = told_by_outputs(found, expm(0.3 * found.A))
+    found = in_output_coordinates(found, expm(0.3 * found.A))
     assert unfit is None
     assert pytest.approx(np.array([[1.0, 0.0]]), abs=1e-9) == found.C
     assert pytest.approx(np.array([[0.5]]), abs=1e-9) == found.D
@@ -69,7 +69,7 @@ def test_what_one_output_does_not_tell_it_tells_a_period_later() -> None:
     assert np.linalg.eigvals(found.A) == pytest.approx(np.linalg.eigvals(OSCILLATOR[:2, :2]), abs=1e-9)
 
 
-def test_of_steps_that_are_no_flow_it_is_said_why() -> None:
+def test_steps_that_are_no_flow_are_refused_with_the_reason() -> None:
     tangent: Any = Stepped(OSCILLATOR, euler=True)
     _, unfit = in_continuous_time(tangent, 0.1)
     assert unfit is not None

@@ -37,9 +37,9 @@ FMU = "components.{}.fmu"
 
 @pytest.fixture(scope="module")
 def instances() -> Iterator[Instances]:
-    made = Instances()
-    yield made
-    made.close()
+    found = Instances()
+    yield found
+    found.close()
 
 
 @pytest.fixture(scope="module")
@@ -47,8 +47,8 @@ def system() -> System:
     return dataclasses.replace(example("double_integrator"), stop_time=20.0)
 
 
-def saying(path: Path, folder: Path, old: str, new: str) -> str:
-    """A copy of an FMU that says something else of itself."""
+def with_description_changed(path: Path, folder: Path, old: str, new: str) -> str:
+    """A copy of an FMU with another text in its model description."""
     copy = folder / path.name
     with zipfile.ZipFile(path) as archive, zipfile.ZipFile(copy, "w") as other:
         for name in archive.namelist():
@@ -62,7 +62,7 @@ def saying(path: Path, folder: Path, old: str, new: str) -> str:
 
 def without_states(system: System, component: str, folder: Path) -> System:
     path = fmus.locate(system.components[component].fmu)
-    other = saying(path, folder, 'canGetAndSetFMUstate="true"', 'canGetAndSetFMUstate="false"')
+    other = with_description_changed(path, folder, 'canGetAndSetFMUstate="true"', 'canGetAndSetFMUstate="false"')
     return changed(system, {FMU.format(component): other})
 
 
@@ -81,7 +81,7 @@ def test_a_plant_that_takes_short_steps_of_one_length_only_makes_the_same_loop(
 ) -> None:
     path = fmus.locate(system.components["plant"].fmu)
     variable = "canHandleVariableCommunicationStepSize"
-    fixed = saying(path, tmp_path, f'{variable}="true"', f'{variable}="false"')
+    fixed = with_description_changed(path, tmp_path, f'{variable}="true"', f'{variable}="false"')
     varied = changed(system, {PERIOD: 0.5, DELAY: 0.3, FMU.format("plant"): fixed})
     assert growth_of_loop(varied, instances) == pytest.approx(theory(0.5, 0.3), abs=1e-10)
 
@@ -143,7 +143,7 @@ def test_the_quadrotor_s_loop_is_that_of_its_own_linearisation(instances: Instan
 
 @pytest.mark.parametrize(
     ("velocity", "said"),
-    [(1.0, r"the operating point is not at rest: \S+ moves by"), (1e9, "the operating point is left: ")],
+    [(1.0, r"the operating point is not at rest: \S+ moves by"), (1e9, "the run leaves the operating point: ")],
 )
 def test_a_point_that_is_not_at_rest_is_refused_naming_what_moves(
     system: System, instances: Instances, velocity: float, said: str
@@ -154,10 +154,10 @@ def test_a_point_that_is_not_at_rest_is_refused_naming_what_moves(
     one_line(caught.value)
 
 
-def test_sampled_components_that_are_never_due_together_again_are_refused(system: System, instances: Instances) -> None:
+def test_sampled_components_without_a_common_hyperperiod_are_refused(system: System, instances: Instances) -> None:
     other = changed(system, {PERIOD: 0.0512341}).components["controller"]
     chosen = dataclasses.replace(system, components={**system.components, "other": other})
-    with pytest.raises(UsageError, match="not due together again within twenty of the longest period"):
+    with pytest.raises(UsageError, match="have no hyperperiod within twenty of the longest period"):
         growth_of_loop(chosen, instances)
 
 
@@ -187,7 +187,7 @@ def test_where_an_fmu_saves_no_state_twin_runs_are_used_and_it_is_said(
     found = local_limits(varied, Range(first=1.9, step=0.1, last=2.1, tolerance=0.1))
     assert found.limit == pytest.approx(2.0, abs=0.02)
     assert found.accuracy == pytest.approx(0.02)
-    assert found.method == f"{TWINS}, as saved states do not serve: the FMU of controller cannot save its state"
+    assert found.method == f"{TWINS}, as saved states do not suffice: the FMU of controller cannot save its state"
 
 
 SPAN = Range(first=0.05, step=0.01, last=0.09, tolerance=0.001)
@@ -205,7 +205,7 @@ def test_the_quadrotor_with_a_hold_that_the_hover_loop_has_not_is_linearised_as_
 def test_the_quadrotor_with_a_controller_that_saves_no_state_goes_by_twin_runs_and_it_is_said(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    plant = saying(
+    plant = with_description_changed(
         fmus.locate("QuadrotorPlant"), tmp_path, 'canGetAndSetFMUstate="true"', 'canGetAndSetFMUstate="false"'
     )
     monkeypatch.setattr(local, "growth_of", by_rule(0.072))
@@ -213,4 +213,4 @@ def test_the_quadrotor_with_a_controller_that_saves_no_state_goes_by_twin_runs_a
     found = local_limits(Varied(request=scenario, of="period"), SPAN)
     assert found.limit == pytest.approx(0.072, abs=2e-4)
     assert found.method is not None
-    assert found.method.startswith(f"{TWINS}, as saved states do not serve: the FMU of plant cannot save its state (")
+    assert found.method.startswith(f"{TWINS}, as saved states do not suffice: the FMU of plant cannot save its state (")
