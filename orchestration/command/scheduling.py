@@ -73,7 +73,7 @@ def _drawn(found: "Scheduled", out: Path, start: float | None, end: float | None
     from orchestration.figures import gantt
     from orchestration.figures.style import SCREEN, save
 
-    whole = gantt.seen(found.timeline)
+    whole = gantt.default_window(found.timeline)
     window = (start or 0.0, found.until if end is None and start is not None else end or whole[1])
     if not 0.0 <= window[0] < window[1] or window[0] >= found.until:
         expected = f"0 <= from < to, and from before the end at {found.until:g} s"

@@ -46,7 +46,7 @@ def connect(
     from orchestration.system.proposal import propose
 
     if out is not None and out.exists():
-        raise UsageError(f"--out {out}: is there already; expected a file that can be made")
+        raise UsageError(f"--out {out}: exists already; expected a file that does not exist")
     resources, others = resources_of(fmu)
     proposal = propose(
         [(text, read_model(fmus.locate(text, inform))) for text in others],

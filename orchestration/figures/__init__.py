@@ -1,1 +1,1 @@
-"""Figures of rows: style, axes, lines; without knowing what a run is."""
+"""Figures of recorded rows: style, axes, lines; independent of what a run is."""

@@ -1,4 +1,4 @@
-"""Maps drawn cell by cell: what was flown, and no more, is coloured."""
+"""Maps drawn cell by cell: only cells with runs are coloured."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -16,12 +16,12 @@ from orchestration.figures.shades import shades_of
 from orchestration.figures.ticks import plain
 
 LIMIT = {"colors": RED, "linewidths": 1.8}
-"""How the line between what is good and what is not looks"""
+"""Style of the line between good and other cells"""
 _HATCH: Mapping[str, Any] = {"facecolor": "none", "edgecolor": GREY, "hatch": "////", "linewidth": 0.0}
 
 
 def edges(values: Sequence[float] | Floats, *, logarithmic: bool = False) -> Floats:
-    """Of cells around values that grow, half-way between neighbours; shape (n + 1,)."""
+    """Edges of cells around increasing values, half-way between neighbours; shape (n + 1,)."""
     at = np.log(np.asarray(values, float)) if logarithmic else np.asarray(values, float)
     if len(at) == 1:
         around = np.array([at[0] - 0.5, at[0] + 0.5])
@@ -34,8 +34,7 @@ def edges(values: Sequence[float] | Floats, *, logarithmic: bool = False) -> Flo
 def fill(panel: Axes, x: Floats, y: Floats, values: Floats, **how: Any) -> Any:
     """Colour cells between edges `x` and `y` by `values`, shape (rows, columns); none where they are nan.
 
-    From which value to which the colours go is as `shades_of` says unless `vmin` does. Returns what a colour bar is
-    made of.
+    The range of the colours is that of `shades_of`, or starts at `vmin`. Returns the mesh for a colour bar.
     """
     if "vmin" not in how and (shades := shades_of(values)) is not None:
         how["norm"] = (LogNorm if shades.logarithmic else Normalize)(shades.low, shades.high)
@@ -48,7 +47,7 @@ def fill(panel: Axes, x: Floats, y: Floats, values: Floats, **how: Any) -> Any:
 
 
 def color_bar(panel: Axes, mesh: Any, values: Floats, label: str) -> None:
-    """What the colours of `values` stand for, with an arrow where some lie beyond; nothing where there is none."""
+    """Add a colour bar for `values`, with an arrow where some lie beyond; nothing without finite values."""
     shades = shades_of(values)
     if shades is not None:
         ends = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
@@ -57,26 +56,26 @@ def color_bar(panel: Axes, mesh: Any, values: Floats, label: str) -> None:
 
 
 def fill_kinds(panel: Axes, x: Floats, y: Floats, kinds: Floats, colors: Sequence[str]) -> None:
-    """Colour cells by what they are: 0 the first colour and so on; none where nan."""
+    """Colour cells by category: 0 the first colour and so on; none where nan."""
     fill(panel, x, y, kinds, cmap=ListedColormap([*colors]), vmin=-0.5, vmax=len(colors) - 0.5)
 
 
 def hatch(panel: Axes, x: Floats, y: Floats, where: npt.NDArray[np.bool_]) -> None:
-    """Hatch the cells of which nothing is known."""
+    """Hatch the cells without a value."""
     cells = [Rectangle((x[j], y[i]), x[j + 1] - x[j], y[i + 1] - y[i]) for i, j in zip(*np.nonzero(where), strict=True)]
     if cells:
         panel.add_collection(PatchCollection(cells, label="missing", **_HATCH))
 
 
 def hatched() -> Patch:
-    """The same in a legend."""
+    """The legend entry of hatched cells."""
     return Patch(label="missing", **_HATCH)
 
 
 def limit(panel: Axes, x: Floats, y: Floats, good: Floats, **how: Any) -> LineCollection | None:
-    """A line along the edges between cells that are good and their neighbours that are not; None if there are none.
+    """A line along the edges between good cells and neighbours that are not good; None if there are none.
 
-    `good` is 1, 0, or nan where nothing is known, shape (rows, columns).
+    `good` is 1, 0, or nan where it is not known, shape (rows, columns).
     """
     segments = [
         [(x[j + 1], y[i]), (x[j + 1], y[i + 1])] for i, j in zip(*np.nonzero(_differ(good[:, :-1], good[:, 1:])))
@@ -89,5 +88,5 @@ def limit(panel: Axes, x: Floats, y: Floats, good: Floats, **how: Any) -> LineCo
 
 
 def _differ(one: Floats, other: Floats) -> npt.NDArray[np.bool_]:
-    found: npt.NDArray[np.bool_] = (one != other) & ~np.isnan(one) & ~np.isnan(other)
-    return found
+    differ: npt.NDArray[np.bool_] = (one != other) & ~np.isnan(one) & ~np.isnan(other)
+    return differ

@@ -1,4 +1,4 @@
-"""A system as a figure: components in a row, messages forward in lanes above them and back in lanes below."""
+"""A block diagram of a system: components in a row, forward messages in lanes above them, backward ones below."""
 
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -17,7 +17,7 @@ from orchestration.system.model import System
 from orchestration.system.variable_names import component_of, variable_of
 
 MOST = 40
-"""Boxes in a row that can still be read"""
+"""Boxes in a row that are still legible"""
 PITCH, WIDTH, HEIGHT, LANE = 4.2, 2.6, 1.5, 0.75
 """Between boxes, of a box, between lanes [inch]"""
 CONTINUOUS, SAMPLED, SOURCE, LINE = "#dcebf5", "#fbe6d0", "#ececec", "#444444"
@@ -36,17 +36,17 @@ class _Arrow:
     end: int
     name: str
     text: str
-    """what travels, and what happens to it"""
+    """the variables, and the timing of the connection"""
     is_late: bool
 
     @property
     def span(self) -> tuple[int, int]:
-        """Of the boxes that it passes."""
+        """The range of the boxes that it passes."""
         return min(self.start, self.end), max(self.start, self.end)
 
 
 def write(system: System, path: Path) -> Path:
-    """Draw a system into a file whose ending says the format; raises `UsageError` for one that cannot be."""
+    """Draw a system into a file in the format of its ending; raises `UsageError` for an unknown ending."""
     if path.suffix[1:] not in FORMATS:
         raise UsageError(f"--out {path}: expected a figure ending in one of {', '.join(FORMATS)}")
     style = replace(SCREEN, formats=(path.suffix[1:],))
@@ -56,7 +56,7 @@ def write(system: System, path: Path) -> Path:
 
 
 def draw(system: System) -> Figure:
-    """Boxes with what steps them, arrows with what they carry; dashed where messages come late or not at all."""
+    """Boxes with their rates, arrows with their variables; dashed where messages may be late or lost."""
     boxes = _boxes(system)
     if len(boxes) > MOST:
         raise UsageError(f"--out: {len(boxes)} components and sources; expected at most {MOST} in a figure")
@@ -82,7 +82,7 @@ def draw(system: System) -> Figure:
 
 
 def _boxes(system: System) -> dict[str, _Box]:
-    """By name, in the order in which they stand: the sources that feed something, then the components."""
+    """Boxes by name, in the order of the row: the sources that are connected, then the components."""
     sources = {
         f"sources.{name}": _Box(title=name, lines=(what(source),), color=SOURCE)
         for name, source in system.sources.items()
@@ -100,7 +100,7 @@ def _boxes(system: System) -> dict[str, _Box]:
 
 
 def _in_a_row(system: System) -> list[str]:
-    """Components so that neighbours are those that feed each other, starting with the first of the file."""
+    """Components ordered so that neighbours feed each other, starting with the first of the file."""
     left = list(system.components)
     row: list[str] = []
     while left:
@@ -114,9 +114,9 @@ def _arrows(system: System, places: Mapping[str, int]) -> list[_Arrow]:
     arrows = []
     for name, source in system.sources.items():
         for receiver in dict.fromkeys(map(component_of, source.to)):
-            fed = [variable_of(end) for end in source.to if component_of(end) == receiver]
+            inputs = [variable_of(end) for end in source.to if component_of(end) == receiver]
             start, end = places[f"sources.{name}"], places[receiver]
-            arrows.append(_Arrow(start=start, end=end, name="", text=_listed(fed), is_late=False))
+            arrows.append(_Arrow(start=start, end=end, name="", text=_listed(inputs), is_late=False))
     for x in system.connections:
         arrows.append(
             _Arrow(
@@ -153,7 +153,7 @@ Port = tuple[_Arrow, str]
 
 
 def _ports(lanes: Mapping[_Arrow, int]) -> dict[Port, float]:
-    """Where arrows leave and enter, spread over the width of their boxes; far ends outside, so that few cross."""
+    """Where arrows leave and enter, spread over the width of their boxes; far ends outside to avoid crossings."""
     ends: dict[int, list[tuple[float, Port]]] = {}
     for arrow, lane in lanes.items():
         low, high = arrow.span
@@ -161,11 +161,11 @@ def _ports(lanes: Mapping[_Arrow, int]) -> dict[Port, float]:
             side = 0.0 if low == high else (1.0 if other > here else -1.0)
             near = side * (100.0 - lane) + (0.1 if which == "start" else 0.0)
             ends.setdefault(here, []).append((near, (arrow, which)))
-    found = {}
+    ports = {}
     for place, members in ends.items():
         for k, (_, port) in enumerate(sorted(members, key=lambda member: member[0])):
-            found[port] = PITCH * place + WIDTH * ((k + 1) / (len(members) + 1) - 0.5)
-    return found
+            ports[port] = PITCH * place + WIDTH * ((k + 1) / (len(members) + 1) - 0.5)
+    return ports
 
 
 def _draw_box(axes: Axes, x: float, box: _Box) -> None:

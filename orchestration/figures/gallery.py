@@ -1,4 +1,4 @@
-"""Figures that a notebook shows by themselves, by name."""
+"""Figures by name, which a notebook displays."""
 
 import base64
 import html
@@ -30,7 +30,7 @@ class Figures(Mapping[str, Figure]):
         return f"<Figures: {', '.join(self)}>"
 
     def _repr_html_(self) -> str:
-        """As notebooks show them: one below the other."""
+        """All figures one below the other, as notebooks show them."""
         return "".join(
             f'<img alt="{html.escape(name)}" style="max-width:100%" src="data:image/png;base64,{self._png(figure)}">'
             for name, figure in self.items()

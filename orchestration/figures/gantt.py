@@ -1,4 +1,4 @@
-"""Who has the processors and the networks of a system when: a Gantt chart of its tasks and messages."""
+"""A Gantt chart of the tasks and messages on the processors and networks of a system."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,9 +20,9 @@ from orchestration.schedule.resources import timeline_of
 PIECES = 160
 """of the busiest processor or link, as many as can be told apart"""
 BAR, LATE = 0.62, 0.16
-"""Heights in a row: of what runs, and of what waits"""
+"""Heights in a row of bars for running and for waiting"""
 COLORS = (BLUE, GREEN, ORANGE, PURPLE, SKY, BROWN)
-"""Of tasks and messages; a switch is grey, what goes wrong is red"""
+"""Of tasks and messages; a context switch is grey, a missed deadline or an error red"""
 _UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
 
 
@@ -38,7 +38,7 @@ class _Row:
 
 
 def chart(runs: Sequence[Run], style: Style) -> Figure | None:
-    """Of the computers and networks of one run; None where there are none, or several runs to lay over each other."""
+    """The chart of one run; None without computers and networks, or for several runs."""
     system = runs[0].system
     if len(runs) > 1 or not (system.computers or system.networks):
         return None
@@ -46,12 +46,12 @@ def chart(runs: Sequence[Run], style: Style) -> Figure | None:
 
 
 def draw(timeline: Timeline, style: Style, window: Window | None = None) -> Figure:
-    """A panel for each processor and link, in it a row for each task and message; `window` [s] as `seen` unless told.
+    """A panel for each processor and link with a row for each task and message; `window` [s]: default of the timeline.
 
-    What runs is a bar, what waits a line from its release on; switches are grey. An arrow is a release, a short stroke
-    a deadline, a red one a deadline that is missed.
+    A bar is execution, a thin one waiting since the release; switches are grey. An arrow is a release, a short stroke
+    a deadline, a red one a missed deadline.
     """
-    shown = window or seen(timeline)
+    shown = window or default_window(timeline)
     panels = {name: rows for name, rows in _panels(timeline).items() if rows}
     heights = [len(rows) for rows in panels.values()]
     size, unit = next(each for each in _UNITS if shown[1] - shown[0] >= 2.0 * each[0] or each[1] == "ns")
@@ -70,8 +70,8 @@ def draw(timeline: Timeline, style: Style, window: Window | None = None) -> Figu
     return figure
 
 
-def seen(timeline: Timeline) -> Window:
-    """From 0 to where the busiest processor or link has had `PIECES` pieces, or to the end [s]."""
+def default_window(timeline: Timeline) -> Window:
+    """From 0 to the time at which the busiest processor or link has had `PIECES` pieces, or to the end [s]."""
     shared = (*timeline.processors.values(), *timeline.links.values())
     ends = [int(each.begin[PIECES]) for each in shared if len(each.begin) > PIECES]
     return 0.0, min([timeline.stop, *ends]) / 1e9
@@ -79,15 +79,15 @@ def seen(timeline: Timeline) -> Window:
 
 def _panels(timeline: Timeline) -> dict[str, list[_Row]]:
     colors = {name: COLORS[i % len(COLORS)] for i, name in enumerate((*timeline.jobs, *timeline.frames))}
-    found: dict[str, list[_Row]] = {}
+    panels: dict[str, list[_Row]] = {}
     for what, shared in ((timeline.jobs, timeline.processors), (timeline.frames, timeline.links)):
         for place, slices in shared.items():
-            found[place] = [
+            panels[place] = [
                 _Row(name=name.partition(".")[2], color=colors[name], slices=slices, owner=i, of=what[name])
                 for i, name in enumerate(slices.owners)
                 if name in what
             ]
-    return found
+    return panels
 
 
 def _draw_row(axes: Axes, row: _Row, place: int, shown: Window, size: float, style: Style) -> None:
@@ -96,14 +96,14 @@ def _draw_row(axes: Axes, row: _Row, place: int, shown: Window, size: float, sty
     first, last = shown[0] * 1e9, shown[1] * 1e9
     waits = _released(of)
     ends = np.where(of.ended == NEVER, last, of.ended)
-    here = (waits <= last) & (ends >= first) & ~_left_out(of)
+    here = (waits <= last) & (ends >= first) & ~_are_skipped(of)
     bars = _spans(waits[here], ends[here], scale)
     axes.broken_barh(bars, (place - LATE / 2, LATE), facecolors=row.color, alpha=0.35, linewidth=0)
-    mine = (slices.owner == row.owner) & (slices.begin <= last) & (slices.end >= first)
+    visible = (slices.owner == row.owner) & (slices.begin <= last) & (slices.end >= first)
     for kind, how in _kinds(row.color).items():
-        some = mine & (slices.kind == kind)
-        axes.broken_barh(_spans(slices.begin[some], slices.end[some], scale), (place - BAR / 2, BAR), **how)
-    released = waits[(waits >= first) & (waits <= last) & ~_left_out(of)].tolist()
+        of_kind = visible & (slices.kind == kind)
+        axes.broken_barh(_spans(slices.begin[of_kind], slices.end[of_kind], scale), (place - BAR / 2, BAR), **how)
+    released = waits[(waits >= first) & (waits <= last) & ~_are_skipped(of)].tolist()
     size = 0.4 * style.font
     axes.plot([t * scale for t in released], [place - BAR / 2 - 0.12] * len(released), "^", color=BLACK, ms=size)
     due = of.deadline[(of.deadline >= first) & (of.deadline <= last)]
@@ -116,13 +116,13 @@ def _released(of: Jobs | Frames) -> Integers:
     return of.released if isinstance(of, Jobs) else of.queued
 
 
-def _left_out(of: Jobs | Frames) -> Booleans:
-    found: Booleans = of.outcome == SKIPPED if isinstance(of, Jobs) else np.zeros(len(of), dtype=np.bool_)
-    return found
+def _are_skipped(of: Jobs | Frames) -> Booleans:
+    skipped: Booleans = of.outcome == SKIPPED if isinstance(of, Jobs) else np.zeros(len(of), dtype=np.bool_)
+    return skipped
 
 
 def _spans(begins: Integers, ends: Integers, scale: float) -> list[tuple[float, float]]:
-    """Begin and length of each, as they are drawn."""
+    """Begin and length of each bar in the unit of the axis."""
     return [(begin * scale, (end - begin) * scale) for begin, end in zip(begins.tolist(), ends.tolist(), strict=True)]
 
 
@@ -135,18 +135,18 @@ def _kinds(color: str) -> Mapping[int, dict[str, Any]]:
 
 
 def _legend(panels: Mapping[str, list[_Row]]) -> list[Line2D | Patch]:
-    return [*_always(), *_if_there(panels)]
+    return [*_common_entries(), *_optional_entries(panels)]
 
 
-def _always() -> Iterator[Line2D | Patch]:
+def _common_entries() -> Iterator[Line2D | Patch]:
     yield Patch(facecolor=BLUE, label="runs")
     yield Patch(facecolor=BLUE, alpha=0.35, label="waits")
     yield Line2D([], [], color=BLACK, marker="^", linestyle="", label="released")
     yield Line2D([], [], color=BLACK, marker="|", linestyle="", label="deadline")
 
 
-def _if_there(panels: Mapping[str, list[_Row]]) -> Iterator[Line2D | Patch]:
-    rows = [row for some in panels.values() for row in some]
+def _optional_entries(panels: Mapping[str, list[_Row]]) -> Iterator[Line2D | Patch]:
+    rows = [row for of_panel in panels.values() for row in of_panel]
     if any(row.of.missed.any() for row in rows):
         yield Line2D([], [], color=RED, marker="|", linestyle="", label="missed")
     kinds = {int(kind) for row in rows for kind in np.unique(row.slices.kind)}

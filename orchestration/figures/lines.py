@@ -1,4 +1,4 @@
-"""What figures over time have in common: lines of runs, legends, and peaks that do not fit."""
+"""Common parts of figures over time: lines of runs, legends, and peaks that do not fit the axis."""
 
 import textwrap
 from collections.abc import Sequence
@@ -20,28 +20,28 @@ Lines: TypeAlias = Sequence[tuple[Floats, Floats]]
 
 TIME = "time [s]"
 OUTSIDE, CLIPPED = 0.015, 3.0
-"""Share of the time to each side that a peak lasts at most, and how many times the range without it makes it one"""
+"""Largest share of the time that counts as a peak, and smallest ratio of its range to that of the rest"""
 
 
 def positive(values: Floats) -> Floats:
-    """What a logarithmic axis can show; nan for the rest."""
+    """The values that a logarithmic axis can show; nan for the rest."""
     return np.where(values > 0.0, values, np.nan)
 
 
 def logarithmic(axes: Axes) -> None:
-    """The vertical axis, as far as anything on it is positive: what is zero throughout stays on a linear one."""
+    """Make the vertical axis logarithmic if any value on it is positive."""
     values = [np.asarray(line.get_ydata(), float) for line in axes.get_lines()]
     if any((one > 0.0).any() for one in values):
         axes.set_yscale("log")
 
 
-def see(axes: Axes, runs: Sequence[Run]) -> None:
-    """The axis of time as far as there is anything on it, or over the window."""
+def set_time_axis(axes: Axes, runs: Sequence[Run]) -> None:
+    """Set the limits of the time axis to the span of the runs, or to the window."""
     axes.set_xlim(min(run.span[0] for run in runs), max(run.span[1] for run in runs))
 
 
 def legend_of_runs(figure: Figure, runs: Sequence[Run], style: Style) -> None:
-    """Which line is which run, above all panels; nothing for one run."""
+    """A legend of the runs above all panels; none for one run."""
     if len(runs) > 1:
         handles = [Line2D([], [], color=run.color, linestyle=run.dashes, label=run.name) for run in runs]
         columns = abreast([run.name for run in runs], style)
@@ -49,25 +49,25 @@ def legend_of_runs(figure: Figure, runs: Sequence[Run], style: Style) -> None:
 
 
 def abreast(names: Sequence[str], style: Style, *, width: float = 1.0) -> int:
-    """How many entries of a legend stand side by side in a figure; `width` is its share of the style's."""
+    """The number of columns of a legend that fit a figure; `width` is its share of the style's."""
     longest = max(map(len, names)) + 6
     return min(len(names), max(1, int(width * style.width / (0.5 * longest * style.font * 0.353))))
 
 
 def quantity(name: str, unit: str | None) -> str:
-    """The label of an axis; what has no dimension is said to have none."""
+    """The label of an axis; a dimensionless quantity has [1]."""
     return f"{name} [1]" if unit == "1" else labels.with_unit(name, unit)
 
 
 def wrapped(label: str, width: int = 24) -> str:
-    """A label in lines of so many characters, its unit never by itself."""
+    """A label broken into lines of `width` characters, its unit never alone on a line."""
     return "\n".join(textwrap.wrap(label.replace(" [", "\u00a0["), width, break_long_words=False))
 
 
 def clip_peaks(axes: Axes, lines: Lines, unit: str, style: Style) -> bool:
-    """Where a short peak would hide all else, leave it out of the axis, say so, and show it in an inset.
+    """Clip short peaks that would hide the rest of the signals, and show them in an inset with a note.
 
-    `lines` are what is drawn on `axes`; returns whether it was done.
+    `lines` are those drawn on `axes`; returns whether anything was clipped.
     """
     inner = [_without_peaks(t, y) for t, y in lines if len(t) > 1 and np.isfinite(y).any()]
     if not inner:
@@ -84,7 +84,7 @@ def clip_peaks(axes: Axes, lines: Lines, unit: str, style: Style) -> bool:
 
 
 def _without_peaks(t: Floats, values: Floats) -> tuple[float, float]:
-    """The range of a signal but for a small share of the time."""
+    """The range of a signal without a small share of the time."""
     held = np.append(np.diff(t), 0.0)
     order = np.argsort(values)
     share = np.cumsum(held[order]) / max(float(held.sum()), 1e-300)
@@ -93,7 +93,7 @@ def _without_peaks(t: Floats, values: Floats) -> tuple[float, float]:
 
 
 def _inset(axes: Axes, lines: Lines, seen: tuple[float, float], unit: str, style: Style) -> None:
-    """The time of the peaks, whole, in the upper right; the text names the largest."""
+    """The time span of the peaks in the upper right; the title states the largest."""
     outside = np.concatenate([t[(y < seen[0]) | (y > seen[1])] for t, y in lines])
     t, y = max(lines, key=lambda line: float(np.nanmax(np.abs(line[1]))))
     k = int(np.nanargmax(np.abs(y)))

@@ -1,4 +1,4 @@
-"""Over which values the colours of a map go; the maps of a report follow the same rules (`report/page/map.js`)."""
+"""The range of values of a map's colours; the maps of a report follow the same rules (`report/page/map.js`)."""
 
 from dataclasses import dataclass
 
@@ -7,28 +7,28 @@ import numpy as np
 from orchestration.basics.simulator import Floats
 
 OUTER = 0.02
-"""Share of the values to each side that is left out of the colours, if it would take most of them"""
+"""Share of the values on each side that is excluded from the range if it would take up most of it"""
 MOST = 2.5
-"""times the range of the others: more than that is most"""
+"""ratio of the full range to that of the other values above which it does"""
 LEAST = 0.05
-"""of the largest value: so much at least all colours stand for, so that next to nothing does not look like much"""
+"""smallest range as a share of the largest value, so that tiny differences do not look large"""
 WIDE = 50.0
-"""times the least value: from there on colours and axes go by the logarithm"""
+"""ratio of the largest to the smallest value above which colours and axes are logarithmic"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Shades:
-    """What the first colour and the last stand for."""
+    """The values of the first and the last colour."""
 
     low: float
     high: float
     logarithmic: bool
     leaves_out: tuple[bool, bool]
-    """whether there are values below, above"""
+    """whether there are values below, and above"""
 
 
 def shades_of(values: Floats) -> Shades | None:
-    """The colours for values, as far as they are finite; None if none is."""
+    """The range of the colours for the finite values; None if there are none."""
     known = np.sort(values[np.isfinite(values)])
     if not len(known):
         return None
@@ -43,7 +43,7 @@ def shades_of(values: Floats) -> Shades | None:
 
 
 def inner(ordered: Floats) -> tuple[int, int]:
-    """The places of the least and the largest of some ordered values that are no outliers."""
+    """The indices of the smallest and the largest of some ordered values that are not outliers."""
     last = len(ordered) - 1
     low, high = (round(share * last) for share in (OUTER, 1.0 - OUTER))
     within = ordered[high] - ordered[low]
@@ -51,6 +51,6 @@ def inner(ordered: Floats) -> tuple[int, int]:
 
 
 def is_wide(values: Floats) -> bool:
-    """Whether values are of different orders of magnitude, all above zero; what is not finite does not count."""
+    """Whether the finite values are all positive and of different orders of magnitude."""
     known = values[np.isfinite(values)]
     return bool(len(known) and known.min() > 0.0 and known.max() > WIDE * known.min())

@@ -1,11 +1,11 @@
-"""What is exchanged in a system of any FMUs."""
+"""The figure of the signals that are exchanged in a system of any FMUs."""
 
 from collections.abc import Iterator, Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestration.figures.lines import TIME, abreast, legend_of_runs, quantity, see, wrapped
+from orchestration.figures.lines import TIME, abreast, legend_of_runs, quantity, set_time_axis, wrapped
 from orchestration.figures.palette import CYCLE
 from orchestration.figures.run import Run, title
 from orchestration.figures.style import Style
@@ -13,25 +13,25 @@ from orchestration.results import display_names as labels
 from orchestration.system.variable_names import component_of
 
 MOST_LINES = 8
-"""In one panel; what is more gets panels of its own"""
+"""in one panel; more get further panels"""
 
 Panel = tuple[str, str | None, list[str]]
-"""What is drawn together: of which connection or component, in which unit, and the columns"""
+"""Name of the connection or component, unit, columns"""
 
 
 def signals(runs: Sequence[Run], style: Style) -> Figure:
     """A panel for each connection and unit, its signals as the receiver has them.
 
-    Of a system without connections, the recorded outputs of each component.
+    Without connections, the recorded outputs of each component.
     """
-    wanted = [*_panels(runs[0])]
-    figure = style.figure(3.0 + 10.5 * max(1, len(wanted)))
-    panels = figure.subplots(max(1, len(wanted)), 1, sharex=True, squeeze=False)[:, 0]
-    for panel, (name, unit, columns) in zip(panels, wanted):
+    contents = [*_panels(runs[0])]
+    figure = style.figure(3.0 + 10.5 * max(1, len(contents)))
+    panels = figure.subplots(max(1, len(contents)), 1, sharex=True, squeeze=False)[:, 0]
+    for panel, (name, unit, columns) in zip(panels, contents):
         for run in runs:
             _draw(panel, run, columns, alone=len(runs) == 1)
         panel.set_ylabel(wrapped(quantity(labels.words(name), unit), 16))
-        see(panel, runs)
+        set_time_axis(panel, runs)
         handles, names = panel.get_legend_handles_labels()
         panel.legend(handles, names, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=abreast(names, style))
     if style.has_titles and title(runs):
@@ -42,23 +42,23 @@ def signals(runs: Sequence[Run], style: Style) -> Figure:
 
 
 def _panels(run: Run) -> Iterator[Panel]:
-    carried = {
+    of_connections = {
         x.name: [end if end in run else start for start, end in zip(x.start, x.end)] for x in run.system.connections
     }
     of_components = {
         name: [column for column in run.recording.columns if column.startswith(f"{name}.")]
         for name in run.system.components
     }
-    for name, columns in (carried or of_components).items():
-        there = [column for column in columns if column in run]
-        for unit in dict.fromkeys(run.described[column].unit for column in there):
-            alike = [column for column in there if run.described[column].unit == unit]
-            for first in range(0, len(alike), MOST_LINES):
-                yield name, unit, alike[first : first + MOST_LINES]
+    for name, columns in (of_connections or of_components).items():
+        recorded = [column for column in columns if column in run]
+        for unit in dict.fromkeys(run.described[column].unit for column in recorded):
+            of_unit = [column for column in recorded if run.described[column].unit == unit]
+            for first in range(0, len(of_unit), MOST_LINES):
+                yield name, unit, of_unit[first : first + MOST_LINES]
 
 
 def _draw(panel: Axes, run: Run, columns: Sequence[str], *, alone: bool) -> None:
-    """Colours tell signals of one run, or runs; dashes the other."""
+    """Colours distinguish the signals of one run, or several runs; dashes then the signals."""
     system = run.system
     applied = {end for x in system.connections for end in x.end}
     for k, column in enumerate(columns):

@@ -1,4 +1,4 @@
-"""How figures look: one place for sizes, fonts and lines, and one for how they are written."""
+"""The style of figures: sizes, fonts and lines; and how files of them are written."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -25,26 +25,26 @@ POINT = INCH / 72.0
 
 @dataclass(frozen=True, kw_only=True)
 class Style:
-    """A size, a look and what is written; text has its size in points in the figure as it is written.
+    """Size, look and formats of figures; font sizes are those in the written file.
 
-    Raises `UsageError` for a format that there is not.
+    Raises `UsageError` for an unknown format.
     """
 
     width: float = 203.0
     """[mm]"""
     height: float | None = None
-    """[mm]; as what is drawn needs it unless told"""
+    """[mm]; default: as the content needs"""
     font: float = 10.0
     """[pt]"""
     serif: bool = False
     line: float = 1.3
     """[pt]"""
     has_titles: bool = True
-    """a paper's captions say what titles would"""
+    """false for papers, which have captions instead"""
     dpi: float = 200.0
     """of PNG"""
     colors: int | None = None
-    """that a PNG has at most; None: all"""
+    """largest number in a PNG; None: unlimited"""
     formats: tuple[str, ...] = WRITTEN
     """of the files"""
 
@@ -55,19 +55,19 @@ class Style:
 
     @property
     def is_wide(self) -> bool:
-        """Whether two panels have room beside each other."""
+        """Whether two panels fit side by side."""
         return self.width >= 33.0 * self.font * POINT
 
     def figure(self, height: float, *, width: float = 1.0, **more: Any) -> Figure:
-        """An empty figure, so many lines of text high unless the style says how high; `width` is a share of its."""
+        """An empty figure, `height` lines of text high unless the style has a height; `width`: share of the style's."""
         high = self.height if self.height is not None else height * self.font * POINT
         figure = Figure(figsize=(width * self.width / INCH, high / INCH), **more)
-        FigureCanvasAgg(figure)  # one renderer, which measures each text once, for layout and PNG
+        FigureCanvasAgg(figure)  # one renderer for layout and PNG: each text is measured once
         return figure
 
     @contextmanager
     def applied(self) -> Iterator[None]:
-        """What is made and written inside looks like this, whatever the user's settings of matplotlib are."""
+        """A context in which figures have this style, regardless of the user's settings of matplotlib."""
         with matplotlib.rc_context():
             matplotlib.rcdefaults()
             matplotlib.rcParams.update(self._settings())
@@ -125,7 +125,7 @@ DOCS = replace(SCREEN, colors=256, formats=("png",))
 
 
 def style_named(name: str) -> Style:
-    """The style of a name; raises `UsageError` for one that there is not."""
+    """The style of a name; raises `UsageError` for an unknown one."""
     if name not in STYLES:
         raise UsageError(f"style {name}: expected one of {', '.join(STYLES)}")
     return STYLES[name]
@@ -144,9 +144,9 @@ def save(
     style: Style = SCREEN,
     progress: Share = lambda share: None,
 ) -> list[Path]:
-    """Write figures by name, in each format of the style, into a folder that is made if need be; the paths.
+    """Write figures by name, in each format of the style, into a folder that is made if need be; their paths.
 
-    The same data give the same bytes: nothing has a date. `progress` hears the share that is written.
+    The same data give the same bytes: files have no date. `progress` receives the share that is written.
     """
     folder.mkdir(parents=True, exist_ok=True)
     written = []
@@ -164,7 +164,7 @@ def save(
 
 
 def write(figure: Figure, file: Path | BinaryIO, ending: str) -> None:
-    """As `Figure.savefig`, which draws twice for the sake of figures whose layout is not done."""
+    """Write a figure whose layout is done; `Figure.savefig` would draw it twice."""
     canvas: Any = figure.canvas
     if not hasattr(canvas, f"print_{ending}"):
         canvas = get_registered_canvas_class(ending)(figure)
@@ -173,7 +173,7 @@ def write(figure: Figure, file: Path | BinaryIO, ending: str) -> None:
 
 @contextmanager
 def laid_out_once(figure: Figure) -> Iterator[None]:
-    """Inside, things stay where they are: to lay out a figure takes as long as to write it."""
+    """A context in which the figure keeps its layout: computing it takes as long as writing the figure."""
     engine = figure.get_layout_engine()
     if engine is not None:
         engine.execute(figure)
@@ -185,7 +185,7 @@ def laid_out_once(figure: Figure) -> Iterator[None]:
 
 
 def _reduce(path: Path, colors: int) -> None:
-    """A third of the bytes."""
+    """Reduce the colours of a PNG, which makes it a third as large."""
     from PIL import Image, PngImagePlugin
 
     about = PngImagePlugin.PngInfo()

@@ -1,4 +1,4 @@
-"""Ticks of logarithmic axes as numbers that people read."""
+"""Ticks of logarithmic axes as plain numbers."""
 
 import math
 from collections.abc import Sequence

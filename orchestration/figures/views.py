@@ -1,4 +1,4 @@
-"""Which figures runs of a kind get: names for whoever has to know them without drawing, and what draws them."""
+"""The figures of runs by kind of request: names, available without matplotlib, and the functions that draw them."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Drawing:
-    """What draws the figures of a kind."""
+    """The functions that draw the figures of a kind."""
 
     makers: Mapping[str, Maker]
-    """by their names; one that cannot be made of a run gives None"""
+    """by the names of figures; they return None if a run has no such figure"""
     columns: Collection[str] | None
     """that they read; None: all"""
 
@@ -34,11 +34,11 @@ class View:
     names: tuple[str, ...]
     """in the order in which they are drawn"""
     first: tuple[str, ...]
-    """those that a run draws at once; all others when they are asked for"""
+    """drawn after every run; the others on request"""
     load: Callable[[], Drawing]
-    """with it comes matplotlib"""
+    """imports matplotlib"""
     needs: frozenset[str] = frozenset()
-    """columns of runs of any kind by which they get these figures too; without any, none does"""
+    """runs of any kind with these columns get the figures too; empty: none"""
 
 
 def _of_any_system() -> Drawing:
@@ -50,15 +50,15 @@ def _of_any_system() -> Drawing:
 
 ANY = "run"
 VIEWS = {ANY: View(names=("signals", "schedule"), first=("signals", "schedule"), load=_of_any_system)}
-"""By kind of request; rooms above enter theirs"""
+"""By kind of request; rooms above register theirs"""
 
 
 def view_of(kind: str, columns: Collection[str]) -> View:
-    """The figures of runs of a kind: its own, or those that their columns are of, or those of any system."""
+    """The figures of runs of a kind: its own, or those that fit their columns, or those of any system."""
     known = (view for view in VIEWS.values() if view.needs and view.needs <= {*columns})
     return VIEWS[kind] if kind != ANY and kind in VIEWS else next(known, VIEWS[ANY])
 
 
 def files() -> frozenset[str]:
-    """What of figures may be in the directory of a run."""
+    """The names of files of figures in a run directory."""
     return frozenset(f"{name}.{ending}" for view in VIEWS.values() for name in view.names for ending in FORMATS)

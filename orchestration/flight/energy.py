@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from orchestration.figures.lines import TIME, legend_of_runs, logarithmic, positive, quantity, see
+from orchestration.figures.lines import TIME, legend_of_runs, logarithmic, positive, quantity, set_time_axis
 from orchestration.figures.palette import BLUE
 from orchestration.figures.run import Run, title
 from orchestration.figures.style import Style
@@ -29,7 +29,7 @@ def energy(runs: Sequence[Run], style: Style) -> Figure | None:
     unit = with_energy[0].described[COLUMN].unit
     logarithmic(panel)
     panel.set(xlabel=TIME, ylabel=quantity("energy L", unit))
-    see(panel, runs)
+    set_time_axis(panel, runs)
     if style.has_titles:
         panel.set_title(title(runs))
     legend_of_runs(figure, runs, style)

@@ -8,7 +8,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from orchestration.basics.simulator import Floats
-from orchestration.figures.lines import TIME, clip_peaks, legend_of_runs, logarithmic, positive, quantity, see, wrapped
+from orchestration.figures.lines import (
+    TIME,
+    clip_peaks,
+    legend_of_runs,
+    logarithmic,
+    positive,
+    quantity,
+    set_time_axis,
+    wrapped,
+)
 from orchestration.figures.palette import BLUE, GREEN, RED
 from orchestration.figures.run import Run, title
 from orchestration.figures.style import Style
@@ -41,7 +50,7 @@ def errors(runs: Sequence[Run], style: Style) -> Figure:
         logarithmic(panel)
         panel.set_ylabel(wrapped(quantity(f"{error.name}, norm", error.unit)))
         panel.minorticks_off()
-        see(panel, runs)
+        set_time_axis(panel, runs)
     return figure
 
 
@@ -64,7 +73,7 @@ def draw_components(panel: Axes, run: Run, error: Error, style: Style, *, clips:
     for k, (axis, color, dashes) in enumerate(AXES):
         panel.plot(run.time, values[:, k], color=color, linestyle=dashes, label=axis)
     panel.set_ylabel(wrapped(quantity(error.name, error.unit)))
-    see(panel, [run])
+    set_time_axis(panel, [run])
     if clips:
         clip_peaks(panel, [(run.time, values[:, k]) for k in range(3)], error.unit, style)
 
@@ -79,7 +88,7 @@ def _overlaid(runs: Sequence[Run], style: Style) -> Figure:
             drawn = [(run, values[:, k]) for run in runs if (values := error.of(run)) is not None]
             for run, values in drawn:
                 panel.plot(run.time, values, color=run.color, linestyle=run.dashes, label=run.name)
-            see(panel, runs)
+            set_time_axis(panel, runs)
             panel.set_ylabel(wrapped(quantity(f"{error.name} {'xyz'[k]}", error.unit), 18))
             if i == len(available) - 1:
                 panel.set_xlabel(TIME)
@@ -110,7 +119,7 @@ def _available_errors(runs: Sequence[Run]) -> list[Error]:
 
 def _position_error(run: Run) -> Floats | None:
     position = run.stacked([f"plant.{name}" for name in POSITION])
-    return position - desired(run.signals)[run.seen]
+    return position - desired(run.signals)[run.visible]
 
 
 def _output_of_controller(name: str) -> Callable[[Run], Floats | None]:

@@ -1,1 +1,1 @@
-"""Working folders for what people write themselves: a controller, a plant, a filter."""
+"""Creates folders for users' own slaves: a controller, a plant, a filter."""

@@ -1,4 +1,4 @@
-"""`quadcosim examples`: writes the examples and studies that pages speak of, also where there is no checkout."""
+"""`quadcosim examples`: writes the examples and studies of the documentation, also without a checkout."""
 
 import shutil
 from pathlib import Path
@@ -7,23 +7,23 @@ from orchestration.basics.errors import UsageError
 from orchestration.building import consent
 
 FOLDERS = ("examples", "studies", "gains")
-"""That belong together: studies read gains"""
+"""written together: studies read gains"""
 KEPT = (".csv", ".md", ".py", ".toml")
-"""Endings of what is written: no pictures, and no FMUs, which are built when they are flown"""
+"""Endings of the files that are written: no pictures, and no FMUs, which are built before a run"""
 _SHIPPED = Path(__file__).parent / "shipped"
-"""Where a wheel has them; `setup.py` puts them there"""
+"""Their place in a wheel, where `setup.py` puts them"""
 
 
 def write(where: Path) -> list[Path]:
     """Write the folders into `where`; their paths.
 
-    Raises `UsageError` for a folder that is there already.
+    Raises `UsageError` if one of them exists.
     """
     origin = _SHIPPED if _SHIPPED.is_dir() else Path(__file__).parents[2]
     written = [where / name for name in FOLDERS]
     for folder in written:
         if folder.exists():
-            raise UsageError(f"{folder}: is there already; expected a folder that can be made")
+            raise UsageError(f"{folder}: exists already; expected a folder that does not exist")
     for name, folder in zip(FOLDERS, written):
         for file in sorted((origin / name).rglob("*")):
             if file.suffix in KEPT:

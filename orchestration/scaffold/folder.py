@@ -1,4 +1,4 @@
-"""`quadcosim new`: writes a folder with a slave, its test, a system that flies it and a page of commands."""
+"""`quadcosim new`: writes a folder with a slave, its test, a system that uses it and a page of commands."""
 
 import importlib.util
 import keyword
@@ -20,16 +20,16 @@ _HERE = Path(__file__).parent
 def write(kind: Kind, name: str, where: Path, *, author: str, license: str) -> list[Path]:
     """Write the folder `where`/`name`; the paths of its files.
 
-    The class has the name in CamelCase, its module in snake_case. Raises `UsageError` for a name that cannot be, or
-    for a folder that is there already.
+    The class has the name in CamelCase, its module in snake_case. Raises `UsageError` for an invalid name, or if the
+    folder exists.
     """
     model = class_name(name)
     module = module_name(model)
     _expect_usable(name, model, module)
     folder = where / name
     if folder.exists():
-        raise UsageError(f"{folder}: is there already; expected a folder that can be made")
-    said = {"Name": model, "module": module, "folder": name, "author": _quoted(author), "license": _quoted(license)}
+        raise UsageError(f"{folder}: exists already; expected a folder that does not exist")
+    names = {"Name": model, "module": module, "folder": name, "author": _quoted(author), "license": _quoted(license)}
     files = {
         f"{module}.py": "law.py",
         f"test_{module}.py": "test.py",
@@ -39,7 +39,7 @@ def write(kind: Kind, name: str, where: Path, *, author: str, license: str) -> l
     folder.mkdir(parents=True)
     for file, template in files.items():
         text = (_HERE / f"{kind}_{template}.tmpl").read_text(encoding="utf-8")
-        (folder / file).write_text(Template(text).substitute(said), encoding="utf-8")
+        (folder / file).write_text(Template(text).substitute(names), encoding="utf-8")
     consent.agree(folder)
     return [folder / file for file in files]
 
@@ -55,7 +55,7 @@ def module_name(model: str) -> str:
 
 
 def git_author() -> str:
-    """Who commits on this machine; empty where git is not there or does not know."""
+    """The user name in git's configuration; empty without git or without a name."""
     try:
         done = subprocess.run(
             ["git", "config", "user.name"], capture_output=True, text=True, encoding="utf-8", errors="replace",
@@ -71,23 +71,23 @@ def _expect_usable(name: str, model: str, module: str) -> None:
         raise UsageError(f"{name!a}: expected a name of letters, digits and _ that begins with a letter, as hover_pd")
     if model in MODELS:
         raise UsageError(f"{name}: an FMU of this project has this name; expected another one")
-    taken = keyword.iskeyword(module) or module in sys.stdlib_module_names or _is_found(module)
+    taken = keyword.iskeyword(module) or module in sys.stdlib_module_names or _is_installed(module)
     if taken or model in _OF_THE_KIT:
-        raise UsageError(f"{name}: Python has a module or a word {module}; expected another name, as my_{module}")
+        raise UsageError(f"{name}: {module} is a module or a keyword of Python; expected another name, as my_{module}")
 
 
 _OF_THE_KIT = ("Slave", "Input", "Output", "Parameter", "State", "Local", "Vec3", "Quaternion")
 
 
-def _is_found(module: str) -> bool:
-    """Whether a module of this name is installed; one that lies in the folder of whoever asks does not count."""
-    found = importlib.util.find_spec(module)
-    if found is None or found.origin is None:  # a folder that is no package
+def _is_installed(module: str) -> bool:
+    """Whether a module of this name is installed; one in the working directory does not count."""
+    spec = importlib.util.find_spec(module)
+    if spec is None or spec.origin is None:  # a folder that is not a package
         return False
     here = Path.cwd()
-    return Path(found.origin) not in (here / f"{module}.py", here / module / "__init__.py")
+    return Path(spec.origin) not in (here / f"{module}.py", here / module / "__init__.py")
 
 
 def _quoted(text: str) -> str:
-    """`text` as it stands between the quotes of a source."""
+    """`text` escaped for a string literal of Python."""
     return text.replace("\\", "\\\\").replace('"', '\\"')

@@ -109,9 +109,9 @@ def test_the_chart_is_written_where_it_is_asked_for(main: Main, file: Path) -> N
 
 def test_a_chart_shows_no_more_than_can_be_told_apart(file: Path) -> None:
     timeline: Timeline = schedule(file, 30.0).timeline
-    end = gantt.seen(timeline)[1]
+    end = gantt.default_window(timeline)[1]
     assert max((each.begin < end * 1e9).sum() for each in timeline.processors.values()) == gantt.PIECES
-    assert gantt.seen(schedule(file, 0.01).timeline) == (0.0, 0.01)
+    assert gantt.default_window(schedule(file, 0.01).timeline) == (0.0, 0.01)
 
 
 def test_a_chart_has_a_panel_for_each_processor_and_link_and_bars_as_long_as_they_run(file: Path) -> None:

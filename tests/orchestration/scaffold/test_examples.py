@@ -34,7 +34,7 @@ def test_the_modules_of_written_examples_may_be_built(tmp_path: Path) -> None:
 def test_nothing_is_written_over(main: Main, tmp_path: Path) -> None:
     (tmp_path / "studies").mkdir()
     line = main("examples", "--out", tmp_path, code=2).stderr
-    assert f"{tmp_path / 'studies'}: is there already; expected a folder that can be made" in line
+    assert f"{tmp_path / 'studies'}: exists already; expected a folder that does not exist" in line
     assert not (tmp_path / "examples").exists()
 
 

@@ -85,9 +85,9 @@ def test_a_plant_and_a_filter_run_good_and_have_a_limit(name: str, here: Path) -
         ("a.b", "expected a name of letters"),
         ("../up", "expected a name of letters"),
         ("é", "expected a name of letters"),
-        ("json", "Python has a module or a word json"),
-        ("class", "Python has a module or a word class"),
-        ("numpy", "Python has a module or a word numpy"),
+        ("json", "json is a module or a keyword of Python"),
+        ("class", "class is a module or a keyword of Python"),
+        ("numpy", "numpy is a module or a keyword of Python"),
         ("unified_controller", "an FMU of this project has this name"),
         ("slave", "expected another name, as my_slave"),
     ],
@@ -100,7 +100,7 @@ def test_names_that_would_not_work_are_refused(name: str, words: str, tmp_path: 
 
 def test_what_is_there_is_not_touched(here: Path, main: Main) -> None:
     (here / "mine").mkdir()
-    assert "mine: is there already" in main("new", "plant", "mine", code=2).stderr
+    assert "mine: exists already" in main("new", "plant", "mine", code=2).stderr
     assert not [*(here / "mine").iterdir()]
     assert "new motor: expected controller, plant, filter" in main("new", "motor", "mine", code=2).stderr
 

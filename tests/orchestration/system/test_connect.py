@@ -213,7 +213,7 @@ def test_the_file_lies_where_it_is_asked_for_and_finds_its_fmus(
     printed = main("connect", "fmus/A.fmu", "fmus/B.fmu").stdout
     assert 'fmu = "fmus/A.fmu"' in printed
     again = main("connect", "fmus/A.fmu", "--out", "new/system.toml", code=2)
-    assert again.stderr.startswith("quadcosim: --out new/system.toml: is there already")
+    assert again.stderr.startswith("quadcosim: --out new/system.toml: exists already")
 
 
 def test_a_complete_proposal_runs(built: dict[str, Path], tmp_path: Path, main: Main) -> None:
