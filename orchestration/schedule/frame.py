@@ -86,16 +86,14 @@ class Frame:
             return self._kept[begin, end]
         found = InstantCollector(len(self.continuous))
         for component, grid in self.points.items():
-            found.add(grid.between(grid.index_from(begin), grid.index_from(end)), self.place[component])
+            found.add(grid.between(grid.index_from(begin), grid.index_from(end)), int(self.place[component]))
         if begin == 0:
             found.add(np.zeros(1, dtype=np.int64))
         for grid, receivers in self._changes:  # the value of the start is that of initialisation
             times = grid.between(max(grid.index_from(begin), 1), max(grid.index_from(end), 1))
-            for receiver in receivers:
-                found.add(times, self.place[receiver])
+            found.add(times, *self.place[receivers].tolist())
         if end > self.stop:
-            found.add(np.full(len(self.continuous), self.stop), np.arange(len(self.continuous)))
-            found.add(np.full(1, self.stop))
+            found.add(np.full(1, self.stop), *range(len(self.continuous)))
         self._kept[begin, end] = instants = found.instants()
         while len(self._kept) > _KEPT:
             self._kept.popitem(last=False)

@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 
 from orchestration.basics.simulator import Integers
+from orchestration.computers.parts import Constant
 from orchestration.schedule.drawing import times
 from orchestration.schedule.fixed_step import FixedStep, Refusal, seconds
 from orchestration.schedule.lookahead import NEVER, Lookahead
@@ -29,29 +30,34 @@ class Link:
         self.index, self.jacobi = index, x.order == "jacobi"
         self.longest = nanoseconds(highest(x.delay)) + nanoseconds(highest(x.delay_jitter))
         self._name, self._fixed, self._refused = owner, fixed, refused
-        self._delay = times(x.delay, partial(streams.of, owner, DELAY))
-        self._late = lateness(x.delay_jitter, x.jitter_distribution, partial(streams.of, owner, DELAY_JITTER))
-        self._lost = losses(x.loss, x.burst_length, partial(streams.of, owner, LOSS))
+        delay = times(x.delay, partial(streams.of, owner, DELAY))
+        late = lateness(x.delay_jitter, x.jitter_distribution, partial(streams.of, owner, DELAY_JITTER))
+        self._late = [each for each in (delay, late) if each != Constant(0)]
+        self._lost = losses(x.loss, x.burst_length, partial(streams.of, owner, LOSS)) if x.loss != 0.0 else None
         self._last = 0
 
     def messages(self, sent: Integers) -> Integers:
         """Arrivals of the next messages, sent at these times; -1 for one that is lost."""
-        lost, own = self._lost(len(sent)), sent + self._delay(len(sent)) + self._late(len(sent))
-        return self.arrivals(np.where(lost, -1, own))
+        own = sum((late(len(sent)) for late in self._late), sent)
+        return self.arrivals(self._without_lost(own))
 
     def arrivals(self, own: Integers) -> Integers:
         """When the next messages arrive that would by themselves at these times, -1 for one that is lost."""
-        result: Integers = np.where(own < 0, -1, self._in_order(np.maximum(own, 0), "an arrival"))
-        return result
+        found = self._in_order(own, "an arrival")
+        return found if own.min(initial=0) == 0 else np.where(own < 0, -1, found)
 
     def measurements(self, samples: Integers) -> tuple[Integers, Integers]:
         """When the next messages are measured, for samples at these times, and their arrivals as in `messages`."""
-        lost, own = self._lost(len(samples)), samples - self._delay(len(samples)) - self._late(len(samples))
-        return self._in_order(own, "a measurement"), np.where(lost, -1, samples)
+        own = samples - sum(late(len(samples)) for late in self._late)
+        return self._in_order(own, "a measurement"), self._without_lost(samples)
 
-    def _in_order(self, times: Integers, what: str) -> Integers:
+    def _without_lost(self, arrivals: Integers) -> Integers:
+        """Of the next messages, -1 for those that are lost."""
+        return arrivals if self._lost is None else np.where(self._lost(len(arrivals)), -1, arrivals)
+
+    def _in_order(self, own: Integers, what: str) -> Integers:
         """Messages never overtake."""
-        times = np.maximum.accumulate(np.append(self._last, times))[1:]
+        times: Integers = np.maximum(np.maximum.accumulate(own), self._last)
         if self._fixed is not None:
             times = self._fixed.aligned(times, f"{what} over {self._name}", self._refused)
         self._last = int(times[-1]) if len(times) else self._last
@@ -59,11 +65,7 @@ class Link:
 
 
 class TimedComponent:
-    """A sampled component: its samples that are drawn and not past, a row each.
-
-    Columns: k, time, time of the next, then for each incoming link when it is measured and arrives, and for each
-    outgoing one when it is sent and arrives.
-    """
+    """A sampled component, and its samples that are drawn and not past, in order."""
 
     first: int
     """[ns], its first sample"""
@@ -83,20 +85,58 @@ class TimedComponent:
         self._ahead = max((link.longest for link in self.incoming), default=0)
         self._name, self._refused, self._stop = f"components.{name}", refused, nanoseconds(plan.system.stop_time)
         self._fixed = [fixed[x] for x in sorted({connections[link.index].sender for link in self.incoming} & {*fixed})]
-        self.rows: Integers = np.zeros((0, 3 + 2 * (len(self.incoming) + len(self.outgoing))), dtype=np.int64)
+        self._columns = [np.zeros(0, dtype=np.int64)] * (_OF_LINKS + 2 * len(self.incoming + self.outgoing))
+
+    @property
+    def numbers(self) -> Integers:
+        """Which samples they are."""
+        return self._columns[0]
+
+    @property
+    def times(self) -> Integers:
+        """[ns]"""
+        return self._columns[1]
+
+    @property
+    def following(self) -> Integers:
+        """Of each the time of the next [ns]."""
+        return self._columns[2]
+
+    def measured(self, place: int) -> Integers:
+        """When the values of an incoming link are measured for them."""
+        return self._columns[_OF_LINKS + 2 * place]
+
+    def sent(self, place: int) -> Integers:
+        """When they send over an outgoing link."""
+        return self._columns[_OF_LINKS + 2 * (len(self.incoming) + place)]
+
+    def arrivals(self, place: int) -> Integers:
+        """When that arrives."""
+        return self._columns[_OF_LINKS + 2 * (len(self.incoming) + place) + 1]
 
     def draw_until(self, end: int) -> None:
         """Draw until no sample that is still to be drawn has anything to do with what is before `end` [ns]."""
         raise NotImplementedError
 
-    def messages(self, rows: Integers) -> Integers:
+    def messages(self, which: slice) -> Integers:
         """Of these samples, in the order in which they are exchanged, shape (n, number, 4)."""
-        links = [*self.incoming, *self.outgoing]
-        result = np.empty((len(rows), len(links), 4), dtype=np.int64)
+        numbers, links = self.numbers[which], [*self.incoming, *self.outgoing]
+        result = np.empty((len(numbers), len(links), 4), dtype=np.int64)
         for i, link in enumerate(links):
-            result[:, i, 0], result[:, i, 1] = link.index, rows[:, 0]
-            result[:, i, 2:] = rows[:, MESSAGES + 2 * i : MESSAGES + 2 * i + 2]
+            result[:, i, 0], result[:, i, 1] = link.index, numbers
+            for j in range(2):
+                result[:, i, 2 + j] = self._columns[_OF_LINKS + 2 * i + j][which]
         return result
+
+    def drop_before(self, end: int) -> None:
+        """Drop the samples before `end` [ns]."""
+        first = int(np.searchsorted(self.times, end))
+        self._columns = [column[first:] for column in self._columns]
+
+    def _append(self, numbers: Integers, times: Integers, following: Integers, links: Sequence[Integers]) -> None:
+        """Add samples; `links` has two columns for each link: when it is measured or sent, and when that arrives."""
+        drawn = (numbers, times, following, *links)
+        self._columns = [np.concatenate([a, b]) if len(a) else b for a, b in zip(self._columns, drawn, strict=True)]
 
     def _moved(self, times: Integers, first: int, before: int) -> Integers:
         """Samples from number `first` on, on points of who is read; `before` is the one before them [ns]."""
@@ -139,8 +179,7 @@ class SampledComponent(TimedComponent):
         super().__init__(name, plan, links, fixed, refused)
         sampling = plan.system.components[name].sampling
         assert sampling is not None
-        ratio = Fraction(repr(float(sampling.clock_ratio)))
-        self._grid = Grid(exact_nanoseconds(sampling.offset) / ratio, exact_nanoseconds(sampling.period) / ratio)
+        self._grid = _grid(sampling.offset, sampling.period, sampling.clock_ratio)
         generator = partial(streams.of, self._name, JITTER)
         self._late = lateness(sampling.jitter, sampling.jitter_distribution, generator)
         self._k, self._next = 0, self._times(0, 1, -1)
@@ -156,14 +195,21 @@ class SampledComponent(TimedComponent):
             last = max(self._grid.index_from(end + self._ahead), self._k + 1)
             times = np.append(self._next, self._times(self._k + 1, last + 1, int(self._next[0])))
             now, then, k = times[:-1], times[1:], np.arange(self._k, last)
-            columns: list[Integers] = [k, now, then]
+            columns: list[Integers] = []
             for link in self.incoming:
                 columns += link.measurements(now)
             for link in self.outgoing:
                 sent = then if link.jacobi else now
                 columns += [sent, link.messages(sent)]
-            self.rows = np.vstack([self.rows, np.column_stack(columns)])
+            self._append(k, now, then, columns)
             self._k, self._next = last, times[-1:]
+
+
+@lru_cache(64)  # the runs of a study have most of them in common
+def _grid(offset: float, period: float, ratio: float) -> Grid:
+    """Of a clock that believes so many seconds to pass in one."""
+    exact = Fraction(repr(float(ratio)))
+    return Grid(exact_nanoseconds(offset) / exact, exact_nanoseconds(period) / exact)
 
 
 class ScheduledComponent(TimedComponent):
@@ -194,31 +240,31 @@ class ScheduledComponent(TimedComponent):
         end += self._ahead
         lookahead.advance_to(end)
         while True:
-            self._take(min(samples.known(lookahead.is_complete), samples.before(end)))
+            self._draw(min(samples.known(lookahead.is_complete), samples.before(end)))
             if lookahead.is_complete or (len(samples.times) and samples.times[0] >= end):
                 return
             lookahead.advance()
 
-    def _take(self, count: int) -> None:
+    def _draw(self, count: int) -> None:
         """So many more are drawn."""
         if not count:
             return
         times, then = self._samples.take(count)
         now = self._moved(times, self._k, self._before)
-        columns: list[Integers] = [np.arange(self._k, self._k + count), now, self._moved(then, self._k + 1, -1)]
+        following, columns = self._moved(then, self._k + 1, -1), list[Integers]()
         for link in self.incoming:
             columns += link.measurements(now)
         for link, messages in zip(self.outgoing, self._sent):
             if messages is None:
-                sent = columns[2] if link.jacobi else now
+                sent = following if link.jacobi else now
                 columns += [sent, link.messages(sent)]
             else:
                 sent, own = messages.take(count)
                 sent, own = np.maximum(sent, now), np.where(own < 0, -1, np.maximum(own, now))
                 columns += [sent, link.arrivals(own)]
-        self.rows = np.vstack([self.rows, np.column_stack(columns)])
+        self._append(np.arange(self._k, self._k + count), now, following, columns)
         self._k, self._before = self._k + count, int(now[-1])
 
 
-TIME, NEXT, MESSAGES = 1, 2, 3
-"""Columns of a row of `SampledComponent`"""
+_OF_LINKS = 3
+"""Columns before those of the links"""

@@ -1,6 +1,7 @@
 """What happens in a span of time: what is regular of it, which many runs share, and what a run has of its own."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -32,40 +33,50 @@ class Instants:
 
 
 class InstantCollector:
-    """Instants as they are found, and who is stepped to them: a component in continuous time by its place, or nobody
-    (-1).
-    """
+    """Instants as they are found, and who is stepped to them: components in continuous time by their places."""
 
     def __init__(self, count: int) -> None:
         """`count` components are in continuous time."""
         self._count = count
         self._times: list[Integers] = [np.zeros(0, dtype=np.int64)]
-        self._places: list[Integers] = [np.full((), -1)]
+        self._places: list[Any] = [[]]
+        """of all times that were added together, or of each of them one"""
 
-    def add(self, times: Integers, places: int | Integers = -1) -> None:
-        """Something happens at each of these times, to which the component in this place, or in each, is stepped."""
+    def add(self, times: Integers, *places: int) -> None:
+        """Something happens at each of these times, in order, to which the components in these places are stepped; -1
+        is none. The same array once more adds to what happens then.
+        """
+        if times is not self._times[-1]:
+            self._times.append(times)
+            self._places.append([])
+        self._places[-1] += [place for place in places if place >= 0]
+
+    def add_each(self, times: Integers, places: Integers) -> None:
+        """The same, of each the component in one place."""
         self._times.append(times)
-        self._places.append(np.asarray(places))
+        self._places.append(places)
 
     def instants(self) -> Instants:
         """All of them."""
-        times = np.concatenate(self._times)
-        order = np.argsort(times, kind="stable")  # what is in order already is only merged
-        times = times[order]
-        first = np.empty(len(times), dtype=np.bool_)
-        first[0:1] = True
-        np.not_equal(times[1:], times[:-1], out=first[1:])
-        instants = times[first]
-        which = np.empty(len(times), dtype=np.int64)
-        which[order] = np.cumsum(first) - 1
+        times = instants = np.concatenate(self._times)
+        which = np.arange(len(times))
+        if not (times[1:] > times[:-1]).all():
+            order = np.argsort(times, kind="stable")  # what is in order already is only merged
+            times = times[order]
+            first = np.empty(len(times), dtype=np.bool_)
+            first[0:1] = True
+            np.not_equal(times[1:], times[:-1], out=first[1:])
+            instants = times[first]
+            which[order] = np.cumsum(first) - 1
         table = np.zeros((len(instants), self._count), dtype=np.bool_)
         begin = 0
         for added, places in zip(self._times, self._places, strict=True):
             rows, begin = which[begin : begin + len(added)], begin + len(added)
-            if places.ndim:
-                rows, places = rows[places >= 0], places[places >= 0]
-            if places.ndim or places >= 0:
-                table[rows, places] = True
+            if isinstance(places, list):
+                for place in places:
+                    table[rows, place] = True
+            else:
+                table[rows[places >= 0], places[places >= 0]] = True
         return Instants(times=instants, stepped=table)
 
 

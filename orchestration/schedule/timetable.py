@@ -17,9 +17,6 @@ from orchestration.schedule.fixed_step import FixedStep, Refusal
 from orchestration.schedule.frame import Frame
 from orchestration.schedule.lookahead import Lookahead
 from orchestration.schedule.random_timing import (
-    MESSAGES,
-    NEXT,
-    TIME,
     Link,
     SampledComponent,
     ScheduledComponent,
@@ -64,7 +61,7 @@ class Timetable:
         self._posted = {i: [self._links[j] for j in own if frame.sender[j] == i] for i in frame.points}
         self._over_networks = [self._links[j] for j in self._plan.posted if j in self._plan.over_networks]
         self._posted_before = dict.fromkeys((link.index for link in self._over_networks), 0)
-        self._on_their_way: Integers = np.zeros((0, _ORDER + 4), dtype=np.int64)
+        self._on_their_way = _NO_MESSAGES
         self._ahead: Schedule | None = None
 
     def _timed(self, name: str, streams: Streams) -> TimedComponent:
@@ -118,10 +115,10 @@ class Timetable:
         found = InstantCollector(len(self._frame.continuous))
         posted, later = self._post(begin, end, found)
         measured = self._measure(begin, end, found)
-        samples, exchanged, sent = self._sample(begin, end, found)
+        sampled, samples, exchanged, sent = self._sample(end, found)
         arrivals = self._arrive(end, [later, sent], found)
         for task in self._tasks:
-            task.rows = task.rows[task.rows[:, TIME] >= end]
+            task.drop_before(end)
         return Span(
             end=end,
             regular=self._frame.regular(begin, end),
@@ -129,15 +126,14 @@ class Timetable:
             posted=posted,
             measured=measured,
             arrivals=arrivals,
-            samples=np.ascontiguousarray(samples[:, 1:]),
-            sampled=np.ascontiguousarray(samples[:, 0]),
+            samples=samples,
+            sampled=sampled,
             exchanged=exchanged,
         )
 
     def _post(self, begin: int, end: int, found: InstantCollector) -> tuple[Integers, Integers]:
         """Messages of components in continuous time to one another: all in order, and those that arrive later."""
-        tables = [np.zeros((0, _ORDER + 4), dtype=np.int64)]
-        later = [np.zeros((0, _ORDER + 4), dtype=np.int64)]
+        tables, later = [_NO_MESSAGES], [_NO_MESSAGES]
         for component, links in self._posted.items():
             if not links:
                 continue
@@ -156,7 +152,8 @@ class Timetable:
             tables.append(sent.table())
             later.append(self._under_way(sent, found))
         table = np.concatenate(tables)
-        table = table[np.lexsort((table[:, 7], table[:, 6], table[:, 4]))]
+        if len(tables) > 2:
+            table = table[np.lexsort((table[:, 7], table[:, 6], table[:, 4]))]
         return np.ascontiguousarray(table[:, :4]), np.concatenate(later)
 
     def _networked(self, link: Link, end: int) -> tuple[Integers, Integers, Integers]:
@@ -177,56 +174,63 @@ class Timetable:
 
     def _measure(self, begin: int, end: int, found: InstantCollector) -> Integers:
         """What is measured for samples to come."""
-        tables = [np.zeros((0, 4), dtype=np.int64)]
+        tables = [_NO_MESSAGES[:, :4]]
         for task in self._tasks:
             for i, link in enumerate(task.incoming):
                 if link.index in self._plan.read_ahead:
-                    taken = task.rows[:, MESSAGES + 2 * i]
-                    now = (taken >= begin) & (taken < end)
-                    tables.append(task.messages(task.rows[now])[:, i])
+                    taken = task.measured(i)
+                    now = slice(*np.searchsorted(taken, (begin, end)).tolist())
+                    tables.append(task.messages(now)[:, i])
                     found.add(taken[now], self._frame.place[self._frame.sender[link.index]])
         table = np.concatenate(tables)
         return table[np.argsort(table[:, 2], kind="stable")]
 
-    def _sample(self, begin: int, end: int, found: InstantCollector) -> tuple[Integers, Integers, Integers]:
-        """Samples with their time before them, what they exchange, and of what they send that which arrives later."""
-        later = [np.zeros((0, _ORDER + 4), dtype=np.int64)]
-        drawn, exchanged = [np.zeros((0, 6), dtype=np.int64)], [np.zeros((0, 0, 4), dtype=np.int64)]
+    def _sample(self, end: int, found: InstantCollector) -> tuple[Integers, Integers, Integers, Integers]:
+        """Times of samples, these, what they exchange, and of what they send that which arrives later."""
+        times, samples, exchanged, later = [_NO_MESSAGES[:, 0]], [_NO_MESSAGES[:, :5]], [_NO_MESSAGES[:, :4].reshape(0, 0, 4)], [_NO_MESSAGES]
+        sender, place = self._frame.sender, self._frame.place
         for task in self._tasks:  # those that come first at one instant come first
-            times = task.rows[:, TIME]
-            found.add(times[(times >= begin) & (times < end)])
-            rows = task.rows[(times >= begin) & (times < min(end, self.stop))]
-            for link in task.incoming:
-                if link.index not in self._plan.read_ahead:
-                    found.add(rows[:, TIME], self._frame.place[self._frame.sender[link.index]])
-            messages, middle = task.messages(rows), len(task.incoming)
-            samples = np.empty((len(rows), 6), dtype=np.int64)
-            samples[:, 0], samples[:, 1], samples[:, 2], samples[:, 3] = rows[:, TIME], task.index, rows[:, NEXT], 0
-            samples[:, 4:] = middle, messages.shape[1]
-            drawn.append(samples)
+            to_end, count = np.searchsorted(task.times, (end, min(end, self.stop))).tolist()
+            now = task.times[:count]
+            now_read = [link.index for link in task.incoming if link.index not in self._plan.read_ahead]
+            found.add(now, *place[sender[now_read]].tolist())
+            for i, link in enumerate(task.outgoing):
+                sent = task.sent(i)[:count], task.arrivals(i)[:count]
+                later.append(self._under_way(_Sent(link, task.numbers[:count], *sent, now, 1, task.rank, i), found))
+            found.add(task.times[count:to_end])
+            messages = task.messages(slice(count))
+            table = np.empty((count, 5), dtype=np.int64)
+            for i, column in enumerate((task.index, task.following[:count], 0, len(task.incoming), messages.shape[1])):
+                table[:, i] = column
+            times.append(now)
+            samples.append(table)
             exchanged.append(messages)
-            for place, link in enumerate(task.outgoing):
-                _, k, sent, arrivals = messages[:, middle + place].T
-                later.append(self._under_way(_Sent(link, k, sent, arrivals, samples[:, 0], 1, task.rank, place), found))
-        return *_one_after_the_other(np.concatenate(drawn), exchanged), np.concatenate(later)
+        return *_one_after_the_other(_concatenated(times), _concatenated(samples), exchanged), _concatenated(later)
 
     def _under_way(self, sent: "_Sent", found: InstantCollector) -> Integers:
         """Messages that arrive later; for those that arrive at once their receiver is stepped."""
-        found.add(sent.time[sent.arrival == sent.time], self._frame.place[self._frame.receiver[sent.link.index]])
-        return sent.table(sent.arrival > sent.time)
+        at_once = sent.arrival == sent.time
+        found.add(
+            sent.time if at_once.all() else sent.time[at_once], self._frame.place[self._frame.receiver[sent.link.index]]
+        )
+        return _NO_MESSAGES if at_once.all() else sent.table(sent.arrival > sent.time)
 
     def _arrive(self, end: int, more: Sequence[Integers], found: InstantCollector) -> Integers:
         """Messages that arrive before `end`; the others stay on their way."""
-        table = np.concatenate([self._on_their_way, *more])
+        table = _concatenated([self._on_their_way, *more])
+        if not len(table):
+            return table[:, :4]
         now = table[:, 3] < end
         self._on_their_way, table = table[~now], table[now]
-        found.add(table[:, 3], self._frame.place[self._frame.receiver[table[:, 0]]])
+        found.add_each(table[:, 3], self._frame.place[self._frame.receiver[table[:, 0]]])
         return np.ascontiguousarray(table[np.lexsort(table[:, [1, 7, 6, 5, 4, 3]].T), :4])
 
 
 _ORDER = 4
 """Columns by which messages are put in order: the instant at which they were sent, whether by a sample, by whom, and
 which of those of one sender they are"""
+_NO_MESSAGES: Integers = np.zeros((0, _ORDER + 4), dtype=np.int64)
+"""No messages"""
 
 
 class _Sent(NamedTuple):
@@ -251,22 +255,30 @@ class _Sent(NamedTuple):
         return rows
 
 
-def _one_after_the_other(samples: Integers, exchanged: Sequence[Integers]) -> tuple[Integers, Integers]:
+def _concatenated(tables: Sequence[Integers]) -> Integers:
+    """All rows, one table after another; the only one that is not empty is not copied."""
+    some = [table for table in tables if len(table)]
+    return np.concatenate(some or tables[:1]) if len(some) != 1 else some[0]
+
+
+def _one_after_the_other(
+    times: Integers, samples: Integers, exchanged: Sequence[Integers]
+) -> tuple[Integers, Integers, Integers]:
     """Samples in order of time, and what they exchange: their last three columns say from where on in it.
 
-    They begin as 0, the number that is received, and that of all; `exchanged` has the messages task after task.
+    These begin as 0, the number that is received, and that of all; `exchanged` has the messages task after task.
     """
-    if sum(len(messages) > 0 for messages in exchanged) <= 1:
-        table = np.concatenate([messages.reshape(-1, 4) for messages in exchanged])
-        samples[:, 3:] += (np.cumsum(samples[:, 5]) - samples[:, 5])[:, None]
-        return samples, table
-    order = np.argsort(samples[:, 0], kind="stable")
+    alone = sum(len(messages) > 0 for messages in exchanged) <= 1
+    order = slice(None) if alone else np.argsort(times, kind="stable")
     begins = np.empty(len(samples), dtype=np.int64)
-    begins[order] = np.cumsum(samples[order, 5]) - samples[order, 5]
-    table, first = np.empty((int(samples[:, 5].sum()), 4), dtype=np.int64), 0
+    begins[order] = np.cumsum(samples[order, 4]) - samples[order, 4]
+    for column in (2, 3, 4):
+        samples[:, column] += begins
+    if alone:
+        return times, samples, _concatenated([messages.reshape(-1, 4) for messages in exchanged])
+    table, first = np.empty((sum(messages.size // 4 for messages in exchanged), 4), dtype=np.int64), 0
     for messages in exchanged:
         places = begins[first : first + len(messages), None] + np.arange(messages.shape[1])
         table[places] = messages
         first += len(messages)
-    samples[:, 3:] += begins[:, None]
-    return samples[order], table
+    return times[order], samples[order], table

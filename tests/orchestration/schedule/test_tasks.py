@@ -206,7 +206,7 @@ def test_while_a_task_is_starved_others_are_drawn_a_window_at_a_time():
     )  # fmt: skip
     timetable, drawn, seen = Timetable(what, Streams(0)), 0, 0
     while (found := timetable.next_schedule(100)) is not None:
-        drawn, seen = max(drawn, *(len(each.rows) for each in timetable._tasks)), seen + len(found.samples)
+        drawn, seen = max(drawn, *(len(each.times) for each in timetable._tasks)), seen + len(found.samples)
     assert seen == 5000
     assert drawn < 200
 
