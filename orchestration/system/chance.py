@@ -1,11 +1,11 @@
-"""Whether a system leaves anything to chance."""
+"""Whether the runs of a system depend on their seed."""
 
 from orchestration.system import placement
 from orchestration.system.model import System
 
 
 def is_random(system: System) -> bool:
-    """Whether seeds make a difference to its runs."""
+    """Whether the seed changes its runs."""
     return (
         has_random_timing(system)
         or any(any(x.noise.values()) for x in system.connections)
@@ -14,7 +14,7 @@ def is_random(system: System) -> bool:
 
 
 def has_random_timing(system: System) -> bool:
-    """Whether seeds make a difference to when its components are stepped and what arrives."""
+    """Whether the seed changes when its components are stepped, or which messages arrive and when."""
     return (
         any(one.sampling is not None and one.sampling.is_random for one in system.components.values())
         or any(x.is_random for x in system.connections)

@@ -1,4 +1,4 @@
-"""Holds a system to what its FMUs say of themselves, before any of them is loaded."""
+"""Checks a system against the model descriptions of its FMUs, before any of them is loaded."""
 
 import difflib
 from collections.abc import Iterable, Mapping
@@ -16,7 +16,7 @@ from orchestration.system.variable_names import component_of, variable_of
 
 
 def check(system: System, models: Mapping[str, Model]) -> None:
-    """Raise `UsageError` for the first thing that cannot be, in one line that names the place and what is valid."""
+    """Raise `UsageError` for the first thing that is invalid, in one line that names the place and what is valid."""
     for name, component in system.components.items():
         place = f"components.{name}"
         for parameter in component.parameters:
@@ -52,14 +52,14 @@ def check(system: System, models: Mapping[str, Model]) -> None:
 
 
 def check_parameter(system: System, models: Mapping[str, Model], name: str, parameter: str) -> None:
-    """Raise `UsageError` for a parameter that a component's FMU does not have, or a value that it cannot take."""
+    """Raise `UsageError` for a parameter that the FMU of a component does not have, or for an invalid value."""
     value, fed = system.components[name].parameters[parameter], f"{name}.{parameter}"
     is_fed = any(fed in x.end for x in system.connections)
     expect_parameter(f"components.{name}.parameters.{parameter}", models[name], parameter, value, is_fed=is_fed)
 
 
 def _check_divergence(condition: str, models: Mapping[str, Model]) -> None:
-    """No part of the condition is a Real signal by itself, which would hold wherever it is not zero."""
+    """Raise `UsageError` for a Real signal as a part of the condition: it would hold wherever it is not zero."""
     for part in parts(parse(condition)):
         name = part.text if isinstance(part, Name) else ""
         model = models.get(component_of(name))
@@ -69,9 +69,9 @@ def _check_divergence(condition: str, models: Mapping[str, Model]) -> None:
 
 
 def recorded_variables(system: System, models: Mapping[str, Model]) -> dict[str, tuple[str, ...]]:
-    """What is recorded of each component beside what is exchanged: as the file says, or all outputs and local Reals.
+    """The variables to record of each component beside exchanged ones: its `record`, or all outputs and local Reals.
 
-    Constants are not, but what an expression names is recorded in any case.
+    Without `record`, constants are left out. A variable in an expression is recorded in any case.
     """
     named = {name for _, expression in expressions(system) for name in names(parse(expression))}
     found = {}
@@ -123,7 +123,7 @@ def _check_pair(place: str, x: Connection, start: End, end: End) -> None:
 def _check_units(
     place: str, start: str, sender: Model, output: Variable, end: str, receiver: Model, into: Variable
 ) -> None:
-    """Units that differ need a conversion, which is proposed; two spellings of one unit do not."""
+    """Raise `UsageError`, proposing a conversion, for units that differ by more than their spelling."""
     try:
         found = conversion(sender, output, receiver, into)
     except OtherQuantity:
@@ -151,7 +151,7 @@ def _expect_input(place: str, end: str, found: End) -> Variable:
 
 
 def _lacks(model: Model, causality: str, missing: list[str]) -> str:
-    """What a model does not have to be an end of a connection."""
+    """The variables that a model lacks as ends of a connection, with those that it has."""
     names = model.names(causality)
     near = difflib.get_close_matches(missing[0], names, n=1)
     hint = f"; did you mean {near[0]}?" if near else ""
@@ -170,7 +170,7 @@ def _article(variable: Variable) -> str:
 
 
 def expect_parameter(place: str, model: Model, name: str, value: Parameter, *, is_fed: bool = False) -> None:
-    """Raise `UsageError`, naming the `place`, for what a model has no parameter for, or a value that it cannot take."""
+    """Raise `UsageError`, naming the `place`, for a parameter that a model does not have, or for an invalid value."""
     variable = model.variable(name, place)
     if not (variable.is_settable or variable.is_constant) or is_fed:
         expected = "a parameter or an input that nothing is connected to"

@@ -1,4 +1,4 @@
-"""The words that a key can have, where it has only some; the command line lists them, and loads no record for it."""
+"""The values of keys that have a few words as values; the command line lists them without loading any record."""
 
 from typing import Literal
 

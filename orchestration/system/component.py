@@ -24,16 +24,14 @@ class Component:
     """The distance of the communication points [s] of a component in continuous time; a component has either this or
     `sampling`."""
     sampling: Sampling | None = None
-    """When a digital task runs; a component has either this or `step`, and none of them if it is the task of a
-    computer."""
+    """When a digital task runs; a component has either this or `step`, or neither if it is the task of a computer."""
     tolerance: float | None = None
-    """The relative tolerance of the FMU's own solver; without it, that of the experiment that the FMU declares,
-    if any."""
+    """The relative tolerance of the FMU's solver; default: that of the experiment that the FMU declares, if any."""
     align: Align = "exact"
-    """What becomes of an instant between two points of a component that takes its own fixed step only: an error
+    """The treatment of an instant between two points of a component that only takes its own fixed step: an error
     (exact), or it moves to the next point (next)."""
     record: tuple[str, ...] | None = None
-    """The variables to record beside what is exchanged; without it, all outputs and local Reals."""
+    """The variables to record beside the exchanged ones; default: all outputs and local Reals."""
 
     def __post_init__(self) -> None:
         if self.tolerance is not None:

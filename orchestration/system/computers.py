@@ -1,4 +1,4 @@
-"""What computers and networks are, as data: the tasks that share a processor, the messages that share a bus."""
+"""Computers and networks as data: the tasks that share a processor, the messages that share a bus."""
 
 from collections.abc import Mapping
 from dataclasses import field
@@ -18,10 +18,10 @@ from orchestration.system.times import is_at_least, nanoseconds
 
 @record()
 class Arrivals:
-    """When something comes that has no period."""
+    """Random arrivals, in place of a period."""
 
     poisson: float
-    """How many come a second on average; the gaps between them are drawn from an exponential distribution."""
+    """The mean number of arrivals per second; the gaps between them are exponentially distributed."""
 
     def __post_init__(self) -> None:
         require_positive(self, "poisson")
@@ -29,52 +29,52 @@ class Arrivals:
 
     @property
     def gap(self) -> float:
-        """From one to the next on average [s]."""
+        """The mean gap between arrivals [s]."""
         return 1.0 / self.poisson
 
 
 @record()
 class Task:
-    """What a computer does again and again: the steps of a component, or load. Times in seconds.
+    """A task of a computer: the steps of a component, or load. Times in seconds.
 
-    It is released every `period`, by `arrivals` by chance, or `on` the messages of a connection.
+    It is released every `period`, by random `arrivals`, or `on` the messages of a connection.
     """
 
     component: str | None = None
-    """The component whose steps are its jobs, which has neither `sampling` nor `step` then; without one it is load."""
+    """The component whose steps are its jobs, which has neither `sampling` nor `step` then; default: none, for load."""
     period: float | None = None
-    """The time T from one release to the next [s], in the computer's own time: release k is at offset + kT."""
+    """The time T from one release to the next [s], in the computer's time: release k is at offset + kT."""
     offset: float = 0.0
-    """The time of the first release [s], in the computer's own time."""
+    """The time of the first release [s], in the computer's time."""
     jitter: Varying = 0.0
-    """The largest lateness of a release [s], drawn for each, or how it is distributed; it is less than the period."""
+    """The largest lateness of a release [s], drawn for each, or its distribution; it is less than the period."""
     arrivals: Arrivals | None = None
-    """How releases come by chance, in place of a period."""
+    """Random releases, in place of a period."""
     on: str | None = None
     """The connection whose arriving messages release it, in place of a period."""
     priority: int = 1
     """The priority: 1 is more urgent than 2; equal ones by release, then by their order in the file."""
     execution: Varying = 0.0
-    """The processor time that a job takes [s], or how it is distributed."""
+    """The processor time that a job takes [s], or its distribution."""
     deadline: float | None = None
-    """The time from the nominal release to when a job should be done [s]; without it, the period, or the mean time
-    between arrivals."""
+    """The time from the nominal release to when a job should be done [s]; default: the period, or the mean time between
+    arrivals."""
     read: Read = "start"
-    """Which inputs it computes with: those of when the job begins (start), or of its release."""
+    """When it reads its inputs: when the job starts (start), or at its release."""
     write: Write = "end"
-    """When its outputs are sent: when the job is done (end), or at its deadline (logical execution time)."""
+    """When it sends its outputs: when the job is done (end), or at its deadline (logical execution time)."""
     overrun: Overrun = "queue"
-    """What becomes of a release while a job is not done: it waits (queue), or makes no job (skip); or the late job ends
-    at its deadline without output (abort)."""
+    """The treatment of a release while a job is not done: it waits (queue), or makes no job (skip); or the late job is
+    ended at its deadline without output (abort)."""
 
     @property
     def due(self) -> float:
-        """The deadline that it has [s]."""
+        """The deadline in effect [s]."""
         return _due(self)
 
     @property
     def is_random(self) -> bool:
-        """Whether seeds make a difference to its jobs."""
+        """Whether the seed changes its jobs."""
         return spreads(self.jitter) or self.arrivals is not None or is_random(self.execution)
 
     def __post_init__(self) -> None:
@@ -91,12 +91,12 @@ class Computer:
     """A processor and the tasks that share it."""
 
     scheduling: Scheduling = "fixed-priority"
-    """Which of the jobs that are there runs: that of the most urgent priority, of the earliest deadline, or the one
-    that came first."""
+    """Which of the waiting jobs runs: that of the most urgent priority, of the earliest deadline, or the one that came
+    first."""
     preemptive: bool = True
-    """Whether a job that comes first takes the processor from one that runs."""
+    """Whether a job of higher rank preempts the one that runs."""
     switch: float = 0.0
-    """What it takes to begin or resume a job [s]."""
+    """The overhead of starting or resuming a job [s]."""
     clock_ratio: float = 1.0
     """The seconds r that the computer believes pass per true second."""
     tasks: Mapping[str, Task] = field(default_factory=dict)
@@ -116,44 +116,44 @@ class Computer:
 
 @record()
 class Message:
-    """What is sent over a network: the messages of a connection, or load of others. Times in seconds."""
+    """The messages of a connection over a network, or load. Times in seconds."""
 
     connection: str | None = None
-    """The connection whose messages these are, sent when its sender writes; without one they are load of others."""
+    """The connection whose messages these are, sent when its sender writes; default: none, for load."""
     bytes: int
-    """The length of what it carries."""
+    """The length of its data."""
     identifier: int | None = None
     """Of CAN: the identifier, of 11 bits; the lowest is sent first."""
     slot: int | None = None
-    """Of TDMA: the slot of the cycle that it is sent in, counted from 0."""
+    """Of TDMA: the slot of the cycle in which it is sent, counted from 0."""
     priority: int = 1
     """Of Ethernet: the priority; 1 is more urgent than 2."""
     start: str | None = None
-    """Of Ethernet: the node that it comes from (`from` in files); of a connection, the computer of its sender, or the
+    """Of Ethernet: the sending node (`from` in files); default for a connection: the computer of its sender, or the
     sender itself."""
     end: str | None = None
-    """Of Ethernet: the node that it goes to (`to` in files); of a connection, the computer of its receiver, or the
+    """Of Ethernet: the receiving node (`to` in files); default for a connection: the computer of its receiver, or the
     receiver itself."""
     period: float | None = None
     """The time from one message to the next [s]: of load, and of a connection from a component in continuous time."""
     offset: float = 0.0
-    """The time of the first one [s]."""
+    """The time of the first message [s]."""
     jitter: Varying = 0.0
-    """The largest lateness of one [s], drawn for each, or how it is distributed; it is less than the period."""
+    """The largest lateness of a message [s], drawn for each, or its distribution; it is less than the period."""
     arrivals: Arrivals | None = None
-    """How they come by chance, in place of a period."""
+    """Random arrivals, in place of a period."""
     deadline: float | None = None
-    """The time in which one should be received [s]; without it, the period or the mean time between arrivals, if it has
-    one."""
+    """The time in which a message should be received [s]; default: the period or the mean time between arrivals, if it
+    has one."""
 
     @property
     def is_random(self) -> bool:
-        """Whether seeds make a difference to when it is queued."""
+        """Whether the seed changes when it is queued."""
         return spreads(self.jitter) or self.arrivals is not None
 
     @property
     def due(self) -> float | None:
-        """The deadline that it has [s]."""
+        """The deadline in effect [s]."""
         return _due(self) if self.deadline or self.period or self.arrivals else None
 
     def __post_init__(self) -> None:
@@ -175,17 +175,17 @@ class Network:
     """A bus or a switch, and the messages that share it."""
 
     kind: NetworkKind
-    """What it is."""
+    """The kind of network."""
     bit_rate: float
-    """Bits a second."""
+    """Bits per second."""
     data_bit_rate: float | None = None
-    """Of CAN FD: bits a second in the data phase of a frame."""
+    """Of CAN FD: bits per second in the data phase of a frame."""
     stuffing: Stuffing = "longest"
-    """Of CAN: how many stuff bits a frame has: as many as there can be (longest), or none."""
+    """Of CAN: the number of stuff bits of a frame: the largest possible (longest), or none."""
     slots: tuple[float, ...] = ()
     """Of TDMA: the lengths of the slots of a cycle [s]."""
     latency: float = 0.0
-    """Of Ethernet: what the switch takes from the last bit in until a frame can go out [s]."""
+    """Of Ethernet: the time in the switch from the last bit in until a frame can go out [s]."""
     error: float = 0.0
     """The probability that a frame is corrupted, and sent again."""
     messages: Mapping[str, Message] = field(default_factory=dict)
@@ -196,9 +196,9 @@ class Network:
         require_not_negative(self, "latency")
         fits = is_finite(self.error) and 0.0 <= self.error < 1.0
         require(fits, "error", self.error, "a probability in [0, 1): a frame that is always corrupted never arrives")
-        self._expect_own("data_bit_rate", self.data_bit_rate is None, "can-fd")
-        self._expect_own("slots", not self.slots, "tdma")
-        self._expect_own("latency", self.latency == 0.0, "ethernet")
+        self._expect_only_with("data_bit_rate", self.data_bit_rate is None, "can-fd")
+        self._expect_only_with("slots", not self.slots, "tdma")
+        self._expect_only_with("latency", self.latency == 0.0, "ethernet")
         if self.kind == "can-fd":
             require(self.data_bit_rate is not None, "data_bit_rate", "none", "bits a second, for can-fd")
             require_positive(self, "data_bit_rate")
@@ -209,7 +209,7 @@ class Network:
             require(fits, "slots", length, "at least a nanosecond each")
         self._expect_messages()
 
-    def _expect_own(self, name: str, is_absent: bool, kind: str) -> None:
+    def _expect_only_with(self, name: str, is_absent: bool, kind: str) -> None:
         require(is_absent or self.kind == kind, name, getattr(self, name), f"none but with kind {kind}")
 
     def _expect_messages(self) -> None:
@@ -256,7 +256,7 @@ def _expect_releases(of: Any, ways: str) -> None:
 
 
 def require_less(place: str, jitter: Varying, period: float) -> None:
-    """A lateness is less than a period [s]; of a trace that is known when it is read."""
+    """Raise `UsageError` for a lateness of a `period` [s] or more."""
     require(highest(jitter) < period, place, highest(jitter), f"less than the period of {period:g} s")
 
 

@@ -20,34 +20,34 @@ from orchestration.system.variable_names import component_of, variable_of
 
 @record()
 class Connection:
-    """One message from a component to another: its signals travel together; times in seconds."""
+    """A message from one component to another, whose signals travel together; times in seconds."""
 
     name: str
-    """The name by which paths and events call it; in a file without one, its index."""
+    """The name by which paths and events call it; default in a file: its index."""
     start: tuple[str, ...]
     """The outputs that it carries, as COMPONENT.VARIABLE, of one component (`from` in files)."""
     end: tuple[str, ...]
     """As many inputs of one component, in the same order (`to` in files)."""
     order: Order = "gauss-seidel"
-    """Whether a message can be there at the instant at which it was sent (gauss-seidel), or at the next one of its
-    sender (jacobi); in a file without it, what `order` at the top says."""
+    """Whether a message can arrive at the instant at which it is sent (gauss-seidel), or at the next one of its sender
+    (jacobi); default in a file: `order` at the top."""
     delay: Varying = 0.0
-    """The time d from sending to arrival [s], or how it is distributed; it may exceed a period, and messages never
-    overtake each other."""
+    """The time d from sending to arrival [s], or its distribution; it may exceed a period, and messages never overtake
+    each other."""
     delay_jitter: Varying = 0.0
-    """The largest random addition J_d to the delay [s], or how the addition itself is distributed."""
+    """The largest random addition J_d to the delay [s], or the distribution of the addition itself."""
     jitter_distribution: Spread = "uniform"
-    """How an addition of which the largest is given is drawn over [0, J_d]; normal is centred at J_d/2, cut to the
-    range."""
+    """The distribution over [0, J_d] of an addition whose largest value is given; normal is centred at J_d/2, cut to
+    the range."""
     loss: Varying = 0.0
-    """The probability that a message is lost, or values of 0 and 1, as of a trace: 1 for one that is lost."""
+    """The probability that a message is lost, or values of 0 and 1, as of a trace: 1 for a lost message."""
     burst_length: float | None = None
-    """The mean number of losses in a row (Gilbert-Elliott); without it, losses are independent."""
+    """The mean number of losses in a row (Gilbert-Elliott); default: losses are independent."""
     hold: Hold = "zero"
     """What the receiver gets between arrivals: the last value (zero), or the line through the last two (first)."""
     noise: Mapping[str, float] = field(default_factory=dict)
     """The standard deviation of normal noise by variable of the sender, in its unit; a vector's name stands for its
-    components. In a file, one number is for all of them."""
+    components. In a file, one number applies to all of them."""
     quantisation: Mapping[str, float] = field(default_factory=dict)
     """The step to which a value is rounded, in its unit, by variable of the sender, likewise."""
     scale: float = 1.0
@@ -55,8 +55,8 @@ class Connection:
     offset: float = 0.0
     """What is added after the scale, in the unit of the receiver."""
     stated: bool = False
-    """Whether scale and offset are meant as they are even if they change nothing: then units may differ. In a file
-    they are where one of them is given."""
+    """Whether scale and offset are given, even if they change nothing: then units may differ. In a file, one of them is
+    enough."""
 
     @property
     def converts(self) -> bool:
@@ -65,7 +65,7 @@ class Connection:
 
     @property
     def is_random(self) -> bool:
-        """Whether seeds make a difference to when its messages arrive, and which."""
+        """Whether the seed changes which of its messages arrive, and when."""
         return is_random(self.delay) or spreads(self.delay_jitter) or spreads(self.loss)
 
     def __post_init__(self) -> None:
@@ -88,21 +88,21 @@ class Connection:
             require(len(owners) == 1, what, ", ".join(ends), "variables of one component")
 
     def places(self, name: str) -> list[int]:
-        """Where in a message a variable of the sender is; those of its components for a vector; none if in no place."""
+        """The places in the message of a variable of the sender, or of the components of a vector."""
         carried = map(variable_of, self.start)
         return [i for i, variable in enumerate(carried) if name in (variable, variable.rpartition(".")[0])]
 
     def _vectors(self) -> list[str]:
-        """What it carries, vectors by their name."""
+        """The variables that it carries, vectors by their name."""
         carried = map(variable_of, self.start)
         return list(dict.fromkeys(variable.rpartition(".")[0] or variable for variable in carried))
 
     @property
     def sender(self) -> str:
-        """The component that it comes from."""
+        """The component that sends it."""
         return component_of(self.start[0])
 
     @property
     def receiver(self) -> str:
-        """The component that it goes to."""
+        """The component that receives it."""
         return component_of(self.end[0])

@@ -1,4 +1,4 @@
-"""What becomes what at the end of a connection: types by rule, units by a factor that the file states."""
+"""Conversions at the end of a connection: types by rule, units by a scale and an offset that the file states."""
 
 from dataclasses import dataclass
 
@@ -11,23 +11,23 @@ BECOMES: dict[Kind, tuple[Kind, ...]] = {
     "Enumeration": ("Real", "Integer", "Enumeration"),
     "Boolean": ("Real", "Integer", "Boolean"),
 }
-"""Anything becomes a Real; a Boolean becomes a number; a Real becomes nothing else by itself"""
+"""The kinds of inputs that an output of a kind can be connected to"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Conversion:
-    """What a receiver gets in its own unit is scale · value + offset."""
+    """The receiver gets scale · value + offset, in its unit."""
 
     scale: float = 1.0
     offset: float = 0.0
 
     @property
     def is_none(self) -> bool:
-        """Whether values stay as they are."""
+        """Whether it leaves values unchanged."""
         return self == Conversion()
 
     def then(self, other: "Conversion") -> "Conversion":
-        """This one, and the other on what comes of it."""
+        """This conversion followed by the other."""
         return Conversion(scale=other.scale * self.scale, offset=other.scale * self.offset + other.offset)
 
     def __call__(self, value: float) -> float:
@@ -39,18 +39,18 @@ class Conversion:
 
 
 class OtherQuantity(Exception):
-    """Two units that no factor turns into each other."""
+    """Two units are of different quantities."""
 
 
 def between(one: BaseUnits, other: BaseUnits) -> Conversion:
-    """From one unit to another; raises `OtherQuantity`."""
+    """The conversion from one unit to another; raises `OtherQuantity`."""
     if one.exponents != other.exponents:
         raise OtherQuantity
     return Conversion(scale=one.factor / other.factor, offset=(one.offset - other.offset) / other.factor)
 
 
 def conversion(sender: Model, output: Variable, receiver: Model, into: Variable) -> Conversion | None:
-    """How the unit of an output becomes that of an input; None if an FMU does not define a unit that differs.
+    """The conversion from the unit of an output to that of an input; None if they differ and one is not defined.
 
     Where a unit is missing, nothing is converted. Raises `OtherQuantity`.
     """

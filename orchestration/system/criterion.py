@@ -4,19 +4,19 @@ from orchestration.basics.records import record
 from orchestration.system.requirements import require
 
 DIVERGED, TERMINATED = "diverged", "terminated"
-"""What a run is called, whatever its criterion is, that left the region that counts, or that an FMU has ended"""
+"""Outcomes whatever the criterion is: the run left the region of validity, or an FMU ended it"""
 
 
 @record()
 class Criterion:
-    """What a good run is, as expressions."""
+    """The expressions by which a run is good, or has diverged."""
 
     good: str | None = None
-    """The condition over objectives, at the end, by which a run is good; without it, that is not asked."""
+    """The condition over objectives, at the end, by which a run is good; default: no run is judged."""
     diverged: str | None = None
-    """The condition over signals that ends a run at the first instant at which it holds; without it, none does."""
+    """The condition over signals that ends a run at the first instant at which it holds; default: none."""
     outcomes: tuple[str, str] = ("good", "bad")
-    """What a run is called that is good, and one that is not; one that diverged, or was terminated, is called so."""
+    """The names of a good run and of one that is not; one that diverged or was terminated keeps that name."""
 
     def __post_init__(self) -> None:
         given = ", ".join(self.outcomes)

@@ -1,4 +1,4 @@
-"""A system in words: its components with their rates, its connections with what happens to their messages."""
+"""A system as text: its components with their rates, its connections with their faults."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -18,7 +18,7 @@ from orchestration.system.variable_names import variable_of
 def as_text(system: System, units: Mapping[str, str] = {}, follows: str = "") -> str:
     """Components, connections, sources, objectives with their `units`, and the criterion, a line each, in columns.
 
-    `follows` says what is followed, and by whom.
+    `follows` describes the references and the components that follow them.
     """
     components = [(name, _fmu(c), rate(c), _parameters(c)) for name, c in system.components.items()]
     connections = [
@@ -81,7 +81,7 @@ def _message(of: PlacedMessage) -> tuple[str, ...]:
 
 def _released(of: Task | Message) -> str:
     if of.arrivals is not None:
-        return f"{of.arrivals.poisson:g} a second by chance"
+        return f"{of.arrivals.poisson:g} a second at random"
     parts = [f"every {seconds(of.period or 0.0)}"]
     parts += [f"from {seconds(of.offset)}"] if of.offset else []
     parts += [f"jitter {varying(of.jitter)}"] if of.jitter else []
@@ -99,14 +99,14 @@ def sampled(sampling: Sampling) -> str:
 
 
 def signals(x: Connection) -> str:
-    """What it carries, vectors as a whole; with the names at the receiver where they are others."""
+    """The variables that it carries, vectors as a whole; with the names at the receiver where they differ."""
     names, others = (list(map(variable_of, ends)) for ends in (x.start, x.end))
     carried = ", ".join(_shortened(names))
     return carried if names == others else f"{carried} -> {', '.join(_shortened(others))}"
 
 
 def timing(x: Connection) -> str:
-    """What happens to the messages of a connection; empty if they arrive as they are, at once."""
+    """The faults of a connection; empty if its messages arrive unchanged, at once."""
     parts = [f"delay {varying(x.delay)}"] if x.delay else []
     parts += [f"delay jitter {_largest(x.delay_jitter, x.jitter_distribution)}"] if x.delay_jitter else []
     if isinstance(x.loss, Distribution):
@@ -127,7 +127,7 @@ def timing(x: Connection) -> str:
 
 
 def what(source: Source) -> str:
-    """What a source is."""
+    """The kind of a source, with its main parameter."""
     if source.constant is not None:
         return f"constant {source.constant:g}"
     if source.noise is not None:
@@ -137,19 +137,19 @@ def what(source: Source) -> str:
     return source.signal or f"trajectory of {source.trajectory}"
 
 
-def varying(of: Varying, said: Callable[[float], str] | None = None) -> str:
-    """A time, or how it is distributed; of what is no time each number as it is `said`."""
-    said = said or seconds
+def varying(of: Varying, formatted: Callable[[float], str] | None = None) -> str:
+    """A number, or its distribution; default of `formatted`: as times."""
+    formatted = formatted or seconds
     if not isinstance(of, Distribution):
-        return said(of)
+        return formatted(of)
     if of.uniform is not None:
-        return f"{said(of.uniform[0])} to {said(of.uniform[1])} uniform"
+        return f"{formatted(of.uniform[0])} to {formatted(of.uniform[1])} uniform"
     if of.normal is not None and of.range is not None:
-        mean, deviation = map(said, of.normal)
-        return f"{mean} ± {deviation} normal, cut to {said(of.range[0])} to {said(of.range[1])}"
+        mean, deviation = map(formatted, of.normal)
+        return f"{mean} ± {deviation} normal, cut to {formatted(of.range[0])} to {formatted(of.range[1])}"
     if of.file is not None:
         return f"{of.column} of {of.file.name}, {of.order}"
-    values = [said(value) for value in of.values or ()]
+    values = [formatted(value) for value in of.values or ()]
     if of.probabilities is not None:
         values = [f"{value} ({share:g})" for value, share in zip(values, of.probabilities, strict=True)]
     return f"one of {', '.join(_few(values))}"
@@ -164,7 +164,7 @@ def _few(names: list[str], most: int = 6) -> list[str]:
 
 
 def seconds(value: float) -> str:
-    """A time with the unit that makes it readable."""
+    """A time with a readable unit."""
     for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
         if value >= size or value == 0.0:
             return f"{value / size:.9g} {unit}"
@@ -180,7 +180,7 @@ def _parameters(component: Component) -> str:
 
 
 def _shortened(names: Sequence[str], most: int = 6) -> list[str]:
-    """Scalars of one vector by the vector's name, as `position.{x,y,z}`; no more than `most`."""
+    """Scalars of a vector under its name, as `position.{x,y,z}`; at most `most` names."""
     groups: dict[str, list[str]] = {}
     for name in names:
         stem, dot, last = name.rpartition(".")

@@ -1,4 +1,4 @@
-"""A time that is not the same each time: how it is distributed, or the trace that it is taken from."""
+"""Numbers that vary: their distribution, or the trace that they are taken from."""
 
 import math
 from collections.abc import Hashable, Iterator, Mapping
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from orchestration.basics.simulator import Floats
 
 LEAST_INSIDE = 1e-6
-"""What of a normal distribution has to be within its range: from less its digits are lost"""
+"""The least share of a normal distribution within its range: with less, digits are lost"""
 
 
 @record()
 class Distribution:
-    """A number that is not the same each time: drawn from a distribution or from a measured trace, or a trace as it is.
+    """A number that varies: drawn from a distribution or from a measured trace, or a trace in its order.
 
     Exactly one of `uniform`, `normal`, `values` and `file` is given. No value is below 0; times are in seconds.
     """
@@ -32,16 +32,16 @@ class Distribution:
     range: tuple[float, float] | None = None
     """The least and the largest value of the normal distribution."""
     values: tuple[float, ...] | None = None
-    """The values that there are."""
+    """The possible values."""
     probabilities: tuple[float, ...] | None = None
-    """The probability of each of the values; without them, all are equally likely."""
+    """The probability of each of the values; default: all are equally likely."""
     file: Path | None = None
     """The path of a CSV file with a trace; in a file, relative to its folder."""
     column: str | None = None
     """The column of the file that holds the values."""
     order: TraceOrder = "drawn"
-    """Whether a row is drawn each time, all equally likely (drawn), or the rows come one after the other and begin anew
-    after the last (as recorded)."""
+    """Whether a row is drawn each time, all equally likely (drawn), or the rows are used in order, beginning anew after
+    the last (as recorded)."""
 
     @property
     def lowest(self) -> float:
@@ -57,7 +57,7 @@ class Distribution:
 
     @property
     def mean(self) -> float:
-        """The value on average, likewise."""
+        """The mean value, likewise."""
         if self.uniform is not None:
             return sum(self.uniform) / 2.0
         if self.normal is not None and self.range is not None:
@@ -70,22 +70,22 @@ class Distribution:
 
     @property
     def is_random(self) -> bool:
-        """Whether seeds make a difference, likewise."""
+        """Whether the seed changes the values, likewise."""
         return self.order == "drawn" and self.lowest < self.highest
 
     def table(self) -> "Floats":
-        """The values that there are, one by one, of a distribution that is no formula.
+        """The possible values of a discrete distribution.
 
         Raises `UsageError` for a file that cannot be read, or holds a value below 0.
         """
         if self.file is not None and self.column is not None:
             return _column(self.file, self.column, _state(self.file))
-        import numpy as np  # what only reads a system does without
+        import numpy as np  # not needed to read a system
 
         return np.array(self.values, dtype=np.float64)
 
     def share(self, value: float) -> float:
-        """How much of the normal distribution is below a value."""
+        """The share of the normal distribution below a value."""
         assert self.normal is not None
         mean, deviation = self.normal
         return math.erfc((mean - value) / (deviation * math.sqrt(2.0))) / 2.0
@@ -137,42 +137,42 @@ class Distribution:
 KINDS = ("uniform", "normal", "values", "file")
 
 Varying: TypeAlias = float | Distribution
-"""A number, or what it is drawn from"""
+"""A number, or its distribution"""
 AS_TABLE = "as {uniform = [0.001, 0.004]}"
 
 
 def lowest(of: Varying) -> float:
-    """The least that it can be."""
+    """The least value."""
     return of.lowest if isinstance(of, Distribution) else of
 
 
 def highest(of: Varying) -> float:
-    """The most that it can be."""
+    """The largest value."""
     return of.highest if isinstance(of, Distribution) else of
 
 
 def mean(of: Varying) -> float:
-    """What it is on average."""
+    """The mean value."""
     return of.mean if isinstance(of, Distribution) else of
 
 
 def is_random(of: Varying) -> bool:
-    """Whether seeds make a difference to it."""
+    """Whether the seed changes it."""
     return isinstance(of, Distribution) and of.is_random
 
 
 def spreads(of: Varying) -> bool:
-    """The same of what, given as a number, is the largest value or a probability."""
+    """As `is_random`, for a number that is the largest value or a probability."""
     return of.is_random if isinstance(of, Distribution) else of > 0.0
 
 
 def content(of: Varying) -> Hashable:
-    """What it is told by from any other, a file that has been written anew included."""
+    """A key of the values: the number or distribution, with the state of its file."""
     return (of, None if of.file is None else _state(of.file)) if isinstance(of, Distribution) else of
 
 
 def require_varying(of: object, *names: str, place: str = "") -> None:
-    """The fields `names` are numbers that are finite and not below 0, or are drawn."""
+    """Require the fields `names` to be finite numbers from 0 on, or distributions."""
     for name in names:
         value = getattr(of, name)
         fits = isinstance(value, Distribution) or (is_finite(value) and value >= 0.0)
@@ -185,18 +185,18 @@ def require_varying(of: object, *names: str, place: str = "") -> None:
 
 
 def reads_file(of: Varying) -> bool:
-    """Whether it is known only when a file is read."""
+    """Whether its values are known only when a file is read."""
     return isinstance(of, Distribution) and of.file is not None
 
 
 def require_spread(spread: str, *jitters: Varying, place: str = "") -> None:
-    """How a lateness is drawn is said once: by its distribution, or by words beside its largest value."""
+    """Require the distribution of a lateness to be given once: as such, or by `spread` beside its largest value."""
     fits = spread == "uniform" or not any(isinstance(jitter, Distribution) for jitter in jitters)
     require(fits, f"{place}jitter_distribution", spread, "none beside a jitter that says its distribution itself")
 
 
 def require_losses(of: object, burst_length: float | None, *names: str, place: str = "") -> None:
-    """The fields `names` are probabilities that can come in such bursts, or values of 0 and 1, one by one."""
+    """Require the fields `names` to be probabilities that allow such bursts, or distributions over 0 and 1."""
     for name in names:
         losses = getattr(of, name)
         if not isinstance(losses, Distribution):
@@ -215,7 +215,7 @@ Of = TypeVar("Of")
 
 
 def distributions(of: Any) -> Iterator[tuple[str, Distribution]]:
-    """What is drawn in a part of a system, by the path from there."""
+    """The distributions in a part of a system, each with its path from there."""
     for field in fields(of):
         value = getattr(of, field.name)
         if isinstance(value, Distribution):
@@ -225,7 +225,7 @@ def distributions(of: Any) -> Iterator[tuple[str, Distribution]]:
 
 
 def with_traces_at(of: Of, paths: Mapping[str, Path]) -> Of:
-    """A part of a system with the files of what is drawn in it at other paths, by what it calls them."""
+    """A part of a system with its trace files at other paths; `paths` are by the present ones."""
     changes: dict[str, Any] = {}
     for field in fields(of):  # type: ignore[arg-type]
         value = getattr(of, field.name)
@@ -240,7 +240,7 @@ def with_traces_at(of: Of, paths: Mapping[str, Path]) -> Of:
 
 
 def _parts(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """What a value is made of that may say something drawn, by the path of each."""
+    """The records in a value that may contain distributions, each with its path."""
     if isinstance(value, Mapping):
         yield from ((f"{name}.{key}", part) for key, part in value.items() if is_dataclass(part))
     elif is_dataclass(value) and not isinstance(value, Distribution):
@@ -254,11 +254,11 @@ def _require_span(name: str, span: tuple[float, float]) -> None:
 
 
 def _state(path: Path) -> tuple[int, int] | None:
-    """By what a file is told from one that was written there later."""
+    """A key that changes when a file is written anew: its time and size."""
     try:
         found = path.stat()
     except (OSError, ValueError):
-        return None  # to be read, for the reason to be said
+        return None  # reading it reports the reason
     return found.st_mtime_ns, found.st_size
 
 

@@ -1,4 +1,4 @@
-"""How files, flags and axes write what is drawn: a table of TOML where a number could be."""
+"""Distributions in files, flags and axes: a table of TOML in place of a number."""
 
 import dataclasses
 import functools
@@ -13,56 +13,56 @@ from orchestration.basics.typed_tables import parsed, table_of
 from orchestration.system.distribution import Distribution, Varying
 
 DistributionTable = table_of(Distribution, file=(str | None, None))
-"""With the path of a trace as it is written"""
+"""The path of a trace is text, as written"""
 
 
 def with_distributions(place: str, table: Any, folder: Path) -> dict[str, Any]:
-    """The keys of a table of a file, those that are drawn as what they are drawn from; `place` ends with its dot."""
+    """The keys of a table of a file, with distributions in place of their tables; `place` ends with its dot."""
     keys: dict[str, Any] = table.model_dump()
     for key in keys:
-        drawn = getattr(table, key)
-        if isinstance(drawn, DistributionTable):
-            keys[key] = _made(f"{place}{key}", drawn, folder)
+        value = getattr(table, key)
+        if isinstance(value, DistributionTable):
+            keys[key] = _distribution(f"{place}{key}", value, folder)
     return keys
 
 
 def parsed_fields(of: Any, place: str, keys: Mapping[str, Any]) -> dict[str, Any]:
-    """New values of fields of a record, those that are drawn from the table, or the text of one, as that says.
+    """New values of fields of a record, with distributions in place of their tables, or of the text of these.
 
-    Relative paths of traces start at the current folder. Raises `UsageError` for a table that cannot be.
+    Relative paths of traces start at the current folder. Raises `UsageError` for an invalid table.
     """
     kind: type = type(of)
     varying = may_vary(kind)
-    return {key: _meant(f"{place}{key}", value) if key in varying else value for key, value in keys.items()}
+    return {key: _parsed_field(f"{place}{key}", value) if key in varying else value for key, value in keys.items()}
 
 
 @functools.cache
 def may_vary(kind: type) -> frozenset[str]:
-    """The fields of a record that are a number, or how it is distributed."""
+    """The fields of a record that are a number or a distribution."""
     return frozenset(field.name for field in dataclasses.fields(kind) if field.type == Varying)
 
 
 def is_table(value: object) -> TypeGuard[str]:
-    """Whether it is the text of a table."""
+    """Whether a value is the text of a table."""
     return isinstance(value, str) and value.lstrip().startswith("{")
 
 
 def as_text(table: Mapping[str, Any], folder: Path) -> str:
     """The text of a table of a file, its trace by a path from the current folder."""
-    told = {**table, "file": str(folder / str(table["file"]))} if "file" in table else table
-    return f"{{{', '.join(f'{key} = {json.dumps(value, default=str)}' for key, value in told.items())}}}"
+    keys = {**table, "file": str(folder / str(table["file"]))} if "file" in table else table
+    return f"{{{', '.join(f'{key} = {json.dumps(value, default=str)}' for key, value in keys.items())}}}"
 
 
 def trace_path(value: str) -> str | None:
-    """What a table that is given as text calls the file of its trace; None for one without, or that is none."""
+    """The path of the trace in the text of a table; None without one."""
     file = toml_of(f"value = {value}", value)["value"].get("file")
     return None if file is None else str(Path(file))
 
 
-def _meant(place: str, value: Any) -> Any:
+def _parsed_field(place: str, value: Any) -> Any:
     if is_table(value):
         value = toml_of(f"value = {value}", f"{place} = {value}")["value"]
-    return _made(place, _parsed(place, value), Path()) if isinstance(value, Mapping) else value
+    return _distribution(place, _parsed(place, value), Path()) if isinstance(value, Mapping) else value
 
 
 def _parsed(place: str, table: Mapping[str, Any]) -> Any:
@@ -70,7 +70,7 @@ def _parsed(place: str, table: Mapping[str, Any]) -> Any:
         return parsed(table, DistributionTable)
 
 
-def _made(place: str, table: Any, folder: Path) -> Distribution:
+def _distribution(place: str, table: Any, folder: Path) -> Distribution:
     keys = table.model_dump() | {"file": None if table.file is None else folder / table.file}
     with at_place(place):
         return Distribution(**keys)

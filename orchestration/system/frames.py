@@ -1,4 +1,4 @@
-"""How long a frame occupies a network, bit by bit."""
+"""The lengths of frames on a network, from their bits."""
 
 from fractions import Fraction
 
@@ -6,11 +6,14 @@ from orchestration.system.computers import Message, Network
 from orchestration.system.times import NANOSECONDS
 
 ERROR_BITS = 31
-"""What a corrupted frame takes beside its own length: the error frame, and what CAN waits after it"""
+"""The bits after a corrupted frame: the error frame, and the pause of CAN after it"""
 
 
 def frame_nanoseconds(network: Network, message: Message, more: int = 0) -> int:
-    """From the first bit to the end of the pause after the last one [ns], rounded half to even; `more` bits beside."""
+    """The time from the first bit of a frame to the end of the pause after it [ns], rounded half to even.
+
+    `more` bits are added.
+    """
     slow, fast = _bits(network, message.bytes)
     time = _seconds(slow + more, network.bit_rate) + _seconds(fast, network.data_bit_rate or network.bit_rate)
     return round(time * NANOSECONDS)
@@ -21,7 +24,7 @@ def _seconds(bits: int, rate: float) -> Fraction:
 
 
 def _bits(network: Network, size: int) -> tuple[int, int]:
-    """Bits of a frame at the bit rate, and at that of the data."""
+    """The bits of a frame at the bit rate, and at the data bit rate."""
     longest = network.stuffing == "longest"
     if network.kind == "can":
         return 8 * size + 47 + (longest * (34 + 8 * size - 1) // 4), 0
@@ -36,11 +39,11 @@ FD_SIZES = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 
 
 def _bits_of_fd(size: int, longest: bool) -> tuple[int, int]:
-    """Of ISO 11898-1:2015, with an identifier of 11 bits; sizes between those that there are, are filled up.
+    """The bits of a CAN FD frame (ISO 11898-1:2015) with an identifier of 11 bits, padded to the next valid size.
 
-    At the bit rate: 17 bits up to BRS, and 12 of ACK, its delimiter, end of frame and the pause. At that of the data:
-    ESI, 4 of length, the data, 4 that count stuff bits, the checksum of 17 or 21 bits with the fixed stuff bits in it
-    (6 or 7), and its delimiter. What is stuffed besides is all up to the end of the data.
+    At the bit rate: 17 bits up to BRS, and 12 of ACK, its delimiter, end of frame and the pause. At the data bit rate:
+    ESI, 4 of length, the data, 4 of the stuff count, the checksum of 17 or 21 bits with its fixed stuff bits (6 or 7),
+    and its delimiter. Dynamic stuff bits occur up to the end of the data.
     """
     size = next(each for each in FD_SIZES if each >= size)
     checksum = 17 + 6 if size <= 16 else 21 + 7

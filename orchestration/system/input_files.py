@@ -1,4 +1,4 @@
-"""The files that a system reads beside its FMUs: tables of sources, traces of what is drawn."""
+"""The files that a system reads beside its FMUs: tables of sources, traces of distributions."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,13 +9,13 @@ from orchestration.system.placement import SHARED
 
 
 def input_files(system: System) -> dict[str, Path]:
-    """The files, each by whose it is: the name of a source, or the place of what is drawn."""
+    """The files, by the name of their source or the place of their distribution."""
     found = {name: source.file for name, source in system.sources.items() if source.file is not None}
     return found | {place: each.file for place, each in distributions_in(system) if each.file is not None}
 
 
 def distributions_in(system: System) -> Iterator[tuple[str, Distribution]]:
-    """Everything that is drawn from a distribution or a trace, by its place."""
+    """All distributions and traces of a system, each with its place."""
     components = ((f"components.{name}", component) for name, component in system.components.items())
     connections = ((f"connections.{x.name}", x) for x in system.connections)
     shared = ((f"{table}.{name}", one) for table in SHARED for name, one in getattr(system, table).items())

@@ -1,4 +1,4 @@
-"""Which output may be meant for which input, by name, type and unit."""
+"""Matches of outputs to inputs by name, type and unit."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -13,26 +13,26 @@ NOISE = frozenset(
         *("cmd", "command", "control", "meas", "measured", "measurement"),
     )
 )
-"""Words in a name that say which end it is, not which quantity"""
+"""Words in a name that denote an end of a connection, not a quantity"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Match:
-    """An output that goes to an input."""
+    """An output matched to an input."""
 
     start: str
     """COMPONENT.VARIABLE"""
     end: str
     conversion: Conversion
     why: str | None
-    """what it goes by; None: the same name"""
+    """the reason for the match; None: the same name"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Matches:
-    """What goes together, and in words what could not be decided."""
+    """The matches, and messages on what could not be decided."""
 
-    found: tuple[Match, ...]
+    matches: tuple[Match, ...]
     undecided: tuple[str, ...]
 
 
@@ -53,17 +53,17 @@ class _Port:
 
     @property
     def words(self) -> frozenset[str]:
-        """Of its name, without those that are no quantity."""
+        """The words of its name, without those that denote no quantity."""
         parts = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+", self.variable.name)
         return frozenset(part.lower() for part in parts) - NOISE
 
 
 def match(models: Mapping[str, Model]) -> Matches:
-    """For each input of each component the output of another that is meant, where only one can be.
+    """Match each input of each component to an output of another, where only one fits.
 
-    Names decide: the same name, else the same words, else words of which one name has some more. A name that is no
-    help leaves it to the unit, if one output and one input only have it. What has the same name is taken first and
-    is no candidate for anything else.
+    Names decide: the same name, else the same words, else the words of one name being among those of the other. Else
+    the unit decides, if only one output and one input have it. Ports of the same name are matched first, and their
+    outputs are no candidates for other inputs.
     """
     inputs = [port for name in models for port in _ports(name, models[name], "input")]
     outputs = [port for name in models for port in _ports(name, models[name], "output")]
@@ -78,7 +78,7 @@ def match(models: Mapping[str, Model]) -> Matches:
             _decide(port, [o for o in others if fits(port, o, free, open_inputs)], why, found, undecided)
         used |= {m.start for m in found.values()}
     return Matches(
-        found=tuple(found[port.place] for port in inputs if port.place in found),
+        matches=tuple(found[port.place] for port in inputs if port.place in found),
         undecided=(
             *(undecided[port.place] for port in inputs if port.place in undecided),
             *_unmatched([port for port in inputs if port.place not in found and port.place not in undecided]),
@@ -87,7 +87,7 @@ def match(models: Mapping[str, Model]) -> Matches:
 
 
 def _unmatched(ports: Sequence[_Port]) -> list[str]:
-    """A line for each component with inputs that nothing fits."""
+    """A line for each component with inputs without a match."""
     lines = []
     for component in dict.fromkeys(port.component for port in ports):
         own = [
@@ -106,20 +106,20 @@ def _ports(name: str, model: Model, causality: str) -> list[_Port]:
 def _decide(
     port: _Port, candidates: Sequence[_Port], why: str | None, found: dict[str, Match], undecided: dict[str, str]
 ) -> None:
-    """Take the one candidate whose type and unit fit, or say why there is none."""
+    """Match the one candidate whose type and unit fit, or note why there is none."""
     fitting: list[tuple[_Port, Conversion]] = []
-    complaints = []
+    objections = []
     for candidate in candidates:
         if port.variable.kind not in BECOMES[candidate.variable.kind]:
-            complaints.append(f"{candidate.described} is of a type that does not become one")
+            objections.append(f"{candidate.described} is of a type that does not become one")
             continue
         try:
             converted = conversion(candidate.model, candidate.variable, port.model, port.variable)
         except OtherQuantity:
-            complaints.append(f"{candidate.described} is of another quantity")
+            objections.append(f"{candidate.described} is of another quantity")
             continue
         if converted is None:
-            complaints.append(f"{candidate.described} is in another unit, which an FMU does not define")
+            objections.append(f"{candidate.described} is in another unit, which an FMU does not define")
             continue
         fitting.append((candidate, converted))
     if len(fitting) == 1:
@@ -128,8 +128,8 @@ def _decide(
     elif fitting:
         names = ", ".join(candidate.place for candidate, _ in fitting)
         undecided[port.place] = f"{port.described} is not connected: it may be any of {names}"
-    elif complaints and why is None:
-        undecided[port.place] = f"{port.described} is not connected: {'; '.join(complaints)}"
+    elif objections and why is None:
+        undecided[port.place] = f"{port.described} is not connected: {'; '.join(objections)}"
 
 
 def _same_name(port: _Port, output: _Port, outputs: Sequence[_Port], inputs: Sequence[_Port]) -> bool:
@@ -160,4 +160,4 @@ _RULES: tuple[tuple[str | None, Callable[[_Port, _Port, Sequence[_Port], Sequenc
     ("its name is alike", _some_words),
     ("nothing else has its unit", _only_one_of_its_unit),
 )
-"""What an input goes by, the surest first; whether an output fits it, given those that are still free"""
+"""The reasons for a match, the surest first, each with the test of an output, given the unmatched ports"""

@@ -1,4 +1,4 @@
-"""What a system is: frozen values, checked for what they mean by themselves; no FMU is opened here."""
+"""A system: components, what connects and drives them, and its objectives; checked without opening any FMU."""
 
 import functools
 from collections.abc import Callable, Iterable, Mapping
@@ -22,9 +22,9 @@ from orchestration.system.written import tables_of
 
 @record()
 class System:
-    """Components and what connects and drives them, what a run comes to and when it is good.
+    """Components, what connects and drives them, the objectives of a run and the criterion of a good one.
 
-    Raises `UsageError` for what cannot be whatever the FMUs are.
+    Raises `UsageError` for what is invalid with any FMUs.
     """
 
     stop_time: float
@@ -38,20 +38,20 @@ class System:
     sources: Mapping[str, Source] = field(default_factory=dict)
     """What drives inputs from outside, by name."""
     computers: Mapping[str, Computer] = field(default_factory=dict)
-    """The processors whose tasks components are, by name."""
+    """The processors that run components as tasks, by name."""
     networks: Mapping[str, Network] = field(default_factory=dict)
     """The buses and switches over which connections go, by name."""
     objectives: Mapping[str, str] = field(default_factory=dict)
-    """What a run comes to: expressions by name."""
+    """The expressions that are evaluated over a run, by name."""
     optional: tuple[str, ...] = ()
-    """The objectives that are without a value where an FMU has no variable of a name in them."""
+    """The objectives that may lack a value: where an FMU does not have one of their variables."""
     criterion: Criterion = field(default_factory=Criterion)
     """When a run is good, and when it has diverged."""
     streams: Mapping[str, int] = field(default_factory=dict)
     """The random streams that have a number instead of a name, as `connections.NAME.CAUSE` and
     `components.NAME.jitter`."""
     operating_point: Mapping[str, Any] = field(default_factory=dict)
-    """What to change, by path, for the system to rest: where the local limit is taken. It is checked when it is
+    """Changes, by path, with which the system rests: where the local limit is computed. It is checked when it is
     used."""
 
     def __repr__(self) -> str:
@@ -77,7 +77,7 @@ class System:
 
         return tomli_w.dumps({key: value for key, value in tables_of(self).items() if value not in ({}, [])})
 
-    # What is asked of any request (`request.Request`): a system is what it means, and has no words of its own.
+    # The protocol `request.Request`: a system is its own system, and has no other terms.
 
     kind: ClassVar[str] = "run"
     title: ClassVar[str | None] = None
@@ -88,7 +88,7 @@ class System:
         return self
 
     def in_own_terms(self, text: str) -> str:
-        """`text` as it is."""
+        """`text` unchanged."""
         return text
 
     def paths_of(self, target: str) -> tuple[str, ...]:
@@ -99,7 +99,7 @@ class System:
         """No quantity has a name."""
 
     def with_twins(self, twin: Callable[[str], str]) -> "System":
-        """The same with other FMUs, each what `twin` makes of it."""
+        """The same system with each FMU replaced by its `twin`."""
         twins = {name: twin(fmu) for name, fmu in self.fmus.items()}
         if twins == self.fmus:
             return self
@@ -107,14 +107,14 @@ class System:
         return replace(self, components=components)
 
     def near_continuous(self, period: float) -> None:
-        """What of it is digital, and where, it does not say."""
+        """None: which of its components are the digital ones is not known."""
 
     def warnings(self, parameters: Mapping[str, float]) -> tuple[str, ...]:
-        """None."""
+        """A system has no warnings."""
         return ()
 
     def headline(self) -> str:
-        """None."""
+        """A system has no headline."""
         return ""
 
     def __post_init__(self) -> None:
@@ -154,12 +154,12 @@ class System:
             fed[end] = place
         names = [x.name for x in self.connections]
         for name in names:
-            require(names.count(name) == 1, "connections", name, "a name of its own for each")
+            require(names.count(name) == 1, "connections", name, "a different name for each")
         expect_placement(self)
         _require_expressions(tuple(expressions(self)))
 
     def _causes(self) -> list[str]:
-        """What random numbers are drawn for."""
+        """The names of its random streams."""
         tasks = [f"components.{name}.jitter" for name, c in self.components.items() if c.sampling is not None]
         sent = [f"connections.{x.name}.{cause}" for x in self.connections for cause in _CAUSES]
         on_computers = [f"{each.place}.{cause}" for each in placed_tasks(self.computers) for cause in TASK_CAUSES]
@@ -175,9 +175,9 @@ class System:
 
 
 _CAUSES = ("delay", "delay_jitter", "loss", "noise")
-"""Of a connection"""
+"""The random streams of a connection"""
 TASK_CAUSES, MESSAGE_CAUSES = ("execution", "jitter", "arrivals"), ("jitter", "arrivals", "error")
-"""What random numbers are drawn for of a task, and of a message"""
+"""The random streams of a task, and of a message"""
 
 
 def _few(names: list[str], most: int = 6) -> list[str]:
@@ -185,7 +185,7 @@ def _few(names: list[str], most: int = 6) -> list[str]:
 
 
 def _require_names(table: str, names: Iterable[str], without: str = "") -> None:
-    """Names are parts of paths and of messages of one line."""
+    """Raise `UsageError` for a name that cannot be part of a path and of a message of one line."""
     for name in names:
         if not (name.isprintable() and name == name.strip() != "" and not (without and without in name)):
             expected = "a name in printable characters" + (" without a dot" if without else "")
@@ -205,12 +205,12 @@ def expressions(system: System) -> list[tuple[str, str]]:
 
 @functools.lru_cache(maxsize=256)
 def _require_expressions(listed: tuple[tuple[str, str], ...]) -> None:
-    """They can be read, and those of the criterion are conditions; runs of a study have them in common."""
+    """Raise `UsageError` for one that is not valid, or for a criterion that is no condition; cached for studies."""
     for place, text in listed:
         try:
             node = parse(text)
         except UsageError as error:
             raise UsageError(f"{place}: {error}") from error
         if place.startswith("criterion."):
-            meant = parse(dict(listed).get(f"objectives.{text.strip()}", text))
-            require(not is_number(meant) and not is_number(node), place, text, "a condition, as in peak < 2.5")
+            condition = parse(dict(listed).get(f"objectives.{text.strip()}", text))
+            require(not is_number(condition) and not is_number(node), place, text, "a condition, as in peak < 2.5")

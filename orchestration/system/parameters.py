@@ -1,4 +1,4 @@
-"""Parameters of an FMU as files nest them, by their names."""
+"""Parameters of an FMU from nested tables of files."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -8,7 +8,7 @@ from orchestration.system.component import Parameter
 
 
 def parameters_in(table: Mapping[str, Any], place: str) -> dict[str, Parameter]:
-    """The values of a table by dotted names; raises `UsageError`, naming the `place`, for what is no value."""
+    """The values of a table by dotted names; raises `UsageError`, naming the `place`, for an invalid value."""
     found = dict(flattened(table))
     for name, value in found.items():
         if not isinstance(value, (int, float, str)):
@@ -17,9 +17,9 @@ def parameters_in(table: Mapping[str, Any], place: str) -> dict[str, Parameter]:
 
 
 def flattened(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Nested tables as dotted names: `gain.eta = 15` and `"gain.eta" = 15` mean the same.
+    """The values of nested tables by dotted names: `gain.eta = 15` and `"gain.eta" = 15` mean the same.
 
-    A table with nothing in it stands where a value was expected, and is left for whoever expects one to refuse.
+    An empty table is kept as a value, which the caller rejects.
     """
     for key, value in table.items():
         if isinstance(value, Mapping) and value:

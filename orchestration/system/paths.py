@@ -1,4 +1,4 @@
-"""What can be changed of a system, by path: axes of studies, `limit --of`, flags and operating points."""
+"""Changes of a system by path: axes of studies, `limit --of`, flags and operating points."""
 
 import dataclasses
 from collections.abc import Iterable, Mapping
@@ -19,19 +19,19 @@ TOP = ("stop_time", "seed")
 
 
 def changed(system: System, changes: Mapping[str, Any]) -> System:
-    """A system with other values, by path.
+    """A system with new values, by path.
 
     Paths are such as `components.tank.step`, `components.controller.sampling.period`, `connections.valve.delay`,
     `components.controller.parameters.maxlevel`, `sources.wind.noise`, `computers.autopilot.tasks.telemetry.execution`,
-    `networks.bus.messages.status.period`, `stop_time`. Where only a whole number can be, 1.0 is 1; where a number may
-    be drawn, a table or the text of one says how, as `{uniform = [0.001, 0.004]}`.
+    `networks.bus.messages.status.period`, `stop_time`. Where a whole number is expected, 1.0 is 1; where a number may
+    vary, a table or the text of one is its distribution, as `{uniform = [0.001, 0.004]}`.
 
-    Raises `UsageError` for a path that does not exist, naming what does, or a value that cannot be.
+    Raises `UsageError` for a path that does not exist, naming those that do, or an invalid value.
     """
     grouped: dict[tuple[str, str], dict[str, Any]] = {}
     top: dict[str, Any] = {}
     for path, given in changes.items():
-        value = _meant(path, given)
+        value = _converted(path, given)
         table, _, rest = path.partition(".")
         if path in TOP:
             top[path] = value
@@ -51,7 +51,7 @@ def changed(system: System, changes: Mapping[str, Any]) -> System:
             shared[table][name] = _with_parts(place, shared[table][name], keys)
         else:
             sources[name] = _replaced(
-                place, sources[name], _in_place(sources[name], _by_parameter(sources[name], keys))
+                place, sources[name], _with_new_kind(sources[name], _by_parameter(sources[name], keys))
             )
     if _only_numbers(grouped, top):
         return replaced(system, components=components, **top)
@@ -64,7 +64,7 @@ def changed(system: System, changes: Mapping[str, Any]) -> System:
 
 
 def _only_numbers(grouped: Mapping[tuple[str, str], Mapping[str, Any]], top: Mapping[str, Any]) -> bool:
-    """Whether changes are none that a system looks at when it is made: those of most runs of a study."""
+    """Whether no change needs a check of the system: so it is in most runs of a study."""
     is_seed = all(key == "seed" and type(value) is int and 0 <= value < 2**63 for key, value in top.items())
     return is_seed and all(table == "components" and _are_parameters(keys) for (table, _), keys in grouped.items())
 
@@ -78,8 +78,8 @@ def names_table(path: str) -> bool:
     return path.startswith("sources.") and path.endswith(".file")
 
 
-def _meant(path: str, value: Any) -> Any:
-    """A value as the system keeps it: ranges and the command line know neither whole numbers nor paths of files."""
+def _converted(path: str, value: Any) -> Any:
+    """A value as the system has it: ranges have no whole numbers, the command line no paths of files."""
     is_whole = path == "seed" or (path.startswith(tuple(f"{table}." for table in SHARED)) and path.endswith(_WHOLE))
     if is_whole and isinstance(value, float) and value.is_integer():
         return int(value)
@@ -156,7 +156,7 @@ def _expect_key(path: str, table: str, system: System, name: str, key: str) -> N
 
 
 def _keys_of_stepping(component: Component) -> list[str]:
-    """Of a component, what says when it is stepped; a task has none of these, but its computer has."""
+    """The keys of when a component is stepped; none if it is a task, whose computer has them."""
     if isinstance(component.sampling, TaskSampling):
         return []
     if isinstance(component.sampling, SamplingOnArrival):
@@ -165,7 +165,7 @@ def _keys_of_stepping(component: Component) -> list[str]:
 
 
 def _expect_part(path: str, place: str, of: Computer | Network, key: str) -> None:
-    """Raise `UsageError` for a task or a message that there is not, naming those that there are."""
+    """Raise `UsageError` for a task or a message that does not exist, naming those that do."""
     parts, _, rest = key.partition(".")
     if not rest or parts != SHARED[place.partition(".")[0]][0]:
         return
@@ -180,7 +180,7 @@ _ARRIVALS = "arrivals.poisson"
 
 
 def _keys_of_parts(of: Computer | Network, key: str) -> tuple[list[str], bool]:
-    """What can be changed of what is shared, and whether a key is one of these."""
+    """The keys of a computer or a network, and whether `key` is one of these."""
     parts, kind = SHARED["computers" if isinstance(of, Computer) else "networks"]
     own = [f.name for f in dataclasses.fields(of) if f.name != parts]
     each = [_IN_FILES.get(f.name, f.name) for f in dataclasses.fields(kind) if f.name != "arrivals"] + [_ARRIVALS]
@@ -237,8 +237,8 @@ def _by_parameter(of: Component | Source, keys: Mapping[str, Any]) -> dict[str, 
     return {**rest, "parameters": {**rest.get("parameters", of.parameters), **parameters}} if parameters else rest
 
 
-def _in_place(source: Source, keys: Mapping[str, Any]) -> dict[str, Any]:
-    """A file, a signal, a constant or noise takes the place of what a source was before, with what belonged to it."""
+def _with_new_kind(source: Source, keys: Mapping[str, Any]) -> dict[str, Any]:
+    """With a new file, signal, constant or noise, the keys that clear the former kind of the source too."""
     new = [kind for kind in _KINDS if keys.get(kind) is not None and getattr(source, kind) is None]
     others = {f.name: f.default for f in dataclasses.fields(Source) if f.name in (*_KINDS, *_OF_KINDS)} if new else {}
     return {**others, **keys}
@@ -262,13 +262,13 @@ def _by_variable(connection: Connection, keys: Mapping[str, Any]) -> dict[str, A
 
 
 def for_each(start: Iterable[str], value: Any) -> Any:
-    """A number for every variable of a message; a table is as it is."""
+    """A number for every variable of a message; a table is unchanged."""
     return value if isinstance(value, Mapping) else {end.partition(".")[2]: value for end in start}
 
 
 def _replaced(place: str, of: Any, keys: Mapping[str, Any]) -> Any:
     if any(isinstance(value, (str, Mapping)) for value in keys.values()):
-        from orchestration.system.distribution_table import parsed_fields  # with it comes what reads files
+        from orchestration.system.distribution_table import parsed_fields  # which loads what reads files
 
         keys = parsed_fields(of, f"{place}.", keys)
     try:

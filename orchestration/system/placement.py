@@ -1,4 +1,4 @@
-"""Which component runs on which computer, and which connection goes over which network."""
+"""The placement of components on computers and of connections on networks."""
 
 from collections.abc import Hashable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 Shared = TypeVar("Shared", Task, Message)
 SHARED: Mapping[str, tuple[str, type]] = {"computers": ("tasks", Task), "networks": ("messages", Message)}
-"""The tables of what is shared, with the key of what shares it, and what that is"""
+"""The tables of shared resources, with the key of their users, and the record of one"""
 
 
 @dataclass(frozen=True)
 class PlacedTask:
-    """A task, and where it is."""
+    """A task with its computer."""
 
     computer_name: str
     name: str
@@ -38,7 +38,7 @@ class PlacedTask:
 
 @dataclass(frozen=True)
 class PlacedMessage:
-    """A message, and where it is."""
+    """A message with its network."""
 
     network_name: str
     name: str
@@ -52,14 +52,14 @@ class PlacedMessage:
 
 
 def placed_tasks(computers: Mapping[str, Computer]) -> Iterator[PlacedTask]:
-    """All of them, in the order of the file."""
+    """All tasks, in the order of the file."""
     for computer_name, computer in computers.items():
         for name, task in computer.tasks.items():
             yield PlacedTask(computer_name, name, computer, task)
 
 
 def placed_messages(networks: Mapping[str, Network]) -> Iterator[PlacedMessage]:
-    """All of them, in the order of the file."""
+    """All messages, in the order of the file."""
     for network_name, network in networks.items():
         for name, message in network.messages.items():
             yield PlacedMessage(network_name, name, network, message)
@@ -71,13 +71,13 @@ def tasks_of(system: "System") -> dict[str, PlacedTask]:
 
 
 def messages_by_connection(system: "System") -> dict[str, PlacedMessage]:
-    """Messages by the connection that they are of."""
+    """The messages of connections, by connection."""
     found = placed_messages(system.networks)
     return {each.message.connection: each for each in found if each.message.connection is not None}
 
 
 def released_by(system: "System") -> dict[str, tuple[str, ...]]:
-    """What each connection releases whose arrivals release something: paths of tasks, and names of components."""
+    """The paths of tasks and names of components that arrivals of messages release, by connection."""
     found: dict[str, tuple[str, ...]] = {}
     for each in placed_tasks(system.computers):
         if each.task.on is not None:
@@ -88,7 +88,7 @@ def released_by(system: "System") -> dict[str, tuple[str, ...]]:
 
 
 def expect_unscheduled(system: "System", why: str) -> None:
-    """Raise `UsageError`, saying `why`, for a system of which something happens when the scheduler says."""
+    """Raise `UsageError`, saying `why`, for a system with instants that the scheduler computes."""
     placed = [task.place for task in tasks_of(system).values()]
     placed += [message.place for message in messages_by_connection(system).values()]
     placed += [f"components.{name}.sampling.on" for name in _by_arrivals(system)]
@@ -97,20 +97,20 @@ def expect_unscheduled(system: "System", why: str) -> None:
 
 
 def _by_arrivals(system: "System") -> dict[str, str]:
-    """Components that are sampled whenever a message arrives, with its connection."""
+    """The connections whose messages release components, by component."""
     samplings = {name: one.sampling for name, one in system.components.items()}
     return {name: each.on for name, each in samplings.items() if isinstance(each, SamplingOnArrival)}
 
 
 def is_random(system: "System") -> bool:
-    """Whether seeds make a difference to when its tasks run and its frames are sent."""
+    """Whether the seed changes when its tasks run and its frames are sent."""
     tasks, messages = placed_tasks(system.computers), [*placed_messages(system.networks)]
-    by_chance = any(each.task.is_random for each in tasks) or any(each.message.is_random for each in messages)
-    return by_chance or any(each.network.error > 0.0 for each in messages)
+    has_random = any(each.task.is_random for each in tasks) or any(each.message.is_random for each in messages)
+    return has_random or any(each.network.error > 0.0 for each in messages)
 
 
 def content_of(system: "System") -> Hashable:
-    """What its computers and networks are told by from any others."""
+    """A key of everything in its computers and networks that determines their timing."""
     shared = [(each.place, *_values(each.computer), *_values(each.task)) for each in placed_tasks(system.computers)]
     shared += [
         (each.place, *_values(each.network), *_values(each.message)) for each in placed_messages(system.networks)
@@ -124,9 +124,9 @@ def _values(of: Any) -> tuple[Hashable, ...]:
 
 
 def punctual(system: "System") -> dict[str, Any]:
-    """Its computers and networks, all of whose tasks and messages are on time: they take the least that they can.
+    """Its computers and networks without lateness, errors and variation: tasks take their least execution time.
 
-    What arrives by chance does so still.
+    Random arrivals remain.
     """
     computers = {
         name: replace(
@@ -149,7 +149,7 @@ def with_tasks(
     components: Mapping[str, Component], connections: tuple[Connection, ...], computers: Mapping[str, Computer],
     networks: Mapping[str, Network],
 ) -> dict[str, Component]:  # fmt: skip
-    """The components, those of tasks with a sampling that says what is known of their instants beforehand."""
+    """The components, with a `TaskSampling` for those that are tasks, and a period for those that messages release."""
     tasks: dict[str, PlacedTask] = {}
     for each in placed_tasks(computers):
         name = each.task.component
@@ -183,7 +183,7 @@ def _with_task(name: str, component: Component, of: PlacedTask | None, periods: 
 
 
 class _Periods:
-    """From one sample of a component to the next [s] of true time, about: of what arrivals release, that of these."""
+    """Approximate periods of components [s] of true time; that of arrivals, for what they release."""
 
     def __init__(
         self, components: Mapping[str, Component], connections: tuple[Connection, ...],
@@ -194,7 +194,7 @@ class _Periods:
         self._messages = {each.message.connection: each for each in placed_messages(networks)}
 
     def of(self, name: str, after: tuple[str, ...] = ()) -> float:
-        """Of a component."""
+        """The period of a component; `after` has those whose period follows from it."""
         task, sampling = self._tasks.get(name), self._components[name].sampling
         if task is not None and task.task.on is None:
             return self._of_task(task)
@@ -205,7 +205,7 @@ class _Periods:
         return sampling.period / sampling.clock_ratio if sampling is not None else 0.0
 
     def of_connection(self, place: str, connection: str, after: tuple[str, ...]) -> float:
-        """Of the messages over a connection; raises `UsageError`, naming the `place`, where there are none."""
+        """The period of the messages of a connection; raises `UsageError`, naming the `place`, where there are none."""
         x, over = self._connections.get(connection), self._messages.get(connection)
         known = ", ".join(self._connections) or "(there is none)"
         require(x is not None, place, connection, f"one of the connections {known}")
@@ -227,12 +227,12 @@ class _Periods:
 
 
 def _expect_period(of: PlacedMessage, sender: str) -> None:
-    """Of what a component in continuous time sends over a network."""
+    """Require a period for what a component in continuous time sends over a network."""
     require(of.message.period is not None, f"{of.place}.period", "none", f"when {sender} sends, which does not say")
 
 
 def expect_placement(system: "System") -> None:
-    """Raise `UsageError` for what cannot be whatever the FMUs are."""
+    """Raise `UsageError` for a placement that is invalid with any FMUs."""
     tasks, messages, released = tasks_of(system), messages_by_connection(system), released_by(system)
     connections = {x.name: x for x in system.connections}
     periods = _Periods(system.components, system.connections, tasks, system.networks)
@@ -266,14 +266,14 @@ def expect_placement(system: "System") -> None:
 
 
 def expect_nodes(system: "System", of: PlacedMessage) -> None:
-    """Raise `UsageError` for a frame of Ethernet that goes nowhere."""
+    """Raise `UsageError` for an Ethernet frame whose receiver is its sender."""
     if of.network.kind == "ethernet":
         start, end = nodes_of(system, of)
         require(start != end, f"{of.place}.to", end, "another node than it comes from")
 
 
 def nodes_of(system: "System", of: PlacedMessage) -> tuple[str, str]:
-    """The nodes between which a message goes: as it says, else the computers of the ends of its connection, or they."""
+    """The nodes at the ends of a message: its own, else the computers of the ends of its connection, or these."""
     tasks, x = tasks_of(system), next((x for x in system.connections if x.name == of.message.connection), None)
     ends = ("", "") if x is None else (x.sender, x.receiver)
     start, end = (tasks[name].computer_name if name in tasks else name for name in ends)

@@ -1,4 +1,4 @@
-"""A system file for some FMUs, proposed from what they say of themselves, with comments on what it leaves open."""
+"""Proposes a system file for some FMUs from their model descriptions, with comments on what is undecided."""
 
 import itertools
 import json
@@ -15,11 +15,11 @@ from orchestration.system.matching import Match, match
 from orchestration.system.variable_names import component_of
 
 STEP, PERIOD, STOP = 0.001, 0.01, 10.0
-"""[s], where no FMU says how it is meant to be run"""
+"""[s], where no FMU has a default experiment"""
 WIDTH = 110
-"""Characters of a line beyond which a list has a line for each of its members"""
+"""Characters of a line; a longer list has a line for each of its members"""
 _TO_FILL_IN = (
-    "# What a run comes to, and when it is good, which `quadcosim limit` asks for. Fill in, for instance:",
+    "# Objectives of a run, and the criterion of a good one, which `quadcosim limit` needs. Fill in, for instance:",
     "# [objectives]",
     '# peak = "max(abs({0}))"',
     '# final = "max(abs({0}) * (time >= 0.75 * stop_time))"',
@@ -34,17 +34,17 @@ TAKEN = frozenset(("rows", "time", "stop_time", "sampled"))
 
 @dataclass(frozen=True, kw_only=True)
 class Proposal:
-    """A system file as text, what it guesses, and what it does not decide."""
+    """A system file as text, its guesses, and what it leaves undecided."""
 
     text: str
     guessed: tuple[str, ...]
-    """connections of variables with different names, and who is a controller"""
+    """connections of variables with different names, and which components are controllers"""
     undecided: tuple[str, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Resources:
-    """What else is proposed: computers and networks of other files."""
+    """Computers and networks of other files, for the proposal."""
 
     tables: Mapping[str, Any] = field(default_factory=dict)
     """of a system file"""
@@ -55,9 +55,9 @@ class Resources:
 def propose(fmus: Sequence[tuple[str, Model]], folder: Path, resources: Resources | None = None) -> Proposal:
     """Components named after their models, connected by name, type and unit; for a file that lies in `folder`.
 
-    Each FMU is given by the path or name that the user wrote, with what it says of itself.
+    Each FMU is given by the path or name that the user wrote, with its model description.
 
-    One whose outputs are all discrete is proposed as sampled, and so is the controller of a loop; any other in
+    An FMU whose outputs are all discrete is proposed as sampled, and so is the controller of a loop; any other in
     continuous time. Raises `UsageError` without any FMU.
     """
     resources = resources or Resources()
@@ -67,7 +67,7 @@ def propose(fmus: Sequence[tuple[str, Model]], folder: Path, resources: Resource
     named = dict(zip(_names(models), models))
     matches = match(named)
     sampled = {name: "all its outputs are discrete" for name, model in named.items() if _is_discrete(model)}
-    guessed = _controllers(named, matches.found, sampled)
+    guessed = _controllers(named, matches.matches, sampled)
     sampled |= guessed
     stop = max((_experiment(model, "stopTime") or 0.0 for model in models), default=0.0) or STOP
     blocks = [
@@ -78,7 +78,7 @@ def propose(fmus: Sequence[tuple[str, Model]], folder: Path, resources: Resource
             f"stop_time = {stop!r}",
         ],
         *(_component(name, text, model, folder, sampled.get(name)) for name, (text, model) in zip(named, fmus)),
-        *_connections(sorted(matches.found, key=lambda m: list(named).index(component_of(m.start)))),
+        *_connections(sorted(matches.matches, key=lambda m: list(named).index(component_of(m.start)))),
     ]
     blocks += _resources(resources.tables)
     undecided = (*matches.undecided, *resources.undecided)
@@ -91,7 +91,7 @@ def propose(fmus: Sequence[tuple[str, Model]], folder: Path, resources: Resource
     return Proposal(
         text="\n\n".join("\n".join(block) for block in blocks) + "\n",
         guessed=(
-            *_guesses(matches.found),
+            *_guesses(matches.matches),
             *(f"{name} is sampled, as {why}" for name, why in guessed.items()),
             *resources.guessed,
         ),
@@ -114,8 +114,8 @@ def _resources(tables: Mapping[str, Any]) -> list[list[str]]:
 
 
 def _inline(keys: Mapping[str, Any]) -> str:
-    said = (f"{key} = {_text(value) if isinstance(value, str) else repr(value)}" for key, value in keys.items())
-    return f"{{ {', '.join(said)} }}"
+    pairs = (f"{key} = {_text(value) if isinstance(value, str) else repr(value)}" for key, value in keys.items())
+    return f"{{ {', '.join(pairs)} }}"
 
 
 def _key(name: str) -> str:
@@ -123,7 +123,7 @@ def _key(name: str) -> str:
 
 
 def _names(models: Iterable[Model]) -> list[str]:
-    """The models' names as names of components, each once."""
+    """Unique names of components after the names of the models."""
     names: list[str] = []
     for model in models:
         plain = re.sub(r"\W+", "_", model.name.rpartition(".")[2], flags=re.ASCII).strip("_") or "component"
@@ -139,33 +139,38 @@ def _is_discrete(model: Model) -> bool:
 
 
 def _controllers(named: Mapping[str, Model], found: Iterable[Match], sampled: Container[str]) -> dict[str, str]:
-    """Of each two in continuous time that feed each other, the one that seems to be the controller, and why."""
+    """The likely controller of each two components in continuous time that feed each other, and the reason."""
     pairs = {(component_of(m.start), component_of(m.end)) for m in found}
     loops = [(a, b) for a, b in pairs if (b, a) in pairs and a not in sampled and b not in sampled]
-    by_answer = {a: _ANSWERS for a, b in loops if _answers_at_once(named[a]) and not _answers_at_once(named[b])}
+    by_feedthrough = {
+        a: _FEEDTHROUGH for a, b in loops if _has_feedthrough(named[a]) and not _has_feedthrough(named[b])
+    }
     by_name = {a: _NAMED for a, b in loops if _NAMES.search(a) and not _NAMES.search(b)}
-    return dict(sorted((by_answer | by_name).items()))
+    return dict(sorted((by_feedthrough | by_name).items()))
 
 
 _NAMES = re.compile(r"control|ctrl|pid|lqr|regulator|autopilot", re.IGNORECASE)
-_NAMED, _ANSWERS = "its name is that of a controller", "all its outputs follow its inputs at once, as a controller's do"
+_NAMED, _FEEDTHROUGH = (
+    "its name is that of a controller",
+    "all its outputs follow its inputs at once, as a controller's do",
+)
 
 
-def _answers_at_once(model: Model) -> bool:
+def _has_feedthrough(model: Model) -> bool:
     return all(model.depends_on(output) for output in model.names("output"))
 
 
 def _component(name: str, fmu: str, model: Model, folder: Path, sampled: str | None) -> list[str]:
-    """`sampled` says why it is."""
+    """The lines of a component; `sampled` is the reason for sampling it."""
     place = _relative(Path(fmu), folder) if fmu.endswith(".fmu") else fmu
     lines = [f"[components.{name}]", f"fmu = {_text(place)}"]
     step = _experiment(model, "stepSize")
     if sampled is not None:
-        said = "" if step else "; its FMU does not say how often"
-        lines.append(f"sampling = {{ period = {step or PERIOD!r} }}    # sampled, as {sampled}{said}")
+        note = "" if step else "; its FMU does not say how often"
+        lines.append(f"sampling = {{ period = {step or PERIOD!r} }}    # sampled, as {sampled}{note}")
     else:
-        said = "" if step else "    # its FMU does not say how long"
-        lines.append(f"step = {step or STEP!r}{said}")
+        note = "" if step else "    # its FMU does not say how long"
+        lines.append(f"step = {step or STEP!r}{note}")
     return lines
 
 
@@ -177,7 +182,7 @@ def _relative(path: Path, folder: Path) -> str:
 
 
 def _experiment(model: Model, key: str) -> float | None:
-    """A number of the FMU's default experiment, if it is there and positive."""
+    """A number of the FMU's default experiment, if present and positive."""
     try:
         value = float(getattr(model.description.defaultExperiment, key, None) or 0.0)
     except ValueError:
@@ -186,7 +191,7 @@ def _experiment(model: Model, key: str) -> float | None:
 
 
 def _connections(found: Sequence[Match]) -> list[list[str]]:
-    """A message for each pair of components, or more where signals are converted differently."""
+    """A message for each pair of components, or several where signals are converted differently."""
     groups: dict[tuple[str, str, str], list[Match]] = {}
     for m in found:
         pair = component_of(m.start), component_of(m.end)

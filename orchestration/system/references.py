@@ -1,4 +1,4 @@
-"""Who follows what: the reference of a component is what it has built in, or what its inputs are fed."""
+"""References of components: a built-in trajectory, or a source that feeds their inputs."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -10,17 +10,17 @@ from orchestration.system.model import System
 from orchestration.system.source import MOTION, Source
 
 BUILT_IN, AT_REST = "paper", "hover"
-"""Signals: what controllers of this project have built in, and the only one that needs nobody to hear it"""
+"""Signals: the built-in trajectory of this project's controllers, and the only one that needs no inputs"""
 
 
 def connect_references(system: System, models: Mapping[str, Model]) -> System:
-    """A `system` that fits its FMUs, with each source that says what a component follows feeding inputs that hear it.
+    """The `system` with each reference source connected to the inputs of the component that follows it.
 
-    A component without a trajectory of its own is fed the paper's. Raises `UsageError` for one that has no inputs for
-    what it is to follow, naming them.
+    A component without a built-in trajectory is fed the paper's. Raises `UsageError` for one without inputs for its
+    reference, naming them.
     """
     sources, components = dict(system.sources), dict(system.components)
-    for name, source, follower in _followed(system):
+    for name, source, follower in _reference_sources(system):
         model = models[follower]
         if source.is_built_in and has_built_in_trajectory(model):
             continue
@@ -30,21 +30,24 @@ def connect_references(system: System, models: Mapping[str, Model]) -> System:
         if lacking and (to or source.signal != AT_REST):
             held = f"{name} {AT_REST}, for one that holds a point by itself"
             raise UsageError(
-                f"sources.{name}: {model.name} cannot hear what it is to follow, it has no input {', '.join(lacking)}; "
+                f"sources.{name}: {model.name} cannot follow it without the inputs {', '.join(lacking)}; "
                 f"expected {held}"
             )
         signal = BUILT_IN if source.is_built_in else source.signal
         sources[name] = replace(source, signal=signal, trajectory=None, to=to)
         if to and USE_REFERENCE_INPUTS in model.variables:
-            told = {**components[follower].parameters, USE_REFERENCE_INPUTS: True}
-            components[follower] = replace(components[follower], parameters=told)
+            parameters = {**components[follower].parameters, USE_REFERENCE_INPUTS: True}
+            components[follower] = replace(components[follower], parameters=parameters)
     return system if sources == system.sources else replace(system, sources=sources, components=components)
 
 
 def describe_references(system: System, models: Mapping[str, Model]) -> str:
-    """What is followed, and by whom, of a system that is not `heard` yet; empty where nothing is."""
+    """The references of a system and the components that follow them, as text; empty if there are none."""
     fed = connect_references(system, models)
-    words = (_words(source, fed.sources[name], models[follower]) for name, source, follower in _followed(system))
+    words = (
+        _description(source, fed.sources[name], models[follower])
+        for name, source, follower in _reference_sources(system)
+    )
     return "; ".join(words)
 
 
@@ -53,14 +56,14 @@ def has_built_in_trajectory(model: Model) -> bool:
     return not TRAJECTORY.keys().isdisjoint(model.variables)
 
 
-def _followed(system: System) -> Iterator[tuple[str, Source, str]]:
-    """Sources that say what a component follows, with their names and its own."""
+def _reference_sources(system: System) -> Iterator[tuple[str, Source, str]]:
+    """The sources that a component follows: name, source, and the name of the component."""
     for name, source in system.sources.items():
         if source.trajectory is not None:
             yield name, source, source.trajectory
 
 
-def _words(source: Source, fed: Source, follower: Model) -> str:
+def _description(source: Source, fed: Source, follower: Model) -> str:
     if fed.trajectory is not None:
         return f"the trajectory that {follower.name} has built in"
     what = "the paper's trajectory" if source.is_built_in else source.signal or str(source.file)

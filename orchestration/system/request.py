@@ -1,4 +1,4 @@
-"""What can be asked to run: a system, or what means one and speaks of it in words of its own."""
+"""Requests to run: a system, or what translates into one and has its own terms for it."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -15,74 +15,74 @@ from orchestration.system.model import System
 Self = TypeVar("Self", bound="ControlLoop")
 Twin = TypeVar("Twin", bound="Request")
 Values = Mapping[str, Parameter]
-"""By target, as axes of studies name them"""
+"""Parameters by target, as axes of studies name them"""
 
 
 @described_as("a System or a Scenario")
 @runtime_checkable
 class Request(Protocol):
-    """What can be asked to run."""
+    """A system to run, or what translates into one."""
 
     kind: ClassVar[str]
-    """By which it is known what is drawn and judged of its runs: `run` of any system."""
+    """The key of the figures and criteria of its runs: `run` of any system."""
     title: ClassVar[str | None]
-    """What an SSP of it is called; None: as its file is."""
+    """The name of an SSP of it; None: that of its file."""
     description: ClassVar[str]
-    """What it is, for an SSP."""
+    """The description in an SSP."""
 
     @property
     def seed(self) -> int:
-        """Of all random numbers of a run."""
+        """The seed of all random numbers of a run."""
 
     def as_system(self) -> System:
-        """The system that it means; raises `UsageError` in the words of the system."""
+        """The system that it translates into; raises `UsageError` in terms of the system."""
 
     def in_own_terms(self, text: str) -> str:
-        """`text` with the paths of its system as it calls them itself."""
+        """`text` with the paths of its system replaced by its own terms."""
 
     def paths_of(self, target: str) -> tuple[str, ...]:
-        """The paths in its system of a target of its own; raises `UsageError` for what is none."""
+        """The paths in its system of one of its targets; raises `UsageError` for an unknown one."""
 
     def range_of(self, quantity: str) -> Range | None:
-        """Where a quantity that has a name is looked for; None for a name that says nothing here."""
+        """The search range of a named quantity; None for an unknown name."""
 
     def with_twins(self: Twin, twin: Callable[[str], str]) -> Twin:
-        """The same with other FMUs, each what `twin` makes of it."""
+        """The same request with each FMU replaced by its `twin`."""
 
     def near_continuous(self, period: float) -> "Request | None":
-        """The same sampled every `period` [s] and nothing late, lost or noisy; None where that cannot be known."""
+        """The same request sampled every `period` [s] without faults or noise; None where that is undefined."""
 
     def warnings(self, parameters: Mapping[str, float]) -> tuple[str, ...]:
-        """What may not be meant, by all numeric parameters that are flown, as COMPONENT.NAME."""
+        """Warnings about likely mistakes, from all numeric parameters in effect, by COMPONENT.NAME."""
 
     def headline(self) -> str:
-        """What was run, over a figure; empty if it has no words for that."""
+        """The title of a figure; empty without one."""
 
     def to_toml(self) -> str:
-        """The file that loads as it."""
+        """The text of the file that loads as this request."""
 
 
 @contextmanager
 def errors_in_own_terms(request: Request) -> Iterator[None]:
-    """What is wrong with the system of a request is said of the request, which is what somebody wrote."""
+    """Translate errors about the system of a request into the terms of the request."""
     try:
         yield
     except UsageError as error:
-        said = request.in_own_terms(str(error))
-        if said == str(error):
+        text = request.in_own_terms(str(error))
+        if text == str(error):
             raise
-        raise type(error)(said) from error
+        raise type(error)(text) from error
 
 
 def system_of(request: Request) -> System:
-    """The system that a request means; raises `UsageError` in the request's own words."""
+    """The system of a request; raises `UsageError` in terms of the request."""
     with errors_in_own_terms(request):
         return request.as_system()
 
 
 @dataclass(frozen=True, kw_only=True)
 class InitialConditions:
-    """One initial state of an ensemble."""
+    """The initial conditions of one run of an ensemble."""
 
     size: float
     """of the initial error, in (0, 1], as a share of the largest of each kind"""
@@ -92,31 +92,31 @@ class InitialConditions:
 @described_as("an ensemble of starts")
 @runtime_checkable
 class Ensemble(Protocol):
-    """Initial states, of which more leave the first ones as they are."""
+    """Initial conditions in an order that does not depend on their number."""
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """The number of initial conditions."""
 
     @property
     def first(self) -> int:
-        """The index of the first; a start is the same in every ensemble that has its index."""
+        """The index of the first; those of an index are the same in every ensemble that has it."""
 
     def some(self, first: int, count: int) -> "Ensemble":
-        """Others of the same kind."""
+        """The same ensemble with `count` members from index `first` on."""
 
     def initial_conditions(self, request: Any) -> Sequence[InitialConditions]:
-        """In the order of their indices."""
+        """The initial conditions for a request, in the order of their indices."""
 
 
 @described_as("a Vehicle")
 @runtime_checkable
 class Craft(Protocol):
-    """What a plant is made of, and what its controllers are told of it."""
+    """A plant, with the parameters that its controllers need of it."""
 
     @property
     def name(self) -> str:
-        """What it is called."""
+        """Its name."""
 
     def parameters_for(self, controller: str) -> Mapping[str, Parameter]:
         """The parameters of the plant and of the controller of this name or path, by target."""
@@ -125,20 +125,20 @@ class Craft(Protocol):
 @described_as("a Scenario")
 @runtime_checkable
 class ControlLoop(Request, Protocol):
-    """A request that knows its plant from its controller: what controllers can be compared and tuned on."""
+    """A request with a plant and a controller, on which controllers can be compared and tuned."""
 
     @property
     def vehicle(self) -> Craft | None:
-        """What its plant is, where that is said as a whole."""
+        """Its plant, where that is given as a whole."""
 
     def with_values(self: Self, values: Mapping[str, Any]) -> Self:
-        """The same with other values, by target; raises `UsageError` for a target that there is not."""
+        """The same request with new values, by target; raises `UsageError` for an unknown target."""
 
     def without_vehicle(self: Self) -> Self:
-        """The same, where what it flies is said elsewhere."""
+        """The same request without its vehicle, which is then given elsewhere."""
 
     def craft(self, given: str | None, folder: Path, *, plant: Values, controller: Values) -> Craft:
-        """A vehicle by name, or by a path that starts at `folder`, with these parameters on top; None: those alone."""
+        """A vehicle by name, or by a path that starts at `folder`, with these parameters on top; None: only those."""
 
     def ensemble(self, table: Mapping[str, Any], beside: Sequence[str] = ()) -> Ensemble:
-        """The starts that a table of a file says, which may have keys `beside`; raises `UsageError`."""
+        """The ensemble of a table of a file, which may have other keys `beside`; raises `UsageError`."""

@@ -1,4 +1,4 @@
-"""What a value of a system or of a timing must be, told in one line: `UsageError` for what cannot be."""
+"""Requirements on values of systems and timings; each raises `UsageError`, in one line, if it is not met."""
 
 import math
 from typing import Any, TypeGuard
@@ -8,7 +8,7 @@ from orchestration.system.times import exact_nanoseconds
 
 
 def is_number(value: object) -> TypeGuard[float]:
-    """Whether `value` can be a time, a share or a factor; true and false are none, nor is what no float holds."""
+    """Whether `value` can be a time, a share or a factor: no truth value, and within the range of a float."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return False
     return isinstance(value, float) or abs(value) < 2**63
@@ -20,34 +20,34 @@ def is_finite(value: object) -> TypeGuard[float]:
 
 
 def require(condition: bool, name: str, value: object, expected: str) -> None:
-    """`name` = `value` is what is `expected` where the condition holds."""
+    """Require the condition; the error reports `name`, `value` and what is `expected`."""
     if not condition:
         raise UsageError(f"{name} = {shown(value)}: expected {expected}")
 
 
 def require_positive(of: object, *names: str, place: str = "") -> None:
-    """The fields `names` are finite and above 0."""
+    """Require the fields `names` to be finite and above 0."""
     for name in names:
         value = getattr(of, name)
         require(is_finite(value) and value > 0.0, place + name, value, "a positive number")
 
 
 def require_not_negative(of: object, *names: str, place: str = "") -> None:
-    """The fields `names` are finite and not below 0."""
+    """Require the fields `names` to be finite and not below 0."""
     for name in names:
         value = getattr(of, name)
         require(is_finite(value) and value >= 0.0, place + name, value, "zero or a positive number")
 
 
 def require_share(of: object, *names: str, place: str = "") -> None:
-    """The fields `names` are probabilities."""
+    """Require the fields `names` to be probabilities."""
     for name in names:
         value = getattr(of, name)
         require(is_number(value) and 0.0 <= value <= 1.0, place + name, value, "a probability in [0, 1]")
 
 
 def require_bursts(of: object, length: float | None, *losses: str, place: str = "") -> None:
-    """Losses of the probabilities in the fields `losses` can come `length` in a row on average; None: independent."""
+    """Require probabilities in the fields `losses` that allow bursts of mean `length`; None: independent losses."""
     if length is None:
         return
     require(is_number(length) and 1.0 <= length < math.inf, f"{place}burst_length", length, "at least 1 loss")
@@ -59,7 +59,7 @@ def require_bursts(of: object, length: float | None, *losses: str, place: str = 
 
 
 def require_own_clock(of: Any, place: str = "") -> None:
-    """`period`, `offset`, `jitter` and `clock_ratio` are what an FMU that keeps the clock itself can have."""
+    """Require `period`, `offset`, `jitter` and `clock_ratio` to be possible for an FMU with its own clock."""
     late = "0 with clock fmu: only the master's clock can be late"
     require(of.jitter == 0.0, f"{place}jitter", of.jitter, late)
     require(of.clock_ratio == 1.0, f"{place}clock_ratio", of.clock_ratio, "1 with clock fmu")

@@ -16,15 +16,15 @@ class Sampling:
     offset: float = 0.0
     """The time of the first instant [s], in its own time."""
     jitter: Varying = 0.0
-    """The largest lateness J of an instant [s], drawn for each, or how the lateness itself is distributed; it is less
+    """The largest lateness J of an instant [s], drawn for each, or the distribution of the lateness itself; it is less
     than the period."""
     jitter_distribution: Spread = "uniform"
-    """How a lateness of which the largest is given is drawn over [0, J]; normal is centred at J/2 with standard
+    """The distribution over [0, J] of a lateness whose largest value is given; normal is centred at J/2 with standard
     deviation J/6, cut to the range."""
     clock_ratio: float = 1.0
     """The seconds r that the component believes pass per true second."""
     clock: Clock = "master"
-    """Who decides when it samples: the master, or the FMU by its parameters sample_period and sample_offset."""
+    """What decides when it samples: the master, or the FMU by its parameters sample_period and sample_offset."""
 
     def __post_init__(self) -> None:
         require_positive(self, "period", "clock_ratio")
@@ -39,20 +39,20 @@ class Sampling:
 
     @property
     def is_random(self) -> bool:
-        """Whether seeds make a difference to its instants."""
+        """Whether the seed changes its instants."""
         return spreads(self.jitter)
 
     def expect_jitter_within_period(self) -> None:
-        """Raise `UsageError` for a lateness of a period or more; of a trace that is known when it is read."""
+        """Raise `UsageError` for a lateness of a period or more; that of a trace is known when the file is read."""
         longest, most = self.period / self.clock_ratio, highest(self.jitter)
         require(most < longest, "jitter", most, f"less than the period of {longest:g} s")
 
 
 @record()
 class TaskSampling(Sampling):
-    """What is known beforehand of the instants of a task: its period, or that of what releases it, about.
+    """The approximate instants of a task of a computer: its period, or that of what releases it.
 
-    A system makes it of what it says of the task; when the task runs is found by the scheduler.
+    A system makes it from the task; the scheduler computes when the task runs.
     """
 
     task: str
@@ -61,12 +61,12 @@ class TaskSampling(Sampling):
 
 @record()
 class SamplingOnArrival(Sampling):
-    """When a digital task runs that is released by messages: whenever one arrives."""
+    """When a digital task runs that messages release: whenever one arrives."""
 
     on: str
     """The connection whose arriving messages it runs on, in place of a period."""
     period: float = 0.0
-    """About; a system knows it."""
+    """Approximate; the system sets it."""
 
     def __post_init__(self) -> None:
         require_positive(self, "clock_ratio")
@@ -76,5 +76,5 @@ class SamplingOnArrival(Sampling):
 
 
 def has_scheduled_instants(sampling: Sampling) -> bool:
-    """Whether the scheduler finds its instants."""
+    """Whether the scheduler computes its instants."""
     return isinstance(sampling, (TaskSampling, SamplingOnArrival))

@@ -12,21 +12,20 @@ from orchestration.system.times import is_at_least
 from orchestration.system.variable_names import variable_of
 
 MOTION = tuple(f"{each}.{axis}" for each in ("position", "velocity", "acceleration", "jerk", "snap") for axis in "xyz")
-"""What a motion says, in its order"""
+"""The values of a motion, in its order"""
 
 
 @record()
 class Source:
     """What drives inputs from outside: a constant, a file, white noise, a signal by name or the built-in trajectory.
 
-    Exactly one of `constant`, `file`, `noise`, `signal` and `trajectory` is given, but that `trajectory` may stand
-    beside a motion or a file. A motion, which is what most signals are and what way-points make, feeds inputs whose
-    names end with QUANTITY.AXIS, as reference.position.x: position, velocity, acceleration, jerk and snap along x, y
-    and z.
+    Exactly one of `constant`, `file`, `noise`, `signal` and `trajectory` is given, except that `trajectory` may stand
+    beside a motion or a file. Motions are way-points and most signals. A motion feeds inputs whose names end with
+    QUANTITY.AXIS, as reference.position.x: position, velocity, acceleration, jerk and snap along x, y and z.
     """
 
     to: tuple[str, ...] = ()
-    """The inputs that it feeds, as COMPONENT.VARIABLE; of a motion it may be empty, for what only objectives need."""
+    """The inputs that it feeds, as COMPONENT.VARIABLE; empty for a motion that only objectives use."""
     constant: float | None = None
     """A constant value, in the unit of the inputs."""
     file: Path | None = None
@@ -34,10 +33,10 @@ class Source:
     or with way-points; in a file, relative to its folder."""
     interpolation: Interpolation = "linear"
     """What holds between the rows of a file: the line (linear), the row before (previous), or a smooth curve (spline)
-    whose rows are way-points, columns x, y, z [m] and `time` [s], or else `hold` [s] and `speed` [m/s] where they are
-    told."""
+    through the rows as way-points, with columns x, y, z [m] and either `time` [s] or, optionally, `hold` [s] and
+    `speed` [m/s]."""
     columns: tuple[str, ...] | None = None
-    """The columns of the file in the order of the inputs, where they are not named as these."""
+    """The columns of the file in the order of the inputs; default: the names of the inputs."""
     noise: float | None = None
     """The intensity [unit² s] of white noise: normal values with variance noise / period, each held over `period`."""
     period: float | None = None
@@ -46,22 +45,22 @@ class Source:
     """The name of a motion (hover, step, circle, lemniscate, helix, paper), or of gusts of wind (dryden: north, east,
     down)."""
     parameters: Mapping[str, float] = field(default_factory=dict)
-    """Parameters of the signal; of way-points without times, `speed` [m/s] and `acceleration` [m/s²], which the times
-    follow from."""
+    """Parameters of the signal; for way-points without times, the limits `speed` [m/s] and `acceleration` [m/s²] that
+    determine the times."""
     scale: float = 1.0
     """The factor by which all values of a file or a signal are multiplied."""
     trajectory: str | None = None
-    """The component that follows it, at those of its inputs SOURCE.position.x … SOURCE.snap.z that it has. Without a
-    signal or a file it follows what its parameters trajectory.* say, or, where it has none, the paper's trajectory."""
+    """The component that follows it, at those of the inputs SOURCE.position.x … SOURCE.snap.z that it has. Without a
+    signal or a file, the component follows its parameters trajectory.* or, if it has none, the paper's trajectory."""
 
     @property
     def is_built_in(self) -> bool:
-        """Whether it is the trajectory that a component has built in."""
+        """Whether it is the built-in trajectory of a component."""
         return self.trajectory is not None and self.signal is None and self.file is None
 
     @property
     def is_motion(self) -> bool:
-        """Whether it says where to be and how to move there."""
+        """Whether it is a position with its derivatives up to snap."""
         return self.interpolation == "spline" or (self.signal is not None and self.signal not in WINDS)
 
     @property
@@ -75,7 +74,7 @@ class Source:
         return self.constant is not None or self.noise is not None
 
     def signals(self, name: str) -> tuple[str, ...]:
-        """What is recorded of the source of that name: by the names of the inputs, unless it feeds two of one name."""
+        """The recorded signals of the source called `name`: its inputs, with components where two have one name."""
         if self.trajectory is not None or (self.is_motion and not self.to):
             return tuple(f"{name}.position.{axis}" for axis in "xyz")
         variables = [variable_of(end) for end in self.to]
@@ -94,8 +93,8 @@ class Source:
             require_positive(self, "period")
             require(is_at_least(self.period or 0.0, 1.0), "period", self.period, "at least a nanosecond")
         else:
-            nobody = self.trajectory is None or not self.to
-            require(nobody, "to", ", ".join(self.to), "none: a trajectory is for objectives")
+            is_alone = self.trajectory is None or not self.to
+            require(is_alone, "to", ", ".join(self.to), "none: a trajectory is for objectives")
             require(self.constant is None or is_finite(self.constant), "constant", self.constant, "a finite number")
             require(self.period is None, "period", self.period, "none without noise")
         self._expect_file()

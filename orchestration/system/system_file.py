@@ -1,4 +1,4 @@
-"""Reads and writes system files (TOML), and gives the JSON schema that editors complete them from."""
+"""Reads system files (TOML), and provides the JSON schema with which editors complete them."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,7 +20,7 @@ from orchestration.system.requirements import require
 from orchestration.system.sampling import Sampling, SamplingOnArrival
 from orchestration.system.source import Source
 
-Made = TypeVar("Made")
+Part = TypeVar("Part")
 
 
 class SamplingTable(table_of(Sampling, within=[DistributionTable], period=(float | None, None))):  # type: ignore[misc]
@@ -54,10 +54,10 @@ _PARTS = [ComponentTable, ConnectionTable, SourceTable, ComputerTable, NetworkTa
 
 
 class SystemTable(table_of(System, within=_PARTS)):  # type: ignore[misc]
-    """Components and what connects and drives them, what a run comes to and when it is good."""
+    """Components, what connects and drives them, the objectives of a run and the criterion of a good one."""
 
     order: Order = "gauss-seidel"
-    """The order of every connection that does not have one of its own."""
+    """The default order of connections."""
 
 
 def schema() -> dict[str, Any]:
@@ -101,7 +101,7 @@ def system_from_tables(tables: Mapping[str, Any], folder: Path) -> System:
             "sources": {name: _source(name, value, folder) for name, value in table.sources.items()},
             "computers": {name: _computer(name, value, folder) for name, value in table.computers.items()},
             "networks": {name: _network(name, value, folder) for name, value in table.networks.items()},
-            "criterion": _made("criterion", Criterion, table.criterion.model_dump()),
+            "criterion": _part("criterion", Criterion, table.criterion.model_dump()),
             "operating_point": dict(flattened(table.operating_point)),
         }
     )
@@ -122,32 +122,32 @@ def _component(name: str, table: Any, folder: Path) -> Component:
     keys["parameters"] = parameters_in(table.parameters, f"{place}.parameters")
     if table.sampling is not None:
         keys["sampling"] = _sampling(f"{place}.sampling", table.sampling, folder)
-    return _made(place, Component, keys)
+    return _part(place, Component, keys)
 
 
 def _sampling(place: str, table: Any, folder: Path) -> Sampling:
     keys = {key: value for key, value in with_distributions(f"{place}.", table, folder).items() if value is not None}
     if table.on is None:
-        return _made(place, Sampling, keys)
+        return _part(place, Sampling, keys)
     require(table.period is None, f"{place}.period", table.period, "none beside on: messages say when it runs")
-    return _made(place, SamplingOnArrival, keys)
+    return _part(place, SamplingOnArrival, keys)
 
 
 def _computer(name: str, table: Any, folder: Path) -> Computer:
     place = f"computers.{name}"
     tasks = {key: _with_arrivals(f"{place}.tasks.{key}", Task, task, folder) for key, task in table.tasks.items()}
-    return _made(place, Computer, table.model_dump(exclude={"tasks"}) | {"tasks": tasks})
+    return _part(place, Computer, table.model_dump(exclude={"tasks"}) | {"tasks": tasks})
 
 
 def _network(name: str, table: Any, folder: Path) -> Network:
     place, of = f"networks.{name}", table.messages.items()
     messages = {key: _with_arrivals(f"{place}.messages.{key}", Message, one, folder) for key, one in of}
-    return _made(place, Network, table.model_dump(exclude={"messages"}) | {"messages": messages})
+    return _part(place, Network, table.model_dump(exclude={"messages"}) | {"messages": messages})
 
 
-def _with_arrivals(place: str, kind: type[Made], table: Any, folder: Path) -> Made:
-    arrivals = table.arrivals and _made(f"{place}.arrivals", Arrivals, table.arrivals.model_dump())
-    return _made(place, kind, with_distributions(f"{place}.", table, folder) | {"arrivals": arrivals})
+def _with_arrivals(place: str, kind: type[Part], table: Any, folder: Path) -> Part:
+    arrivals = table.arrivals and _part(f"{place}.arrivals", Arrivals, table.arrivals.model_dump())
+    return _part(place, kind, with_distributions(f"{place}.", table, folder) | {"arrivals": arrivals})
 
 
 def _connection(index: int, table: Any, order: Order, folder: Path) -> Connection:
@@ -160,14 +160,14 @@ def _connection(index: int, table: Any, order: Order, folder: Path) -> Connectio
         for variable, value in keys[what].items():
             if isinstance(value, bool) or not isinstance(value, (int, float)):
                 raise UsageError(f"connections.{keys['name']}.{what}.{variable} = {value!r}: expected a number")
-    return _made(f"connections.{keys['name']}", Connection, keys)
+    return _part(f"connections.{keys['name']}", Connection, keys)
 
 
 def _source(name: str, table: Any, folder: Path) -> Source:
     file = None if table.file is None else folder / table.file
-    return _made(f"sources.{name}", Source, {**table.model_dump(), "file": file})
+    return _part(f"sources.{name}", Source, {**table.model_dump(), "file": file})
 
 
-def _made(place: str, kind: type[Made], keys: Mapping[str, Any]) -> Made:
+def _part(place: str, kind: type[Part], keys: Mapping[str, Any]) -> Part:
     with at_place(place):
         return kind(**keys)

@@ -1,4 +1,4 @@
-"""Time in integer nanoseconds, from the decimal form in which people write seconds."""
+"""Time in integer nanoseconds, from the decimal form of seconds."""
 
 import functools
 import itertools
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 NANOSECONDS = 1_000_000_000
 
 
-@functools.lru_cache(maxsize=4096)  # the runs of a study have most times in common
+@functools.lru_cache(maxsize=4096)  # most times are common to the runs of a study
 def exact_nanoseconds(seconds: float) -> Fraction:
     """The rational number that the decimal form of `seconds` means, in nanoseconds."""
     return Fraction(repr(float(seconds))) * NANOSECONDS
@@ -26,12 +26,12 @@ def nanoseconds(seconds: float) -> int:
 
 
 def down_to_nanoseconds(seconds: float) -> float:
-    """The last whole nanosecond that is not after it."""
+    """A time [s] rounded down to a whole nanosecond [s]."""
     return math.floor(seconds * NANOSECONDS + 1e-6) / NANOSECONDS
 
 
 def is_at_least(seconds: float, nanoseconds: float) -> bool:
-    """Whether a time is no shorter than so many nanoseconds, by what the decimal forms of both mean."""
+    """Whether a time [s] is at least so many nanoseconds, by the decimal forms of both."""
     about = seconds * NANOSECONDS
     if abs(about - nanoseconds) > 1e-9 * nanoseconds:
         return about > nanoseconds
@@ -68,8 +68,8 @@ class Grid:
         return k
 
     def between(self, first: int, end: int) -> "npt.NDArray[np.int64]":
-        """Instants `first` up to `end` of them, without that one, as an array."""
-        import numpy as np  # what only reads a system does without
+        """The instants with indices from `first` to before `end`, as an array."""
+        import numpy as np  # not needed to read a system
 
         if abs(self._offset + end * self._period) + 1 >= 2**62:
             return np.array([self[k] for k in range(first, end)], dtype=np.int64)

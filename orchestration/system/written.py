@@ -1,4 +1,4 @@
-"""A system as the tables of its file: the fields of its parts, by their names there."""
+"""A system as the tables of its file."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -7,14 +7,14 @@ from typing import Any
 
 
 def tables_of(system: Any) -> dict[str, Any]:
-    """The tables of the system file that loads as a `System`, wherever it lies, without what is what it is anyway."""
+    """The tables of the file that loads as `system`, in any folder, without defaults."""
     tables: dict[str, Any] = {"stop_time": system.stop_time, "seed": system.seed, "optional": list(system.optional)}
     tables["components"] = {
         name: _without_defaults(component, keep=("fmu",)) for name, component in system.components.items()
     }
     for component, table in zip(system.components.values(), tables["components"].values()):
         if hasattr(component.sampling, "task"):
-            del table["sampling"]  # which the task says
+            del table["sampling"]  # which follows from the task
         if hasattr(component.sampling, "on"):
             del table["sampling"]["period"]
         if table["fmu"].endswith(".fmu"):
@@ -53,7 +53,7 @@ def _without_defaults(of: Any, keep: tuple[str, ...] = ()) -> dict[str, Any]:
 
 
 def in_toml(value: Any) -> Any:
-    """A value as TOML has it: what is drawn as the table that says it, paths so that the file may lie anywhere."""
+    """A value for TOML: a distribution as its table, paths absolute."""
     if dataclasses.is_dataclass(value):
         return _without_defaults(value)
     if isinstance(value, Path):

@@ -82,7 +82,7 @@ def test_what_it_is_fed_by_itself_is_the_path_that_others_have_built_in(scenario
 def test_one_that_hears_no_reference_is_refused_but_for_rest(scenario: Scenario, folder: Path) -> None:
     deaf = scenario.with_changes(controller=FmuChoice(fmu=str(folder / "mine" / "native" / "Deaf.fmu")))
     expected = (
-        "reference: Deaf cannot hear what it is to follow, it has no input reference.position.x, "
+        "reference: Deaf cannot follow it without the inputs reference.position.x, "
         "reference.position.y, reference.position.z; expected reference hover, for one that holds a point by itself"
     )
     for choice in (ReferenceChoice(), ReferenceChoice(name="circle")):

@@ -132,7 +132,7 @@ def refusal(folder: Path, text: str) -> str:
         ("stop_time = 60.0", "stop_time = 0.0", "stop_time = 0.0: expected a positive number"),
         ("stop_time = 60.0", "", "stop_time: expected a value"),
         ("seed = 3", "seed = 0.5", "seed = 0.5: "),
-        ('name = "valve"', 'name = "0"', "connections = 0: expected a name of its own for each"),
+        ('name = "valve"', 'name = "0"', "connections = 0: expected a different name for each"),
         ("[sources.rain]", '[sources."a.b"]', "sources = a.b: expected a name in printable characters without a dot"),
         ('name = "valve"', 'name = "a\\nb"', "connections = a\\nb: expected a name in printable characters"),
         ("stop_time = 60.0", "stop_time = nan", "stop_time = nan: expected a positive number"),
