@@ -16,8 +16,8 @@ from scipy.linalg import expm, solve_discrete_are
 from orchestration.basics.errors import QuadcosimError
 from orchestration.certificates.breaking import least_breaking
 from orchestration.certificates.certificate import Certificate, read_certificate
-from orchestration.certificates.certify import certified
-from orchestration.certificates.checker import proven
+from orchestration.certificates.certify import find_certificate
+from orchestration.certificates.checker import verified
 from orchestration.certificates.family import Family
 from tests.orchestration.certificates.loops import HOVER_A, HOVER_B, HOVER_F, late_command, switched
 
@@ -34,10 +34,10 @@ def main() -> None:
     for name, loops in (("two matrices in any order", _switched()), ("late commands", _late())):
         beyond, below = 0, 0
         for too_much, less in loops:
-            beyond += certified(too_much, ["benchmark"]) is not None
-            below += certified(less, ["benchmark"]) is not None
+            beyond += find_certificate(too_much, ["benchmark"]) is not None
+            below += find_certificate(less, ["benchmark"]) is not None
         print(f"{name}: certified {beyond} of {EACH} that are unstable, {below} of {EACH} a tenth below", flush=True)
-    found = certified(late_command(HOVER_A, HOVER_B, HOVER_F, 0.06, 0.019), ["benchmark"])
+    found = find_certificate(late_command(HOVER_A, HOVER_B, HOVER_F, 0.06, 0.019), ["benchmark"])
     assert found is not None
     print(f"one number of {ALTERED} altered: {_rejected(found.certificate)} rejected, the others prove another loop")
 
@@ -89,7 +89,7 @@ def _rejected(certificate: Certificate) -> int:
             table[i][j] *= 1.1
             path.write_text(json.dumps(document), encoding="utf-8")
             try:
-                proven(read_certificate(path))
+                verified(read_certificate(path))
             except QuadcosimError:
                 rejected += 1
     return rejected

@@ -1,10 +1,10 @@
-"""A set of starts from which a loop with a limited command is proved to come to rest, however large the errors in it.
+"""A set of initial states from which a loop with a limited command is proved to come to rest, even with large errors.
 
 The plant and the law are linear, without memory in the law, and each signal of the command is cut to ±limit. Where
 |H z| ≤ limit, the cut value of F z lies between F z and H z, for any H (T. Hu, Z. Lin, Control Systems with Actuator
 Saturation, 2001). So a form that falls for both commands, in every combination of the signals, falls for the cut one in
-the set zᵀPz ≤ 1, as long as |H z| ≤ limit there: what starts in it stays in it, and dies out. P and H are looked for by
-semidefinite programming and proved by the checker of certificates, in ball arithmetic.
+the set zᵀPz ≤ 1, as long as |H z| ≤ limit there: states in it stay in it, and decay. P and H are found by semidefinite
+programming and proved by the checker of certificates, in ball arithmetic.
 """
 
 from __future__ import annotations
@@ -21,27 +21,28 @@ from orchestration.basics.extras import needs
 from orchestration.basics.simulator import Floats
 from orchestration.certificates.certificate import Cells, Certificate
 from orchestration.certificates.certify import RADIUS
-from orchestration.certificates.checker import BITS, NotProven, proven
+from orchestration.certificates.checker import BITS, NotProven, verified
+from orchestration.certificates.events import LOSS, Varying
 from orchestration.certificates.family import Factor, Family, Letter
-from orchestration.certificates.margin import measured
+from orchestration.certificates.margin import linear_loop_of
 from orchestration.certificates.search import least_cost
-from orchestration.certificates.timeline import LOSS, Timeline, Varying
+from orchestration.certificates.timeline import Timeline
 from orchestration.requests.request import RequestLike, request_of
 
 FALL = 1e-4
-"""by which a form falls at least, relative; what covers the radius of what was measured"""
+"""by which a form falls at least, relative; it covers the radius of measured matrices"""
 MOST_SIGNALS = 3
 """of a command"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Basin:
-    """The set zᵀPz ≤ 1 of what a loop holds just before a sample: from everywhere in it the loop comes to rest."""
+    """The set zᵀPz ≤ 1 of states of a loop just before a sample: from each of them the loop comes to rest."""
 
     P: Floats
     """The form."""
     H: Floats
-    """The other command, by signal: it stays within the limit in the set."""
+    """The auxiliary command, by signal: it stays within the limit in the set."""
     limit: float
     """To which each signal of the command is cut, both ways."""
     certificate: str
@@ -49,7 +50,7 @@ class Basin:
 
     @property
     def reach(self) -> Floats:
-        """How far along each coordinate, the others at 0, the set goes."""
+        """The extent of the set along each coordinate, the others at 0."""
         found: Floats = 1.0 / np.sqrt(np.diag(self.P))
         return found
 
@@ -58,25 +59,25 @@ class Basin:
 def basin(asked: RequestLike, connection: str, limit: float) -> Basin:
     """A proved basin of a system's loop about its operating point, if each signal of a connection is cut to ±`limit`.
 
-    The loop is linear but for that, punctual, and has one sampled component, which has no memory. The limit is of the
-    deviation from what is sent at the operating point. Of the sets that this method proves it is the one whose least
-    reach along a coordinate is largest.
+    The loop is otherwise linear, without jitter, and has one sampled component, which has no memory. The limit applies
+    to the deviation from the command at the operating point. The set is the one provable by this method whose least
+    extent along a coordinate is largest.
 
-    Raises `UsageError` for another loop, and for one of which no basin is found.
+    Raises `UsageError` for another loop, and for one without a basin found.
     """
     if not limit > 0.0:
         raise UsageError(f"limit {limit:g}: expected a positive number")
     request = request_of(asked)
-    loop = measured(request)
+    loop = linear_loop_of(request)
     sampled = [name for name in loop.components if loop.is_sampled(name)]
     sent = [x.name for x in loop.system.connections if x.sender in sampled]
     if len(sampled) != 1 or len(loop.components[sampled[0]].A) or sent != [connection]:
-        raise UsageError(f"{connection}: expected what the only sampled component sends, and no memory in that")
+        raise UsageError(f"{connection}: expected the connection from the only sampled component, which has no memory")
     return largest_basin(Timeline(loop, [Varying(kind=LOSS, name=connection, path=connection)]).family(), limit)
 
 
 def largest_basin(family: Family, limit: float) -> Basin:
-    """The basin of a family of one letter, whose first factor makes the command: the rows that move no single value."""
+    """The basin of a family of one letter, whose first factor computes the command in the rows that copy no value."""
     (letter,) = family.letters
     sample = family.matrices[letter.product[0].matrix]
     rows = [i for i, row in enumerate(sample) if [x for x in row if x] not in ([1.0], [])]
@@ -84,15 +85,15 @@ def largest_basin(family: Family, limit: float) -> Basin:
     if len(signals) > MOST_SIGNALS:
         raise UsageError(f"a command of {len(signals)} signals: expected at most {MOST_SIGNALS}")
     of_signal = [[i for i in rows if tuple(sample[i].tolist()) == signal] for signal in signals]
-    P, H = _found(family, of_signal, limit)
+    P, H = _solve(family, of_signal, limit)
     certificate = _certificate(family, of_signal, P, H)
-    proven(certificate)
+    verified(certificate)
     _expect_within(certificate.coordinates, H, limit)
     return Basin(P=P, H=H, limit=limit, certificate=certificate.to_json())
 
 
-def _with(family: Family, of_signal: Sequence[Sequence[int]], commands: Sequence[Floats | None]) -> Floats:
-    """The first factor with other commands, of the coordinates that are kept; None: as it is."""
+def _with_commands(family: Family, of_signal: Sequence[Sequence[int]], commands: Sequence[Floats | None]) -> Floats:
+    """The first factor with other commands, by the kept coordinates; None: unchanged."""
     sample: Floats = family.matrices[family.letters[0].product[0].matrix].copy()
     for rows, command in zip(of_signal, commands):
         if command is not None:
@@ -101,13 +102,15 @@ def _with(family: Family, of_signal: Sequence[Sequence[int]], commands: Sequence
     return sample
 
 
-def _found(family: Family, of_signal: Sequence[Sequence[int]], limit: float) -> tuple[Floats, Floats]:
+def _solve(family: Family, of_signal: Sequence[Sequence[int]], limit: float) -> tuple[Floats, Floats]:
     """P and H, by Q = P⁻¹ and Y = H Q."""
     n, m, letter = len(family.kept), len(of_signal), family.letters[0]
     name = letter.product[0].matrix
 
     def at(commands: Sequence[Floats]) -> Floats:
-        return replace(family, matrices={**family.matrices, name: _with(family, of_signal, commands)}).at(letter)
+        return replace(family, matrices={**family.matrices, name: _with_commands(family, of_signal, commands)}).at(
+            letter
+        )
 
     nothing = [np.zeros(n)] * m
     without = at(nothing)
@@ -116,22 +119,22 @@ def _found(family: Family, of_signal: Sequence[Sequence[int]], limit: float) -> 
     count = n * (n + 1) // 2
     upper = np.triu_indices(n)
 
-    def taken(x: Floats) -> tuple[Floats, Floats]:
+    def unpacked(x: Floats) -> tuple[Floats, Floats]:
         Q = np.zeros((n, n))
         Q[upper] = x[:count]
         return Q + np.triu(Q, 1).T, x[count : count + m * n].reshape(m, n)
 
     def falls(x: Floats, cut: Sequence[bool]) -> Floats:
-        Q, Y = taken(x)
+        Q, Y = unpacked(x)
         after = without @ Q + effect @ np.where(np.array(cut)[:, None], Y, gains @ Q)
         return np.block([[(1.0 - FALL) * Q, after.T], [after, Q]])
 
     def stays(x: Floats, i: int) -> Floats:
-        Q, Y = taken(x)
+        Q, Y = unpacked(x)
         return np.block([[np.full((1, 1), (1.0 - FALL) * limit**2), Y[i : i + 1]], [Y[i : i + 1].T, Q]])
 
     def reaches(x: Floats, i: int) -> Floats:
-        Q, _ = taken(x)
+        Q, _ = unpacked(x)
         r = np.eye(n)[:, i : i + 1]
         return np.block([[np.full((1, 1), x[-1]), r.T], [r, Q]])
 
@@ -141,13 +144,13 @@ def _found(family: Family, of_signal: Sequence[Sequence[int]], limit: float) -> 
     x = least_cost(conditions, count + m * n + 1)
     if x is None:
         raise UsageError("no basin was found; is the loop unstable?")
-    Q, Y = taken(x)
+    Q, Y = unpacked(x)
     P = np.linalg.inv(Q)
     return 0.5 * (P + P.T), Y @ P
 
 
 def _certificate(family: Family, of_signal: Sequence[Sequence[int]], P: Floats, H: Floats) -> Certificate:
-    """That the form falls for every combination of commands."""
+    """The certificate that the form falls for every combination of commands."""
     letter = family.letters[0]
     first, *rest = letter.product
     matrices, letters = dict(family.matrices), []
@@ -157,7 +160,7 @@ def _certificate(family: Family, of_signal: Sequence[Sequence[int]], P: Floats, 
             if not any(cut)
             else f"{first.matrix}, cut {'+'.join(str(i + 1) for i in range(len(cut)) if cut[i])}"
         )
-        matrices[name] = _with(family, of_signal, [h if c else None for h, c in zip(H, cut)])
+        matrices[name] = _with_commands(family, of_signal, [h if c else None for h, c in zip(H, cut)])
         letters.append(Letter(name=name, product=(Factor(matrix=name), *rest)))
     return Certificate(
         of=(), radius=RADIUS, family=Family(matrices=matrices, kept=family.kept, letters=tuple(letters)),
@@ -172,6 +175,6 @@ def _expect_within(coordinates: Floats, H: Floats, limit: float) -> None:
     try:
         by_form = arb_mat(H.tolist()) * arb_mat(coordinates.tolist()).inv()
         if not all(sum(x * x for x in row) <= limit**2 for row in by_form.tolist()):
-            raise NotProven("the other command may leave the limit")
+            raise NotProven("the auxiliary command may exceed the limit")
     finally:
         ctx.prec = before

@@ -1,4 +1,4 @@
-"""Looks for periodic sequences of letters that make a loop unstable: what bounds a certificate from above."""
+"""Searches periodic sequences of letters that make a loop unstable, and so bound certificates from above."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from orchestration.certificates.family import Family
 LONGEST = 6
 """letters after which a sequence repeats"""
 SCAN = 24
-"""values that are tried before the first that is too much is narrowed down"""
+"""values that are tried before the first unstable one is bisected"""
 FINE = 1e-4
-"""of the range: to which that is done"""
+"""of the range: the tolerance of the bisection"""
 
 Draw = tuple[int, tuple[float, ...]]
 """Which letter, and the values of its parameters"""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Broken:
+class BreakingSequence:
     """A sequence that makes a loop unstable."""
 
     value: float
     """the least at which one was found"""
     sequence: tuple[tuple[str, tuple[float, ...]], ...]
-    """letters with their parameters, again and again"""
+    """letters with their parameters, repeated"""
     radius: float
     """spectral radius of the sequence"""
 
@@ -49,7 +49,7 @@ def unstable_sequence(family: Family, longest: int = LONGEST) -> tuple[tuple[Dra
 
 
 def _cycles(family: Family, maps: dict[Draw, Floats], longest: int) -> Iterator[tuple[tuple[Draw, ...], Floats]]:
-    """Words that lead from a mode back to it, each once, and their products."""
+    """Words that lead from a mode back to it, one of each rotation, with their products."""
     draws = list(maps)
     seen = set[tuple[int, ...]]()
 
@@ -73,21 +73,23 @@ def _cycles(family: Family, maps: dict[Draw, Floats], longest: int) -> Iterator[
         yield from extended(start, start, (), np.eye(size))
 
 
-def least_breaking(family_up_to: Callable[[float], Family], limit: float, longest: int = LONGEST) -> Broken | None:
-    """The least value up to `limit` at which a sequence is unstable, as far as the scan sees."""
+def least_breaking(
+    family_up_to: Callable[[float], Family], limit: float, longest: int = LONGEST
+) -> BreakingSequence | None:
+    """The least value up to `limit` at which the scan finds an unstable sequence."""
     found = functools.cache(lambda value: unstable_sequence(family_up_to(value), longest))
     rising = [min(limit, limit * i / SCAN) for i in range(SCAN + 1)]
     first = next((i for i in range(1, SCAN + 1) if found(rising[i])), None)
     if first is None:
         return None
     value = bisected(lambda v: found(v) is not None, rising[first - 1], rising[first], FINE * limit).bad
-    return broken_at(family_up_to(value), value, longest)
+    return breaking_at(family_up_to(value), value, longest)
 
 
-def broken_at(family: Family, value: float, longest: int = LONGEST) -> Broken | None:
-    """What is unstable there."""
+def breaking_at(family: Family, value: float, longest: int = LONGEST) -> BreakingSequence | None:
+    """An unstable sequence of a family; None if none was found."""
     found = unstable_sequence(family, longest)
     if found is None:
         return None
     sequence = tuple((family.letters[i].name, point) for i, point in found[0])
-    return Broken(value=value, sequence=sequence, radius=found[1])
+    return BreakingSequence(value=value, sequence=sequence, radius=found[1])

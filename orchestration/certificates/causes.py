@@ -1,6 +1,6 @@
-"""A computer or a network that makes a loop late: what of it varies, translated to draws of a `Timeline`.
+"""Varying quantities of a computer or a network that delays a loop, translated to draws of a `Timeline`.
 
-Whatever the scheduler is dealt, a component samples within a window after its nominal sample, and its messages arrive
+Whatever the execution times are, a component samples within a window after its nominal sample, and its messages arrive
 within another. A loop that no sequence of draws from these windows makes unstable is stable on that computer.
 """
 
@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 from orchestration.basics.bisection import bisected
 from orchestration.basics.errors import UsageError
 from orchestration.certificates.breaking import FINE
+from orchestration.certificates.events import JITTER, LATENCY, SHIFT, Varying
 from orchestration.certificates.family import Family
 from orchestration.certificates.parts import Loop
-from orchestration.certificates.timeline import JITTER, LATENCY, START, Timeline, Varying
+from orchestration.certificates.timeline import Timeline
 from orchestration.computers.windows import Window, windows_of
 from orchestration.system.distribution import Distribution, lowest
 from orchestration.system.distribution import Varying as Delay
@@ -33,16 +34,16 @@ class Cause:
     key: str
     path: str
     period: float
-    """of that task or message [s], which the value is less than"""
+    """of that task or message [s]; the value is less"""
 
-    def up_to(self, system: System, value: float) -> System:
-        """With draws up to a value [s]."""
+    def with_draws_up_to(self, system: System, value: float) -> System:
+        """The system with draws up to a value [s]."""
         spread = self.key == EXECUTION and value > 0.0
         return changed(system, {self.path: Distribution(uniform=(0.0, value)) if spread else value})
 
 
 def cause_at(system: System, path: str) -> Cause | None:
-    """What a path is of; None: no execution time and no jitter of what shares something."""
+    """The cause at a path; None: it is no execution time and no jitter of a task or message."""
     for task in placed_tasks(system.computers):
         if path in (f"{task.place}.{EXECUTION}", f"{task.place}.jitter"):
             return Cause(key=path.rpartition(".")[2], path=path, period=task.task.period or task.task.due)
@@ -52,24 +53,24 @@ def cause_at(system: System, path: str) -> Cause | None:
     return None
 
 
-class Caused:
-    """A loop that a computer or a network makes late."""
+class ScheduledLoop:
+    """A loop that a computer or a network delays."""
 
     def __init__(self, loop: Loop, system: System, cause: Cause) -> None:
-        """`loop` is that of the components of `system` if nothing made them late.
+        """`loop` is that of the components of `system` without delays.
 
-        Raises `UsageError` where theory has no bound of how late they are, where a message may arrive after the next
-        sample, and for more than one component that is late.
+        Raises `UsageError` where there is no bound of their lateness, where a message may arrive after the next sample,
+        and for more than one delayed component.
         """
         self._loop, self._system, self._cause = loop, system, cause
         self.family(0.0)
 
     def family(self, value: float) -> Family:
-        """With draws up to a value [s]; raises `UsageError` as above."""
+        """The family for draws up to a value [s]; raises `UsageError` as above."""
         windows = self._windows(value)
-        timeline = Timeline(replace(self._loop, system=self._by_the_least(windows)), self._varying(windows))
-        together = [window.together / NANOSECONDS for window in windows.values() if not window.is_certain]
-        return timeline.family(_widths(windows), together=together[0] if together else None)
+        timeline = Timeline(replace(self._loop, system=self._earliest_system(windows)), self._varying(windows))
+        largest_sum = [window.together / NANOSECONDS for window in windows.values() if not window.is_certain]
+        return timeline.family(_widths(windows), largest_sum=largest_sum[0] if largest_sum else None)
 
     def largest(self) -> float:
         """The largest value for which there is a family [s]."""
@@ -84,35 +85,38 @@ class Caused:
         return down_to_nanoseconds(bisected(fails, 0.0, self._cause.period, FINE * self._cause.period).good or 0.0)
 
     def value_of(self, family: Family) -> float:
-        """The largest value of which the windows are no wider than those of a family [s]."""
+        """The largest value [s] whose windows are no wider than those of a family."""
         most = family.largest()
 
         def fails(value: float) -> bool:
             try:
-                own = _widths(self._windows(value))
+                widths = _widths(self._windows(value))
             except UsageError:
                 return True
-            return len(own) > len(most) or (len(own) == len(most) and any(a > b for a, b in zip(own, most)))
+            return len(widths) > len(most) or (len(widths) == len(most) and any(a > b for a, b in zip(widths, most)))
 
         found = bisected(fails, 0.0, self._cause.period, 0.5 / NANOSECONDS).good or 0.0
         return min(down_to_nanoseconds(found), self.largest())
 
     def _windows(self, value: float) -> dict[str, Window]:
-        windows = windows_of(self._cause.up_to(self._system, value))
+        windows = windows_of(self._cause.with_draws_up_to(self._system, value))
         late = [name for name, window in windows.items() if not window.is_certain]
         if len(late) > 1:
             raise UsageError(
-                f"{self._cause.path}: makes {', '.join(late)} late; expected one component that is, the tasks of "
-                "others as load"
+                f"{self._cause.path}: delays {', '.join(late)}; expected one delayed component, other tasks as load"
             )
         return windows
 
     def _varying(self, windows: Mapping[str, Window]) -> list[Varying]:
         path = self._cause.path
-        return [Varying(kind=kind, name=name, path=path) for name, window in windows.items() for kind in _drawn(window)]
+        return [
+            Varying(kind=kind, name=name, path=path)
+            for name, window in windows.items()
+            for kind in _draw_widths(window)
+        ]
 
-    def _by_the_least(self, windows: Mapping[str, Window]) -> System:
-        """The system of the loop, each component and message as early as it can be."""
+    def _earliest_system(self, windows: Mapping[str, Window]) -> System:
+        """The system of the loop, each component and message as early as possible."""
         components = dict(self._loop.system.components)
         for name, window in windows.items():
             of_loop, task = components[name].sampling, self._system.components[name].sampling
@@ -121,25 +125,25 @@ class Caused:
             offset = task.offset + window.earliest / NANOSECONDS * task.clock_ratio
             components[name] = replace(components[name], sampling=replace(of_loop, offset=offset, jitter=0.0))
         connections = tuple(
-            replace(x, delay=_longer(x.delay, windows[x.sender])) if x.sender in windows else x
+            replace(x, delay=_least_delay(x.delay, windows[x.sender])) if x.sender in windows else x
             for x in self._loop.system.connections
         )
         return replace(self._loop.system, components=components, connections=connections)
 
 
-def _longer(delay: Delay, window: Window) -> float:
-    """With the least that lies between a sample that is as early as it can be and its messages [s]."""
+def _least_delay(delay: Delay, window: Window) -> float:
+    """The delay plus the least time between an earliest sample and its messages [s]."""
     least = window.least - (window.earliest if window.at_deadline else 0)
     return float(exact_nanoseconds(lowest(delay)) + least) / NANOSECONDS
 
 
-def _drawn(window: Window) -> dict[str, int]:
-    """What of a window is drawn, from 0 to how much [ns]."""
-    shift = START if window.at_deadline else JITTER
+def _draw_widths(window: Window) -> dict[str, int]:
+    """The kinds of draws of a window, each from 0 to a width [ns]."""
+    shift = SHIFT if window.at_deadline else JITTER
     widths = {shift: window.shift, LATENCY: window.spread}
     return {kind: width for kind, width in widths.items() if width}
 
 
 def _widths(windows: Mapping[str, Window]) -> list[float]:
-    """Of all that is drawn [s]."""
-    return [width / NANOSECONDS for window in windows.values() for width in _drawn(window).values()]
+    """The widths of all draws [s]."""
+    return [width / NANOSECONDS for window in windows.values() for width in _draw_widths(window).values()]

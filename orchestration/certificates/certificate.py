@@ -1,4 +1,4 @@
-"""A certificate: matrices, cells and quadratic forms, as a file that a checker verifies by itself."""
+"""A certificate: matrices, cells and quadratic forms, as a file that a checker verifies independently."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ Box = tuple[tuple[float, float], ...]
 """The ends of a cell along each parameter"""
 Word = tuple[int, ...]
 Node = tuple[int, Word]
-"""A mode, and the labels of the values to come"""
+"""A mode, and the labels of future values"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cells:
-    """How the values of a letter are divided."""
+    """The cells into which the values of a letter are divided."""
 
     edges: tuple[tuple[float, ...], ...]
     """of the cells along each parameter, ascending"""
@@ -43,19 +43,19 @@ class Cells:
 
 @dataclass(frozen=True, kw_only=True)
 class Certificate:
-    """What proves that no sequence of letters makes a family grow, if the checker says so."""
+    """The proof, if the checker accepts it, that no sequence of letters makes a family grow."""
 
     of: tuple[str, ...]
-    """paths of what varies in the system that it was made for"""
+    """paths of the quantities that vary in its system"""
     radius: float
-    """relative, by row, of what was measured: the proof is for all matrices as near as that"""
+    """relative, by row, of measured matrices: the proof covers all matrices within it"""
     family: Family
     cells: tuple[Cells, ...]
     """of each letter; a label belongs to one letter"""
     coordinates: Floats
-    """in which the forms are given, by those that the family keeps"""
+    """of the forms, by the kept coordinates of the family"""
     memory: int
-    """how many labels to come a form depends on"""
+    """the number of future labels that a form depends on"""
     forms: Mapping[Node, Floats]
 
     def to_json(self) -> str:
@@ -85,7 +85,7 @@ class Certificate:
 
 
 def words(certificate: Certificate, mode: int, length: int) -> Iterator[tuple[int, Word]]:
-    """The words of labels of a length that may come after a mode, each with the mode that its first label leads to."""
+    """The words of labels of a length that may follow a mode, each with the mode that its first label leads to."""
     if length == 0:
         yield mode, ()
         return
@@ -129,7 +129,7 @@ def _certificate(document: Mapping[str, Any]) -> Certificate:
         )
     kept = tuple(map(_index, document["kept"]))
     if any(len(m) != size for m in matrices.values()) or len(set(kept)) != len(kept) or not kept or max(kept) >= size:
-        raise ValueError("matrices of different sizes, or coordinates that they do not have")
+        raise ValueError("matrices of different sizes, or coordinates outside of them")
     forms = {
         (_index(each["mode"]), tuple(map(_index, each["word"]))): _square(each["form"], len(kept))
         for each in document["forms"]
@@ -148,27 +148,27 @@ def _certificate(document: Mapping[str, Any]) -> Certificate:
     )
 
 
-def _factor(given: list[Any], matrices: Mapping[str, Floats], parameters: int) -> Factor:
-    name, times = str(given[0]), tuple(map(_number, given[1:]))
+def _factor(entries: list[Any], matrices: Mapping[str, Floats], parameters: int) -> Factor:
+    name, times = str(entries[0]), tuple(map(_number, entries[1:]))
     if name not in matrices or (times and len(times) != parameters + 1):
-        raise ValueError(f"factor {given}")
+        raise ValueError(f"factor {entries}")
     return Factor(matrix=name, times=times or None)
 
 
-def _square(given: Any, size: int | None = None) -> Floats:
-    found: Floats = np.array(given, dtype=float)
+def _square(value: Any, size: int | None = None) -> Floats:
+    found: Floats = np.array(value, dtype=float)
     if found.shape != (len(found), len(found)) or not np.isfinite(found).all() or size not in (None, len(found)):
         raise ValueError("expected a square matrix of finite numbers")
     return found
 
 
-def _number(given: Any) -> float:
-    if isinstance(given, bool) or not isinstance(given, (int, float)) or not math.isfinite(given):
-        raise ValueError(f"expected a finite number, not {given!r}")
-    return float(given)
+def _number(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise ValueError(f"expected a finite number, not {value!r}")
+    return float(value)
 
 
-def _index(given: Any) -> int:
-    if isinstance(given, bool) or not isinstance(given, int) or given < 0:
-        raise ValueError(f"expected a whole number, not {given!r}")
-    return given
+def _index(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+        raise ValueError(f"expected a whole number, not {value!r}")
+    return value

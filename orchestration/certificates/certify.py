@@ -1,4 +1,4 @@
-"""A certificate for a family: cells, labels and coordinates are chosen, forms looked for, and the checker asked."""
+"""Finds a certificate for a family: chooses cells, labels and coordinates, searches forms, and calls the checker."""
 
 from __future__ import annotations
 
@@ -10,63 +10,65 @@ import numpy as np
 
 from orchestration.basics.simulator import Floats
 from orchestration.certificates.certificate import Cells, Certificate
-from orchestration.certificates.checker import NotProven, proven
+from orchestration.certificates.checker import NotProven, verified
 from orchestration.certificates.family import Family
 from orchestration.certificates.search import forms_for, inequalities_of
 
 RADIUS = 1e-6
-"""relative, of what is measured"""
+"""relative, of measured matrices"""
 LADDER = ((1, 0), (2, 1), (2, 2), (2, 3), (2, 4), (3, 3))
-"""labels of each letter with a parameter, and how many of those to come a form depends on: tried in turn"""
+"""labels of each letter with a parameter, and the number of future labels that a form depends on: tried in turn"""
 LARGEST = 1000
-"""inequalities of a search: steps of the ladder that ask for more are left out"""
+"""inequalities of a search: steps of the ladder that need more are skipped"""
 SEARCHED = 12
-"""cells in which forms are looked for; of two parameters the square root of that along each"""
+"""cells for which forms are searched; of two parameters the square root of that along each"""
 FINER = {1: (2, 4, 8), 2: (2, 4)}
-"""times as many, by how many parameters there are, in which they are proved: cells are refined first, forms looked for
+"""factors on the number of cells for the proof, by the number of parameters: cells are refined first, forms searched
 again second"""
 ROUNDS = 3
-"""of the search, each in the coordinates of the forms that the one before found"""
+"""of the search, each in the coordinates of the forms of the one before"""
 COUPLED = 1e-7
-"""of the largest entry of a row: entries below that count as none when parts are told apart, not in the proof"""
+"""of the largest entry of a row: smaller entries count as 0 when parts are separated, not in the proof"""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Found:
-    """A certificate, and which step of the ladder it took."""
+class CertificateOnStep:
+    """A certificate, and the step of the ladder at which it was found."""
 
     certificate: Certificate
     step: int
 
 
-def certified(family: Family, of: Sequence[str], first: int = 0, radius: float = RADIUS) -> Found | None:
-    """A certificate that the checker takes, from a step of the ladder on; None if none was found."""
+def find_certificate(
+    family: Family, of: Sequence[str], first: int = 0, radius: float = RADIUS
+) -> CertificateOnStep | None:
+    """A certificate that the checker accepts, from a step of the ladder on; None if none was found."""
     parts = parts_of(family)
     for step, (labels, memory) in enumerate(LADDER):
         if step < first:
             continue
         certificate = Certificate(
-            of=tuple(of), radius=radius, family=family, cells=tuple(_divided(family, labels, 1)),
+            of=tuple(of), radius=radius, family=family, cells=tuple(_cells_of(family, labels, 1)),
             coordinates=_coordinates(family, parts), memory=memory, forms={},
         )  # fmt: skip
         if inequalities_of(certificate) > LARGEST:
             continue
-        found = _proved(certificate, parts, labels)
+        found = _prove(certificate, parts, labels)
         if found is not None:
-            return Found(certificate=found, step=step)
+            return CertificateOnStep(certificate=found, step=step)
     return None
 
 
-def _proved(certificate: Certificate, parts: Sequence[Sequence[int]], labels: int) -> Certificate | None:
+def _prove(certificate: Certificate, parts: Sequence[Sequence[int]], labels: int) -> Certificate | None:
     family = certificate.family
     for _ in range(ROUNDS):
         forms = forms_for(certificate, parts)
         if forms is None:
             return None
-        for finer in FINER[max(1, *(len(letter.ranges) for letter in family.letters))]:
-            refined = replace(certificate, forms=forms, cells=tuple(_divided(family, labels, finer)))
+        for refinement in FINER[max(1, *(len(letter.ranges) for letter in family.letters))]:
+            refined = replace(certificate, forms=forms, cells=tuple(_cells_of(family, labels, refinement)))
             try:
-                proven(refined)
+                verified(refined)
             except NotProven:
                 continue
             return refined
@@ -75,12 +77,12 @@ def _proved(certificate: Certificate, parts: Sequence[Sequence[int]], labels: in
             mean[np.ix_(part, part)] /= np.linalg.norm(mean[np.ix_(part, part)], 2)
         try:
             certificate = replace(certificate, coordinates=np.linalg.cholesky(mean).T @ certificate.coordinates)
-        except np.linalg.LinAlgError:  # forms that nearly fit a loop that grows
+        except np.linalg.LinAlgError:  # the forms of a loop that is nearly unstable
             return None
     return None
 
 
-def _divided(family: Family, labels: int, finer: int) -> Iterator[Cells]:
+def _cells_of(family: Family, labels: int, refinement: int) -> Iterator[Cells]:
     """The cells of each letter: labels of equal width along each parameter, each of as many cells."""
     total = [sum(x.ranges[i][1] - x.ranges[i][0] for x in family.letters if len(x.ranges) > i) for i in (0, 1)]
     first = 0
@@ -89,7 +91,7 @@ def _divided(family: Family, labels: int, finer: int) -> Iterator[Cells]:
         edges, own = [], np.zeros((), dtype=int)
         for i, (low, high) in enumerate(letter.ranges):
             share = (high - low) / total[i] if total[i] > 0.0 else 1.0
-            cells = SEARCHED ** (1.0 / count) * finer * share / labels
+            cells = SEARCHED ** (1.0 / count) * refinement * share / labels
             each = max(1, math.ceil(cells - 1e-9))
             edges.append(tuple(np.linspace(low, high, labels * each + 1).tolist()) if high > low else (low, high))
             along = np.repeat(np.arange(labels), each) if high > low else np.zeros(1, dtype=int)
@@ -101,7 +103,7 @@ def _divided(family: Family, labels: int, finer: int) -> Iterator[Cells]:
 
 
 def parts_of(family: Family) -> list[list[int]]:
-    """The kept coordinates in sets that do not move one another, the largest first."""
+    """The kept coordinates in sets that do not act on one another, the largest first."""
     size = len(next(iter(family.matrices.values())))
     joined = np.eye(size, dtype=bool)
     for matrix in family.matrices.values():
@@ -116,7 +118,7 @@ def parts_of(family: Family) -> list[list[int]]:
 
 
 def _coordinates(family: Family, parts: Sequence[Sequence[int]]) -> Floats:
-    """Coordinates in which the mean square, over values of the parameters, is nearly a norm that falls."""
+    """Coordinates in which the mean square, over values of the parameters, is nearly a decreasing norm."""
     maps = [
         family.at(letter, [low + share * (high - low) for low, high in letter.ranges])
         for letter in family.letters

@@ -1,4 +1,4 @@
-"""A certificate's file looked at again: what it proves, and whether that is about a system."""
+"""The check of a certificate's file: what it proves, and whether it is about a system."""
 
 from __future__ import annotations
 
@@ -10,38 +10,39 @@ import numpy as np
 from orchestration.basics.errors import UsageError
 from orchestration.basics.extras import needs
 from orchestration.basics.simulator import Floats
-from orchestration.certificates.causes import Caused
+from orchestration.certificates.causes import ScheduledLoop
 from orchestration.certificates.certificate import Certificate, read_certificate
+from orchestration.certificates.events import LOSS, Varying
 from orchestration.certificates.family import Family
-from orchestration.certificates.margin import cause_in, expect_unshared, measured, varying_of
-from orchestration.certificates.timeline import LOSS, Timeline, Varying
+from orchestration.certificates.margin import cause_in, expect_without_scheduler, linear_loop_of, varying_of
+from orchestration.certificates.timeline import Timeline
 from orchestration.requests.request import RequestLike, request_of
 from orchestration.stability.known_loops import rested
 
 ROUNDING = 1e-12
-"""of the largest entry of a row: what may be left of a zero"""
+"""of the largest entry of a row: the largest value that counts as 0"""
 
 
 class AnotherLoop(UsageError):
-    """A certificate proves something of another loop than that of the system."""
+    """A certificate is about another loop than that of the system."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Checked:
-    """What a certificate was found to prove, made of its numbers."""
+    """What a certificate proves, from its numbers."""
 
     ranges: dict[str, tuple[tuple[float, float], ...]]
-    """By what may happen in a period: the ranges of its values [s]."""
+    """By letter, an event of a period: the ranges of its values [s]."""
     runs: dict[str, int | None]
-    """How often each of that may happen in a row; None: for ever."""
+    """By letter: how many times in a row it may come; None: any number."""
     states: int
-    """Numbers that go from one period to the next."""
+    """The size of the state from period to period."""
     radius: float
-    """Relative: the proof is for all matrices that are as near as that."""
+    """Relative: the proof covers all matrices within it."""
     of: tuple[str, ...]
-    """The paths that vary in the system that it was compared with; none if it was compared with none."""
+    """The paths that vary in the system that it was compared with; empty without a system."""
     up_to: float | None = None
-    """Of a path of a computer or a network: the largest value [s] that makes the loop no later than these ranges."""
+    """Of a path of a computer or a network: the largest value [s] that delays the loop no more than these ranges."""
 
 
 @needs("flint")
@@ -51,44 +52,44 @@ def check(path: str | Path, asked: RequestLike | None = None) -> Checked:
     Raises `QuadcosimError` for a certificate that proves nothing, `UsageError` for a file that is none and for one of
     another loop.
     """
-    from orchestration.certificates.checker import proven
+    from orchestration.certificates.checker import verified
 
     certificate = read_certificate(Path(path))
-    found, up_to = proven(certificate), None
+    proof, up_to = verified(certificate), None
     if asked is not None:
         request = request_of(asked)
         cause = cause_in(request, certificate.of[0]) if len(certificate.of) == 1 else None
         if cause is None:
-            expect_unshared(request)
+            expect_without_scheduler(request)
             varying = [varying_of(request, of) for of in certificate.of]
-            family = _as_long(certificate, Timeline(measured(request), varying), varying)
+            family = _family_for(certificate, Timeline(linear_loop_of(request), varying), varying)
         else:
-            caused = Caused(measured(request), rested(request), cause)
-            up_to = caused.value_of(certificate.family)
-            family = caused.family(up_to)
-        expect_of(certificate, family)
+            scheduled = ScheduledLoop(linear_loop_of(request), rested(request), cause)
+            up_to = scheduled.value_of(certificate.family)
+            family = scheduled.family(up_to)
+        expect_same_family(certificate, family)
     return Checked(
-        ranges=found.ranges, runs=found.runs, states=found.states, radius=found.radius,
+        ranges=proof.ranges, runs=proof.runs, states=proof.states, radius=proof.radius,
         of=() if asked is None else certificate.of, up_to=up_to,
     )  # fmt: skip
 
 
-def _as_long(certificate: Certificate, timeline: Timeline, varying: list[Varying]) -> Family | None:
-    """The family of a system for the ranges and runs of a certificate; None: it has none."""
+def _family_for(certificate: Certificate, timeline: Timeline, varying: list[Varying]) -> Family | None:
+    """The family of a system for the ranges and runs of a certificate; None: the system has none."""
     own = certificate.family
     timed = sum(each.kind != LOSS for each in varying)
     if any(len(letter.ranges) != timed for letter in own.letters):
-        raise AnotherLoop("the certificate varies something else than the paths that it names")
+        raise AnotherLoop("other quantities vary in the certificate than at the paths that it names")
     most = own.largest()
-    run = max(len(letter.moves) for letter in own.letters) - 1  # what arrives does after any number of losses
+    run = max(len(letter.moves) for letter in own.letters) - 1  # an arrival may follow any number of losses
     return timeline.family(most, run=run) if not most or sum(most) <= timeline.largest() else None
 
 
-def expect_of(certificate: Certificate, family: Family | None) -> None:
+def expect_same_family(certificate: Certificate, family: Family | None) -> None:
     """Raise `AnotherLoop` where a certificate is not of that family, within the radius that its proof covers."""
     own = certificate.family
     if family is None or (family.kept, family.letters) != (own.kept, own.letters):
-        raise AnotherLoop("what happens in a period of the system is something else than in the certificate")
+        raise AnotherLoop("the events of a period of the system are not those of the certificate")
     if family.matrices.keys() != own.matrices.keys():
         raise AnotherLoop("the system has other matrices than the certificate")
     for name, theirs in family.matrices.items():
@@ -97,7 +98,7 @@ def expect_of(certificate: Certificate, family: Family | None) -> None:
 
 
 def _is_within(own: Floats, theirs: Floats, radius: float) -> bool:
-    """Whether a matrix is in the set that the checker proves something of."""
+    """Whether a matrix is in the set that the proof covers."""
     from orchestration.certificates.checker import OF_THE_LARGEST
 
     if own.shape != theirs.shape:

@@ -1,13 +1,13 @@
-"""Verifies a certificate by itself, in ball arithmetic: every number below is an interval that holds the true one.
+"""Verifies a certificate independently, in ball arithmetic: every number below is an interval with the true one.
 
-Proven is: V(mode, word, z) = zᵀ P(mode, word) z, where the word are the labels of the values to come, falls from one
-period to the next, whatever letter comes next and whatever its parameters are:
+Proved is: V(mode, word, z) = zᵀ P(mode, word) z, where the word consists of the labels of future values, falls from one
+period to the next, for any next letter and any values of its parameters:
 
     M(τ)ᵀ P(next mode, next word) M(τ) < P(mode, word)    for all τ in the cells of the word's first label.
 
 M(τ) over a cell lies between its values at the corners of the cell, but for r²/2 · sup |∂²M/∂τ²| along each parameter,
 r half of the cell's width; and MᵀPM is convex in M, so the corners suffice. The forms may be given in any coordinates
-X of the state: what is looked at is congruent to the above. Nothing here knows how the forms were found.
+X of the state: the tested matrices are congruent to the above. Nothing here depends on how the forms were found.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from orchestration.certificates.family import Factor, Letter
 BITS = 106
 """of the arithmetic"""
 OF_THE_LARGEST = 1e-3
-"""of the radius: what the largest entry of a row adds to the others"""
+"""of the radius: the share of the largest entry of a row that is added for the others"""
 
 
 class NotProven(QuadcosimError):
@@ -34,19 +34,19 @@ class NotProven(QuadcosimError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Proven:
-    """What a certificate was found to prove, made of its numbers."""
+class Proof:
+    """What a certificate proves, from its numbers."""
 
     ranges: dict[str, tuple[tuple[float, float], ...]]
     """by letter: of each of its parameters"""
     runs: dict[str, int | None]
-    """by letter: how often it may come in a row; None: for ever"""
+    """by letter: how many times in a row it may come; None: any number"""
     states: int
     radius: float
 
 
-def proven(certificate: Certificate) -> Proven:
-    """What `certificate` proves; raises `NotProven` where it proves nothing."""
+def verified(certificate: Certificate) -> Proof:
+    """Verify `certificate`: what it proves; raises `NotProven` where it proves nothing."""
     before, ctx.prec = ctx.prec, BITS
     try:
         forms = _forms(certificate)
@@ -56,7 +56,7 @@ def proven(certificate: Certificate) -> Proven:
     finally:
         ctx.prec = before
     letters = certificate.family.letters
-    return Proven(
+    return Proof(
         ranges={letter.name: letter.ranges for letter in letters},
         runs={letter.name: _longest_run(letter) for letter in letters},
         states=len(certificate.family.kept),
@@ -65,7 +65,7 @@ def proven(certificate: Certificate) -> Proven:
 
 
 def _forms(certificate: Certificate) -> dict[Node, arb_mat]:
-    """The forms of all that may come, each symmetric to the bit and positive definite."""
+    """The forms of all modes and words, each symmetric to the bit and positive definite."""
     modes = {mode for letter in certificate.family.letters for move in letter.moves for mode in move}
     nodes = {(mode, word) for mode in modes for _, word in words(certificate, mode, certificate.memory)}
     found = {}
@@ -82,7 +82,7 @@ def _forms(certificate: Certificate) -> dict[Node, arb_mat]:
 
 
 def edges_of(certificate: Certificate) -> Iterator[tuple[Node, Node, int]]:
-    """Every node, what may come after it, and the label in between."""
+    """Every node, each node that may follow it, and the label in between."""
     modes = {mode for letter in certificate.family.letters for move in letter.moves for mode in move}
     for mode in sorted(modes):
         for after, longer in words(certificate, mode, certificate.memory + 1):
@@ -94,15 +94,15 @@ def _expect_fall(edge: tuple[Node, Node, int], forms: dict[Node, arb_mat], enclo
     for box, corners in enclosures.of(label):
         for M in corners:
             if not is_positive(forms[start] - M.transpose() * forms[end] * M):
-                raise NotProven(f"the form does not fall for {_said(enclosures.letter_of(label), box)}")
+                raise NotProven(f"the form does not fall for {_cell_text(enclosures.letter_of(label), box)}")
 
 
 class _Enclosures:
-    """Of the maps over cells."""
+    """Enclosures of the maps over cells."""
 
     def __init__(self, certificate: Certificate) -> None:
         self._certificate, family = certificate, certificate.family
-        self._matrices = {name: _measured(m, certificate.radius) for name, m in family.matrices.items()}
+        self._matrices = {name: _enclosed(m, certificate.radius) for name, m in family.matrices.items()}
         size, coordinates = len(next(iter(family.matrices.values()))), arb_mat(certificate.coordinates.tolist())
         chosen = arb_mat([[int(i == j) for j in range(size)] for i in family.kept])
         try:
@@ -118,7 +118,7 @@ class _Enclosures:
         return next(letter for letter, cells in pairs if label in cells.labels)
 
     def of(self, label: int) -> Iterator[tuple[Box, list[arb_mat]]]:
-        """The cells of a label, and of each the maps at its corners, as wide as the map between them may be."""
+        """The cells of a label, and for each the maps at its corners, widened to enclose the maps between them."""
         letter = self.letter_of(label)
         cells = self._certificate.cells[self._certificate.family.letters.index(letter)]
         for box in [box for other, box in cells.boxes() if other == label]:
@@ -165,15 +165,16 @@ class _Enclosures:
         return self._factors[factor, box]
 
 
-def _measured(matrix: Floats, radius: float) -> arb_mat:
-    """With what measuring may leave: of every entry, and a thousandth of that of the largest one of its row.
+def _enclosed(matrix: Floats, radius: float) -> arb_mat:
+    """A measured matrix with its error: `radius` of every entry, and a thousandth of that of the largest in its
+    row.
 
-    Zeros are exact, and so are rows of a single one, which hold or move a value.
+    Zeros are exact, and so are rows with a single 1, which hold or copy a value.
     """
-    return arb_mat([_measured_row(row.tolist(), radius) for row in matrix])
+    return arb_mat([_enclosed_row(row.tolist(), radius) for row in matrix])
 
 
-def _measured_row(row: list[float], radius: float) -> list[arb]:
+def _enclosed_row(row: list[float], radius: float) -> list[arb]:
     if [x for x in row if x != 0.0] == [1.0]:
         return [arb(x) for x in row]
     of_all = OF_THE_LARGEST * max(map(abs, row))
@@ -185,7 +186,7 @@ def _sum_of_sizes(a: arb_mat, b: arb_mat) -> arb_mat:
 
 
 def _widened(M: arb_mat, by: arb_mat) -> arb_mat:
-    """Every entry and all that is as near as an entry of `by` is large."""
+    """The matrix with the sizes of the entries of `by` added as radii."""
     rows = zip(M.tolist(), by.tolist())
     return arb_mat([[x + arb(0, y.abs_upper()) for x, y in zip(p, q)] for p, q in rows])
 
@@ -211,12 +212,12 @@ def is_positive(Q: arb_mat) -> bool:
 
 
 def _longest_run(letter: Letter) -> int | None:
-    """How many moves of a letter may follow one another."""
+    """The largest number of moves of a letter in a row; None: any."""
     reached, count = {start for start, _ in letter.moves}, 0
     while reached and count <= len(letter.moves):
         reached, count = {end for start, end in letter.moves if start in reached}, count + 1
     return None if count > len(letter.moves) and reached else count - 1
 
 
-def _said(letter: Letter, box: Box) -> str:
+def _cell_text(letter: Letter, box: Box) -> str:
     return " and ".join([letter.name, *(f"{low:.6g} to {high:.6g}" for low, high in box)])

@@ -72,10 +72,10 @@ class Family:
         """The same without coordinates on whose values at the beginning of a period nothing depends."""
         samples = [abs(self.at(x, [low + share * (high - low) for low, high in x.ranges]))
                    for x in self.letters for share in (0.0, 0.37, 1.0)]  # fmt: skip
-        together = np.sum(samples, axis=0)
+        largest_sum = np.sum(samples, axis=0)
         alive = np.arange(len(self.kept))
         while True:
-            felt = alive[(together[np.ix_(alive, alive)] > 0.0).any(axis=0)]
+            felt = alive[(largest_sum[np.ix_(alive, alive)] > 0.0).any(axis=0)]
             if len(felt) == len(alive):
                 return replace(self, kept=tuple(self.kept[i] for i in alive))
             alive = felt

@@ -1,4 +1,4 @@
-"""How far a quantity of a loop may vary from draw to draw: certified, broken, and by the small gain."""
+"""How far a quantity of a loop may vary from draw to draw: certified, breaking, and by the small-gain bound."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from orchestration.basics.extras import needs
 from orchestration.basics.progress import ShareProgress, share_reporter
 from orchestration.basics.terminal import Share
 from orchestration.building.inputs import files_of
-from orchestration.certificates.breaking import LONGEST, Broken, broken_at, least_breaking
-from orchestration.certificates.causes import Cause, Caused, cause_at
+from orchestration.certificates.breaking import LONGEST, BreakingSequence, breaking_at, least_breaking
+from orchestration.certificates.causes import Cause, ScheduledLoop, cause_at
+from orchestration.certificates.events import DELAY, JITTER, LOSS, Varying
 from orchestration.certificates.family import Family
 from orchestration.certificates.parts import Loop, loop_of
 from orchestration.certificates.repeated import least_repeated
-from orchestration.certificates.timeline import DELAY, JITTER, LOSS, Timeline, Varying
+from orchestration.certificates.timeline import Timeline
 from orchestration.exact.scheduled import without_scheduler
 from orchestration.fmi.foreign import computed
 from orchestration.fmi.reuse import Instances
@@ -34,11 +35,11 @@ from orchestration.system.times import NANOSECONDS, down_to_nanoseconds
 from orchestration.system.variable_names import variable_of
 
 MOST_LOST = 8
-"""losses in a row that are looked at"""
+"""losses in a row that are considered"""
 SHARES = (0.95, 0.97, 0.98, 0.99, 1.0)
-"""of what breaks the loop, or of the largest value: tried for a certificate, upward; below the first by halves"""
+"""of the breaking or the largest value: tried for a certificate, upward; below the first by bisection"""
 FINEST = 0.02
-"""of what breaks the loop: to which that is done"""
+"""of the breaking value: the tolerance of the bisection"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,22 +47,22 @@ class Certified:
     """How far a quantity may vary; times in seconds, losses as the longest run of them."""
 
     of: str
-    """The path of what varies: each draw is anywhere from 0 to the value."""
+    """The path of the varying quantity: each draw is anywhere from 0 to the value."""
     certified: float | None
-    """The largest value for which a proof was found that no sequence makes the loop unstable; None: there is none, as
-    the loop is unstable without any, or on its computer none was found even for 0."""
+    """The largest value for which a proof was found that no sequence makes the loop unstable; None: the loop is
+    unstable even for 0, or on its computer no proof was found for 0."""
     breaking: float | None
-    """The least value at which a periodic sequence was found that makes it unstable; None: none that was tried does."""
+    """The least value at which a periodic sequence was found that makes it unstable; None: none was found."""
     breaking_sequence: tuple[tuple[str, tuple[float, ...]], ...]
-    """That sequence: what happens at each draw, with its values, again and again."""
+    """That sequence: the letter of each draw with its values, repeated."""
     small_gain: float | None
-    """What the small-gain bound of Kao and Lincoln promises; None where it does not apply."""
+    """The small-gain bound of Kao and Lincoln; None where it does not apply."""
     largest: float
-    """The largest value that was looked at."""
+    """The largest value that was considered."""
     searched: str
     """Which sequences were tried for `breaking`."""
     states: int
-    """Numbers that go from one period to the next."""
+    """The size of the state from period to period."""
     certificate: str | None
     """The proof, as the text of a file that `check` verifies."""
 
@@ -78,31 +79,31 @@ def margin(asked: RequestLike, of: str, *, progress: ShareProgress = None) -> Ce
     """How far a quantity of a system may vary from draw to draw, the loop linearised about its operating point.
 
     `of` is the path of a sampled component's `sampling.jitter`, of a connection's `delay_jitter`, or of its `loss`,
-    which stands for the longest run of messages that are lost one after the other; all else is punctual. Of a system
-    with computers or networks it is that of a task's `execution`, or of the `jitter` of a task or message; all others
-    are as they may be. What is found is about the linear loop: nothing is said of large errors.
+    which means the longest run of messages lost in a row; all else is without jitter. Of a system with computers or
+    networks it is that of a task's `execution`, or of the `jitter` of a task or message; the others vary as the file
+    allows. The result is about the linear loop, not about large errors.
 
-    Raises `UsageError` where the loop cannot be made linear or the path is for something else, saying why.
+    Raises `UsageError` where the loop has no linear form or the path is unsupported, saying why.
     """
     request = request_of(asked)
     cause = cause_in(request, of)
     if cause is not None:
-        with share_reporter(progress, "certifying") as heard:
-            return _of_cause(request, cause, heard)
+        with share_reporter(progress, "certifying") as report:
+            return _of_cause(request, cause, report)
     varying = varying_of(request, of)
-    expect_unshared(request)
-    loop = measured(request)
+    expect_without_scheduler(request)
+    loop = linear_loop_of(request)
     timeline = Timeline(loop, [varying])
-    with share_reporter(progress, "certifying") as heard:
-        return (_of_losses if varying.kind == LOSS else _of_times)(timeline, varying, heard)
+    with share_reporter(progress, "certifying") as report:
+        return (_of_losses if varying.kind == LOSS else _of_times)(timeline, varying, report)
 
 
-def measured(request: Request) -> Loop:
-    """The loop of a request about its operating point, from its FMUs; nothing makes it late."""
-    return computed(files_of(system_of(request)).fmus.values(), _measured, request)
+def linear_loop_of(request: Request) -> Loop:
+    """The loop of a request about its operating point, from its FMUs, without computers and networks."""
+    return computed(files_of(system_of(request)).fmus.values(), _linear_loop_of, request)
 
 
-def _measured(request: Request) -> Loop:
+def _linear_loop_of(request: Request) -> Loop:
     instances = Instances()
     try:
         with errors_in_own_terms(request), at_rest(without_scheduler(rested(request)), instances) as rest:
@@ -111,25 +112,25 @@ def _measured(request: Request) -> Loop:
         instances.close()
 
 
-def expect_unshared(request: Request) -> None:
-    """Raise `UsageError` for what a scheduler decides, saying what to ask for instead."""
+def expect_without_scheduler(request: Request) -> None:
+    """Raise `UsageError` for a system with a scheduler, naming the paths to use instead."""
     system = system_of(request)
     for name, task in tasks_of(system).items():
         raise UsageError(
-            f"{task.place}: a scheduler has {name} sampled; expected --of {task.place}.execution, as a cause"
+            f"{task.place}: a scheduler decides when {name} samples; expected --of {task.place}.execution, as a cause"
         )
     for name, message in messages_by_connection(system).items():
         raise UsageError(f"{message.place}: {name} waits for other frames; expected --of the jitter of one, as a cause")
 
 
 def cause_in(request: Request, of: str) -> Cause | None:
-    """What a path is of, where it is of a computer or a network."""
+    """The cause at a path of a computer or a network; None: it is of neither."""
     (path, *others) = paths_in(request, of) or (of,)
     return None if others else cause_at(system_of(request), path)
 
 
 def varying_of(request: Request, of: str) -> Varying:
-    """What a path is of; raises `UsageError` for one that nothing is certified for."""
+    """The varying quantity at a path; raises `UsageError` for an unsupported path."""
     found = paths_in(request, of)
     for path in found[:1] if len(found) == 1 else ():
         table, _, rest = path.partition(".")
@@ -152,7 +153,7 @@ def _of_times(timeline: Timeline, varying: Varying, progress: Share) -> Certifie
     searched = (
         f"draws at either end of each range, sequences that repeat after at most {LONGEST}, values up to {largest:g} s"
     )
-    if broken_at(up_to(0.0), 0.0) is not None:
+    if breaking_at(up_to(0.0), 0.0) is not None:
         return _unstable(varying, largest, searched, up_to(0.0))
     broken = least_breaking(up_to, largest)
     top = largest if broken is None else broken.value
@@ -166,20 +167,20 @@ def _of_times(timeline: Timeline, varying: Varying, progress: Share) -> Certifie
 
 
 def _of_losses(timeline: Timeline, varying: Varying, progress: Share) -> Certified:
-    from orchestration.certificates.certify import certified
+    from orchestration.certificates.certify import find_certificate
 
     searched = f"sequences that repeat after at most the run and {LONGEST // 2} messages, runs up to {MOST_LOST}"
-    if broken_at(timeline.family(), 0.0) is not None:
+    if breaking_at(timeline.family(), 0.0) is not None:
         return _unstable(varying, MOST_LOST, searched, timeline.family())
-    broken: Broken | None = None
+    broken: BreakingSequence | None = None
     value, certificate = None, None
     for run in range(MOST_LOST + 1):
         progress(run / (MOST_LOST + 1))
         family = timeline.family(run=run)
-        broken = broken_at(family, run, run + LONGEST // 2)
+        broken = breaking_at(family, run, run + LONGEST // 2)
         if broken is not None:
             break
-        found = certified(family, [varying.path])
+        found = find_certificate(family, [varying.path])
         if found is not None:
             value, certificate = run, found.certificate.to_json()
     return Certified(
@@ -192,18 +193,18 @@ def _of_losses(timeline: Timeline, varying: Varying, progress: Share) -> Certifi
 def _of_cause(request: Request, cause: Cause, progress: Share) -> Certified:
     system, files = rested(request), files_of(system_of(request))
     with errors_in_own_terms(request):
-        loop = measured(request)
-        caused = Caused(loop, system, cause)
-        tried = computed(files.fmus.values(), least_repeated, system, cause, files.models, loop.period)
-    largest = caused.largest()
-    top = largest if tried.breaking is None else min(largest, tried.breaking)
+        loop = linear_loop_of(request)
+        scheduled = ScheduledLoop(loop, system, cause)
+        search = computed(files.fmus.values(), least_repeated, system, cause, files.models, loop.period)
+    largest = scheduled.largest()
+    top = largest if search.breaking is None else min(largest, search.breaking)
     value, certificate = None, None
-    if tried.breaking != 0.0:
-        value, certificate = largest_certified(caused.family, [cause.path], top, progress)
+    if search.breaking != 0.0:
+        value, certificate = largest_certified(scheduled.family, [cause.path], top, progress)
     return Certified(
-        of=cause.path, certified=value, breaking=tried.breaking,
-        breaking_sequence=tried.sequence,
-        small_gain=None, largest=largest, searched=tried.searched, states=len(caused.family(0.0).kept),
+        of=cause.path, certified=value, breaking=search.breaking,
+        breaking_sequence=search.sequence,
+        small_gain=None, largest=largest, searched=search.searched, states=len(scheduled.family(0.0).kept),
         certificate=certificate,
     )  # fmt: skip
 
@@ -222,19 +223,19 @@ def largest_certified(
     progress: Share,
     shares: Sequence[float] | None = None,
 ) -> tuple[float | None, str | None]:
-    """The largest value for which a certificate is found, below `top`, and that; None where even 0 has none."""
-    from orchestration.certificates.certify import certified
+    """The largest value below `top` with a certificate, and that certificate; None where even 0 has none."""
+    from orchestration.certificates.certify import find_certificate
 
     first, *more = shares or SHARES
     best: tuple[float | None, str | None] = (None, None)
-    step, tried = 0, 0
+    step, attempts = 0, 0
 
     def works(share: float) -> bool:
-        nonlocal best, step, tried
-        tried += 1
-        progress(1.0 - 0.7**tried)
+        nonlocal best, step, attempts
+        attempts += 1
+        progress(1.0 - 0.7**attempts)
         value = down_to_nanoseconds(share * top)
-        found = certified(family_up_to(value), of, step)
+        found = find_certificate(family_up_to(value), of, step)
         if found is not None:
             best, step = (value, found.certificate.to_json()), found.step
         return found is not None
@@ -253,9 +254,9 @@ def largest_certified(
 
 
 def small_gain(loop: Loop, varying: Varying) -> float | None:
-    """The bound of Kao and Lincoln [s]; None where the loop is not the one that it is for.
+    """The bound of Kao and Lincoln [s]; None where it does not apply to the loop.
 
-    It is for one component in continuous time and one that is sampled and has no memory, the command alone late.
+    It applies to one component in continuous time and a sampled one without memory, with delays of the command alone.
     """
     names = list(loop.components)
     sampled = [name for name in names if loop.is_sampled(name)]
@@ -268,11 +269,11 @@ def small_gain(loop: Loop, varying: Varying) -> float | None:
     static = not len(controller.A) and not of.D.any() and len(loop.samples_of(law)) == 1
     if command.sender != law or measurement.delay or command.order != "gauss-seidel" or not static:
         return None
-    taken = [of.outputs.index(variable_of(start)) for start in measurement.start]
-    heard = [controller.inputs.index(variable_of(end)) for end in measurement.end]
-    said = [controller.outputs.index(variable_of(start)) for start in command.start]
-    moved = [of.inputs.index(variable_of(end)) for end in command.end]
-    F = command.scale * measurement.scale * controller.D[np.ix_(said, heard)] @ of.C[taken]
+    measured = [of.outputs.index(variable_of(start)) for start in measurement.start]
+    inputs = [controller.inputs.index(variable_of(end)) for end in measurement.end]
+    commands = [controller.outputs.index(variable_of(start)) for start in command.start]
+    driven = [of.inputs.index(variable_of(end)) for end in command.end]
+    F = command.scale * measurement.scale * controller.D[np.ix_(commands, inputs)] @ of.C[measured]
     period = float(loop.period) / NANOSECONDS
     delay = lowest(command.delay)
-    return certain_jitter(SampledLoop(A=of.A, B=of.B[:, moved], F=F, period=period, delay=delay))
+    return certain_jitter(SampledLoop(A=of.A, B=of.B[:, driven], F=F, period=period, delay=delay))

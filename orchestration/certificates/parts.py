@@ -1,4 +1,4 @@
-"""The matrices of a system's components about its operating point, and what a place in their common state is."""
+"""The matrices of a system's components about its operating point, and the layout of their common state."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from orchestration.system.times import NANOSECONDS, exact_nanoseconds
 from orchestration.system.variable_names import variable_of
 
 Place = tuple[str, ...]
-"""Of the state: what it is, of whom, and which"""
+"""of the state: kind, component or connection, and index or name"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,11 +36,11 @@ class Loop:
     system: System
     components: Mapping[str, Matrices]
     period: Fraction
-    """after which all is as it was"""
+    """the hyperperiod"""
     order: Sequence[str]
     """of sampled components at one instant"""
-    minds: frozenset[str] = frozenset()
-    """sampled components that do something else where their next sample comes at another time"""
+    step_dependent: frozenset[str] = frozenset()
+    """sampled components whose samples depend on the time to the next one"""
 
     def samples_of(self, name: str) -> list[Fraction]:
         """The instants of a component within a period of the loop."""
@@ -51,7 +51,7 @@ class Loop:
         return [(first + k * step) % self.period for k in range(round(self.period / step))]
 
     def connection(self, name: str) -> Connection:
-        """By its name."""
+        """The connection of a name."""
         return next(x for x in self.system.connections if x.name == name)
 
     def is_sampled(self, name: str) -> bool:
@@ -60,7 +60,7 @@ class Loop:
 
 
 def loop_of(rest: AtRest) -> Loop:
-    """The loop of a system at rest; raises `UsageError` for what this is not for."""
+    """The loop of a system at rest; raises `UsageError` for an unsupported one."""
     from scipy.linalg import expm  # comes with an extra
 
     system = rest.simulation.system
@@ -70,7 +70,7 @@ def loop_of(rest: AtRest) -> Loop:
         if system.components[x.sender].sampling is None and system.components[x.receiver].sampling is None:
             raise UsageError(f"connections.{x.name}: expected a sampled component at one of its ends")
     period = float(rest.period) / NANOSECONDS
-    components, minds = {}, set()
+    components, step_dependent = {}, set()
     for name, component in system.components.items():
         tangent = rest.tangents[name]
         if component.sampling is not None:
@@ -78,7 +78,7 @@ def loop_of(rest: AtRest) -> Loop:
             components[name] = in_output_coordinates(found, found.A)
             varies = rest.simulation.instances[name].model.varies_step
             if not varies or depends_on_step(tangent, component.sampling.period):
-                minds.add(name)
+                step_dependent.add(name)
         else:
             assert component.step is not None
             found, unfit = in_continuous_time(tangent, min(component.step, period))
@@ -91,17 +91,21 @@ def loop_of(rest: AtRest) -> Loop:
             if variable_of(start) not in known[0] or variable_of(end) not in known[1]:
                 raise UsageError(f"connections.{x.name}: carries {start}, which is no Real")
     return Loop(
-        system=system, components=components, period=rest.period, order=Plan(system).sampled, minds=frozenset(minds)
+        system=system,
+        components=components,
+        period=rest.period,
+        order=Plan(system).sampled,
+        step_dependent=frozenset(step_dependent),
     )
 
 
 @dataclass(kw_only=True)
 class Layout:
-    """Where what goes through time is: states, what is held, messages on their way."""
+    """The places of the state: states of components, held inputs, messages in transit."""
 
     loop: Loop
     kept: frozenset[str] = frozenset()
-    """connections of which the last message is remembered where it is not read, as others may be lost"""
+    """connections whose last message is remembered, as later ones may be lost"""
     places: dict[Place, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -118,11 +122,11 @@ class Layout:
         return not self.loop.is_sampled(x.sender) and x.name not in self.kept
 
     def place(self, of: Place) -> int:
-        """Where it is; at the end, if it is new."""
+        """Its index; at the end, if it is new."""
         return self.places.setdefault(of, len(self.places))
 
     def flow(self) -> Floats:
-        """The generator of what happens between instants."""
+        """The generator of the flow between instants."""
         found: Floats = np.zeros((len(self.places), len(self.places)))
         for name, matrices in self.loop.components.items():
             if self.loop.is_sampled(name):
@@ -133,8 +137,8 @@ class Layout:
         return found
 
 
-class Assigned:
-    """The linear map of an instant, from assignments one after the other: a row for every place."""
+class InstantMap:
+    """The linear map of an instant, built by assignments one after the other: a row for every place."""
 
     def __init__(self, layout: Layout, size: int) -> None:
         self.layout = layout
@@ -142,14 +146,14 @@ class Assigned:
         self._read: dict[tuple[str, str], Floats] = {}
 
     def measure(self, x: Connection) -> list[Floats]:
-        """What a connection takes from a component in continuous time."""
+        """The values that a connection reads from a component in continuous time."""
         of, layout = self.layout.loop.components[x.sender], self.layout
         states = self.rows[[layout.places["state", x.sender, str(i)] for i in range(len(of.A))]]
         inputs = self.rows[[layout.places["input", x.sender, end] for end in of.inputs]]
         outputs = of.C @ states + of.D @ inputs
         return [x.scale * outputs[of.outputs.index(variable_of(start))] for start in x.start]
 
-    def hear(self, x: Connection, values: Sequence[Floats]) -> None:
+    def receive(self, x: Connection, values: Sequence[Floats]) -> None:
         """A message arrives."""
         for end, value in zip(x.end, values):
             key = ("input", x.receiver, variable_of(end))
@@ -158,12 +162,12 @@ class Assigned:
             self._read[x.receiver, variable_of(end)] = value
 
     def push(self, x: Connection, values: Sequence[Floats], count: int) -> None:
-        """A message is sent, `count` of them being on their way already."""
+        """A message is sent, with `count` of them in transit already."""
         for i, value in enumerate(values):
             self.rows[self.layout.place(("message", x.name, str(count), str(i)))] = value
 
     def pop(self, x: Connection, count: int) -> list[Floats]:
-        """The oldest of the messages on their way, which the others follow."""
+        """The oldest message in transit is removed, and the others move up."""
         at = [
             [self.layout.place(("message", x.name, str(k), str(i))) for i in range(len(x.start))] for k in range(count)
         ]
@@ -173,26 +177,26 @@ class Assigned:
         self.rows[at[-1]] = 0.0
         return values
 
-    def last(self, x: Connection, values: Sequence[Floats] | None) -> list[Floats]:
-        """What was sent last, after `values` are if they are not lost."""
+    def remember(self, x: Connection, values: Sequence[Floats] | None) -> list[Floats]:
+        """The values sent last, which are replaced by `values` if these are not lost."""
         at = [self.layout.place(("last", x.name, str(i))) for i in range(len(x.start))]
         if values is not None:
             self.rows[at] = values
         return list(self.rows[at])
 
     def sample(self, name: str) -> dict[str, Floats]:
-        """A sampled component steps; what it says then."""
+        """A sampled component steps; its outputs."""
         of, layout = self.layout.loop.components[name], self.layout
         at = [layout.places["state", name, str(i)] for i in range(len(of.A))]
         size = len(self.rows)
         states = self.rows[at].reshape(len(at), size)
-        heard = [
+        rows = [
             self.rows[layout.places["input", name, end]]
             if ("input", name, end) in layout.places
             else self._read[name, end]
             for end in of.inputs
         ]
-        inputs = np.array(heard).reshape(len(heard), size)
+        inputs = np.array(rows).reshape(len(rows), size)
         outputs = of.C @ states + of.D @ inputs
         self.rows[at] = of.A @ states + of.B @ inputs
         return dict(zip(of.outputs, outputs))

@@ -1,4 +1,4 @@
-"""Two quantities that vary at once: which pairs of values are certified together, and which break the loop."""
+"""Two quantities that vary at once: pairs of values that are certified, and pairs that break the loop."""
 
 from __future__ import annotations
 
@@ -11,21 +11,22 @@ from matplotlib.figure import Figure
 from orchestration.basics.errors import UsageError
 from orchestration.basics.extras import needs
 from orchestration.basics.progress import ShareProgress, share_reporter
-from orchestration.certificates.breaking import Broken, least_breaking, unstable_sequence
+from orchestration.certificates.breaking import BreakingSequence, least_breaking, unstable_sequence
+from orchestration.certificates.events import LOSS
 from orchestration.certificates.family import Family
-from orchestration.certificates.margin import expect_unshared, largest_certified, measured, varying_of
-from orchestration.certificates.timeline import LOSS, Timeline
+from orchestration.certificates.margin import expect_without_scheduler, largest_certified, linear_loop_of, varying_of
+from orchestration.certificates.timeline import Timeline
 from orchestration.figures.palette import BLUE, RED
 from orchestration.figures.style import SCREEN, Style, save
 from orchestration.requests.request import RequestLike, request_of
 from orchestration.system.times import down_to_nanoseconds
 
 COLUMNS = 6
-"""values of the first quantity, from 0 to what breaks the loop by itself"""
+"""values of the first quantity, from 0 to the one that alone breaks the loop"""
 SHARES = (0.95, 0.98)
-"""of what breaks the loop: tried for a certificate, as of one quantity"""
+"""of the breaking value: tried for a certificate, as of one quantity"""
 LONGEST = 4
-"""draws after which the sequences that are tried repeat"""
+"""draws after which the tried sequences repeat"""
 
 Pair = tuple[float, float]
 
@@ -35,15 +36,15 @@ class Region:
     """Pairs of values [s]: at each draw both quantities are anywhere from 0 to theirs."""
 
     of: tuple[str, str]
-    """The paths of what varies."""
+    """The paths of the varying quantities."""
     certified: tuple[Pair, ...]
-    """For which a proof was found: so it is for all pairs that are smaller in both."""
+    """Pairs for which a proof was found, which covers all pairs smaller in both."""
     breaking: tuple[Pair, ...]
-    """At which a periodic sequence was found that makes the loop unstable, the second value being the least."""
+    """Pairs at which a periodic sequence was found that makes the loop unstable, the second value being the least."""
     searched: str
     """Which sequences were tried for `breaking`."""
     states: int
-    """Numbers that go from one period to the next."""
+    """The size of the state from period to period."""
     certificates: tuple[str, ...]
     """The proofs, one for each certified pair, as the texts of files that `check` verifies."""
 
@@ -82,7 +83,7 @@ class Region:
 def region(
     asked: RequestLike, of: str, and_of: str, *, columns: int = COLUMNS, progress: ShareProgress = None
 ) -> Region:
-    """How far two quantities of a system may vary at once: see `margin`, of which both are paths of times.
+    """How far two quantities of a system may vary at once, as `margin`; both are paths of times.
 
     Raises `UsageError` as `margin` does, for two quantities of different sampled components, and for a loop that is
     unstable without either.
@@ -91,23 +92,23 @@ def region(
     pair = [varying_of(request, each) for each in (of, and_of)]
     if any(each.kind == LOSS for each in pair) or pair[0] == pair[1]:
         raise UsageError(f"--of {of} --and {and_of}: expected two different jitters or delay jitters")
-    expect_unshared(request)
-    timeline = Timeline(measured(request), pair)
+    expect_without_scheduler(request)
+    timeline = Timeline(linear_loop_of(request), pair)
     if unstable_sequence(timeline.family([0.0, 0.0])) is not None:
         raise UsageError("the loop is unstable where nothing varies, so nothing can be certified")
     paths = (pair[0].path, pair[1].path)
-    with share_reporter(progress, "certifying") as heard:
-        widest = _broken(timeline, 0.0, first=True)
+    with share_reporter(progress, "certifying") as report:
+        widest = _least_breaking(timeline, 0.0, first=True)
         most = down_to_nanoseconds(timeline.largest()) if widest is None else widest.value
         certified, breaking, texts = list[Pair](), list[Pair](), list[str]()
         for i in range(columns):
-            heard(i / columns)
+            report(i / columns)
             a = down_to_nanoseconds(most * i / columns)
-            broken = _broken(timeline, a)
+            broken = _least_breaking(timeline, a)
             top = down_to_nanoseconds(timeline.largest() - a) if broken is None else broken.value
             if broken is not None:
                 breaking.append((a, broken.value))
-            b, text = largest_certified(_beside(timeline, a), paths, top, lambda share: None, SHARES)
+            b, text = largest_certified(_second_varies(timeline, a), paths, top, lambda share: None, SHARES)
             if b is not None and text is not None:
                 certified.append((a, b))
                 texts.append(text)
@@ -118,12 +119,12 @@ def region(
     )  # fmt: skip
 
 
-def _beside(timeline: Timeline, a: float) -> Callable[[float], Family]:
+def _second_varies(timeline: Timeline, a: float) -> Callable[[float], Family]:
     return lambda b: timeline.family([a, b])
 
 
-def _broken(timeline: Timeline, other: float, *, first: bool = False) -> Broken | None:
-    """What breaks the loop in one quantity, the other one being anywhere up to its value."""
+def _least_breaking(timeline: Timeline, other: float, *, first: bool = False) -> BreakingSequence | None:
+    """What breaks the loop in one quantity, the other one varying up to its value."""
 
     def up_to(value: float) -> Family:
         return timeline.family([value, other] if first else [other, value])

@@ -1,6 +1,6 @@
-"""What a task is dealt again and again: which of it makes a loop unstable, and bounds a certificate from above.
+"""Repeated values of a task that make a loop unstable, and so bound certificates from above.
 
-A task whose execution times repeat after n jobs is n tasks, each with n times the period.
+A task whose execution times repeat after n jobs is equivalent to n tasks, each with n times the period.
 """
 
 from __future__ import annotations
@@ -27,47 +27,47 @@ from orchestration.system.placement import PlacedTask, placed_tasks
 from orchestration.system.times import NANOSECONDS
 
 LONGEST = 4
-"""turns after which what is dealt repeats; a turn has as many jobs as there are in a period of the loop"""
+"""turns after which a sequence repeats; a turn has as many jobs as there are in a period of the loop"""
 MOST_JOBS = 64
-"""after which it repeats"""
+"""after which a sequence repeats"""
 AGREE = 1e-6
 """of a radius, from order to order"""
 
 Word = tuple[int, ...]
-"""0 or 1 by turn: nothing, or the value"""
+"""by turn, 0 or 1: nothing, or the value"""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tried:
-    """What makes a loop unstable if it comes again and again."""
+class RepeatedSearch:
+    """A repeated sequence that makes a loop unstable, if one was found."""
 
     breaking: float | None = None
     """the least value [s]; None: none that was tried does"""
     sequence: tuple[tuple[str, tuple[float, ...]], ...] = ()
-    """how many jobs are dealt which value"""
+    """numbers of jobs, with their value"""
     searched: str
 
 
-def least_repeated(system: System, cause: Cause, models: Mapping[str, Model], period: Fraction) -> Tried:
-    """The least value of a cause at which something makes a loop unstable that comes again and again.
+def least_repeated(system: System, cause: Cause, models: Mapping[str, Model], period: Fraction) -> RepeatedSearch:
+    """The least value of a cause at which a repeated sequence makes a loop unstable.
 
-    `period` is that of the loop [ns], and `models` are by what the system calls its FMUs. All jobs of other tasks take
-    the longest that they can; what else is drawn is as little as it can be.
+    `period` is that of the loop [ns], and `models` are by the names of FMUs in the system. All jobs of other tasks take
+    their longest execution times; all other draws are the least.
     """
     of = next((each for each in placed_tasks(system.computers) if cause.path.startswith(f"{each.place}.")), None)
     if of is None or of.task.period is None or (of.task.component is not None and cause.key != EXECUTION):
-        return Tried(searched="no sequences")
-    loops, always = Loops(models), _always_most(system)
+        return RepeatedSearch(searched="no sequences")
+    loops, always = Loops(models), _with_longest_jobs(system)
     jobs = math.ceil(period / NANOSECONDS / Fraction(repr(float(cause.period))))
     longest = 1 if of.task.component is not None else max(1, min(LONGEST, MOST_JOBS // jobs))
 
     words, unknown = [*_words(longest)], dict[Word, UsageError]()
 
     def fails(value: float, word: Word) -> bool:
-        system = _dealt(always, of, cause, [value * share for share in word for _ in range(jobs)])
+        system = _with_repeated(always, of, cause, [value * share for share in word for _ in range(jobs)])
         try:
             return loops.radius(system, agree=AGREE) >= 1.0
-        except UsageError as error:  # more than the processor can do, or a timetable that does not repeat itself
+        except UsageError as error:  # an overloaded processor, or a timetable that does not repeat
             unknown[word] = error
             return False
 
@@ -80,19 +80,19 @@ def least_repeated(system: System, cause: Cause, models: Mapping[str, Model], pe
         good = value
     searched = (
         f"0 and a value up to {value:g} s, in sequences that repeat after at most {longest} times {jobs} jobs, "
-        "as far as a timetable repeats itself"
+        "as far as a timetable repeats"
     )
     if len(unknown) == len(words):
         searched += f": {unknown[words[0]]}"
     if worst is None:
-        return Tried(searched=searched)
+        return RepeatedSearch(searched=searched)
     least = bisected(lambda x: fails(x, worst), good, value, FINE * cause.period).bad
     sequence = tuple((f"{jobs} jobs" if jobs > 1 else "job", (least * share,)) for share in worst)
-    return Tried(breaking=least, sequence=sequence, searched=searched)
+    return RepeatedSearch(breaking=least, sequence=sequence, searched=searched)
 
 
 def _words(longest: int) -> Iterator[Word]:
-    """Those that are no other one again and again, one of each that differ in where they begin."""
+    """Words that are no repetition of a shorter one, one of each rotation."""
     for length in range(1, longest + 1):
         for word in itertools.product((1, 0), repeat=length):
             turned = [word[i:] + word[:i] for i in range(length)]
@@ -100,20 +100,20 @@ def _words(longest: int) -> Iterator[Word]:
                 yield word
 
 
-def _always_most(system: System) -> System:
-    """In which every job takes the longest that it can, and all else is punctual."""
-    calm, most = deterministic(system), {}
+def _with_longest_jobs(system: System) -> System:
+    """The system in which every job takes its longest time, without jitter."""
+    punctual, most = deterministic(system), {}
     for name, computer in system.computers.items():
-        of_calm = calm.computers[name]
+        of_calm = punctual.computers[name]
         tasks = {
             key: replace(task, execution=highest(computer.tasks[key].execution)) for key, task in of_calm.tasks.items()
         }
         most[name] = replace(of_calm, tasks=tasks)
-    return replace(calm, computers=most)
+    return replace(punctual, computers=most)
 
 
-def _dealt(system: System, of: PlacedTask, cause: Cause, values: Sequence[float]) -> System:
-    """With the jobs of a task dealt these values in turn, as tasks of their own."""
+def _with_repeated(system: System, of: PlacedTask, cause: Cause, values: Sequence[float]) -> System:
+    """The system with these values for the jobs of a task in turn, as separate tasks."""
     if of.task.component is not None:
         return changed(system, {cause.path: values[0]})
     computer = system.computers[of.computer_name]
@@ -124,14 +124,18 @@ def _dealt(system: System, of: PlacedTask, cause: Cause, values: Sequence[float]
             continue
         assert task.period is not None
         for i, value in enumerate(values):
-            offset = task.offset + _times(i, task.period)
-            dealt = {"execution": value} if cause.key == EXECUTION else {"offset": offset + value}
-            every: dict[str, Any] = {"period": _times(len(values), task.period), "offset": offset, "deadline": task.due}
-            tasks[f"{name} {i + 1}"] = replace(task, **{**every, **dealt})
+            offset = task.offset + _multiple(i, task.period)
+            varied = {"execution": value} if cause.key == EXECUTION else {"offset": offset + value}
+            every: dict[str, Any] = {
+                "period": _multiple(len(values), task.period),
+                "offset": offset,
+                "deadline": task.due,
+            }
+            tasks[f"{name} {i + 1}"] = replace(task, **{**every, **varied})
     computers = {**system.computers, of.computer_name: replace(computer, tasks=tasks)}
     return replace(system, computers=computers)
 
 
-def _times(count: int, period: float) -> float:
-    """So many periods, of which the decimal form is as short as that of one [s]."""
+def _multiple(count: int, period: float) -> float:
+    """A number of periods [s], whose decimal form is as short as that of one."""
     return float(count * Fraction(repr(float(period))))

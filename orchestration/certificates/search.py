@@ -1,4 +1,4 @@
-"""Looks for the quadratic forms of a certificate, by semidefinite programming; what it finds is proved elsewhere."""
+"""Searches the quadratic forms of a certificate, by semidefinite programming; they are proved elsewhere."""
 
 from __future__ import annotations
 
@@ -15,31 +15,31 @@ from orchestration.certificates.certificate import Certificate, Node
 from orchestration.certificates.checker import edges_of
 
 FALL = 1e-7
-"""of a form, at least, relative to the largest one: what the program finds below that is taken for nothing"""
+"""of a form, at least, relative to the largest one: a smaller one counts as none"""
 
 
 def forms_for(certificate: Certificate, parts: Sequence[Sequence[int]]) -> Mapping[Node, Floats] | None:
     """Forms that fall at the corners of all cells, in the coordinates of `certificate`; None if none were found.
 
-    `parts` are the coordinates that do not move each other.
+    `parts` are sets of coordinates that do not act on one another.
     """
     maps = _maps(certificate)
     edges = list(dict.fromkeys(edges_of(certificate)))
     nodes = list(dict.fromkeys(start for start, _, _ in edges))
-    whole = {node: np.zeros(certificate.coordinates.shape) for node in nodes}
+    forms = {node: np.zeros(certificate.coordinates.shape) for node in nodes}
     for part in parts:
         inside = np.ix_(part, part)
         of_part = {label: [M[inside] for M in found] for label, found in maps.items()}
-        found = _solved(nodes, edges, of_part, len(part))
+        found = _solve(nodes, edges, of_part, len(part))
         if found is None:
             return None
         for node, form in found.items():
-            whole[node][inside] = form
-    return whole
+            forms[node][inside] = form
+    return forms
 
 
 def inequalities_of(certificate: Certificate) -> int:
-    """How many matrix inequalities a search would have to satisfy, or enough to be too many."""
+    """The number of matrix inequalities of a search, or an upper bound of it."""
     labels = sum(len(set(cells.labels)) for cells in certificate.cells)
     corners = sum(math.prod(map(len, cells.edges)) for cells in certificate.cells)
     modes = max(len(letter.moves) for letter in certificate.family.letters)
@@ -60,10 +60,10 @@ def _maps(certificate: Certificate) -> dict[int, list[Floats]]:
     return result
 
 
-def _solved(
+def _solve(
     nodes: Sequence[Node], edges: Sequence[tuple[Node, Node, int]], maps: Mapping[int, Sequence[Floats]], size: int
 ) -> dict[Node, Floats] | None:
-    """Forms below the identity of which the least fall is largest; None where that is nothing."""
+    """Forms below the identity whose least fall is largest; None where it vanishes."""
     from scipy import sparse
 
     basis = _symmetric_basis(size)
@@ -97,7 +97,7 @@ def _solved(
 
 
 def least_cost(conditions: Sequence[Callable[[Floats], Floats]], count: int) -> Floats | None:
-    """The numbers with the least last one for which matrices, affine in them, are positive; None: there are none."""
+    """The numbers, with the least last one, for which matrices affine in them are positive; None: there are none."""
     from scipy import sparse
 
     A, rest, sizes = list[Floats](), list[Floats](), list[int]()

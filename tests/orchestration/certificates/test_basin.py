@@ -1,4 +1,4 @@
-"""Proved basins of loops whose command is limited, against flights of the same loop."""
+"""Proved basins of loops whose command is limited, against runs of the same loop."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -48,7 +48,7 @@ def test_every_start_in_the_set_comes_to_rest_and_never_leaves_it(period: float)
 
 
 def test_near_the_largest_period_it_is_not_much_smaller_than_what_flights_find() -> None:
-    """At 1.5 s, along the position: from 1 m on there are flights that come back for ever."""
+    """At 1.5 s, along the position: from 1 m on there are runs that come back for ever."""
     found = double_integrator(1.5)
     assert np.abs(after(1.5, np.array([[1.02], [0.0]]), 1000)).max() > 0.1
     assert 0.8 < found.reach[0] < 1.02
@@ -65,7 +65,7 @@ def test_more_than_the_set_is_not_proved(tmp_path: Path) -> None:
     file = tmp_path / "basin.json"
     file.write_text(found.certificate, encoding="utf-8")
     assert check(file).states == 2
-    with pytest.raises(NotProven, match="may leave the limit"):
+    with pytest.raises(NotProven, match="may exceed the limit"):
         module._expect_within(np.linalg.cholesky(found.P).T / 1.01, found.H, 1.0)
 
 
@@ -73,7 +73,7 @@ def test_more_than_the_set_is_not_proved(tmp_path: Path) -> None:
     ("changes", "connection", "expected"),
     [
         ({"components.controller.sampling.period": 2.1}, "command", "no basin was found"),
-        ({}, "measurement", "expected what the only sampled component sends"),
+        ({}, "measurement", "expected the connection from the only sampled component"),
     ],
 )
 def test_other_loops_are_refused(changes: dict[str, float], connection: str, expected: str) -> None:

@@ -14,10 +14,10 @@ from orchestration.basics.errors import UsageError
 from orchestration.building.inputs import files_of
 from orchestration.certificates import margin as certificates
 from orchestration.certificates.breaking import unstable_sequence
-from orchestration.certificates.causes import Caused, cause_at
-from orchestration.certificates.certify import certified
+from orchestration.certificates.causes import ScheduledLoop, cause_at
+from orchestration.certificates.certify import find_certificate
 from orchestration.certificates.check import AnotherLoop, check
-from orchestration.certificates.margin import Certified, margin, measured
+from orchestration.certificates.margin import Certified, linear_loop_of, margin
 from orchestration.certificates.parts import Loop
 from orchestration.certificates.region import region
 from orchestration.certificates.repeated import least_repeated
@@ -62,13 +62,13 @@ def on_a_bus(**sampling: Any) -> System:
 
 @pytest.fixture(scope="module")
 def loop() -> Loop:
-    return measured(request_of(on_a_computer()))
+    return linear_loop_of(request_of(on_a_computer()))
 
 
-def caused(loop: Loop, system: System, path: str) -> Caused:
+def scheduled_loop(loop: Loop, system: System, path: str) -> ScheduledLoop:
     cause = cause_at(system, path)
     assert cause is not None
-    return Caused(loop, system, cause)
+    return ScheduledLoop(loop, system, cause)
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +97,7 @@ def test_what_breaks_a_loop_does_so_where_it_is_run(found: Certified) -> None:
 
 def test_in_windows_that_are_a_little_wider_a_sequence_grows(loop: Loop) -> None:
     """No scheduler deals it; but of the windows alone no more can be proved."""
-    windows = caused(loop, on_a_computer(), LOGGER)
+    windows = scheduled_loop(loop, on_a_computer(), LOGGER)
     assert unstable_sequence(windows.family(0.12), 2) is None
     assert unstable_sequence(windows.family(0.14), 2) is not None
 
@@ -142,9 +142,9 @@ def test_more_urgent_tasks_that_do_not_vary_leave_less(found: Certified, tmp_pat
     ],
 )
 def test_only_what_a_task_lets_vary_is_drawn(loop: Loop, control: Any, computer: Any, kinds: int) -> None:
-    family = caused(loop, on_a_computer(control=control, **computer), LOGGER).family(0.08)
+    family = scheduled_loop(loop, on_a_computer(control=control, **computer), LOGGER).family(0.08)
     assert {len(letter.ranges) for letter in family.letters} == {kinds}
-    assert certified(family, [LOGGER]) is not None
+    assert find_certificate(family, [LOGGER]) is not None
 
 
 @pytest.mark.parametrize(
@@ -159,7 +159,7 @@ def test_only_what_a_task_lets_vary_is_drawn(loop: Loop, control: Any, computer:
 )
 def test_where_nothing_varies_the_map_is_that_of_the_timetable(loop: Loop, control: Any, computer: Any) -> None:
     system = on_a_computer(control=control, **computer)
-    family = caused(loop, system, LOGGER).family(0.05)
+    family = scheduled_loop(loop, system, LOGGER).family(0.05)
     (letter,) = family.letters
     radius = np.abs(np.linalg.eigvals(family.at(letter))).max()
     assert Loops(files_of(system).models).radius(system, agree=1e-9) == pytest.approx(radius**2, rel=1e-8)
@@ -195,7 +195,7 @@ def test_a_sequence_that_breaks_a_loop_does_so_where_it_is_a_trace(tmp_path: Pat
 @pytest.mark.parametrize("scheduling", ["fixed-priority", "earliest-deadline-first"])
 def test_of_the_laws_own_task_a_larger_value_is_never_earlier(loop: Loop, scheduling: Any) -> None:
     system = on_a_computer(control={"deadline": 0.3}, scheduling=scheduling)
-    own = caused(loop, system, OWN)
+    own = scheduled_loop(loop, system, OWN)
     for value in (0.01, 0.1):
         assert own.value_of(own.family(value)) >= value
 
@@ -230,7 +230,7 @@ def test_a_delay_of_what_a_scheduler_delays_is_refused_for_its_cause() -> None:
 def test_two_components_that_are_late_are_refused() -> None:
     system = example("three_servos")
     at_ease = {f"computers.node.tasks.{name}.execution": 0.0005 for name in ("slow", "middle", "fast")}
-    with pytest.raises(UsageError, match=r"slow\.execution: makes slow, middle late; expected one component"):
+    with pytest.raises(UsageError, match=r"slow\.execution: delays slow, middle; expected one delayed component"):
         margin(changed(system, at_ease), "computers.node.tasks.slow.execution")
 
 

@@ -18,8 +18,8 @@ from orchestration.basics.errors import UsageError
 from orchestration.certificates import checker
 from orchestration.certificates.breaking import least_breaking
 from orchestration.certificates.certificate import Certificate, read_certificate
-from orchestration.certificates.certify import certified
-from orchestration.certificates.checker import NotProven, proven
+from orchestration.certificates.certify import find_certificate
+from orchestration.certificates.checker import NotProven, verified
 from orchestration.certificates.family import Family
 from tests.orchestration.certificates.loops import (
     HOVER_A,
@@ -36,37 +36,37 @@ ROTATION = 0.999 * np.array([[math.cos(0.3), -math.sin(0.3)], [math.sin(0.3), ma
 @pytest.fixture(scope="module")
 def hover() -> Certificate:
     """95 % of what breaks a lateral axis at 60 ms."""
-    found = certified(late_command(HOVER_A, HOVER_B, HOVER_F, 0.06, 0.019), ["here"])
+    found = find_certificate(late_command(HOVER_A, HOVER_B, HOVER_F, 0.06, 0.019), ["here"])
     assert found is not None
     return found.certificate
 
 
 def test_a_form_that_falls_for_every_letter_is_a_proof() -> None:
-    assert proven(certificate_of(switched(ROTATION, ROTATION.T), np.eye(2))).states == 2
+    assert verified(certificate_of(switched(ROTATION, ROTATION.T), np.eye(2))).states == 2
 
 
 def test_a_form_that_falls_by_rounding_only_is_none() -> None:
     exact = switched(np.eye(2))
     with pytest.raises(NotProven, match="does not fall"):
-        proven(certificate_of(exact, np.eye(2)))
+        verified(certificate_of(exact, np.eye(2)))
 
 
 def test_a_form_that_is_not_symmetric_to_the_bit_is_none() -> None:
     form = np.eye(2)
     form[0, 1] = 1e-300
     with pytest.raises(NotProven, match="not symmetric"):
-        proven(certificate_of(switched(ROTATION), form))
+        verified(certificate_of(switched(ROTATION), form))
 
 
 def test_an_indefinite_form_that_falls_is_none() -> None:
     with pytest.raises(NotProven, match="not positive definite"):
-        proven(certificate_of(switched(2.0 * np.eye(2)), -np.eye(2)))
+        verified(certificate_of(switched(2.0 * np.eye(2)), -np.eye(2)))
 
 
 def test_every_word_and_mode_needs_a_form(hover: Certificate) -> None:
     longer = dataclasses.replace(hover, memory=hover.memory + 1)
     with pytest.raises(NotProven, match="no form for"):
-        proven(longer)
+        verified(longer)
 
 
 @pytest.mark.parametrize("cell", [(0.0, 0.004), (0.011, 0.019)])
@@ -86,9 +86,9 @@ def test_a_cell_holds_every_map_of_it(hover: Certificate, cell: tuple[float, flo
 
 
 def test_the_proof_covers_what_was_measured_to_1e_6_and_not_to_1e_2(hover: Certificate) -> None:
-    assert proven(hover).radius == 1e-6
+    assert verified(hover).radius == 1e-6
     with pytest.raises(NotProven):
-        proven(dataclasses.replace(hover, radius=1e-2))
+        verified(dataclasses.replace(hover, radius=1e-2))
 
 
 def test_within_the_radius_every_loop_is_stable(hover: Certificate) -> None:
@@ -98,15 +98,15 @@ def test_within_the_radius_every_loop_is_stable(hover: Certificate) -> None:
         for name, m in hover.family.matrices.items()
     }
     moved = dataclasses.replace(hover, radius=0.0, family=dataclasses.replace(hover.family, matrices=matrices))
-    assert proven(moved).radius == 0.0
+    assert verified(moved).radius == 0.0
 
 
 def test_what_is_said_is_made_of_the_numbers(hover: Certificate) -> None:
     document = json.loads(hover.to_json())
     letter = document["letters"][0]
     letter["edges"], letter["labels"] = [letter["edges"][0][:-4]], letter["labels"][:-4]
-    shrunk = proven(_read(document)).ranges["late"][0]
-    assert proven(hover).ranges == {"late": ((0.0, 0.019),)}
+    shrunk = verified(_read(document)).ranges["late"][0]
+    assert verified(hover).ranges == {"late": ((0.0, 0.019),)}
     assert shrunk == (0.0, letter["edges"][0][-1])
     assert shrunk[1] < 0.019
 
@@ -121,7 +121,7 @@ def _read(document: Any) -> Certificate:
 def test_a_certificate_comes_back_from_its_file_as_it_was(hover: Certificate) -> None:
     again = _read(json.loads(hover.to_json()))
     assert again.to_json() == hover.to_json()
-    assert proven(again) == proven(hover)
+    assert verified(again) == verified(hover)
 
 
 ALTERED: dict[str, Callable[[dict[str, Any]], Any]] = {
@@ -138,7 +138,7 @@ def test_an_altered_certificate_is_rejected(hover: Certificate, change: Callable
     document = json.loads(hover.to_json())
     change(document)
     with pytest.raises(NotProven):
-        proven(_read(document))
+        verified(_read(document))
 
 
 MALFORMED: dict[str, Callable[[dict[str, Any]], Any]] = {
@@ -178,16 +178,16 @@ def unstable(seed: int) -> Family:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_none_is_given_for_a_loop_that_is_unstable_by_construction(seed: int) -> None:
-    assert certified(unstable(seed), ["here"]) is None
+    assert find_certificate(unstable(seed), ["here"]) is None
 
 
 def test_what_lies_close_below_has_one() -> None:
     """The same loops, 5 % smaller: forms that depend on what comes next leave that little open."""
     family = unstable(0)
     smaller = switched(*[0.95 * m for m in family.matrices.values()])
-    found = certified(smaller, ["here"])
+    found = find_certificate(smaller, ["here"])
     assert found is not None
-    assert proven(found.certificate).runs == {"m0": None, "m1": None}
+    assert verified(found.certificate).runs == {"m0": None, "m1": None}
 
 
 def test_of_an_integrator_all_but_the_last_of_what_breaks_it_is_certified() -> None:
@@ -200,5 +200,5 @@ def test_of_an_integrator_all_but_the_last_of_what_breaks_it_is_certified() -> N
     assert broken is not None
     turns = [point for _, (point,) in broken.sequence]
     assert sorted(turns) == [0.0, broken.value]
-    assert certified(up_to(0.97 * broken.value), ["here"]) is not None
-    assert certified(up_to(1.001 * broken.value), ["here"]) is None
+    assert find_certificate(up_to(0.97 * broken.value), ["here"]) is not None
+    assert find_certificate(up_to(1.001 * broken.value), ["here"]) is None

@@ -11,11 +11,11 @@ import pytest
 from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.certificates import margin as certificates
 from orchestration.certificates import region as regions
-from orchestration.certificates.breaking import broken_at
-from orchestration.certificates.certify import certified, parts_of
+from orchestration.certificates.breaking import breaking_at
+from orchestration.certificates.certify import find_certificate, parts_of
 from orchestration.certificates.check import check
-from orchestration.certificates.checker import proven
-from orchestration.certificates.margin import Certified, margin, measured, small_gain, varying_of
+from orchestration.certificates.checker import verified
+from orchestration.certificates.margin import Certified, linear_loop_of, margin, small_gain, varying_of
 from orchestration.certificates.parts import Loop
 from orchestration.certificates.region import region
 from orchestration.certificates.timeline import Timeline
@@ -75,7 +75,7 @@ def test_a_certificate_is_of_its_own_system_and_of_no_other(
     assert own.of == (COMMAND,)
     assert own.ranges == {"late": ((0.0, found.certified),)}
     slower = changed(system, {"components.controller.sampling.period": 1.01})
-    with pytest.raises(UsageError, match="what happens in a period of the system is something else"):
+    with pytest.raises(UsageError, match="the events of a period of the system are not those"):
         check(path, slower)
     with pytest.raises(UsageError, match="controller samples: the system's matrix is farther"):
         check(path, changed(system, {"connections.command.scale": 1.00001}))
@@ -86,8 +86,8 @@ def test_a_valid_proof_of_altered_matrices_is_refused_against_the_system(
 ) -> None:
     assert found.certificate is not None
     document = json.loads(found.certificate)
-    *held, said = document["matrices"]["controller samples"]
-    document["matrices"]["controller samples"] = [*held, [0.99999 * x for x in said]]
+    *held, command = document["matrices"]["controller samples"]
+    document["matrices"]["controller samples"] = [*held, [0.99999 * x for x in command]]
     path = tmp_path / "altered.json"
     path.write_text(json.dumps(document), encoding="utf-8")
     assert check(path).states == 3
@@ -100,7 +100,7 @@ def test_a_certificate_of_another_quantity_is_refused(system: System, found: Cer
     path = tmp_path / "other.json"
     for of in ([SAMPLE], [LOST], [COMMAND, SAMPLE]):
         path.write_text(json.dumps(json.loads(found.certificate) | {"of": of}), encoding="utf-8")
-        with pytest.raises(UsageError, match="something else"):
+        with pytest.raises(UsageError, match=r"other quantities vary|not those of the certificate"):
             check(path, system)
 
 
@@ -147,7 +147,7 @@ def test_what_it_is_not_for_is_refused(system: System) -> None:
 
 @functools.cache
 def hover(period: float) -> Loop:
-    return measured(native(timing=Timing(period=period)))
+    return linear_loop_of(native(timing=Timing(period=period)))
 
 
 def command_of(period: float) -> tuple[Timeline, Any]:
@@ -161,24 +161,24 @@ def test_95_percent_of_what_breaks_hover_is_certified_for_all_axes(period: float
     most = round(0.95 * breaking, 6)
     family = timeline.family([most])
     assert [len(part) for part in parts_of(family)] == [5, 5, 3, 3]
-    proof = certified(family, [COMMAND], step)
+    proof = find_certificate(family, [COMMAND], step)
     assert proof is not None
-    assert proven(proof.certificate).ranges == {"late": ((0.0, most),)}
-    assert broken_at(timeline.family([0.999 * breaking]), 0.0) is None
-    assert broken_at(timeline.family([1.001 * breaking]), 0.0) is not None
+    assert verified(proof.certificate).ranges == {"late": ((0.0, most),)}
+    assert breaking_at(timeline.family([0.999 * breaking]), 0.0) is None
+    assert breaking_at(timeline.family([1.001 * breaking]), 0.0) is not None
     assert small_gain(timeline.loop, varying) == pytest.approx({0.04: 0.00935, 0.06: 0.00153}[period], abs=1e-5)
 
 
 def test_two_at_once_about_hover() -> None:
     """Samples up to 4 ms late and commands up to 23.87 ms, at 40 ms."""
     both = [varying_of(native(), path) for path in (SAMPLE, COMMAND)]
-    assert certified(Timeline(hover(0.04), both).family([0.004, 0.02387]), [SAMPLE, COMMAND]) is not None
+    assert find_certificate(Timeline(hover(0.04), both).family([0.004, 0.02387]), [SAMPLE, COMMAND]) is not None
 
 
 def test_losses_about_hover() -> None:
     timeline = Timeline(hover(0.04), [varying_of(native(), LOST)])
-    assert certified(timeline.family(run=1), [LOST]) is not None
-    broken = broken_at(timeline.family(run=2), 2)
+    assert find_certificate(timeline.family(run=1), [LOST]) is not None
+    broken = breaking_at(timeline.family(run=2), 2)
     assert broken is not None
     assert [name for name, _ in broken.sequence] == ["lost", "lost", "arrives"]
 
@@ -196,7 +196,7 @@ def test_within_what_is_certified_random_sequences_die_out() -> None:
 # -- the command -----------------------------------------------------------------------------------------------------
 
 
-def said(capsys: pytest.CaptureFixture[str], *arguments: str | Path, code: int = 0) -> str:
+def output_of(capsys: pytest.CaptureFixture[str], *arguments: str | Path, code: int = 0) -> str:
     with pytest.raises(SystemExit) as ended:
         main([*map(str, arguments)])
     captured = capsys.readouterr()
@@ -211,15 +211,15 @@ def test_the_command_writes_what_it_checks(
     file = Path(__file__).resolve().parents[3] / "examples" / "double_integrator" / "system.toml"
     slow, other = (("--set", f"components.controller.sampling.period={period}") for period in (1.0, 0.9))
     path = tmp_path / "certificate.json"
-    document = json.loads(said(capsys, "margin", file, *slow, "--of", COMMAND, "--out", path, "--json"))
+    document = json.loads(output_of(capsys, "margin", file, *slow, "--of", COMMAND, "--out", path, "--json"))
     assert document["certified"] == pytest.approx(0.95 * document["breaking"], rel=1e-6)
     assert document["certificate"] == str(path)
-    text = said(capsys, "margin", "--check", path, file, *slow)
+    text = output_of(capsys, "margin", "--check", path, file, *slow)
     assert f"late               0 to {document['certified']:.9g} s, any number of times in a row" in text
     assert "connections.command.delay_jitter of this system" in text
-    assert "no system was given" in said(capsys, "margin", "--check", path)
-    assert "something else than in the certificate" in one_line(
-        said(capsys, "margin", "--check", path, file, *other, code=2)
+    assert "no system was given" in output_of(capsys, "margin", "--check", path)
+    assert "not those of the certificate" in one_line(
+        output_of(capsys, "margin", "--check", path, file, *other, code=2)
     )
 
 
@@ -236,7 +236,7 @@ def test_the_command_writes_what_it_checks(
 def test_flags_that_do_not_go_together_are_refused_in_a_line(
     capsys: pytest.CaptureFixture[str], flags: list[str], expected: str
 ) -> None:
-    assert expected in one_line(said(capsys, "margin", *flags, code=2))
+    assert expected in one_line(output_of(capsys, "margin", *flags, code=2))
 
 
 def test_a_missing_package_is_said_with_its_extra(monkeypatch: pytest.MonkeyPatch, system: System) -> None:

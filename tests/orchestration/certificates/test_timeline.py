@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from orchestration.basics.errors import UsageError
+from orchestration.certificates.events import BOXES, DELAY, JITTER, LATENCY, LOSS, SHIFT, Varying
 from orchestration.certificates.family import Family
 from orchestration.certificates.parts import Loop, loop_of
-from orchestration.certificates.timeline import BOXES, DELAY, JITTER, LATENCY, LOSS, START, Timeline, Varying
+from orchestration.certificates.timeline import Timeline
 from orchestration.fmi.reuse import Instances
 from orchestration.stability.loop_at_rest import at_rest
 from orchestration.stability.monodromy import growth_of_loop
@@ -25,14 +26,14 @@ COMMAND = Varying(kind=DELAY, name="command", path="connections.command.delay_ji
 MEASUREMENT = Varying(kind=DELAY, name="measurement", path="connections.measurement.delay_jitter")
 SAMPLE = Varying(kind=JITTER, name="controller", path="components.controller.sampling.jitter")
 LOST = Varying(kind=LOSS, name="command", path="connections.command.loss")
-UNHEARD = Varying(kind=LOSS, name="measurement", path="connections.measurement.loss")
+LOST_MEASUREMENT = Varying(kind=LOSS, name="measurement", path="connections.measurement.loss")
 
 
 @pytest.fixture(scope="module")
 def instances() -> Iterator[Instances]:
-    made = Instances()
-    yield made
-    made.close()
+    found = Instances()
+    yield found
+    found.close()
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +93,7 @@ def test_a_delay_that_stays_is_the_masters(
 
 def test_a_start_moves_the_sample_and_not_the_message(system: System, instances: Instances) -> None:
     early = loop(changed(system, {"connections.command.delay": 0.3}), instances)
-    family = Timeline(early, [Varying(kind=START, name="controller", path="start")]).family([0.25])
+    family = Timeline(early, [Varying(kind=SHIFT, name="controller", path="start")]).family([0.25])
     for late in (0.11, 0.25):
         shorter = changed(system, {"connections.command.delay": round(0.3 - late, 6)})
         expected = math.exp(PERIOD * growth_of_loop(shorter, instances))
@@ -110,7 +111,7 @@ def test_two_that_are_limited_in_sum_may_each_be_as_large_as_the_sum(system: Sys
     both = Timeline(loop(system, instances), [SAMPLE, COMMAND])
     with pytest.raises(UsageError, match="expected less, so that no message is open"):
         both.family([0.4, 0.4])
-    letters = both.family([0.4, 0.4], together=0.4).letters
+    letters = both.family([0.4, 0.4], largest_sum=0.4).letters
     drawn = np.random.default_rng(3).uniform(0.0, 0.4, (200, 2))
     for point in drawn[drawn.sum(axis=1) <= 0.4]:
         assert any(all(low <= x <= high for x, (low, high) in zip(point, letter.ranges)) for letter in letters)
@@ -165,7 +166,7 @@ def test_a_law_without_memory_says_the_same_where_its_measurement_is_lost(system
     """So to lose every second measurement is to lose every second command."""
     of = loop(system, instances)
     radii = []
-    for what in (LOST, UNHEARD):
+    for what in (LOST, LOST_MEASUREMENT):
         family = Timeline(of, [what]).family(run=1)
         arrives, lost = (family.at(letter) for letter in family.letters)
         radii.append(np.abs(np.linalg.eigvals(lost @ arrives)).max())
@@ -187,6 +188,6 @@ def test_what_is_not_for_this_is_refused(system: System, instances: Instances) -
 
 def test_a_law_that_integrates_over_its_step_is_refused_with_late_samples(system: System, instances: Instances) -> None:
     of = loop(system, instances)
-    assert not of.minds
-    with pytest.raises(UsageError, match="controller does something else where its next sample comes later"):
-        Timeline(dataclasses.replace(of, minds=frozenset(["controller"])), [SAMPLE])
+    assert not of.step_dependent
+    with pytest.raises(UsageError, match="samples of controller depend on the time to the next one"):
+        Timeline(dataclasses.replace(of, step_dependent=frozenset(["controller"])), [SAMPLE])
