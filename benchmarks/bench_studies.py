@@ -36,7 +36,7 @@ def many_short_runs() -> tuple[float, float]:
     task = RunTask(index=0, key="", settings={}, system=system, keep_signals=False)
     durations, memory, runner = [], [], Runner()
     for i in range(MANY):
-        durations.append(runner.fly(dataclasses.replace(task, index=i)).row.duration)
+        durations.append(runner.run(dataclasses.replace(task, index=i)).row.duration)
         memory.append(resident())
     return statistics.median(durations) * 1e3, memory[-1] - memory[MANY // 2]
 

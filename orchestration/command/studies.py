@@ -53,13 +53,13 @@ def sweep(
     """Run what is missing of a study; it may be stopped and started again at any time."""
     from orchestration.studies.study_file import load_study
     from orchestration.studies.sweep import sweep as fly
-    from orchestration.workers.choice import choice_named
+    from orchestration.workers.choice import engine_choice
 
     chosen = load_study(study)
     _say_if_endless(chosen)
     summary = fly(
         chosen, folder=out, workers=workers, dask=dask, retry_failed=retry_failed,
-        engine=choice_named(engine), time_limit=time_limit,
+        engine=engine_choice(engine), time_limit=time_limit,
     )  # fmt: skip
     failed = f", {summary.failed} failed (quadcosim export shows why; --retry-failed)" if summary.failed else ""
     lines = [f"{summary.path}: {summary.total} runs, {summary.flown} flown now{failed}"]
@@ -168,10 +168,10 @@ def tune(
     """Tune a controller on some initial conditions and judge it on others; it resumes where it was stopped."""
     from orchestration.tuning.tune import tune as search_all
     from orchestration.tuning.tuning_file import load_tuning
-    from orchestration.workers.choice import choice_named
+    from orchestration.workers.choice import engine_choice
 
     command = f"quadcosim tune {tuning} --out {out}" + (f" --engine {engine}" if engine != "auto" else "")
-    found = search_all(load_tuning(tuning), out=out, workers=workers, engine=choice_named(engine), command=command)
+    found = search_all(load_tuning(tuning), out=out, workers=workers, engine=engine_choice(engine), command=command)
     return of_files(found.written)
 
 
@@ -203,9 +203,9 @@ def compare(
     """Compare controllers from the same initial conditions: survival, settling, limits, error and effort."""
     from orchestration.command import comparison as command
     from orchestration.comparison.file import load_comparison
-    from orchestration.workers.choice import choice_named
+    from orchestration.workers.choice import engine_choice
 
-    how = choice_named(engine)
+    how = engine_choice(engine)
     chosen = dataclasses.replace(load_comparison(comparison), native=native)
     if time_limit is not None and (cell is not None or start is not None):
         raise UsageError("--time-limit: expected without --cell; it is of the runs of a whole comparison")

@@ -26,7 +26,7 @@ from orchestration.studies.table import export, frame, units_in
 from orchestration.system.model import System
 from orchestration.system.request import errors_in_own_terms
 from orchestration.workers.batching import TOLERATED
-from orchestration.workers.choice import Chosen, EngineChoice, chosen
+from orchestration.workers.choice import EngineChoice, Execution, choose_execution
 from orchestration.workers.executors import RunEvaluator
 
 if TYPE_CHECKING:
@@ -133,7 +133,7 @@ def rerun_cells(
     starts = files.starts_of(study.origin)
     systems = [study.system(i, starts) for i in chain(*runs)]
     with RunEvaluator(files, workers, how.engine) as pool:
-        flights = pool.fly_all(systems, in_lanes=how.in_lanes, on_gpu=how.on_gpu)
+        flights = pool.run_all(systems, in_lanes=how.in_lanes, on_gpu=how.on_gpu)
     return cell_summaries(comparison, frame_of(comparison, zip(chain(*runs), flights)))
 
 
@@ -164,7 +164,9 @@ def flight(comparison: Comparison, index: int, start: int, out: Path, *, engine:
     keep_run(out, lambda to: fly(request, recorder=to, engine=how.engine))
 
 
-def _prepared(comparison: Comparison, indices: Sequence[int], engine: EngineChoice) -> tuple[Comparison, Files, Chosen]:
+def _prepared(
+    comparison: Comparison, indices: Sequence[int], engine: EngineChoice
+) -> tuple[Comparison, Files, Execution]:
     """A comparison as an engine runs some of its runs, its files and the choice of the engine.
 
     Raises `UsageError` for an invalid run.
@@ -179,5 +181,5 @@ def _prepared(comparison: Comparison, indices: Sequence[int], engine: EngineChoi
                 checked(system, files.models_of(system))
         return systems[0], files
 
-    how = chosen(engine, comparison.native, first)
+    how = choose_execution(engine, comparison.native, first)
     return replace(comparison, native=how.native), first(how.native)[1], how

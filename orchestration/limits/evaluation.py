@@ -80,8 +80,8 @@ class Evaluator:
         system = self._varied.at(value)
         runs = [replace(system, seed=system.seed + i) for i in range(self._seeds)]
         all_values = self._done + 1 + self._left
-        metrics = self._pool.fly(
-            runs, stop=stop, hear=lambda seeds: self._progress((self._done + seeds / len(runs)) / all_values)
+        metrics = self._pool.run_until(
+            runs, stop=stop, report=lambda seeds: self._progress((self._done + seeds / len(runs)) / all_values)
         )
         self._done += 1
         down = next((one for one in metrics if not is_good(one)), None)

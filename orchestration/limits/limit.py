@@ -25,7 +25,7 @@ from orchestration.stability.known_loops import LocalLimit
 from orchestration.stability.local_limit import local_limits
 from orchestration.system.chance import has_random_timing, is_random
 from orchestration.system.request import Request, errors_in_own_terms, system_of
-from orchestration.workers.choice import alone
+from orchestration.workers.choice import single_run_execution
 from orchestration.workers.executors import RunEvaluator
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ def find(
 
     Raises `UsageError` for a quantity, range, tolerance, step or confidence that cannot be.
     """
-    request, how = alone(request_of(asked), engine)
+    request, how = single_run_execution(request_of(asked), engine)
     of = of or default_quantity(request)
     varied, files = _checked(request, of, confidence)
     near = request.near_continuous(CONTINUOUS) if continuous else None
@@ -229,7 +229,7 @@ def _refuted(trials: Evaluator, bracket: Bracket | None, above: list[float]) -> 
 
 def _flown(near: Request, pool: RunEvaluator) -> Continuous:
     """What comes of a run near continuous time."""
-    (metrics,) = pool.fly([system_of(near)], stop=lambda metrics: False)
+    (metrics,) = pool.run_until([system_of(near)], stop=lambda metrics: False)
     return Continuous(period=CONTINUOUS, outcome=metrics["outcome"], settling_time=metrics["settling_time"])
 
 

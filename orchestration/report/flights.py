@@ -17,7 +17,7 @@ from orchestration.studies.study import Study
 from orchestration.system.check import recorded_variables
 from orchestration.system.model import System
 from orchestration.system.references import connect_references
-from orchestration.workers.choice import chosen
+from orchestration.workers.choice import choose_execution
 
 SOME = 64
 """Runs that are flown at once, so that of no more the whole signals are held"""
@@ -46,7 +46,7 @@ def fastest(study: Study) -> tuple[Study, Files, bool]:
         files = asked.files()
         return asked.system(0, files.starts_of(asked.origin)), files
 
-    how = chosen("auto", study.native, first)
+    how = choose_execution("auto", study.native, first)
     flown = replace(study, native=how.native)
     return flown, flown.files(), how.in_lanes
 

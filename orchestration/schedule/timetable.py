@@ -187,7 +187,12 @@ class Timetable:
 
     def _sample(self, end: int, found: InstantCollector) -> tuple[Integers, Integers, Integers, Integers]:
         """Times of samples, these, what they exchange, and of what they send that which arrives later."""
-        times, samples, exchanged, later = [_NO_MESSAGES[:, 0]], [_NO_MESSAGES[:, :5]], [_NO_MESSAGES[:, :4].reshape(0, 0, 4)], [_NO_MESSAGES]
+        times, samples, exchanged, later = (
+            [_NO_MESSAGES[:, 0]],
+            [_NO_MESSAGES[:, :5]],
+            [_NO_MESSAGES[:, :4].reshape(0, 0, 4)],
+            [_NO_MESSAGES],
+        )
         sender, place = self._frame.sender, self._frame.place
         for task in self._tasks:  # those that come first at one instant come first
             to_end, count = np.searchsorted(task.times, (end, min(end, self.stop))).tolist()

@@ -28,8 +28,8 @@ from orchestration.studies.swept import Swept
 from orchestration.studies.vouching import vouched, with_python_twins
 from orchestration.system.model import System
 from orchestration.workers.batching import chunks
-from orchestration.workers.choice import Chosen, EngineChoice, chosen
-from orchestration.workers.executors import Fly, cluster, expect_scheduler, local_workers
+from orchestration.workers.choice import EngineChoice, Execution, choose_execution
+from orchestration.workers.executors import TaskRunner, cluster, expect_scheduler, local_workers
 from orchestration.workers.pool import Inputs
 from orchestration.workers.provenance import versions
 from orchestration.workers.row import Row
@@ -59,7 +59,7 @@ def sweep(
     progress: CountProgress = "bar",
     announce: Announce | None = inform,
 ) -> Swept:
-    """Fly the runs of a study that its store does not have, writing each row as it comes.
+    """Run what the store of a study does not have, writing each row as it comes.
 
     `metrics` are more of what each run comes to, by name: functions of its `Result` that give a number, or None for no
     value. Their source is what is run, in other processes, and what a run is known by, so a function has all that it
@@ -118,7 +118,7 @@ def sweep(
     )  # fmt: skip
 
 
-def ready(study: Study, engine: EngineChoice) -> tuple[Study, Files, Chosen, tuple[str, ...]]:
+def ready(study: Study, engine: EngineChoice) -> tuple[Study, Files, Execution, tuple[str, ...]]:
     """A study as it is flown by an engine, its files, how, and what is followed in it, by whom.
 
     Raises `UsageError` for a run that cannot be.
@@ -132,7 +132,7 @@ def ready(study: Study, engine: EngineChoice) -> tuple[Study, Files, Chosen, tup
         return asked.system(0, files.starts_of(asked.origin)), files
 
     apart = "metrics that are functions need whole runs, one at a time" if study.metrics else None
-    how = chosen(engine, study.native, first, apart=apart)
+    how = choose_execution(engine, study.native, first, no_lanes=apart)
     if how.native not in found:
         first(how.native)
     flown, files, follows = found[how.native]
@@ -146,7 +146,7 @@ def _expect_workers(workers: int, dask: str | None) -> None:
         expect_scheduler(dask)
 
 
-def _workers(inputs: Inputs, workers: int, dask: str | None) -> AbstractContextManager[Fly]:
+def _workers(inputs: Inputs, workers: int, dask: str | None) -> AbstractContextManager[TaskRunner]:
     """Those that fly tasks, here or on a cluster."""
     return local_workers(inputs, workers) if dask is None else cluster(inputs, dask)
 

@@ -18,7 +18,7 @@ from orchestration.fmi.model import Model, Variable
 from orchestration.system.component import Component
 from orchestration.system.model import System
 from orchestration.workers.batching import TOLERATED, Agreement, Pair, sample
-from orchestration.workers.executors import Fly
+from orchestration.workers.executors import TaskRunner
 from orchestration.workers.row import Row
 from orchestration.workers.task import Chunk, RunTask
 
@@ -36,7 +36,7 @@ def with_python_twins(files: Files) -> Files:
 
 
 def vouched(
-    lanes: Mapping[str, Row], files: Files, task_of: Callable[[int, str], RunTask], fly: Fly
+    lanes: Mapping[str, Row], files: Files, task_of: Callable[[int, str], RunTask], fly: TaskRunner
 ) -> Agreement | None:
     """How a sample of the runs that were flown in lanes compares with other ways to fly them; None if there were none.
 

@@ -20,7 +20,7 @@ from orchestration.tuning.exact import ExactFound, ExactTuning, search_exactly
 from orchestration.tuning.sought import Outcome, Sought, best_by_period
 from orchestration.tuning.tuning import Found, Tuning, search
 from orchestration.tuning.tuning_file import gains_text
-from orchestration.workers.choice import EngineChoice, alone, chosen
+from orchestration.workers.choice import EngineChoice, choose_execution, single_run_execution
 from orchestration.workers.executors import RunEvaluator
 from orchestration.workers.provenance import versions
 
@@ -102,7 +102,7 @@ def tune(
     elif workers != 1 or engine != "auto":
         raise UsageError("--workers and --engine: expected none; a tuning by expect flies nothing")
     else:
-        exact = dataclasses.replace(tuning, base=alone(tuning.base, "auto")[0])
+        exact = dataclasses.replace(tuning, base=single_run_execution(tuning.base, "auto")[0])
         with share_reporter(progress, "searching") as hear:
             find = functools.partial(search_exactly, exact)
             done = searched(exact, exact.files(), folder, find, ExactFound, progress=hear, announce=announce)
@@ -118,7 +118,7 @@ def _flown(
     announce: Callable[[str], None],
 ) -> list[Found]:
     """What the searches of a tuning by runs find."""
-    how = chosen(engine, tuning.native, lambda native: dataclasses.replace(tuning, native=native).first())
+    how = choose_execution(engine, tuning.native, lambda native: dataclasses.replace(tuning, native=native).first())
     asked = dataclasses.replace(tuning, native=how.native)
     files = asked.files()
     if engine == "auto":
@@ -126,10 +126,10 @@ def _flown(
     if follows := describe_references(asked.origin, files.models_of(asked.origin)):
         announce(f"follows {follows}")
     with share_reporter(progress, "searching") as hear, RunEvaluator(files, workers, how.engine) as pool:
-        fly = functools.partial(pool.fly_all, in_lanes=how.in_lanes, on_gpu=how.on_gpu)
+        fly = functools.partial(pool.run_all, in_lanes=how.in_lanes, on_gpu=how.on_gpu)
 
         def find(period: float, seed: int, heard: Callable[[float], None]) -> Found:
-            return search(asked, period, seed, fly, pool.fly_all, heard)
+            return search(asked, period, seed, fly, pool.run_all, heard)
 
         return searched(asked, files, folder, find, Found, progress=hear, announce=announce)
 

@@ -1,1 +1,1 @@
-"""Processes that fly runs: a pool here, dask elsewhere, and what they are told."""
+"""Worker processes that simulate runs: a local pool or dask, and the tasks sent to them."""

@@ -1,4 +1,4 @@
-"""What of a sweep is flown in lanes: runs in chunks for the workers, and a sample of them by FMUs, to compare."""
+"""Runs of a sweep in SIMD lanes: chunks for the workers, and a sample that is repeated with FMUs for comparison."""
 
 import hashlib
 import json
@@ -15,24 +15,24 @@ from orchestration.schedule.schedule_cache import timing
 from orchestration.workers.task import Chunk, RunTask
 
 SAMPLE = 8
-"""Runs that are flown by FMUs too"""
+"""Runs that are repeated with FMUs"""
 TOLERATED = 1e-9
-"""relative difference of a metric"""
+"""largest relative difference of a metric"""
 CHUNK, SORTED = 256, 4096
-"""Runs of a chunk, at most, and runs that are put in order so that those of a chunk are alike"""
+"""Largest number of runs in a chunk, and number of runs sorted at a time so that those of a chunk are alike"""
 ON_GPU = 2**15
-"""Runs of a chunk that are flown on a GPU, at most: it wants as many at once as it has threads"""
+"""Largest number of runs in a chunk on a GPU, enough to fill its threads"""
 
 
 def chunks(tasks: Iterable[RunTask], total: int, workers: int, on_gpu: bool = False) -> Iterator[RunTask | Chunk]:
-    """Tasks in chunks, of which each of so many workers gets a few; those whose signals are kept by themselves."""
+    """Tasks in chunks, several for each worker; tasks whose signals are kept remain single."""
     size = max(preferred_lanes(), min(CHUNK, total // (4 * workers) // preferred_lanes() * preferred_lanes()))
     size, order = (ON_GPU, ON_GPU) if on_gpu else (size, SORTED)
     waiting = iter(tasks)
-    while some := list(islice(waiting, order)):
-        yield from (task for task in some if task.keep_signals)
+    while window := list(islice(waiting, order)):
+        yield from (task for task in window if task.keep_signals)
         places: dict[Any, int] = {}
-        rest = [(task, (outline(task.system), timing(task.system))) for task in some if not task.keep_signals]
+        rest = [(task, (outline(task.system), timing(task.system))) for task in window if not task.keep_signals]
         for _, key in rest:
             places.setdefault(key, len(places))
         ordered = [task for task, _ in sorted(rest, key=lambda pair: places[pair[1]])]
@@ -41,32 +41,32 @@ def chunks(tasks: Iterable[RunTask], total: int, workers: int, on_gpu: bool = Fa
 
 
 def sample(keys: Iterable[str]) -> set[str]:
-    """Which of some runs are flown by FMUs too: chosen by their content alone."""
+    """The keys of the runs to repeat with FMUs, chosen by their content alone."""
     return set(sorted(keys, key=lambda key: hashlib.sha256(f"sample {key}".encode()).digest())[:SAMPLE])
 
 
 Pair = tuple[int, Mapping[str, Any], Mapping[str, Any]]
-"""The index of a run, and its metrics flown in two ways, that in lanes first"""
+"""The index of a run, its metrics in lanes, and its metrics with FMUs"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Agreement:
-    """How a sample of runs that were flown in lanes compares with the same runs flown by FMUs."""
+    """Agreement of a sample of runs in lanes with the same runs by FMUs."""
 
     runs: int
     difference: float
-    """the largest one of any metric, relative"""
+    """the largest relative difference of any metric"""
     metric: str | None
     index: int | None
-    """where it is; None if there is none"""
+    """the run in which it occurs; None if there is none"""
     python: "Agreement | None" = None
-    """the same of how they begin, by FMUs in Python, chaotic runs left aside; None: there are no such FMUs"""
+    """the same for the beginning of non-chaotic runs with FMUs in Python; None: there are no such FMUs"""
 
     def __str__(self) -> str:
-        text = f"{self.runs} runs flown by FMUs too: largest relative difference {self._largest}"
+        text = f"{self.runs} runs repeated with FMUs: largest relative difference {self._largest}"
         if self.python is None:
             return text
-        return f"{text}; the beginning of {self.python.runs} by FMUs in Python too: {self.python._largest}"
+        return f"{text}; the beginning of {self.python.runs} with FMUs in Python: {self.python._largest}"
 
     @property
     def _largest(self) -> str:
@@ -74,32 +74,32 @@ class Agreement:
         return f"{self.difference:.1g}{at}"
 
     def as_text(self) -> str:
-        """As a store keeps it."""
+        """The form in which a store keeps it."""
         return json.dumps(asdict(self))
 
     @classmethod
     def from_text(cls, text: str) -> "Agreement":
-        """As a store has kept it."""
-        kept = json.loads(text)
-        python = kept.pop("python", None)
-        return cls(**kept, python=None if python is None else cls(**python))
+        """From the form in which a store keeps it."""
+        fields = json.loads(text)
+        python = fields.pop("python", None)
+        return cls(**fields, python=None if python is None else cls(**python))
 
     @classmethod
     def of(cls, pairs: Iterable[Pair]) -> "Agreement":
-        """Of runs flown in two ways."""
-        found = [
+        """Compare runs in lanes with the same runs by FMUs."""
+        differences = [
             (_difference(lanes.get(name), value), name, index)
             for index, lanes, alone in pairs
             for name, value in alone.items()
         ]
-        largest, name, index = max(found, key=lambda each: each[0], default=(0.0, "", 0))
-        runs = len({index for _, _, index in found})
+        largest, name, index = max(differences, key=lambda each: each[0], default=(0.0, "", 0))
+        runs = len({index for _, _, index in differences})
         if largest == 0.0:
             return cls(runs=runs, difference=0.0, metric=None, index=None)
         return cls(runs=runs, difference=largest, metric=name, index=index)
 
     def expect(self, by: str = "its FMUs") -> None:
-        """Raise `QuadcosimError` naming run and metric if they differ by more than is tolerated."""
+        """Raise `QuadcosimError`, naming run and metric, if the difference exceeds the tolerance."""
         if self.difference > TOLERATED:
             raise QuadcosimError(
                 f"run {self.index}: {self.metric} in lanes differs by {self.difference:.3g} "

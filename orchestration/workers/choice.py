@@ -1,4 +1,4 @@
-"""What flies many runs where nobody asks for an engine: the fastest that can be had, and why not a faster one."""
+"""The choice of an engine for many runs: by default the fastest available, with the reason if it is not the fastest."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,27 +14,27 @@ from orchestration.system.model import System
 from orchestration.system.request import Twin, system_of
 
 EngineChoice = Literal["auto", "python", "compiled", "batch", "cuda"]
-"""`auto`: `batch` where it can be had, else native FMUs one at a time, else the FMUs as they are"""
+"""`auto`: `batch` if available, else native FMUs one at a time, else the FMUs as they are"""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Chosen:
-    """How many runs are flown."""
+class Execution:
+    """How a number of runs is executed."""
 
     native: bool
-    """whether by the native twins of the FMUs"""
+    """whether with the native twins of the FMUs"""
     in_lanes: bool
-    """whether many at once, as lanes of batches"""
+    """whether many at once, in SIMD lanes"""
     engine: Engine | None
-    """of runs that are flown one at a time; None: the fastest that each can have"""
+    """for runs one at a time; None: the fastest that each can use"""
     reason: str | None = None
-    """why it is not the fastest, where that was to be taken"""
+    """why `auto` did not choose the fastest"""
     on_gpu: bool = False
     """whether the lanes are threads of a GPU"""
 
     @property
     def name(self) -> str:
-        """As `--engine` has it."""
+        """The name as in `--engine`."""
         if self.in_lanes:
             return "cuda" if self.on_gpu else "batch"
         return self.engine or "compiled"
@@ -46,45 +46,45 @@ class Chosen:
         return f"engine {self.name}: {what}, one run at a time" + (f" ({self.reason})" if self.reason else "")
 
 
-def choice_named(name: str) -> EngineChoice:
-    """The engine of that name; raises `UsageError` for another name than those that there are."""
+def engine_choice(name: str) -> EngineChoice:
+    """The engine of this name; raises `UsageError` for an unknown name."""
     known = get_args(EngineChoice)
     if name not in known:
         raise UsageError(f"--engine {name}: {expected_name(name, known)}")
     return cast(EngineChoice, name)
 
 
-def chosen(
-    engine: EngineChoice, native: bool, first: Callable[[bool], tuple[System, Files]], *, apart: str | None = None
-) -> Chosen:
-    """How runs are flown by an engine, with `native` if that was asked for.
+def choose_execution(
+    engine: EngineChoice, native: bool, first: Callable[[bool], tuple[System, Files]], *, no_lanes: str | None = None
+) -> Execution:
+    """How runs are executed by an engine, with native twins if `native` is requested.
 
-    `first` gives the first run, checked, and its files, by native twins or not; `apart` is why runs are no lanes,
-    whatever they are. Raises `UsageError` naming what stands in the way of lanes if these were asked for, and
-    `QuadcosimError` without a GPU if that was.
+    `first` returns the first run, checked, and its files, with native twins or not; `no_lanes` is a reason that rules
+    out lanes. Raises `UsageError`, naming the obstacle, if requested lanes are impossible, and `QuadcosimError` if
+    there is no GPU for `cuda`.
     """
     if engine in ("python", "compiled"):
-        return Chosen(native=native, in_lanes=False, engine=engine)
+        return Execution(native=native, in_lanes=False, engine=engine)
     if engine in ("batch", "cuda"):
-        if apart is not None:
-            raise UsageError(f"--engine {engine}: {apart}")
+        if no_lanes is not None:
+            raise UsageError(f"--engine {engine}: {no_lanes}")
         if engine == "cuda":
-            from orchestration.engines.cuda.fleet import expect_gpu  # others need not wait for what it loads
+            from orchestration.engines.cuda.fleet import expect_gpu  # deferred: slow to load
 
             expect_gpu()
         _expect_lanes(*first(True))
-        return Chosen(native=True, in_lanes=True, engine=None, on_gpu=engine == "cuda")
+        return Execution(native=True, in_lanes=True, engine=None, on_gpu=engine == "cuda")
     try:
         system, files = first(True)
-    except QuadcosimError as error:  # what is wrong with the request is said by whoever flies it
-        return Chosen(native=native, in_lanes=False, engine=None, reason=str(error))
+    except QuadcosimError as error:  # an invalid request is reported when it is run
+        return Execution(native=native, in_lanes=False, engine=None, reason=str(error))
     try:
-        if apart is not None:
-            raise UsageError(apart)
+        if no_lanes is not None:
+            raise UsageError(no_lanes)
         _expect_lanes(system, files)
     except QuadcosimError as error:
-        return Chosen(native=True, in_lanes=False, engine=None, reason=str(error))
-    return Chosen(native=True, in_lanes=True, engine=None)
+        return Execution(native=True, in_lanes=False, engine=None, reason=str(error))
+    return Execution(native=True, in_lanes=True, engine=None)
 
 
 def _expect_lanes(system: System, files: Files) -> None:
@@ -92,13 +92,13 @@ def _expect_lanes(system: System, files: Files) -> None:
     expect_lanes(checked(system, models).system, models)
 
 
-def alone(request: Twin, engine: Engine | Literal["auto"]) -> tuple[Twin, Chosen]:
-    """What is flown one run at a time, and how: by `auto` the native twins of its FMUs where they can be had."""
+def single_run_execution(request: Twin, engine: Engine | Literal["auto"]) -> tuple[Twin, Execution]:
+    """The request to run one at a time, and how: with `auto`, the native twins of its FMUs if available."""
     if engine != "auto":
-        return request, Chosen(native=False, in_lanes=False, engine=engine)
+        return request, Execution(native=False, in_lanes=False, engine=engine)
     native = native_twins(request)
     try:
         files_of(system_of(native))
     except QuadcosimError as error:
-        return request, Chosen(native=False, in_lanes=False, engine=None, reason=str(error))
-    return native, Chosen(native=True, in_lanes=False, engine=None)
+        return request, Execution(native=False, in_lanes=False, engine=None, reason=str(error))
+    return native, Execution(native=True, in_lanes=False, engine=None)

@@ -1,4 +1,4 @@
-"""Runs tasks in worker processes, here or on a dask cluster, and yields the outcomes as they come."""
+"""Runs tasks in worker processes, locally or on a dask cluster, and yields the outcomes as they come."""
 
 import atexit
 import concurrent.futures
@@ -20,18 +20,18 @@ from orchestration.workers.batching import chunks
 from orchestration.workers.pool import Inputs, InterruptedWorker, Pool
 from orchestration.workers.task import Chunk, Outcome, RunTask
 
-Fly = Callable[[Iterable[RunTask | Chunk]], Generator[list[Outcome], None, None]]
-"""The outcomes of tasks, in any order, as they come."""
+TaskRunner = Callable[[Iterable[RunTask | Chunk]], Generator[list[Outcome], None, None]]
+"""Yields the outcomes of tasks as they come, in any order."""
 Submit = Callable[[RunTask | Chunk], "Future[list[Outcome]]"]
 _PATIENCE = 10.0
-"""[s], for a scheduler that is there"""
+"""[s] to wait for the scheduler"""
 _WORKERS_PATIENCE = 60.0
-"""[s], for the first of its workers, which may still be starting"""
+"""[s] to wait for its first worker"""
 _ADDRESS = re.compile(r"(?:(?:tcp|tls|ws|wss)://)?(\[[0-9a-fA-F:.]+\]|[^\s:/\[\]]+):(\d{1,5})")
 
 
 class RunEvaluator:
-    """Flies a few runs at a time for someone who decides by their metrics what to fly next."""
+    """Evaluates a few runs at a time for searches that choose the next runs by the metrics."""
 
     def __init__(self, files: Files, workers: int, engine: Engine | None = None) -> None:
         if workers < 1:
@@ -46,58 +46,58 @@ class RunEvaluator:
     def __exit__(self, *exception: object) -> None:
         self._stack.close()
 
-    def fly_all(self, systems: Sequence[System], *, in_lanes: bool = False, on_gpu: bool = False) -> list[Any]:
-        """The metrics of all runs in their order, by native FMUs many at once if they are to fly `in_lanes`, `on_gpu`
-        or not.
+    def run_all(self, systems: Sequence[System], *, in_lanes: bool = False, on_gpu: bool = False) -> list[Any]:
+        """The metrics of all runs in their order; `in_lanes`: with native FMUs, many at once, `on_gpu` or not.
 
         Raises `QuadcosimError` if a run fails.
         """
         if not in_lanes:
-            return self.fly(systems, stop=lambda metrics: False)
+            return self.run_until(systems, stop=lambda metrics: False)
         tasks = (self._task(i, system) for i, system in enumerate(systems))
-        found: list[Any] = [None] * len(systems)
-        for future in [self._submit(some) for some in chunks(tasks, len(systems), self._workers, on_gpu)]:
+        metrics: list[Any] = [None] * len(systems)
+        for future in [self._submit(part) for part in chunks(tasks, len(systems), self._workers, on_gpu)]:
             for outcome in future.result():
-                found[outcome.row.index] = _metrics(outcome)
-        return found
+                metrics[outcome.row.index] = _metrics(outcome)
+        return metrics
 
-    def fly(
-        self, systems: Sequence[System], stop: Callable[[Any], bool], hear: Callable[[int], None] = lambda done: None
+    def run_until(
+        self, systems: Sequence[System], stop: Callable[[Any], bool], report: Callable[[int], None] = lambda done: None
     ) -> list[Any]:
-        """The metrics of the runs in their order, up to the first whose metrics `stop`, with any number of workers.
+        """The metrics of the runs in their order, up to the first for whose metrics `stop` is true.
 
-        `hear` is told after each how many are done. Raises `QuadcosimError` if a run fails.
+        The result does not depend on the number of workers. `report` is called after each run with the number of runs
+        done. Raises `QuadcosimError` if a run fails.
         """
         futures = [self._submit(self._task(i, system)) for i, system in enumerate(systems)]
-        found = []
+        metrics: list[Any] = []
         try:
             for future in futures:
                 (outcome,) = future.result()
-                found.append(_metrics(outcome))
-                hear(len(found))
-                if stop(found[-1]):
+                metrics.append(_metrics(outcome))
+                report(len(metrics))
+                if stop(metrics[-1]):
                     break
         finally:
             for future in futures:
                 future.cancel()
-        return found
+        return metrics
 
     def _task(self, index: int, system: System) -> RunTask:
         return RunTask(index=index, key="", settings={}, system=system, keep_signals=False, engine=self._engine)
 
 
 def _metrics(outcome: Outcome) -> Any:
-    """Of a run; raises `QuadcosimError` if it has failed."""
+    """The metrics of a run; raises `QuadcosimError` if it has failed."""
     if outcome.row.metrics is None:
         raise QuadcosimError(str(outcome.row.message))
     return outcome.row.metrics
 
 
 @contextmanager
-def local_workers(inputs: Inputs, workers: int) -> Iterator[Fly]:
-    """Flies tasks in `workers` processes of this machine, which start with the first of them.
+def local_workers(inputs: Inputs, workers: int) -> Iterator[TaskRunner]:
+    """Run tasks in `workers` processes of this machine, which start with the first task.
 
-    Raises `QuadcosimError` for what is not a run's own failure, `KeyboardInterrupt` if a worker is interrupted.
+    Raises `QuadcosimError` for failures not caused by a run, `KeyboardInterrupt` if a worker is interrupted.
     """
     with ExitStack() as stack:
         submit = _local_submit(stack, inputs, workers)
@@ -108,11 +108,10 @@ def local_workers(inputs: Inputs, workers: int) -> Iterator[Fly]:
 
 
 @contextmanager
-def cluster(inputs: Inputs, address: str) -> Iterator[Fly]:
-    """Flies tasks in the workers of a dask scheduler.
+def cluster(inputs: Inputs, address: str) -> Iterator[TaskRunner]:
+    """Run tasks in the workers of a dask scheduler.
 
-    Raises `QuadcosimError` if the scheduler cannot be reached or has no workers, or for what is not a run's own
-    failure.
+    Raises `QuadcosimError` if the scheduler cannot be reached or has no workers, and for failures not caused by a run.
     """
     import asyncio
 
@@ -122,44 +121,49 @@ def cluster(inputs: Inputs, address: str) -> Iterator[Fly]:
         try:
             client: Any = stack.enter_context(distributed.Client(address, timeout=_PATIENCE, set_as_default=False))
             client.wait_for_workers(1, timeout=_WORKERS_PATIENCE)
-        except (OSError, TimeoutError, asyncio.TimeoutError, ValueError) as error:  # two of a name before Python 3.11
+        except (
+            OSError,
+            TimeoutError,
+            asyncio.TimeoutError,
+            ValueError,
+        ) as error:  # the TimeoutErrors are distinct before Python 3.11
             raise QuadcosimError(f"--dask {address}: expected a dask scheduler with workers there: {error}") from error
-        # The files travel once, by the hash of their content.
+        # Files are sent once, identified by the hash of their content.
         scattered = client.scatter(inputs, broadcast=True, hash=True)
         executor = stack.enter_context(client.get_executor(pure=False))
         slots = sum(client.nthreads().values())
 
         def submit(task: RunTask | Chunk) -> "Future[list[Outcome]]":
-            return executor.submit(fly_on_cluster, task, scattered)  # type: ignore[no-any-return]
+            return executor.submit(run_on_cluster, task, scattered)  # type: ignore[no-any-return]
 
         try:
             yield partial(_drain, submit=submit, most=2 * max(1, slots))
         except (concurrent.futures.CancelledError, OSError, distributed.KilledWorker) as error:
             raise QuadcosimError(
-                f"--dask {address}: the scheduler or its workers were lost ({type(error).__name__}); what was flown is "
-                "kept, start the sweep again"
+                f"--dask {address}: the scheduler or its workers were lost ({type(error).__name__}); finished "
+                "runs are kept, start the sweep again"
             ) from error
 
 
 def expect_scheduler(address: str) -> None:
-    """Raise `UsageError` for an address that is none, `QuadcosimError` at once where nobody listens."""
-    found = _ADDRESS.fullmatch(address)
-    if found is None or not 0 < int(found[2]) < 65536:
+    """Raise `UsageError` for an invalid address, `QuadcosimError` immediately if nothing listens there."""
+    match = _ADDRESS.fullmatch(address)
+    if match is None or not 0 < int(match[2]) < 65536:
         raise UsageError(f"--dask {address}: expected the address of a scheduler, as in tcp://host:8786")
     try:
-        socket.create_connection((found[1].strip("[]"), int(found[2])), timeout=_PATIENCE).close()
+        socket.create_connection((match[1].strip("[]"), int(match[2])), timeout=_PATIENCE).close()
     except OSError as error:
         raise QuadcosimError(f"--dask {address}: expected a dask scheduler with workers there: {error}") from error
 
 
-def fly_on_cluster(task: RunTask | Chunk, inputs: Inputs) -> list[Outcome]:
-    """The outcomes of runs, called in a dask worker: flown in a process of its own there too."""
+def run_on_cluster(task: RunTask | Chunk, inputs: Inputs) -> list[Outcome]:
+    """The outcomes of runs; called in a dask worker, simulates in a separate process there too."""
     with _POOLS_LOCK:
         if inputs.digest not in _POOLS:
             _POOLS[inputs.digest] = pool = Pool(inputs)
             atexit.register(pool.remove)  # last
             atexit.register(pool.close)
-    return _POOLS[inputs.digest].fly(task)
+    return _POOLS[inputs.digest].run(task)
 
 
 _POOLS: dict[str, Pool] = {}
@@ -167,28 +171,28 @@ _POOLS_LOCK = threading.Lock()
 
 
 def _local_submit(stack: ExitStack, inputs: Inputs, workers: int) -> Submit:
-    """Submits to threads that each wait for a worker process, until `stack` is closed."""
+    """A function that submits tasks to threads, each of which waits for a worker process; ends with `stack`."""
     pool = Pool(inputs)
     stack.callback(pool.remove)  # last: a thread may still have been starting a process
     executor = ThreadPoolExecutor(workers)
     stack.callback(executor.shutdown, cancel_futures=True)
     stack.callback(pool.close)  # first: it ends what the threads wait for
     stack.callback(executor.shutdown, wait=False, cancel_futures=True)
-    return lambda task: executor.submit(pool.fly, task)
+    return lambda task: executor.submit(pool.run, task)
 
 
 def _drain(tasks: Iterable[RunTask | Chunk], submit: Submit, most: int) -> Generator[list[Outcome], None, None]:
-    """Keep `most` tasks under way until none is left; yield what is finished."""
+    """Keep `most` tasks in progress until none is left; yield the outcomes of those that finish."""
     waiting = iter(tasks)
-    under_way = {submit(task) for task in islice(waiting, most)}
+    in_progress = {submit(task) for task in islice(waiting, most)}
     try:
-        while under_way:
-            done, under_way = concurrent.futures.wait(
-                under_way, timeout=1.0, return_when=concurrent.futures.FIRST_COMPLETED
+        while in_progress:
+            done, in_progress = concurrent.futures.wait(
+                in_progress, timeout=1.0, return_when=concurrent.futures.FIRST_COMPLETED
             )
             for future in done:
                 yield future.result()
-            under_way |= {submit(task) for task in islice(waiting, len(done))}
+            in_progress |= {submit(task) for task in islice(waiting, len(done))}
     finally:
-        for future in under_way:
+        for future in in_progress:
             future.cancel()

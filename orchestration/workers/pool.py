@@ -1,4 +1,4 @@
-"""Worker processes as their coordinator sees them: who flies what, and what the death of one means."""
+"""Worker processes in their coordinator: the assignment of tasks, and what follows from the death of a worker."""
 
 import hashlib
 import os
@@ -30,17 +30,17 @@ from orchestration.workers.task import (
 )
 
 ATTEMPTS = 3
-"""How often a run is flown, the later times first in a new process, before the death of its worker is its result."""
+"""How often a run is tried, from the second time in a new process, before the death of its worker is its result"""
 _FROM_OUTSIDE = {-getattr(signal, name) for name in ("SIGKILL", "SIGTERM", "SIGHUP") if hasattr(signal, name)}
-"""Ends that no run brings upon its process, but a user, or a machine that is out of memory."""
+"""Exit codes of processes ended from outside: by a user, or by the system when out of memory"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Inputs:
-    """What every run of a study needs, by content: this is what was hashed, wherever it is flown."""
+    """The content of the files that the runs of a study need, as hashed, for workers on any machine."""
 
     contents: Mapping[str, bytes]
-    """files, by what systems call them"""
+    """files by their names in systems"""
     versions: dict[str, str]
 
     @classmethod
@@ -50,48 +50,48 @@ class Inputs:
 
     @cached_property
     def digest(self) -> str:
-        """A hash of the whole."""
+        """A hash of contents and versions."""
         return hashlib.sha256(pickle.dumps((dict(self.contents), self.versions))).hexdigest()
 
 
 class InterruptedWorker(QuadcosimError):
-    """Somebody sent an interrupt to a worker process: it is meant for all."""
+    """A worker process received an interrupt, which is meant for all."""
 
 
 class WorkerProcess:
-    """One worker process, its temporary files in a folder of its own."""
+    """One worker process with its own folder for temporary files."""
 
     def __init__(self, root: Path) -> None:
         self._folder = tempfile.TemporaryDirectory(dir=root, prefix="worker-", ignore_cleanup_errors=True)
-        place = self._folder.name
+        path = self._folder.name
         self._child = Child(
-            subprocesses.command("orchestration.workers.worker_process", place),
-            environment=subprocesses.environment(**dict.fromkeys(("TMPDIR", "TEMP", "TMP"), place)),
+            subprocesses.command("orchestration.workers.worker_process", path),
+            environment=subprocesses.environment(**dict.fromkeys(("TMPDIR", "TEMP", "TMP"), path)),
         )
 
-    def ask(self, task: RunTask | Chunk) -> Any:
-        """The answer to a task, or to many; raises `Died`, also at its time limit."""
+    def request(self, task: RunTask | Chunk) -> Any:
+        """Send a task and return the answer; raises `Died`, also at its time limit."""
         self._child.allow(task.time_limit)
         self._child.send(task)
         answer = self._child.receive()
         self._child.allow(None)
         return answer
 
-    def ready(self) -> Ready:
-        """What it says of itself once it has started; raises `Died`."""
+    def wait_until_ready(self) -> Ready:
+        """The report of the process once it has started; raises `Died`."""
         self._child.send(sources())
         answer = self._child.receive()
         assert isinstance(answer, Ready)
         return answer
 
     def close(self) -> None:
-        """End it and remove what it left."""
+        """End it and remove its folder."""
         self._child.close()
         self._folder.cleanup()
 
 
 class Supervisor:
-    """Flies one run at a time in a worker process, which is made anew when it dies."""
+    """Runs one task at a time in a worker process, which is replaced when it dies."""
 
     def __init__(self, root: Path, inputs: Inputs) -> None:
         self._root, self._inputs = root, inputs
@@ -100,16 +100,16 @@ class Supervisor:
         self._worker: WorkerProcess | None = None
         self._machine: str | None = None
 
-    def fly(self, task: RunTask) -> Outcome:
-        """The outcome of a run; a run that ends its process whenever it is flown alone has failed.
+    def run(self, task: RunTask) -> Outcome:
+        """The outcome of a run; a run that ends its process `ATTEMPTS` times has failed.
 
-        Raises `QuadcosimError` for what is not the run's own failure.
+        Raises `QuadcosimError` for failures not caused by the run.
         """
         crashes = killed = 0
         while True:
-            worker = self._ready()
+            worker = self._ready_worker()
             try:
-                answer = worker.ask(task)
+                answer = worker.request(task)
             except Died as death:
                 self._drop()
                 if death.ending.reached is not None:
@@ -121,38 +121,38 @@ class Supervisor:
                 else:
                     crashes += 1
                 if crashes == ATTEMPTS:
-                    message = f"its worker process {death}, {ATTEMPTS} times, the last ones with nothing else flown"
+                    message = f"its worker process {death}, {ATTEMPTS} times, the last times in a new process"
                     return Outcome(row=row_of(task, None, message, 0.0, self._machine))
                 if killed == ATTEMPTS:
                     raise QuadcosimError(
-                        f"the worker process of run {task.index} {death} {ATTEMPTS} times: not the run's doing, or too "
-                        "little memory; start the sweep again, with fewer workers"
+                        f"the worker process of run {task.index} {death} {ATTEMPTS} times: not caused by the run, or "
+                        "too little memory; start the sweep again, with fewer workers"
                     ) from None
                 continue
             if isinstance(answer, EnvironmentFailure):
-                raise WorkerEnvironmentError(f"no run's own failure: {answer.message}")
+                raise WorkerEnvironmentError(f"not a failure of a run: {answer.message}")
             assert isinstance(answer, Outcome)
             return answer
 
-    def fly_chunk(self, chunk: Chunk) -> list[Outcome]:
-        """The outcomes of many runs; they are flown one by one if they end their process together, or take
-        more time than all of them may.
+    def run_chunk(self, chunk: Chunk) -> list[Outcome]:
+        """The outcomes of many runs; they are run one by one if together they end their process or exceed their
+        common time limit.
 
-        Raises `QuadcosimError` for what is no run's own failure.
+        Raises `QuadcosimError` for failures not caused by a run.
         """
         try:
-            answer = self._ready().ask(chunk)
+            answer = self._ready_worker().request(chunk)
         except Died as death:
             self._drop()
             _expect_no_interrupt(death)
-            return [self.fly(task) for task in chunk.tasks]
+            return [self.run(task) for task in chunk.tasks]
         if isinstance(answer, EnvironmentFailure):
-            raise WorkerEnvironmentError(f"no run's own failure: {answer.message}")
+            raise WorkerEnvironmentError(f"not a failure of a run: {answer.message}")
         assert isinstance(answer, list)
         return answer
 
     def close(self) -> None:
-        """End the process; whoever waits for it is told."""
+        """End the process; a waiting `run` raises `QuadcosimError`."""
         with self._lock:
             self._closed = True
         self._drop()
@@ -163,7 +163,7 @@ class Supervisor:
         if worker is not None:
             worker.close()
 
-    def _ready(self) -> WorkerProcess:
+    def _ready_worker(self) -> WorkerProcess:
         """The worker process, started if there is none; raises `QuadcosimError` if none can be started."""
         for attempt in range(ATTEMPTS):
             with self._lock:
@@ -173,7 +173,7 @@ class Supervisor:
                     return self._worker
                 self._worker = worker = WorkerProcess(self._root)
             try:
-                ready = worker.ready()
+                ready = worker.wait_until_ready()
             except Died as death:
                 self._drop()
                 _expect_no_interrupt(death)
@@ -202,7 +202,7 @@ def _expect_no_interrupt(death: Died) -> None:
 
 
 class Pool:
-    """Supervisors for one inputs: as many as fly at once."""
+    """Supervisors for the inputs of one study: as many as there are concurrent calls."""
 
     def __init__(self, inputs: Inputs) -> None:
         self._scratch = scratch.temporary()
@@ -218,8 +218,8 @@ class Pool:
             self._scratch.remove()
             raise
 
-    def fly(self, task: RunTask | Chunk) -> list[Outcome]:
-        """The outcomes of runs; called from any number of threads, each of which gets a process of its own.
+    def run(self, task: RunTask | Chunk) -> list[Outcome]:
+        """The outcomes of runs; may be called from several threads, each of which gets its own process.
 
         Raises `QuadcosimError` once it is closed.
         """
@@ -228,24 +228,24 @@ class Pool:
             if isinstance(task, Chunk):
                 systems = all_with_files([each.system for each in task.tasks], self._paths)
                 each = tuple(replace(one, system=system) for one, system in zip(task.tasks, systems))
-                return supervisor.fly_chunk(replace(task, tasks=each))
-            return [supervisor.fly(replace(task, system=with_files(task.system, self._paths)))]
+                return supervisor.run_chunk(replace(task, tasks=each))
+            return [supervisor.run(replace(task, system=with_files(task.system, self._paths)))]
         finally:
             self._idle.put(supervisor)
 
     def close(self) -> None:
-        """End all processes, and let none begin."""
+        """End all processes, and start no more."""
         with self._lock:
             self._closed = True
         for supervisor in self._supervisors:
             supervisor.close()
 
     def remove(self) -> None:
-        """Remove what they left, once nobody is in `fly` any more who could still leave something."""
+        """Remove the temporary files; to be called when no thread is in `run` any more."""
         self._scratch.remove()
 
     def _supervisor(self) -> Supervisor:
-        """One that has nothing to do, or a new one."""
+        """An idle supervisor, or a new one."""
         with self._lock:
             if self._closed:
                 raise QuadcosimError("the sweep has ended")

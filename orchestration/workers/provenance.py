@@ -1,4 +1,4 @@
-"""What the bits of a run depend on beside its system: versions, sources, the machine."""
+"""What the bits of a run depend on besides its system: versions, sources, machine."""
 
 import contextlib
 import functools
@@ -19,8 +19,8 @@ ROOTS = (
     "orchestration.fmi.isolated_process",
     "orchestration.runs.apart_process",
 )
-"""Where the code that flies begins; the last two are started by their names, as processes of their own."""
-_ASIDE = (
+"""Entry modules of the simulation code; the last two are started by name as separate processes"""
+_EXCLUDED = (
     "orchestration.building.fmus",
     "orchestration.figures.gallery",
     "orchestration.recording.tables",
@@ -28,29 +28,31 @@ _ASIDE = (
     "orchestration.runs.draw",
     "orchestration.workers.row",
 )
-"""What finds FMUs, reads SSP, keeps results and draws them; it is imported there and changes no bit of them."""
+"""Modules imported by that code which affect no result: they find FMUs, read SSP, keep and draw results"""
 _PACKAGES = ("orchestration", "fmu_kit")
 _FEATURES = ("fma", "fma4", "avx2", "avx512f")
-"""of a processor, by which the C library and numpy choose among their mathematical functions"""
+"""Processor flags by which the C library and NumPy choose their mathematical functions"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Sources:
-    """The sources on the flight's path by one hash, and how their files are told from edited ones on this machine."""
+    """The hash of the simulation code's sources, and the state of their files to detect edits on this machine."""
 
     hash: str
     states: Mapping[str, tuple[int, int, int]]
-    """by path: size, and when content and file were changed last [ns]"""
+    """by path: size, and times of the last change of content and of status [ns]"""
 
     @classmethod
     def read(cls) -> "Sources":
-        """As they are now."""
-        files = flight_sources()
-        states = {str(path): _state(path) for path in files.values()}  # before: what is edited meanwhile is not these
+        """Read the present sources."""
+        files = simulation_sources()
+        states = {
+            str(path): _state(path) for path in files.values()
+        }  # before hashing, so that a concurrent edit is detected
         return cls(hash=sources_hash(files), states=states)
 
-    def now(self) -> "Sources":
-        """These if no file has changed since, else as they are now: to read all of them takes a tenth of a second."""
+    def current(self) -> "Sources":
+        """These if no file has changed since, else read again, which takes a tenth of a second."""
         with contextlib.suppress(OSError):
             if all(_state(Path(path)) == state for path, state in self.states.items()):
                 return self
@@ -59,48 +61,48 @@ class Sources:
 
 @functools.cache
 def sources() -> Sources:
-    """Those of this process, read once."""
+    """The sources of this process, read once."""
     return Sources.read()
 
 
 def software(sources: Sources) -> dict[str, str]:
-    """Versions of what a run's bits depend on."""
+    """Versions of the software that a run's bits depend on."""
     packages = {name: importlib.metadata.version(name) for name in ("quadcosim", "numpy", "fmpy")}
     return {**packages, "sources": sources.hash}
 
 
 @functools.cache
 def versions() -> dict[str, str]:
-    """Those of this process."""
+    """The software versions of this process."""
     return software(sources())
 
 
-def flight_sources() -> dict[str, Path]:
-    """The modules of this project that the code that flies imports, directly or not, by name."""
-    from orchestration.engines import loop  # not before: a worker that is told of its sources needs none of them
+def simulation_sources() -> dict[str, Path]:
+    """The modules of this project that the simulation code imports, directly or not, by name."""
+    from orchestration.engines import loop  # deferred: a worker that receives its sources does not need them
     from orchestration.engines.batch import kernels
     from orchestration.requests import request
 
-    found: dict[str, Path] = {}
-    seen, waiting = set(_ASIDE), list(ROOTS)
+    modules: dict[str, Path] = {}
+    seen, waiting = set(_EXCLUDED), list(ROOTS)
     while waiting:
         name = waiting.pop()
         if name in seen:
             continue
         seen.add(name)
         if (path := _source(name)) is not None:
-            found[name] = path
+            modules[name] = path
             waiting += imported(path.read_text(encoding="utf-8"))
-    return found | {path.name: path for path in (*request.FILES, *loop.FILES, *kernels.FILES)}
+    return modules | {path.name: path for path in (*request.FILES, *loop.FILES, *kernels.FILES)}
 
 
 _IMPORT = re.compile(r"^[ \t]*(?:from[ \t]+([\w.]+)[ \t]+)?import[ \t]+(\([^)]*\)|[^#\n]*)", re.MULTILINE)
 
 
 def imported(source: str) -> Iterator[str]:
-    """The names of all that a module's source imports: modules, and what may be a module of a package.
+    """The names that a module's source imports: modules, and names that may be modules of a package.
 
-    By its lines: each sweep begins with this, and syntax trees of a hundred modules take it half a second.
+    Parsed by regular expressions, since each sweep starts with it: syntax trees of a hundred modules take 0.5 s.
     """
     for module, names in _IMPORT.findall(source):
         if module:
@@ -118,8 +120,8 @@ def sources_hash(sources: Mapping[str, Path]) -> str:
 
 
 def _state(path: Path) -> tuple[int, int, int]:
-    found = path.stat()
-    return found.st_size, found.st_mtime_ns, found.st_ctime_ns
+    status = path.stat()
+    return status.st_size, status.st_mtime_ns, status.st_ctime_ns
 
 
 def _source(name: str) -> Path | None:
@@ -128,12 +130,12 @@ def _source(name: str) -> Path | None:
     if package not in _PACKAGES or not parts:
         return None
     path = os.path.join(subprocesses.ROOT, package, *parts) + ".py"
-    return Path(path) if os.path.isfile(path) else None  # a name that is imported from a module has none
+    return Path(path) if os.path.isfile(path) else None  # none for a name that is not a module
 
 
 @functools.cache
 def machine() -> str:
-    """The kind of this machine: flights on different kinds may differ in the last bit."""
+    """The kind of this machine: results on different kinds may differ in the last bit."""
     libc = " ".join(platform.libc_ver()) or platform.system()
     features = " ".join(name for name in _FEATURES if name in _processor_flags())
     return f"Python {platform.python_version()}, {libc}, {platform.machine()} {features}".rstrip()

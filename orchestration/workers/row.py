@@ -1,4 +1,4 @@
-"""What a worker says of a run."""
+"""The row of a run in a store."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,10 +7,10 @@ from typing import Any
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """One run: its settings and what it came to."""
+    """One run: its settings and its results."""
 
     index: int
-    """place in the design"""
+    """position in the design"""
     key: str
     """hash of everything that determines the run"""
     settings: Mapping[str, Any]
@@ -23,7 +23,7 @@ class Row:
     duration: float
     """wall-clock time of the run [s]"""
     machine: str | None = None
-    """the kind of machine that flew it"""
+    """the kind of machine that ran it"""
 
     @property
     def status(self) -> str:

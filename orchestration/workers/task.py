@@ -1,4 +1,4 @@
-"""What a worker process is asked and answers, and how it flies: with FMUs that it has loaded once."""
+"""Tasks and answers of a worker process, and their execution with FMUs that are loaded once."""
 
 import io
 import time
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class RunTask:
-    """One run of a study, its files where the worker finds them."""
+    """One run of a study, with the paths of its files on the worker."""
 
     index: int
     key: str
@@ -34,16 +34,16 @@ class RunTask:
     system: System
     keep_signals: bool
     metrics: tuple[OwnMetric, ...] = ()
-    """of the study's own, beside those of the system"""
+    """the study's own metrics, besides those of the system"""
     engine: Engine | None = None
-    """that flies it; None: the fastest that can be had"""
+    """None: the fastest available"""
     time_limit: float | None = None
-    """[s] of the processor that it may take; None: as long as it takes"""
+    """[s] of processor time; None: unlimited"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Chunk:
-    """Runs of a study that are flown as lanes of batches; all of native FMUs, of none are signals kept."""
+    """Runs of a study that are simulated in SIMD lanes, all with native FMUs and without keeping signals."""
 
     tasks: tuple[RunTask, ...]
     on_gpu: bool = False
@@ -51,7 +51,7 @@ class Chunk:
 
     @property
     def time_limit(self) -> float | None:
-        """[s] of the processor that all of them may take; None: as long as they take."""
+        """[s] of processor time for all of them; None: unlimited."""
         limits = [task.time_limit for task in self.tasks if task.time_limit is not None]
         return sum(limits) if len(limits) == len(self.tasks) else None
 
@@ -63,14 +63,14 @@ class Outcome:
     row: Row
     signals: bytes | None = None
     in_lanes: bool = False
-    """whether a batch has flown it"""
+    """whether it was run in SIMD lanes"""
     ended: bool = False
-    """whether it was ended at a limit"""
+    """whether it was stopped at a limit"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Ready:
-    """A worker process has started: its software and the kind of its machine."""
+    """The report of a started worker process: its software and the kind of its machine."""
 
     versions: dict[str, str]
     machine: str
@@ -78,13 +78,13 @@ class Ready:
 
 @dataclass(frozen=True, kw_only=True)
 class EnvironmentFailure:
-    """Nothing can be flown here, which is no run's own failure."""
+    """This worker cannot simulate, for a reason that is not a failure of a run."""
 
     message: str
 
 
 class WorkerEnvironmentError(QuadcosimError):
-    """What failed is not the run but where it was to be flown: no space, no file, an FMU that does not load."""
+    """A failure of the worker's environment, not of the run: no space, a missing file, an FMU that does not load."""
 
 
 class Runner:
@@ -94,21 +94,21 @@ class Runner:
         self._instances = Instances()
         self._machine = machine
         self._batches: dict[bool, Batches] = {}
-        """that load only where runs are flown in lanes: whether on a GPU"""
+        """by `on_gpu`; loaded when runs are first simulated in lanes"""
 
-    def fly(self, task: RunTask) -> Outcome:
-        """Fly one run; what is wrong with it is its row.
+    def run(self, task: RunTask) -> Outcome:
+        """Simulate one run; its own failure becomes its row.
 
-        Raises `WorkerEnvironmentError` for what is not the run's own failure.
+        Raises `WorkerEnvironmentError` for other failures.
         """
         started = time.perf_counter()
         metrics, message, signals = None, None, None
         _expect_files(task.system)
         try:
-            with prepared(task.system, load=self._load, engine=task.engine) as flight:
-                flight.master.initialise()
-                flight.master.run()
-                result = flight.result()
+            with prepared(task.system, load=self._load, engine=task.engine) as simulation:
+                simulation.master.initialise()
+                simulation.master.run()
+                result = simulation.result()
                 own = {metric.name: metric.of(result) for metric in task.metrics}
                 metrics, message = {**result.metrics, **own}, result.divergence or result.termination
                 signals = _parquet(result) if task.keep_signals else None
@@ -122,30 +122,30 @@ class Runner:
             row=row_of(task, metrics, message, time.perf_counter() - started, self._machine), signals=signals
         )
 
-    def fly_chunk(self, chunk: Chunk) -> list[Outcome]:
-        """Fly many runs at once, those alone that a batch leaves.
+    def run_chunk(self, chunk: Chunk) -> list[Outcome]:
+        """Simulate many runs at once, and one by one those that a batch cannot complete.
 
-        Raises `WorkerEnvironmentError` for what is no run's own failure.
+        Raises `WorkerEnvironmentError` for failures not caused by a run.
         """
         started = time.perf_counter()
         _expect_files(chunk.tasks[0].system)
         try:
             if chunk.on_gpu not in self._batches:
                 self._batches[chunk.on_gpu] = _batches(on_gpu=chunk.on_gpu)
-            flown = self._batches[chunk.on_gpu].run([task.system for task in chunk.tasks])
+            outcomes = self._batches[chunk.on_gpu].run([task.system for task in chunk.tasks])
         except (QuadcosimError, OSError, MemoryError) as error:
             raise WorkerEnvironmentError(str(error) or type(error).__name__) from error
         duration = (time.perf_counter() - started) / len(chunk.tasks)
         return [
-            self.fly(task)
+            self.run(task)
             if each is None
             else Outcome(row=row_of(task, each.metrics, each.message, duration, self._machine), in_lanes=True)
-            for task, each in zip(chunk.tasks, flown, strict=True)
+            for task, each in zip(chunk.tasks, outcomes, strict=True)
         ]
 
     @contextmanager
     def _load(self, path: Path, instance_name: str) -> Iterator[Instance]:
-        """An FMU that does not load has not been told yet what run it is for."""
+        """Load an FMU; its failure is one of the environment, since it does not depend on the run."""
         with ExitStack() as stack:
             try:
                 fmu = stack.enter_context(self._instances.load(path, instance_name))
@@ -169,7 +169,7 @@ def _batches(*, on_gpu: bool) -> "Batches":
 
 
 def _expect_files(system: System) -> None:
-    """Raise `WorkerEnvironmentError` if a file is not there, or is not the FMU that the coordinator has read."""
+    """Raise `WorkerEnvironmentError` if a file is missing, or is not the FMU that the coordinator has read."""
     fmus = [Path(component.fmu) for component in system.components.values()]
     for file in (*fmus, *input_files(system).values()):
         if not file.is_file():
@@ -184,7 +184,7 @@ def _expect_files(system: System) -> None:
 def row_of(
     task: RunTask, metrics: dict[str, Any] | None, message: str | None, duration: float, machine: str | None
 ) -> Row:
-    """The row of a task; without metrics it has failed."""
+    """The row of a task; without metrics the run has failed."""
     return Row(
         index=task.index, key=task.key, settings=task.settings, seed=task.system.seed, metrics=metrics,
         message=message, duration=duration, machine=machine,
@@ -192,7 +192,7 @@ def row_of(
 
 
 def _parquet(result: Result) -> bytes:
-    from orchestration.recording import tables  # pyarrow loads only where signals are kept
+    from orchestration.recording import tables  # deferred: pyarrow is needed only where signals are kept
 
     buffer = io.BytesIO()
     tables.write_signals(buffer, result.recording, result.about)

@@ -1,4 +1,4 @@
-"""A worker process: flies the runs that it is asked for, one by one or in chunks."""
+"""A worker process: simulates the runs that it receives, one by one or in chunks."""
 
 import shutil
 import signal
@@ -21,8 +21,8 @@ from orchestration.workers.task import (
 
 
 def main(own_folder: Path) -> None:
-    """Serve as long as somebody asks."""
-    tempfile.tempdir = str(own_folder)  # and no other if it is full
+    """Answer tasks until the coordinator closes the channel."""
+    tempfile.tempdir = str(own_folder)  # no fallback to other folders if it is full
 
     def orphaned() -> None:
         for folder in scratch.abandoned(iter([own_folder.parent])):
@@ -30,17 +30,17 @@ def main(own_folder: Path) -> None:
 
     # An FMU must not be blamed for an interrupt.
     parent = Parent(interrupt=signal.SIG_DFL, on_orphaned=orphaned)
-    told: Sources = parent.receive()
-    parent.send(Ready(versions=software(told.now()), machine=machine()))
+    coordinator_sources: Sources = parent.receive()
+    parent.send(Ready(versions=software(coordinator_sources.current()), machine=machine()))
     runner = Runner(machine())
     for task in parent:
-        parent.send(_fly(runner, task))
-    parent.leave()  # the coordinator ends a process otherwise
+        parent.send(_run(runner, task))
+    parent.leave()
 
 
-def _fly(runner: Runner, task: RunTask | Chunk) -> Outcome | list[Outcome] | EnvironmentFailure:
+def _run(runner: Runner, task: RunTask | Chunk) -> Outcome | list[Outcome] | EnvironmentFailure:
     try:
-        return runner.fly_chunk(task) if isinstance(task, Chunk) else runner.fly(task)
+        return runner.run_chunk(task) if isinstance(task, Chunk) else runner.run(task)
     except WorkerEnvironmentError as error:
         return EnvironmentFailure(message=str(error))
 

@@ -398,7 +398,7 @@ class StubPool:
     def __exit__(self, *exception: object) -> None:
         return None
 
-    def fly(self, systems: Sequence[System], stop: Any, hear: Any = lambda done: None) -> list[dict[str, Any]]:
+    def run_until(self, systems: Sequence[System], stop: Any, report: Any = lambda done: None) -> list[dict[str, Any]]:
         found: list[dict[str, Any]] = []
         for system in systems:
             self.flown.append(system)
@@ -414,7 +414,7 @@ class StubPool:
                     "ultimate_bound": bound,
                 }
             )
-            hear(len(found))
+            report(len(found))
             if stop(found[-1]):
                 break
         return found

@@ -33,7 +33,7 @@ from orchestration.studies.store import TEXTS, DesignPoint, open_for_reading, op
 from orchestration.system.distribution import Distribution
 from orchestration.system.paths import changed as with_changes
 from orchestration.workers import provenance
-from orchestration.workers.provenance import Sources, flight_sources, imported, sources_hash, versions
+from orchestration.workers.provenance import Sources, imported, simulation_sources, sources_hash, versions
 from orchestration.workers.row import Row
 from quadcosim import QuadcosimError, Scenario, UsageError
 from tests.orchestration.studies.common import METRICS, OBJECTIVES, files_in, one_line, row
@@ -533,7 +533,7 @@ def test_a_parameter_given_as_its_fmu_has_it_is_the_same_run() -> None:
                "orchestration.quadrotor.wiring"],
 )  # fmt: skip
 def test_an_edited_source_on_the_path_of_the_flight_is_other_software(module: str, tmp_path: Path) -> None:
-    sources = flight_sources()
+    sources = simulation_sources()
     edited = tmp_path / "edited.py"
     edited.write_bytes(sources[module].read_bytes() + b"\n")
     assert sources_hash({**sources, module: edited}) != sources_hash(sources) == versions()["sources"]
@@ -542,16 +542,16 @@ def test_an_edited_source_on_the_path_of_the_flight_is_other_software(module: st
 def test_sources_are_read_again_where_one_was_edited_since(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "one.py"
     file.write_text("1")
-    monkeypatch.setattr(provenance, "flight_sources", lambda: {"one": file})
+    monkeypatch.setattr(provenance, "simulation_sources", lambda: {"one": file})
     read = Sources.read()
-    assert read.now() is read
+    assert read.current() is read
     file.write_text("2")
     os.utime(file, ns=(0, 0))
-    assert read.now().hash == sources_hash({"one": file}) != read.hash
+    assert read.current().hash == sources_hash({"one": file}) != read.hash
 
 
 def test_every_header_that_c_on_the_path_of_the_flight_includes_is_one_of_its_sources() -> None:
-    sources = flight_sources()
+    sources = simulation_sources()
     written = {"operators.h", "sizes.h", "expressions.h"}  # by Python, for a system
     texts = [path.read_text(encoding="utf-8") for path in sources.values() if path.suffix in (".c", ".h")]
     included = {name for text in texts for name in re.findall(r'#include "(.+)"', text)}
@@ -559,7 +559,7 @@ def test_every_header_that_c_on_the_path_of_the_flight_includes_is_one_of_its_so
 
 
 def test_what_is_started_by_its_name_is_one_of_the_flights_sources() -> None:
-    sources = flight_sources()
+    sources = simulation_sources()
     texts = [path.read_text(encoding="utf-8") for path in sources.values() if path.suffix == ".py"]
     started = {name for text in texts for name in re.findall(r'command\(\s*"(orchestration\.[\w.]+)"', text)}
     assert {"orchestration.fmi.isolated_process", "orchestration.runs.apart_process"} <= started
@@ -567,7 +567,7 @@ def test_what_is_started_by_its_name_is_one_of_the_flights_sources() -> None:
 
 
 def test_every_import_of_the_flights_sources_is_seen() -> None:
-    for path in flight_sources().values():
+    for path in simulation_sources().values():
         if path.suffix == ".py":
             text = path.read_text(encoding="utf-8")
             nodes = [*ast.walk(ast.parse(text))]
@@ -584,7 +584,7 @@ def test_sources_that_only_show_or_keep_results_are_not_on_the_path_of_the_fligh
         "orchestration.studies.sweep",
         "orchestration.studies.store",
     )
-    assert not {*aside} & {*flight_sources()}
+    assert not {*aside} & {*simulation_sources()}
 
 
 # -- damage -----------------------------------------------------------------------------------------------

@@ -64,7 +64,7 @@ def test_the_order_of_runs_does_not_change_them(folder: Path, reference: list[di
     files = chosen.files()
     for index in (15, 3, 8, 0):
         system = with_files(chosen.system(index, starts()), files.fmus)
-        metrics = runner.fly(RunTask(index=0, key="", settings={}, system=system, keep_signals=False)).row.metrics
+        metrics = runner.run(RunTask(index=0, key="", settings={}, system=system, keep_signals=False)).row.metrics
         assert metrics is not None
         assert metrics["position_rmse"].hex() == reference[index]["position_rmse"]
         assert metrics["control_effort.torque"].hex() == reference[index]["control_effort.torque"]
@@ -295,10 +295,10 @@ def test_no_signals_are_kept_unless_told_and_those_that_are_asked_for_later_are_
 def test_a_pool_flies_in_order_up_to_the_first_that_stops_it_and_two_workers_in_some_order() -> None:
     scenarios = [short(period=period).as_system() for period in (0.01, 0.02, 0.03)]
     with engine.RunEvaluator(files_in(), 1) as pool:
-        everything = pool.fly(scenarios, stop=lambda metrics: False)
-        first = pool.fly(scenarios, stop=lambda metrics: True)
+        everything = pool.run_until(scenarios, stop=lambda metrics: False)
+        first = pool.run_until(scenarios, stop=lambda metrics: True)
     with engine.RunEvaluator(files_in(), 2) as pool:
-        by_two = pool.fly(scenarios, stop=lambda metrics: False)
+        by_two = pool.run_until(scenarios, stop=lambda metrics: False)
     expected = [run(scenario).metrics["position_rmse"] for scenario in scenarios]
     assert [metrics["position_rmse"] for metrics in everything] == expected
     assert [metrics["position_rmse"] for metrics in first] == expected[:1]
@@ -308,7 +308,7 @@ def test_a_pool_flies_in_order_up_to_the_first_that_stops_it_and_two_workers_in_
 def test_a_pool_raises_what_a_run_failed_with() -> None:
     bad = short().with_changes(parameters={"plant.mass": -1.0}).as_system()
     with engine.RunEvaluator(files_in(), 1) as pool, pytest.raises(QuadcosimError, match=r"mass = -1.0: expected"):
-        pool.fly([bad], stop=lambda metrics: False)
+        pool.run_until([bad], stop=lambda metrics: False)
 
 
 # -- usage ------------------------------------------------------------------------------------------------

@@ -64,8 +64,8 @@ def test_whole_runs_are_compared_with_native_fmus_and_their_beginning_with_pytho
     assert found.python is not None
     assert (found.runs, found.python.runs) == (2, 2)
     assert {*seen} == {(False, True, LENGTH), (False, False, LENGTH), (False, True, 1.0), (True, False, 1.0)}
-    assert "2 runs flown by FMUs too" in str(found)
-    assert "the beginning of 2 by FMUs in Python too" in str(found)
+    assert "2 runs repeated with FMUs" in str(found)
+    assert "the beginning of 2 with FMUs in Python" in str(found)
     assert Agreement.from_text(found.as_text()) == found
 
 

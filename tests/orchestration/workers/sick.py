@@ -1,4 +1,4 @@
-"""A plant that ends the process that flies it, or blames an interrupt, at chosen masses."""
+"""A plant that ends its process at chosen masses."""
 
 from pathlib import Path
 

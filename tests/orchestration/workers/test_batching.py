@@ -1,4 +1,4 @@
-"""A sweep by lanes writes the rows that the FMUs of its runs would have written, and says how far they agree."""
+"""A sweep in SIMD lanes writes the rows that the FMUs of its runs would have written, and reports their agreement."""
 
 import dataclasses
 from pathlib import Path
@@ -29,7 +29,7 @@ def noisy(folder: Path) -> Study:
 
 
 def assert_alike(lanes: list[dict[str, Any]], alone: list[dict[str, Any]]) -> None:
-    """The same rows, numbers to 1e-12, without what is a run's own."""
+    """The same rows, numbers to 1e-12, without duration and machine."""
     assert len(lanes) == len(alone)
     for one, other in zip(lanes, alone):
         assert one.keys() == other.keys()
@@ -45,14 +45,14 @@ def _is_hex(value: Any) -> bool:
     return isinstance(value, str) and value.lstrip("-").startswith("0x")
 
 
-def test_rows_are_those_of_the_fmus_in_a_store_of_the_same_runs_and_the_command_says_how_far_they_agree(
+def test_rows_are_those_of_the_fmus_and_the_command_reports_their_agreement(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, main: Main
 ) -> None:
     chosen = noisy(tmp_path)
     alone = bits(swept(dataclasses.replace(chosen, native=True), tmp_path / "alone"))
     monkeypatch.chdir(tmp_path)
     done = main("sweep", "study.toml", "--engine", "batch")
-    assert "8 runs flown by FMUs too: largest relative difference" in done.stdout
+    assert "8 runs repeated with FMUs: largest relative difference" in done.stdout
     assert done.stdout.splitlines()[-1] in main("status", "study.toml").stdout
     lanes = bits(tmp_path / STORE)
     assert len(lanes) == RUNS
@@ -66,7 +66,7 @@ def test_rows_are_those_of_the_fmus_in_a_store_of_the_same_runs_and_the_command_
     assert agreement.python.difference < 1e-9
 
 
-def test_a_sweep_goes_on_where_it_was_and_flies_nothing_twice(tmp_path: Path) -> None:
+def test_a_sweep_continues_and_repeats_no_run(tmp_path: Path) -> None:
     few = study(axis("timing.period", 0.01, 0.02))
     more = study(axis("timing.period", 0.01, 0.02, 0.03))
     assert sweep(few, folder=tmp_path, engine="batch").flown == 2
@@ -75,14 +75,14 @@ def test_a_sweep_goes_on_where_it_was_and_flies_nothing_twice(tmp_path: Path) ->
     assert sweep(more, folder=tmp_path, engine="batch").agreement is None
 
 
-def test_a_run_that_its_fmus_refuse_has_the_row_that_it_has_alone(tmp_path: Path) -> None:
+def test_a_run_that_its_fmus_refuse_has_the_same_row_as_outside_of_lanes(tmp_path: Path) -> None:
     chosen = study(axis("plant.inertia.xy", 0.0, 1.0), axis("plant.mass", 0.9, 1.1))
     alone = bits(swept(dataclasses.replace(chosen, native=True), tmp_path / "alone"))
     assert {row["status"] for row in alone} == {"done", "failed"}
     assert_alike(bits(swept(chosen, tmp_path / "lanes", engine="batch")), alone)
 
 
-def test_a_system_without_lanes_is_refused_before_anything_is_flown(tmp_path: Path) -> None:
+def test_a_system_without_lanes_is_refused_before_any_run(tmp_path: Path) -> None:
     path = small(tmp_path)
     text = f"""
     axes = [{{ name = "x", sets = ["components.one.parameters.gain"], values = [1.0, 2.0] }}]
@@ -99,10 +99,10 @@ def test_a_system_without_lanes_is_refused_before_anything_is_flown(tmp_path: Pa
 
 
 def test_a_difference_names_run_and_metric() -> None:
-    found = Agreement.of([(3, {"a": 1.0, "b": None}, {"a": 1.0, "b": None}), (7, {"a": 2.0}, {"a": 2.0 + 1e-6})])
-    assert (found.runs, found.metric, found.index) == (2, "a", 7)
+    agreement = Agreement.of([(3, {"a": 1.0, "b": None}, {"a": 1.0, "b": None}), (7, {"a": 2.0}, {"a": 2.0 + 1e-6})])
+    assert (agreement.runs, agreement.metric, agreement.index) == (2, "a", 7)
     with pytest.raises(QuadcosimError, match=r"run 7: a in lanes differs by 5e-07"):
-        found.expect()
+        agreement.expect()
     with pytest.raises(QuadcosimError, match="run 1: outcome"):
         Agreement.of([(1, {"outcome": "good"}, {"outcome": "bad"})]).expect()
     Agreement.of([(3, {"a": 1.0}, {"a": 1.0 + 1e-12})]).expect()
@@ -123,23 +123,23 @@ def tasks(count: int, keep: tuple[int, ...] = ()) -> list[RunTask]:
     ]
 
 
-def test_chunks_have_runs_that_are_alike_and_leave_alone_whose_signals_are_kept() -> None:
-    found = list(chunks(tasks(64, keep=(5,)), 64, 1))
-    assert [each.index for each in found if isinstance(each, RunTask)] == [5]
-    lanes = [each.tasks for each in found if isinstance(each, Chunk)]
+def test_chunks_group_similar_runs_without_those_whose_signals_are_kept() -> None:
+    items = list(chunks(tasks(64, keep=(5,)), 64, 1))
+    assert [each.index for each in items if isinstance(each, RunTask)] == [5]
+    lanes = [each.tasks for each in items if isinstance(each, Chunk)]
     assert sorted(task.index for each in lanes for task in each) == [i for i in range(64) if i != 5]
     assert [len({task.index % 2 for task in each}) for each in lanes].count(2) <= 1
 
 
-def test_runs_that_end_their_process_together_are_flown_one_by_one(
+def test_runs_that_end_their_process_together_are_repeated_one_by_one(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     class Dying:
-        def ask(self, what: Any) -> Any:
+        def request(self, what: Any) -> Any:
             raise Died(Ending(code=-6))
 
-    flown: list[int] = []
-    monkeypatch.setattr(Supervisor, "_ready", lambda self: Dying())
-    monkeypatch.setattr(Supervisor, "fly", lambda self, task: flown.append(task.index))
-    Supervisor(tmp_path, Inputs(contents={}, versions={})).fly_chunk(Chunk(tasks=tuple(tasks(3))))
-    assert flown == [0, 1, 2]
+    repeated: list[int] = []
+    monkeypatch.setattr(Supervisor, "_ready_worker", lambda self: Dying())
+    monkeypatch.setattr(Supervisor, "run", lambda self, task: repeated.append(task.index))
+    Supervisor(tmp_path, Inputs(contents={}, versions={})).run_chunk(Chunk(tasks=tuple(tasks(3))))
+    assert repeated == [0, 1, 2]

@@ -86,37 +86,37 @@ def test_fmus_that_cannot_be_written_are_one_line_and_leave_nothing(temporary: P
     assert not list(temporary.iterdir())
 
 
-def test_a_crew_that_is_closed_starts_no_process_any_more(temporary: Path) -> None:
+def test_a_closed_pool_starts_no_process(temporary: Path) -> None:
     pool = Pool(inputs(a=b"content"))
     pool.close()
     with pytest.raises(QuadcosimError, match="the sweep has ended"):
-        pool.fly(task())
+        pool.run(task())
     pool.remove()
     assert not list(temporary.iterdir())
 
 
-@pytest.mark.parametrize(("read_at", "said"), [(None, "told"), ((0, 0, 0), versions()["sources"])])
-def test_a_worker_reads_the_sources_that_it_is_told_of_only_where_one_was_edited_since(
-    read_at: tuple[int, int, int] | None, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("read_at", "expected"), [(None, "received"), ((0, 0, 0), versions()["sources"])])
+def test_a_worker_reads_the_sources_only_if_one_was_edited_since_the_coordinator_did(
+    read_at: tuple[int, int, int] | None, expected: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     states = sources().states
     known = states if read_at is None else dict.fromkeys(states, read_at)
-    monkeypatch.setattr(pool, "sources", lambda: Sources(hash="told", states=known))
+    monkeypatch.setattr(pool, "sources", lambda: Sources(hash="received", states=known))
     worker = pool.WorkerProcess(tmp_path)
     try:
-        assert worker.ready().versions == {**versions(), "sources": said}
+        assert worker.wait_until_ready().versions == {**versions(), "sources": expected}
     finally:
         worker.close()
 
 
-def test_what_workers_leave_is_removed_after_the_last_thread_that_could_leave_more(
+def test_temporary_files_are_removed_after_the_last_thread_that_could_leave_more(
     temporary: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    begun, closed = threading.Event(), threading.Event()
+    started, closed = threading.Event(), threading.Event()
 
     class Slow(pool.Supervisor):
-        def fly(self, task: RunTask) -> Outcome:
-            begun.set()
+        def run(self, task: RunTask) -> Outcome:
+            started.set()
             closed.wait()
             (self._root / "late").mkdir(parents=True)
             raise QuadcosimError("the sweep has ended")
@@ -126,7 +126,7 @@ def test_what_workers_leave_is_removed_after_the_last_thread_that_could_leave_mo
 
     monkeypatch.setattr(pool, "Supervisor", Slow)
     with ExitStack() as stack:
-        flown = _local_submit(stack, inputs(a=b"content"), 1)(task())
-        begun.wait()
-    assert isinstance(flown.exception(), QuadcosimError)
+        future = _local_submit(stack, inputs(a=b"content"), 1)(task())
+        started.wait()
+    assert isinstance(future.exception(), QuadcosimError)
     assert not list(temporary.iterdir())

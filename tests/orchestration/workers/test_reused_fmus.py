@@ -1,4 +1,4 @@
-"""A sweep of FMUs that keep what they should not gives the rows of fresh processes, through the commands."""
+"""A sweep of FMUs that keep state over a reset gives the rows of fresh processes, through the commands."""
 
 import json
 from pathlib import Path
@@ -15,7 +15,7 @@ pytestmark = needs_compiler
 
 HABITS = {"broken": ["BROKEN_RESET"], "statics": ["STATICS"], "both": ["BROKEN_RESET", "STATICS"]}
 FMUS = {**{name: name for name in HABITS}, "twin": "statics"}
-"""Which FMU each component is; of one there are two in a process."""
+"""The FMU of each component; one of them twice in a process"""
 GAINS = (3.0, 2.0, 1.0)
 SYSTEM = f"""
 stop_time = 0.1

@@ -7,7 +7,7 @@ import pytest
 from orchestration.basics.errors import QuadcosimError
 from orchestration.engines.cuda import compiler, driver, fleet
 from orchestration.engines.cuda.driver import Gpu
-from orchestration.workers.choice import chosen
+from orchestration.workers.choice import choose_execution
 from orchestration.workers.pool import Supervisor
 from orchestration.workers.task import Chunk, Outcome, Runner, RunTask
 from tests.orchestration.fmi.small import needs_compiler
@@ -20,15 +20,15 @@ pytestmark = needs_compiler
 def test_a_sweep_on_a_gpu_agrees_with_the_fmus(gpu: Gpu, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     runner, on_gpu = Runner(), list[int]()
 
-    def fly_chunk(self: Supervisor, chunk: Chunk) -> list[Outcome]:
+    def run_chunk(self: Supervisor, chunk: Chunk) -> list[Outcome]:
         on_gpu.extend([len(chunk.tasks)] * chunk.on_gpu)
-        return runner.fly_chunk(chunk)
+        return runner.run_chunk(chunk)
 
-    def fly(self: Supervisor, task: RunTask) -> Outcome:
-        return runner.fly(task)
+    def run(self: Supervisor, task: RunTask) -> Outcome:
+        return runner.run(task)
 
-    monkeypatch.setattr(Supervisor, "fly_chunk", fly_chunk)  # in this process, which plays the GPU
-    monkeypatch.setattr(Supervisor, "fly", fly)
+    monkeypatch.setattr(Supervisor, "run_chunk", run_chunk)  # in this process, which plays the GPU
+    monkeypatch.setattr(Supervisor, "run", run)
     monkeypatch.setattr(fleet, "expect_compiler", lambda: None)
     some = study(axis("timing.period", 0.01, 0.02), axis("plant.mass", 0.9, 1.0, 1.1), base=short())
     summary = sweep(some, folder=tmp_path, engine="cuda")
@@ -42,7 +42,7 @@ def test_without_a_driver_it_is_said_what_is_missing(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(fleet, "expect_compiler", lambda: None)
     monkeypatch.setattr(driver, "LIBRARY", "libno_gpu.so.1")
     with pytest.raises(QuadcosimError, match=r"cuda: no driver of a GPU of NVIDIA: expected libno_gpu\.so\.1$"):
-        chosen("cuda", False, first)
+        choose_execution("cuda", False, first)
 
 
 def test_what_the_driver_says_is_said(gpu: Gpu) -> None:
