@@ -15,7 +15,7 @@ from pathlib import Path
 from benchmarks.flights import CASES, STEPS
 from fmu_kit import packaging
 from fmu_kit.bundle import Target
-from orchestration.building import fmus
+from orchestration.building import builder
 from orchestration.building.models import MODELS
 
 HERE = Path(__file__).parent.parent
@@ -49,7 +49,7 @@ def main() -> None:
     other = parser.parse_args().checkout.resolve()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        fmus.build(MODELS, folder)
+        builder.build(MODELS, folder)
         for model in ("EmptyPlant", "EmptyController"):
             packaging.build(Target("benchmarks.empty", model), folder)
         here, there = Side(HERE, folder), Side(other, folder)

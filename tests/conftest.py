@@ -13,7 +13,7 @@ import pytest
 
 import quadcosim  # noqa: F401 - errors are told in the words of Python, those of the command line in its own
 from orchestration.basics import terminal
-from orchestration.building import fmus
+from orchestration.building import builder, fmus
 from orchestration.building.models import MODELS
 from orchestration.command import cli
 from tests.commands import Done, Main
@@ -70,7 +70,7 @@ def built(making: Making, tmp_path_factory: pytest.TempPathFactory) -> dict[str,
     if making.native:
         return {model: fmus.locate(f"native/{model}") for model in MODELS}
     folder = tmp_path_factory.mktemp("fmus")
-    return {path.stem: path for path in fmus.build(MODELS, folder)}
+    return {path.stem: path for path in builder.build(MODELS, folder)}
 
 
 @pytest.fixture

@@ -1,1 +1,1 @@
-"""Where FMUs are, and the building of those that are old."""
+"""Finds FMUs, and builds those that are out of date."""

@@ -1,7 +1,7 @@
-"""Whether modules that are not this project's may be run: whoever builds an FMU runs what it is built from.
+"""Consent to building FMUs of modules that are not of this project, which runs these modules.
 
-A program that calls this project decides by calling. The command line asks, once for a folder: what is in the folder
-may then be built whenever it has changed.
+A program that calls this package consents by the call. The command line asks once for each folder, whose modules may
+then be built whenever they have changed.
 """
 
 import hashlib
@@ -14,7 +14,7 @@ from orchestration.basics.errors import UsageError
 from orchestration.processes.subprocesses import ROOT
 
 Ask = Callable[[str], bool]
-"""Puts a question to somebody; whether the answer is yes"""
+"""Asks the user a question; returns whether the answer is yes"""
 
 
 @dataclass(kw_only=True)
@@ -28,7 +28,7 @@ _policy: _Policy | None = None
 
 @contextmanager
 def asking(ask: Ask) -> Iterator[None]:
-    """While the block runs, a folder that nobody has agreed to is asked for."""
+    """While the block runs, building asks for consent to each folder that has none."""
     global _policy
     before, _policy = _policy, _Policy(ask=ask)
     try:
@@ -38,18 +38,18 @@ def asking(ask: Ask) -> Iterator[None]:
 
 
 def allow() -> None:
-    """The answer is yes, whatever is asked for in this block."""
+    """Consent to all folders until the end of the block of `asking`."""
     if _policy is not None:
         _policy.allowed = True
 
 
 def is_allowed() -> bool:
-    """Whether the answer is yes without a question."""
+    """Whether building needs no consent."""
     return _policy is None or _policy.allowed
 
 
 def agree(folder: Path) -> None:
-    """From now on what is in `folder` may be built; where nothing can be written, it is asked for again."""
+    """Record the consent to `folder`; where nothing can be written, it is asked for again."""
     place = _place(folder)
     with suppress(OSError):
         place.parent.mkdir(parents=True, exist_ok=True)
@@ -57,7 +57,7 @@ def agree(folder: Path) -> None:
 
 
 def expect(fmu: Path, folder: Path) -> None:
-    """Raise `UsageError` if an FMU may not be built of the modules in `folder`; an answer is kept."""
+    """Raise `UsageError` if an FMU may not be built of the modules in `folder`; consent is recorded."""
     if _policy is None or _is_of_this_project(folder) or _place(folder).is_file():
         return
     what = f"building it runs the modules in {folder.resolve()}, which are not of this project"
@@ -67,7 +67,7 @@ def expect(fmu: Path, folder: Path) -> None:
 
 
 def _is_of_this_project(folder: Path) -> bool:
-    """Whether it is among the examples of the checkout that this is run from."""
+    """Whether it is in the examples of the checkout that this package runs from."""
     root = Path(ROOT)
     return (root / "pyproject.toml").is_file() and folder.resolve().is_relative_to(root / "examples")
 

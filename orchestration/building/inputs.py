@@ -1,4 +1,4 @@
-"""The files of a study: FMUs and tables of sources, read once; what is described, hashed and flown is this content."""
+"""The files of a study: FMUs and tables of sources, read once, so that what is hashed is what is run."""
 
 import hashlib
 from collections.abc import Iterable, Mapping
@@ -22,7 +22,7 @@ from orchestration.system.source import Source
 
 @dataclass(frozen=True, kw_only=True)
 class Files:
-    """Files by what systems call them."""
+    """Files by the names that systems have for them."""
 
     fmus: Mapping[str, Path]
     tables: Mapping[str, Path]
@@ -37,12 +37,12 @@ class Files:
 
     @cached_property
     def hashes(self) -> dict[str, str]:
-        """The hash of each."""
+        """The hash of each file."""
         return {name: hashlib.sha256(content).hexdigest() for name, content in self.contents.items()}
 
     @cached_property
     def models(self) -> dict[str, Model]:
-        """What each FMU says of itself; raises `UsageError` for a file that is none."""
+        """The model of each FMU; raises `UsageError` for a file that is none."""
         assert self.contents is not None
         return {name: read_model(path) for name, path in self.fmus.items()}
 
@@ -55,7 +55,7 @@ class Files:
         }
 
     def models_of(self, system: System) -> dict[str, Model]:
-        """The models of its components."""
+        """The models of the components of a system."""
         return {name: self.models[component.fmu] for name, component in system.components.items()}
 
     def starts_of(self, system: System) -> dict[str, float]:
@@ -69,33 +69,33 @@ class Files:
 
 
 def files_of(system: System, fmus_too: Iterable[str] = (), tables_too: Iterable[str] = ()) -> Files:
-    """The files of a system, FMUs built if need be; raises `UsageError` for an FMU that is not there."""
+    """The files of a system, FMUs built if need be; raises `UsageError` for an FMU that does not exist."""
     of_components = {system.fmus[name]: path for name, path in fmus.of_components(system.fmus).items()}
     tables = {**tables_of(system), **{name: Path(name) for name in tables_too}}
     return Files(fmus=of_components | {name: fmus.locate(name) for name in fmus_too}, tables=tables)
 
 
 def tables_of(system: System) -> dict[str, Path]:
-    """The files that a system reads beside its FMUs, by what it calls them."""
+    """The files that a system reads beside its FMUs, by its names for them."""
     return {str(file): file for file in input_files(system).values()}
 
 
 def with_files(system: System, paths: Mapping[str, Path]) -> System:
-    """`system` with its files at these paths, by what it calls them, so that none is looked for."""
+    """`system` with its files at these paths, by its names for them, so that none is searched for."""
     return next(iter(all_with_files([system], paths)))
 
 
 def all_with_files(systems: Iterable[System], paths: Mapping[str, Path]) -> list[System]:
-    """Systems with their files at these paths; what they have in common stays in common."""
-    made: dict[int, Any] = {}
+    """Systems with their files at these paths; parts that they share stay shared."""
+    located: dict[int, Any] = {}
     return [
         replaced(
             system,
-            components={name: _at(each, paths, made) for name, each in system.components.items()},
-            connections=tuple(_at(each, paths, made) for each in system.connections),
-            sources={name: _at(each, paths, made) for name, each in system.sources.items()},
-            computers={name: _at(each, paths, made) for name, each in system.computers.items()},
-            networks={name: _at(each, paths, made) for name, each in system.networks.items()},
+            components={name: _at(each, paths, located) for name, each in system.components.items()},
+            connections=tuple(_at(each, paths, located) for each in system.connections),
+            sources={name: _at(each, paths, located) for name, each in system.sources.items()},
+            computers={name: _at(each, paths, located) for name, each in system.computers.items()},
+            networks={name: _at(each, paths, located) for name, each in system.networks.items()},
         )
         for system in systems
     ]
@@ -104,14 +104,14 @@ def all_with_files(systems: Iterable[System], paths: Mapping[str, Path]) -> list
 Part = TypeVar("Part", Component, Connection, Source, Computer, Network)
 
 
-def _at(part: Part, paths: Mapping[str, Path], made: dict[int, Any]) -> Part:
-    if id(part) not in made:
+def _at(part: Part, paths: Mapping[str, Path], located: dict[int, Any]) -> Part:
+    if id(part) not in located:
         fields: dict[str, Any] = {}
         if isinstance(part, Component):
             fields["fmu"] = str(paths[part.fmu])
         elif isinstance(part, Source) and part.file is not None:
             fields["file"] = paths[str(part.file)]
         moved = with_traces_at(part, paths)
-        made[id(part)] = replaced(moved, **fields) if fields else moved
-    found: Part = made[id(part)]
-    return found
+        located[id(part)] = replaced(moved, **fields) if fields else moved
+    result: Part = located[id(part)]
+    return result

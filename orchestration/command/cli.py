@@ -128,7 +128,7 @@ def build(
 
     With --name one slave is built as another FMU: parameters that are fixed by --set and --vehicle are constants of it.
     """
-    from orchestration.building import fmus
+    from orchestration.building import builder, fmus
     from orchestration.building.models import MODELS
     from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER
 
@@ -136,13 +136,13 @@ def build(
         raise UsageError("--target: expected --native with it; FMUs with Python inside are the same for all systems")
     if fmi == 3 and not native:
         raise UsageError("--fmi 3: expected --native with it; FMUs with Python inside are of FMI 2.0")
-    packing = fmus.IN_PYTHON if not native else fmus.NATIVE_FMI_3 if fmi == 3 else fmus.NATIVE
+    packing = builder.IN_PYTHON if not native else builder.NATIVE_FMI_3 if fmi == 3 else builder.NATIVE
     if variant.are_given and variant.name is None:
         raise UsageError("--set, --vehicle: expected --name NAME, what the FMU with these values is called")
     if variant.name is not None and variant.name in MODELS:
         raise UsageError(f"--name {variant.name}: expected another name than that of a slave")
     asked = [slave] if slave is not None else [DEFAULT_CONTROLLER] if variant.are_given else list(MODELS)
-    slaves = variant.applied_to([each for name in asked for each in fmus.slaves_named(name)])
+    slaves = variant.applied_to([each for name in asked for each in builder.slaves_named(name)])
     folder = None if slave in (None, *MODELS) else Path(str(slave))
     if folder is not None:
         folder = folder if folder.is_dir() else folder.parent
@@ -150,7 +150,7 @@ def build(
     where = out or (folder or fmus.default_folder()) / packing.folder
     with progress_bar("building") as progress:
         how: Any = {"packing": packing, "systems": target, "progress": progress}
-        return of_files(fmus.build_slaves(slaves, where, inform, **how))
+        return of_files(builder.build_slaves(slaves, where, inform, **how))
 
 
 @takes("variant", VariantFlags)
@@ -169,9 +169,9 @@ def export_c(
     variant: VariantFlags,
 ) -> Answer:
     """Write a controller, or any slave, as two files in C for a microcontroller: no allocation, C99."""
-    from orchestration.building import fmus
+    from orchestration.building import builder
 
-    written = fmus.export_c(variant.applied_to(fmus.slaves_named(slave)), out, single=single)
+    written = builder.export_c(variant.applied_to(builder.slaves_named(slave)), out, single=single)
     return of_files(each for path in written for each in (path.with_suffix(".h"), path))
 
 

@@ -102,7 +102,7 @@ def _said_by_fmus(system: "System") -> tuple[dict[str, str], str]:
     from orchestration.fmi.model import read_model
 
     try:
-        paths = {name: fmus.looked_up(fmu, inform) for name, fmu in system.fmus.items()}
+        paths = {name: fmus.look_up(fmu, inform) for name, fmu in system.fmus.items()}
         models = {name: read_model(path) for name, path in paths.items() if path is not None}
         if models.keys() != paths.keys():
             return {}, ""

@@ -60,7 +60,7 @@ class VariantFlags:
         if len(slaves) != 1:
             listed = ", ".join(slave.model for slave in slaves)
             raise UsageError(f"--set, --vehicle and --name are of one slave: expected FOLDER/NAME for one of {listed}")
-        from orchestration.building.fmus import with_fixed
+        from orchestration.building.builder import with_fixed
 
         (slave,) = slaves
         values = {**self._told(slave), **assigned("set", self.set)}

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from orchestration.building.fmus import looked_up, python_twin, python_twins
+from orchestration.building.fmus import look_up, python_twin, python_twins
 from orchestration.building.inputs import Files
 from orchestration.fmi.model import Model, Variable
 from orchestration.system.component import Component
@@ -31,7 +31,7 @@ _BEGUN, _NUDGED, _PYTHON = "begun ", "nudged ", "in Python "
 def with_python_twins(files: Files) -> Files:
     """The files of a study, and of each native FMU the one in Python where there is such, built if need be."""
     twins = {python_twin(fmu) for fmu in files.fmus} - files.fmus.keys()
-    paths = {twin: path for twin in twins if (path := looked_up(twin)) is not None}
+    paths = {twin: path for twin in twins if (path := look_up(twin)) is not None}
     return replace(files, fmus={**files.fmus, **paths})
 
 

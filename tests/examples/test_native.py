@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from fmu_kit.compiler.pack.c_compiler import Mathematics
-from orchestration.building import fmus
+from orchestration.building import builder
 from orchestration.runs.result import Result
 from orchestration.runs.simulation import run
 from orchestration.system.model import System
@@ -26,7 +26,7 @@ def on_native(name: str, folder: Path, mathematics: Mathematics) -> Result:
     """Its run with the same slaves written out as C."""
     asked = system(name)
     places = {Path(each.fmu).resolve().parent for each in asked.components.values()}
-    built = {k: v for place in places for k, v in natives(fmus.slaves_of(place), folder, mathematics).items()}
+    built = {k: v for place in places for k, v in natives(builder.slaves_of(place), folder, mathematics).items()}
     components = {key: replace(each, fmu=str(built[Path(each.fmu).stem])) for key, each in asked.components.items()}
     return run(replace(asked, components=components))
 

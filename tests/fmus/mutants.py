@@ -13,7 +13,7 @@ from xml.etree.ElementTree import Element, SubElement
 import fmpy
 
 from fmu_kit.archive import ICONS
-from orchestration.building import fmus
+from orchestration.building import builder
 from orchestration.building.models import MODELS
 from tests.fmus.damage import (
     DESCRIPTION,
@@ -549,7 +549,7 @@ def tables() -> dict[int, list[Verdict]]:
     for version in (2, 3):
         with tempfile.TemporaryDirectory() as folder:
             if version == 2:
-                subjects = {path.stem: path for path in fmus.build(MODELS, Path(folder))}
+                subjects = {path.stem: path for path in builder.build(MODELS, Path(folder))}
             else:
                 subjects = {model: faulty(model, Path(folder)) for model in (PLANT, CONTROLLER)}
             mutants = [mutant for mutant in MUTANTS if version in mutant.versions]

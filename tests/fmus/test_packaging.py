@@ -15,7 +15,7 @@ from fmu_kit import bundle
 from fmu_kit.archive import content_guid
 from fmu_kit.loader import BESIDE, GUID_FILE
 from orchestration.basics.errors import QuadcosimError
-from orchestration.building import fmus
+from orchestration.building import builder
 from orchestration.building.models import MODELS
 from orchestration.checks.doctor import binaries
 from tests.fmus.archive import files_of
@@ -66,16 +66,16 @@ def nothing_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("nothing_kept")
 def test_building_again_in_another_folder_gives_the_same_bytes(built: dict[str, Path], tmp_path: Path) -> None:
-    for path in fmus.build(MODELS, tmp_path / "elsewhere"):
+    for path in builder.build(MODELS, tmp_path / "elsewhere"):
         assert path.read_bytes() == built[path.stem].read_bytes()
 
 
 @pytest.mark.usefixtures("nothing_kept")
 def test_building_again_in_the_same_folder_gives_the_same_bytes(tmp_path: Path) -> None:
-    (path,) = fmus.build(["QuadrotorPlant"], tmp_path)
+    (path,) = builder.build(["QuadrotorPlant"], tmp_path)
     first = path.read_bytes()
     shutil.rmtree(tmp_path / "cache")
-    (again,) = fmus.build(["QuadrotorPlant"], tmp_path)
+    (again,) = builder.build(["QuadrotorPlant"], tmp_path)
     assert again == path
     assert again.read_bytes() == first
 
@@ -100,7 +100,7 @@ def test_without_a_source_date_the_date_is_1980(model: str, built: dict[str, Pat
 
 def test_source_date_epoch_sets_the_date(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", str(EPOCH))
-    (path,) = fmus.build(["QuadrotorPlant"], tmp_path)
+    (path,) = builder.build(["QuadrotorPlant"], tmp_path)
     date = fmpy.read_model_description(str(path)).generationDateAndTime
     expected = datetime.datetime.fromtimestamp(EPOCH, datetime.timezone.utc)
     assert date == expected.strftime("%Y-%m-%dT%H:%M:%SZ") == "2001-09-09T01:46:40Z"
@@ -110,7 +110,7 @@ def test_source_date_epoch_does_not_change_the_guid(
     built: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", str(EPOCH))
-    (path,) = fmus.build(["QuadrotorPlant"], tmp_path)
+    (path,) = builder.build(["QuadrotorPlant"], tmp_path)
     plain = fmpy.read_model_description(str(built["QuadrotorPlant"]))
     assert fmpy.read_model_description(str(path)).guid == plain.guid
 
@@ -207,7 +207,7 @@ def test_without_a_compiler_an_fmu_is_packed_without_a_loader_and_says_so(
         (tools / "cc").chmod(0o755)
     monkeypatch.setenv("PATH", str(tools))
     said: list[str] = []
-    (path,) = fmus.build(["QuadrotorPlant"], tmp_path, said.append)
+    (path,) = builder.build(["QuadrotorPlant"], tmp_path, said.append)
     why = "no C compiler that is called cc" if compiler == "none" else f"{tools}/cc: no headers"
     assert said == [
         f"QuadrotorPlant.fmu: packed without its loader ({why}); a host that is not Python must load Python itself"
@@ -217,7 +217,7 @@ def test_without_a_compiler_an_fmu_is_packed_without_a_loader_and_says_so(
         name for name in with_one if "quadcosim_" not in name and name != BESIDE
     }
     assert without["binaries/linux64/QuadrotorPlant.so"] == with_one[BESIDE]
-    assert fmus.out_of_date(["QuadrotorPlant"], tmp_path) == []
+    assert builder.out_of_date(["QuadrotorPlant"], tmp_path) == []
     with Instance(path) as instance:
         instance.initialise({})
 
@@ -307,7 +307,7 @@ def test_a_target_must_name_module_and_class(text: str) -> None:
 def test_a_failed_build_says_why(sources: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(MODELS, "Missing", "controller_fmu.no_such_module:Missing")
     with pytest.raises(QuadcosimError, match=r"building .*failed: .*no_such_module"):
-        fmus.build(["Missing"], tmp_path)
+        builder.build(["Missing"], tmp_path)
 
 
 # -- out of date ----------------------------------------------------------------------------------------
@@ -344,26 +344,26 @@ def test_the_source_hash_changes_with_the_files_beside_the_slave(
 
 
 def test_fresh_fmus_are_up_to_date(built: dict[str, Path]) -> None:
-    assert fmus.out_of_date(MODELS, built["QuadrotorPlant"].parent) == []
+    assert builder.out_of_date(MODELS, built["QuadrotorPlant"].parent) == []
 
 
 def test_an_fmu_of_other_sources_is_out_of_date(built: dict[str, Path], sources: Path, tmp_path: Path) -> None:
     shutil.copy(built["QuadrotorPlant"], tmp_path)
     replace(sources / "controller_fmu" / "sliding_mode" / "law.py", "model.mass * n  #", "2.0 * model.mass * n  #")
     build(sources, tmp_path, "UnifiedController")
-    assert fmus.out_of_date(["UnifiedController", "QuadrotorPlant"], tmp_path) == ["UnifiedController"]
+    assert builder.out_of_date(["UnifiedController", "QuadrotorPlant"], tmp_path) == ["UnifiedController"]
 
 
 @pytest.mark.parametrize("content", [None, b"", b"no archive"])
 def test_a_missing_or_broken_fmu_is_out_of_date(content: bytes | None, tmp_path: Path) -> None:
     if content is not None:
         (tmp_path / "QuadrotorPlant.fmu").write_bytes(content)
-    assert fmus.out_of_date(["QuadrotorPlant"], tmp_path) == ["QuadrotorPlant"]
+    assert builder.out_of_date(["QuadrotorPlant"], tmp_path) == ["QuadrotorPlant"]
 
 
 def test_building_replaces_an_fmu_and_leaves_nothing_else(built: dict[str, Path], tmp_path: Path) -> None:
     path = tmp_path / "QuadrotorPlant.fmu"
     path.write_bytes(b"not an archive")
-    assert fmus.build(["QuadrotorPlant"], tmp_path) == [path]
+    assert builder.build(["QuadrotorPlant"], tmp_path) == [path]
     assert path.read_bytes() == built["QuadrotorPlant"].read_bytes()
     assert list(tmp_path.iterdir()) == [path]

@@ -15,7 +15,7 @@ import pytest
 from fmu_kit.bundle import PackagingError
 from fmu_kit.compiler.pack.c_compiler import compiled_for, targets_of, universal
 from fmu_kit.compiler.pack.c_compiler import compiler as compiler_here
-from orchestration.building import fmus
+from orchestration.building import builder, fmus
 from orchestration.checks.doctor.binaries import newest, read
 
 needs_zig = pytest.mark.skipif(
@@ -33,11 +33,11 @@ LIBRARIES = {
         f"aarch64-darwin/{MODEL}.dylib",
     },
 }
-PACKINGS = {2: fmus.NATIVE, 3: fmus.NATIVE_FMI_3}
+PACKINGS = {2: builder.NATIVE, 3: builder.NATIVE_FMI_3}
 
 
 def built(folder: Path, version: int) -> Path:
-    (path,) = fmus.build([MODEL], folder, packing=PACKINGS[version], systems="all")
+    (path,) = builder.build([MODEL], folder, packing=PACKINGS[version], systems="all")
     return path
 
 

@@ -11,7 +11,7 @@ import pytest
 from fmu_kit.bundle import Target
 from fmu_kit.compiler.emit.embedded_code import single_number
 from fmu_kit.compiler.pack.embedded import write
-from orchestration.building import fmus
+from orchestration.building import builder, fmus
 from orchestration.building.models import MODELS
 from tests.commands import Main
 from tests.fmu_kit.compiler.embedded import (
@@ -56,7 +56,7 @@ def exported(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 def native(name: str) -> Instance:
     """One of this project's FMUs without Python inside."""
-    return Instance(fmus.locate(f"{fmus.NATIVE.folder}/{name}"))
+    return Instance(fmus.locate(f"{builder.NATIVE.folder}/{name}"))
 
 
 @pytest.fixture(scope="module")

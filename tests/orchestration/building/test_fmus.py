@@ -11,7 +11,7 @@ import pytest
 
 from fmu_kit.archive import SOURCE_HASH_FILE, read_source_hash, write_archive
 from fmu_kit.bundle import Target, bundled_sources
-from orchestration.building import fmus
+from orchestration.building import builder, fmus
 from orchestration.building.models import MODELS
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.model import read_model
@@ -104,9 +104,9 @@ def test_an_fmu_that_is_not_of_these_sources_is_built_anew(
     """None: another FMU under this name, which carries another hash."""
     path = with_fmus_folder(project) / "QuadrotorPlant.fmu"
     path.write_bytes(built["UnifiedController"].read_bytes() if content is None else content)
-    assert fmus.out_of_date(["QuadrotorPlant"], path.parent) == ["QuadrotorPlant"]
+    assert builder.out_of_date(["QuadrotorPlant"], path.parent) == ["QuadrotorPlant"]
     fmus.locate("QuadrotorPlant")
-    assert fmus.out_of_date(["QuadrotorPlant"], path.parent) == []
+    assert builder.out_of_date(["QuadrotorPlant"], path.parent) == []
     assert path.read_bytes() == built["QuadrotorPlant"].read_bytes()
 
 
@@ -114,13 +114,13 @@ def test_modification_times_do_not_matter(project: Path, built: dict[str, Path])
     path = with_fmus_folder(project) / "QuadrotorPlant.fmu"
     path.write_bytes(built["QuadrotorPlant"].read_bytes())
     os.utime(path, (0, 0))
-    assert fmus.out_of_date(["QuadrotorPlant"], path.parent) == []
+    assert builder.out_of_date(["QuadrotorPlant"], path.parent) == []
 
 
 @pytest.mark.parametrize("model", MODELS)
 def test_no_source_of_an_fmu_is_outside_the_packages_whose_files_are_looked_at(model: str) -> None:
     target = Target.parse(MODELS[model])
-    assert {place.partition("/")[0] for place in bundled_sources(target)} <= {*fmus.packages_of(target)}
+    assert {place.partition("/")[0] for place in bundled_sources(target)} <= {*builder.packages_of(target)}
 
 
 def test_sources_are_read_again_when_a_file_beside_them_is_another_or_there_is_one_more(
@@ -138,11 +138,11 @@ def test_sources_are_read_again_when_a_file_beside_them_is_another_or_there_is_o
         read.append(target)
         return "of another FMU than there is"
 
-    packing = replace(fmus.IN_PYTHON, source_hash=source_hash)
+    packing = replace(builder.IN_PYTHON, source_hash=source_hash)
 
     def times() -> int:
         for _ in range(2):
-            assert fmus.out_of_date(["OwnPlant"], tmp_path, packing) == ["OwnPlant"]
+            assert builder.out_of_date(["OwnPlant"], tmp_path, packing) == ["OwnPlant"]
         return len(read)
 
     assert times() == 1
@@ -167,13 +167,13 @@ def test_a_build_that_fails_says_why_in_one_line(tmp_path: Path, monkeypatch: py
     said = "Traceback …\ncontroller_fmu/sliding_mode/law.py:3: imports numpy\n"
     builds_by(f"import sys; sys.stderr.reconfigure(encoding='utf-8'); sys.exit({said!r})", monkeypatch)
     with pytest.raises(QuadcosimError, match=r"failed: controller_fmu/sliding_mode/law.py:3: imports numpy$"):
-        fmus.build(["UnifiedController"], tmp_path)
+        builder.build(["UnifiedController"], tmp_path)
 
 
 def test_a_build_says_how_far_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     builds_by("print('a.fmu'); print('b.fmu')", monkeypatch)
     heard: list[float] = []
-    assert fmus.build(["UnifiedController", "QuadrotorPlant"], tmp_path, progress=heard.append) == [
+    assert builder.build(["UnifiedController", "QuadrotorPlant"], tmp_path, progress=heard.append) == [
         Path("a.fmu"),
         Path("b.fmu"),
     ]
@@ -245,16 +245,18 @@ def test_somebody_elses_fmu_is_left_as_it_is_beside_a_slave_of_its_name(lamp: Pa
     assert fmus.locate(str(lamp / "Lamp.fmu")).read_bytes() == b"of another tool"
 
 
-@pytest.mark.parametrize("packing", [fmus.IN_PYTHON, fmus.NATIVE, fmus.NATIVE_FMI_3], ids=lambda each: each.folder)
-def test_a_variant_is_built_again_with_its_values_when_its_sources_change(packing: fmus.Packing, lamp: Path) -> None:
+@pytest.mark.parametrize(
+    "packing", [builder.IN_PYTHON, builder.NATIVE, builder.NATIVE_FMI_3], ids=lambda each: each.folder
+)
+def test_a_variant_is_built_again_with_its_values_when_its_sources_change(packing: builder.Packing, lamp: Path) -> None:
     law = (lamp / "lamp.py").read_text(encoding="utf-8").replace("import Input,", "import Input, Parameter,")
     law = law.replace("VOLTS *", "self.share * VOLTS *").replace(
         "    switch", '    share = Parameter("of it", "1", start=1.0)\n    switch'
     )
     (lamp / "lamp.py").write_text(law, encoding="utf-8")
-    (slave,) = fmus.slaves_of(lamp)
+    (slave,) = builder.slaves_of(lamp)
     folder = lamp / packing.folder
-    (path,) = fmus.build_slaves([fmus.with_fixed(slave, "Dim", {"share": 0.5})], folder, packing=packing)
+    (path,) = builder.build_slaves([builder.with_fixed(slave, "Dim", {"share": 0.5})], folder, packing=packing)
     heard: list[str] = []
     assert fmus.locate(str(path), heard.append) == path
     assert heard == []
@@ -278,9 +280,11 @@ def with_another_hash(path: Path) -> bytes:
 def test_a_variant_of_this_projects_is_built_again_in_its_folder_and_elsewhere_only_said_to_be_old(
     project: Path, tmp_path: Path
 ) -> None:
-    (slave,) = fmus.slaves_named("QuadrotorPlant")
-    target = fmus.with_fixed(slave, "Heavy", {"mass": 2.0})
-    own, elsewhere = fmus.build_slaves([target], with_fmus_folder(project)) + fmus.build_slaves([target], tmp_path)
+    (slave,) = builder.slaves_named("QuadrotorPlant")
+    target = builder.with_fixed(slave, "Heavy", {"mass": 2.0})
+    own, elsewhere = builder.build_slaves([target], with_fmus_folder(project)) + builder.build_slaves(
+        [target], tmp_path
+    )
     built, heard = own.read_bytes(), list[str]()
     fmus.locate(str(elsewhere), heard.append)
     assert heard == []
@@ -290,7 +294,7 @@ def test_a_variant_of_this_projects_is_built_again_in_its_folder_and_elsewhere_o
     fmus.locate(str(elsewhere), heard.append)
     assert heard == [
         f"building {own}",
-        f"{elsewhere} was built of other sources than today's: expected quadcosim build --name Heavy again",
+        f"{elsewhere} was built of other sources than the current ones: expected quadcosim build --name Heavy again",
     ]
     assert (own.read_bytes(), elsewhere.read_bytes()) == (built, old)
 
@@ -305,12 +309,12 @@ def test_a_slave_that_cannot_be_built_is_an_error_of_one_line(lamp: Path) -> Non
 
 
 def test_every_slave_of_a_folder_is_built_into_it_unless_told(lamp: Path, tmp_path: Path) -> None:
-    assert fmus.build_slaves(fmus.slaves_of(lamp), lamp) == [lamp / "Lamp.fmu"]
-    assert fmus.build_slaves(fmus.slaves_of(lamp), tmp_path / "out") == [tmp_path / "out" / "Lamp.fmu"]
+    assert builder.build_slaves(builder.slaves_of(lamp), lamp) == [lamp / "Lamp.fmu"]
+    assert builder.build_slaves(builder.slaves_of(lamp), tmp_path / "out") == [tmp_path / "out" / "Lamp.fmu"]
     assert (tmp_path / "out" / "Lamp.fmu").read_bytes() == (lamp / "Lamp.fmu").read_bytes()
 
 
 @pytest.mark.parametrize("folder", ["nowhere", "."])
 def test_a_folder_without_slaves_is_wrong_usage(folder: str, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r": expected a "):
-        fmus.slaves_of(tmp_path / folder)
+        builder.slaves_of(tmp_path / folder)

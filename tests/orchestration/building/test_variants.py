@@ -6,7 +6,7 @@ import fmpy
 import pytest
 from fmpy.validation import validate_fmu
 
-from orchestration.building import fmus
+from orchestration.building import builder, fmus
 from orchestration.checks.validation.validator import validate
 from orchestration.command.variant_flags import VariantFlags
 from orchestration.fmi.model import read_model
@@ -18,7 +18,7 @@ from quadcosim import Result, Scenario, UsageError, run
 from tests.commands import Main
 from tests.orchestration.interop.common import LOOP, farthest
 
-MAKINGS = {"python": fmus.IN_PYTHON, "native": fmus.NATIVE, "FMI 3": fmus.NATIVE_FMI_3}
+MAKINGS = {"python": builder.IN_PYTHON, "native": builder.NATIVE, "FMI 3": builder.NATIVE_FMI_3}
 REDESIGN: dict[str, float | str] = {
     "discretisation": "mean",
     "stages": 2,
@@ -36,8 +36,8 @@ def fixed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     flags = VariantFlags(
         set=[f"{key}={value}" for key, value in REDESIGN.items()], vehicle="crazyflie", name="Redesign"
     )
-    slaves = flags.applied_to(fmus.slaves_named("UnifiedController"))
-    (path,) = fmus.build_slaves(slaves, tmp_path_factory.mktemp("fixed"), packing=MAKINGS[request.param])
+    slaves = flags.applied_to(builder.slaves_named("UnifiedController"))
+    (path,) = builder.build_slaves(slaves, tmp_path_factory.mktemp("fixed"), packing=MAKINGS[request.param])
     return path
 
 

@@ -9,7 +9,7 @@ from xml.etree.ElementTree import fromstring
 import pytest
 
 from orchestration.basics.errors import UsageError
-from orchestration.building import fmus
+from orchestration.building import builder, fmus
 from orchestration.limits import limit
 from orchestration.runs.simulation import run
 from orchestration.scaffold.folder import Kind, class_name, module_name, write
@@ -70,7 +70,9 @@ def test_each_passes_its_own_tests_and_a_mistake_in_one_is_said_with_its_line(he
 @pytest.mark.parametrize("name", KINDS)
 def test_a_plant_and_a_filter_run_good_and_have_a_limit(name: str, here: Path) -> None:
     write(KINDS[name], name, here, author="Ada", license="MIT")
-    fmus.build_slaves(fmus.slaves_of(here / name), here / name / "native", packing=fmus.NATIVE)  # all in one process
+    builder.build_slaves(
+        builder.slaves_of(here / name), here / name / "native", packing=builder.NATIVE
+    )  # all in one process
     system = fmus.native_twins(load_system(here / name / "system.toml"))
     assert run(system).metrics["good"]
     of, first, last = LIMITS[name]
