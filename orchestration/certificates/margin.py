@@ -21,7 +21,7 @@ from orchestration.certificates.parts import Loop, loop_of
 from orchestration.certificates.repeated import least_repeated
 from orchestration.certificates.timeline import Timeline
 from orchestration.exact.scheduled import without_scheduler
-from orchestration.fmi.foreign import computed
+from orchestration.fmi.foreign import isolated_call
 from orchestration.fmi.reuse import Instances
 from orchestration.requests.ranges import paths_in
 from orchestration.requests.request import RequestLike, request_of
@@ -100,7 +100,7 @@ def margin(asked: RequestLike, of: str, *, progress: ShareProgress = None) -> Ce
 
 def linear_loop_of(request: Request) -> Loop:
     """The loop of a request about its operating point, from its FMUs, without computers and networks."""
-    return computed(files_of(system_of(request)).fmus.values(), _linear_loop_of, request)
+    return isolated_call(files_of(system_of(request)).fmus.values(), _linear_loop_of, request)
 
 
 def _linear_loop_of(request: Request) -> Loop:
@@ -195,7 +195,7 @@ def _of_cause(request: Request, cause: Cause, progress: Share) -> Certified:
     with errors_in_own_terms(request):
         loop = linear_loop_of(request)
         scheduled = ScheduledLoop(loop, system, cause)
-        search = computed(files.fmus.values(), least_repeated, system, cause, files.models, loop.period)
+        search = isolated_call(files.fmus.values(), least_repeated, system, cause, files.models, loop.period)
     largest = scheduled.largest()
     top = largest if search.breaking is None else min(largest, search.breaking)
     value, certificate = None, None

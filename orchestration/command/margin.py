@@ -125,13 +125,13 @@ def _of_hover(chosen: "Request") -> Answer:
     """The delays of the quadrotor about hover: constant ones exactly, varying ones by bounds."""
     from orchestration.building.inputs import files_of
     from orchestration.flight.margin import margin_of
-    from orchestration.fmi.foreign import computed
+    from orchestration.fmi.foreign import isolated_call
     from orchestration.quadrotor.scenario import Scenario
     from orchestration.system.request import system_of
 
     if not isinstance(chosen, Scenario):
         raise UsageError("margin: expected a scenario of the quadrotor, or --of PATH")
-    found = dataclasses.asdict(computed(files_of(system_of(chosen)).fmus.values(), margin_of, chosen))
+    found = dataclasses.asdict(isolated_call(files_of(system_of(chosen)).fmus.values(), margin_of, chosen))
     lines = []
     for name, value in found.items():
         shown = " ".join(f"{share:g}" for share in value) if isinstance(value, tuple) else value

@@ -6,7 +6,7 @@ from orchestration.building import fmus
 from orchestration.building.inputs import files_of
 from orchestration.comparison.crossovers import CROSSOVERS
 from orchestration.comparison.design import FMU, Comparison, Controller, VehicleEntry
-from orchestration.fmi.foreign import computed
+from orchestration.fmi.foreign import isolated_call
 from orchestration.fmi.model import read_model
 from orchestration.studies.axes import Value
 from orchestration.system.request import ControlLoop
@@ -31,7 +31,7 @@ def bandwidths(comparison: Comparison) -> dict[Key, float]:
                 if tuned not in known:
                     loop = _loop(comparison, controller, vehicle, tuned)
                     fmus_of_it = files_of(loop.as_system()).fmus.values()
-                    known[tuned] = controller.bandwidth or computed(fmus_of_it, crossover, loop)
+                    known[tuned] = controller.bandwidth or isolated_call(fmus_of_it, crossover, loop)
                 by_key[controller.name, vehicle.name, value] = known[tuned]
     return by_key
 

@@ -156,7 +156,7 @@ class CompiledLoop:
         for instance, component in zip(self._structures.instances, self._components):
             if component.moved:
                 component.moved = 0
-                instance.has_changed(ROUNDING)
+                instance.warn_of_change(ROUNDING)
 
     def _fail(self, code: int) -> None:
         """Raise what C has come back with."""

@@ -10,7 +10,8 @@ from orchestration.basics.simulator import Floats, Transfer
 from orchestration.engines.channel import Channel, of_each
 from orchestration.engines.feeds import Feed
 from orchestration.engines.structures import address, structures
-from orchestration.fmi.native import Call, NativeInstance, bounds_of
+from orchestration.fmi.native import NativeInstance
+from orchestration.fmi.transfers import Call, bounds_of
 from orchestration.system.connection import Connection
 
 c = structures(1)
@@ -48,7 +49,7 @@ class RunStructures:
         """A component, but for what its place in the system says."""
         instance = self.instances[index]
         version = instance.model.version
-        said = [ctypes.addressof(each) for each in instance.said] or [0, 0, 0, 0]
+        said = [ctypes.addressof(each) for each in instance.step_outputs] or [0, 0, 0, 0]
         event, ends, early, reached = said
         return c.Component(
             fmu=instance.handle,
@@ -99,9 +100,9 @@ class RunStructures:
             count=len(part.references),
             buffer=self.address(part.buffer),
             values=len(part.buffer),
-            asked=None if call.in_place else self.address(part.asked.astype(np.int64)),
+            asked=None if call.in_place else self.address(part.array_places.astype(np.int64)),
             places=None if call.in_place else self.address(part.places.astype(np.int64)),
-            size=len(part.asked),
+            size=len(part.array_places),
             type=getattr(c, kind.upper()),
             counts_values=instance.counts_values,
             low=low,

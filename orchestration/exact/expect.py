@@ -12,7 +12,7 @@ from orchestration.exact.loops import Loops
 from orchestration.exact.objective_means import ObjectiveMeans
 from orchestration.exact.scheduled import is_scheduled
 from orchestration.expressions.syntax import Call
-from orchestration.fmi.foreign import computed
+from orchestration.fmi.foreign import isolated_call
 from orchestration.requests.request import RequestLike, request_of
 from orchestration.stability.known_loops import LOOPS, rested
 from orchestration.system.model import System
@@ -65,7 +65,7 @@ def expect(asked: RequestLike, *, as_simulated: bool = False, horizon: float | N
         system = rested(request)
         files = files_of(system)
         loops = Loops(files.models, simulated=as_simulated)
-        return computed(files.fmus.values(), expected_of, system, loops, horizon)
+        return isolated_call(files.fmus.values(), expected_of, system, loops, horizon)
 
 
 def expected_of(system: System, loops: Loops, horizon: float | None = None) -> Expected:

@@ -9,7 +9,7 @@ from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.building.inputs import Files
 from orchestration.exact.loops import Loops
 from orchestration.exact.objectives import inlined_objectives, means_of
-from orchestration.fmi.foreign import computed
+from orchestration.fmi.foreign import isolated_call
 from orchestration.fmi.model import Model
 from orchestration.stability.known_loops import LOOPS
 from orchestration.system.chance import is_random
@@ -38,7 +38,7 @@ def infinite_means_warning(request: Request, systems: Sequence[System], files: F
     if not chosen:
         return None
     try:
-        radii = computed(files.fmus.values(), radii_of, [*chosen.values()], files.models)
+        radii = isolated_call(files.fmus.values(), radii_of, [*chosen.values()], files.models)
     except QuadcosimError:
         return None
     above = [radius for radius in radii if radius is not None and radius >= 1.0]

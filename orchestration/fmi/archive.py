@@ -1,4 +1,4 @@
-"""The archive that an FMU is, opened once for all checks, and the description in it."""
+"""The archive of an FMU, opened once for all checks, and its model description."""
 
 import math
 import zipfile
@@ -13,19 +13,19 @@ from orchestration.basics.errors import QuadcosimError, UsageError
 
 DESCRIPTION = "modelDescription.xml"
 LARGEST, DENSEST = 1000.0, 20.0
-"""An FMU that unpacks to more MB than this, and to more than so many times its size, is none that is flown"""
+"""An FMU that unpacks to more MB than this, and to more than this many times its size, is not run"""
 
 
 class UnreadableFmuError(QuadcosimError):
-    """The file is so damaged that there is nothing to look at; the text, without its path, says what was expected."""
+    """The file is too damaged to be checked; the text, without its path, states what was expected."""
 
 
 class OtherVersionError(UnreadableFmuError):
-    """It is an FMU, of a version of FMI that is not looked at."""
+    """It is an FMU of a version of FMI that is not supported."""
 
 
 VERSIONS = {"2.0": 2, "3.0": 3}
-"""Of FMI, that are looked at, as descriptions write them"""
+"""Supported versions of FMI, as model descriptions write them"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,13 +34,13 @@ class Archive:
 
     path: Path
     entries: tuple[zipfile.ZipInfo, ...]
-    """As they are listed, one name perhaps more than once"""
+    """As listed in the archive; a name may occur more than once"""
     files: Mapping[str, bytes]
     """Content by name"""
 
 
 class _Files(Mapping[str, bytes]):
-    """The files of an archive, each read when it is asked for: together they may be larger than the memory."""
+    """The files of an archive, each read on access: together they may be larger than the memory."""
 
     def __init__(self, archive: zipfile.ZipFile) -> None:
         self._archive = archive
@@ -62,10 +62,10 @@ class _Files(Mapping[str, bytes]):
 
 
 def read_archive(path: Path, size_limit: float = math.inf) -> Archive:
-    """The file, found whole; it is kept open.
+    """Open an archive after checking that it is intact; it stays open.
 
-    Raises `UnreadableFmuError` if it is no archive, or damaged, or unpacks to more than `size_limit` MB, or has no
-    model description.
+    Raises `UnreadableFmuError` if it is no archive, is damaged, unpacks to more than `size_limit` MB, or has no model
+    description.
     """
     if not path.is_file():
         raise UnreadableFmuError("expected an .fmu file")
@@ -86,9 +86,9 @@ def read_archive(path: Path, size_limit: float = math.inf) -> Archive:
 
 
 def expect_honest_size(path: Path) -> None:
-    """Raise `UsageError` for an archive that is made to fill a disk, by what it says of its files."""
+    """Raise `UsageError` for an archive that would fill the disk (a zip bomb), by the sizes that it declares."""
     with zipfile.ZipFile(path) as archive:
-        unpacked = sum(entry.file_size for entry in archive.infolist())  # no more than that is unpacked
+        unpacked = sum(entry.file_size for entry in archive.infolist())  # zipfile unpacks no more than that
     times = unpacked / path.stat().st_size
     if unpacked > LARGEST * 1e6 and times > DENSEST:
         raise UsageError(
@@ -98,7 +98,7 @@ def expect_honest_size(path: Path) -> None:
 
 
 def read_root(archive: Archive) -> Element:
-    """The description; raises `UnreadableFmuError` if it is no XML, `OtherVersionError` if of no known version."""
+    """The model description; raises `UnreadableFmuError` for no XML, `OtherVersionError` for an unsupported version."""
     try:
         root = ElementTree.fromstring(archive.files[DESCRIPTION])
     except ElementTree.ParseError as error:
@@ -112,5 +112,5 @@ def read_root(archive: Archive) -> Element:
 
 
 def version_of(root: Element) -> int:
-    """2 or 3, of a description that was read."""
+    """The version of FMI of a model description: 2 or 3."""
     return VERSIONS[root.get("fmiVersion", "")]

@@ -1,4 +1,4 @@
-"""What FMUs print to standard output goes to standard error, so that it spoils no output that a program reads."""
+"""Redirects what FMUs print from standard output to standard error, so that it does not corrupt the output."""
 
 import contextlib
 import ctypes
@@ -14,8 +14,8 @@ _OUT, _ERR = 1, 2
 def banners_to_stderr() -> Iterator[None]:
     """While the block runs, only what Python prints to `sys.stdout` goes to this process's standard output.
 
-    What C code prints, and processes that are started meanwhile, goes to standard error: the descriptors are set
-    once, a step costs nothing. For a whole command, as it holds for all threads.
+    Output of C code, and of processes that are started meanwhile, goes to standard error. The descriptors are set once,
+    so that a step costs nothing; they apply to all threads, so that this is for a whole command.
     """
     try:
         kept = os.dup(_OUT)
@@ -34,14 +34,14 @@ def banners_to_stderr() -> Iterator[None]:
         try:
             if theirs is not None:
                 sys.stdout = python
-                _emptied(theirs, kept)
+                _flush(theirs, kept)
         finally:
             _set_output(kept)
             os.close(kept)
 
 
-def _emptied(stream: TextIO, descriptor: int) -> None:
-    """Raise `BrokenPipeError` if nobody reads any more; what is left then goes nowhere, so that no other asks again."""
+def _flush(stream: TextIO, descriptor: int) -> None:
+    """Raise `BrokenPipeError` if the reader is gone; the rest is then discarded, so that it is raised only once."""
     try:
         stream.flush()
     except BrokenPipeError:
@@ -60,7 +60,7 @@ def _is_standard(stream: object) -> bool:
 
 
 def _set_output(target: int) -> None:
-    """Whatever C code has printed until now and still holds goes where it went until now."""
+    """Set the descriptor of standard output; what C code has buffered before goes to the previous one."""
     with contextlib.suppress(AttributeError, OSError):
         library = ctypes.cdll.msvcrt if sys.platform == "win32" else ctypes.CDLL(None)
         library.fflush(None)

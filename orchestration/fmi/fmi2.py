@@ -23,8 +23,8 @@ class Fmi2Instance(NativeInstance):
         if self.model.version != 2:
             raise UsageError(f"{self.path}: FMI {self.description.fmiVersion}; expected FMI 2.0 for co-simulation")
 
-    def _know(self, library: Any) -> None:
-        self._do_step = self.watched(library.fmi2DoStep)
+    def _load_step(self, library: Any) -> None:
+        self._do_step = self.guarded(library.fmi2DoStep)
 
     def _enter(self, start: float, stop: float | None) -> None:
         self._call("setupExperiment", tolerance=self._tolerance, startTime=start, stopTime=stop)
@@ -39,7 +39,7 @@ class Fmi2Instance(NativeInstance):
             self.collect_warnings()
 
     def step_error(self, status: int, end: float) -> SimulatorError:
-        """As `NativeInstance`; an FMU that has discarded a step is asked whether that ends the run."""
+        """As `NativeInstance`; after a discarded step the status of the FMU tells whether that ends the run."""
         if status != fmi2.fmi2Discard:
             return self.failure("fmi2DoStep")
         ends, reached = fmi2.fmi2Boolean(), fmi2.fmi2Real(math.nan)

@@ -32,19 +32,19 @@ class Fmi3Instance(NativeInstance):
         if clocks:
             raise UsageError(f"{self.path}: has clocks, which are not supported: {', '.join(clocks)}; expected none")
 
-    def _know(self, library: Any) -> None:
-        self._do_step = self.watched(library.fmi3DoStep)
+    def _load_step(self, library: Any) -> None:
+        self._do_step = self.guarded(library.fmi3DoStep)
         self._event, self._ends, self._early = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool()
         self._reached = ctypes.c_double()
-        self.said = (self._event, self._ends, self._early, self._reached)
-        self._said = [ctypes.byref(x) for x in self.said]
+        self.step_outputs = (self._event, self._ends, self._early, self._reached)
+        self._step_arguments = [ctypes.byref(x) for x in self.step_outputs]
 
     def _enter(self, start: float, stop: float | None) -> None:
         self._call("enterInitializationMode", tolerance=self._tolerance, startTime=start, stopTime=stop)
 
     def step(self, t: float, h: float) -> None:
         """Advance from `t` to `t + h` seconds."""
-        status = self._do_step(self._component, t, h, True, *self._said)
+        status = self._do_step(self._component, t, h, True, *self._step_arguments)
         if status > WARNING or self._event or self._ends or self._early:
             raise self.step_error(status, t + h)
         if self._messages:

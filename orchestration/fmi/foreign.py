@@ -1,4 +1,4 @@
-"""What is computed by FMUs of others is computed in a process of its own: however that ends, this one goes on."""
+"""Calls that load third-party FMUs run in a separate process: however that ends, this process goes on."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -15,13 +15,13 @@ T = TypeVar("T")
 
 
 class LostError(SimulatorError):
-    """The process that FMUs of others were in has ended; the text says how."""
+    """The process of third-party FMUs has ended; the text states how."""
 
 
-def computed(fmus: Iterable[Path], function: Callable[..., T], *arguments: object) -> T:
-    """What a function gives, or raises, that loads these FMUs: here, if all of them are of this project's kit.
+def isolated_call(fmus: Iterable[Path], function: Callable[..., T], *arguments: object) -> T:
+    """Call a function that loads these FMUs, in a separate process unless all of them are of this project's kit.
 
-    Raises `LostError` if the process that it has else ends before.
+    Returns or raises what the function does. Raises `LostError` if the process ends before.
     """
     if all(read_model(path).is_of_this_kit for path in fmus):
         return function(*arguments)
@@ -34,5 +34,5 @@ def computed(fmus: Iterable[Path], function: Callable[..., T], *arguments: objec
         raise LostError(f"the process of the FMUs {death}") from None
     if error is not None:
         raise error
-    given: T = result
-    return given
+    value: T = result
+    return value

@@ -1,4 +1,4 @@
-"""The process of a call: `python -m orchestration.fmi.foreign_process` is told a function and its arguments."""
+"""The process of a call: `python -m orchestration.fmi.foreign_process` receives a function and its arguments."""
 
 import pickle
 from typing import Any
@@ -8,29 +8,29 @@ from orchestration.processes.channel import Parent
 
 
 def main() -> None:
-    """Say what comes of the call, or what it raises."""
+    """Send the result of the call, or the exception that it raises."""
     parent = Parent()
     result = error = None
     try:
         function, arguments = parent.receive()
         result = function(*arguments)
-        _expect_passable(result, f"the result of {getattr(function, '__name__', function)}")
+        _expect_picklable(result, f"the result of {getattr(function, '__name__', function)}")
     except Exception as raised:
-        error, result = _passable(raised), None
+        error, result = _picklable(raised), None
     parent.send((result, error))
 
 
-def _passable(error: Exception) -> Exception:
-    """The error, or its words where the error itself cannot be passed on."""
-    words = f"{type(error).__name__}: {error}"
+def _picklable(error: Exception) -> Exception:
+    """The error, or one with its text if it cannot be pickled."""
+    text = f"{type(error).__name__}: {error}"
     try:
-        _expect_passable(error, words)
+        _expect_picklable(error, text)
     except QuadcosimError as why:
         return why
     return error
 
 
-def _expect_passable(content: Any, name: str) -> None:
+def _expect_picklable(content: Any, name: str) -> None:
     try:
         pickle.loads(pickle.dumps(content, pickle.HIGHEST_PROTOCOL))
     except Exception as error:

@@ -1,4 +1,4 @@
-"""What a run needs of an instance of an FMU, wherever it lives and whatever version of FMI it is of."""
+"""The interface of an instance of an FMU, in whichever process it is and of whichever version of FMI."""
 
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
@@ -21,43 +21,43 @@ class Instance(Simulator, Protocol):
     name: str
     model: Model
     warnings: list[str]
-    """what the FMU has warned of since it was instantiated or reset, and parameters that it has not kept"""
+    """of the FMU since it was instantiated or reset, and of parameters that it has not kept"""
     failed: bool
-    """Whether a call has failed: the instance is then never called again."""
+    """Whether a call has failed; the instance is then never called again."""
     stopped: bool
-    """Whether it has ended a run or discarded a step: it is then for no other run, whatever a reset would do."""
+    """Whether it has ended a run or discarded a step; it is then not reused, even if it could be reset."""
 
     def set(self, name: str, value: Value) -> None:
-        """Set one variable before initialisation; raises `UsageError` for a value it cannot take."""
+        """Set one variable before initialisation; raises `UsageError` for an invalid value."""
 
     def set_tolerance(self, tolerance: float) -> None:
-        """Give its solver a relative tolerance, before initialisation, instead of that of its declared experiment."""
+        """Set the relative tolerance of its solver, before initialisation; default: that of its declared experiment."""
 
     def get(self, name: str) -> Value:
         """The value of one variable: a Boolean as one, a String as a text, any other as a float."""
 
     def reset(self) -> None:
-        """Back to the state after instantiation, all parameters at their defaults, as far as the FMU does it."""
+        """Return to the state after instantiation, with all parameters at their defaults, as far as the FMU does so."""
 
     def close(self) -> None:
-        """Free the instance and what was made for it."""
+        """Free the instance and its resources."""
 
     @property
     def description(self) -> ModelDescription:
-        """What it says of itself, as fmpy reads it."""
+        """Its model description, as fmpy reads it."""
         return self.model.description
 
     @property
     def variables(self) -> Mapping[str, Variable]:
-        """What it has, by name."""
+        """Its variables by name."""
         return self.model.variables
 
     def variable(self, name: str) -> Variable:
-        """One of them; raises `UsageError` naming those that are near."""
+        """A variable by name; raises `UsageError` naming similar ones."""
         return self.model.variable(name, f"{self.name}.{name}")
 
     def names(self, *causalities: str, kind: Kind = "Real") -> tuple[str, ...]:
-        """Those of a type and of one of the causalities, in the order of the description."""
+        """The variables of a type and of one of the causalities, in the order of the description."""
         return self.model.names(*causalities, kinds=(kind,))
 
     def __enter__(self: T) -> T:
@@ -68,7 +68,7 @@ class Instance(Simulator, Protocol):
 
 
 class Loader(Protocol):
-    """Gives an instance of an FMU for one run."""
+    """Provides an instance of an FMU for one run."""
 
     def __call__(self, path: Path, instance_name: str) -> AbstractContextManager[Instance]:
-        """An instance as it is after instantiation, all parameters at their defaults."""
+        """An instance in the state after instantiation, with all parameters at their defaults."""

@@ -1,4 +1,4 @@
-"""Opens instances of FMUs: in this process, or in one of their own where one process does not hold two of them."""
+"""Opens instances of FMUs: in this process, or in a separate one if a process cannot have two of them."""
 
 from pathlib import Path
 
@@ -12,14 +12,14 @@ from orchestration.fmi.native import NativeInstance
 from orchestration.fmi.repeatability import content_hash
 
 _opened: set[str] = set()
-"""Hashes of the FMUs of which this process has had an instance"""
+"""Hashes of the FMUs that have had an instance in this process"""
 
 
 def open_instance(path: Path, instance_name: str) -> Instance:
-    """An instance of the FMU at `path`, of FMI 2.0 or 3.0, that is like the first one of a process.
+    """An instance of the FMU at `path`, of FMI 2.0 or 3.0, that behaves as the first one of a process.
 
-    The second one of a process is in a process of its own if the FMU says that a process can have one only, or
-    has not been shown to be the same again.
+    A second one has a separate process if the FMU declares that a process can have one only, or if it has not been
+    shown to behave as the first.
     """
     content = content_hash(path)
     if content in _opened and not repeatability.of(path).second_instance:
@@ -29,6 +29,6 @@ def open_instance(path: Path, instance_name: str) -> Instance:
 
 
 def open_here(path: Path, instance_name: str) -> NativeInstance:
-    """An instance in this process, whatever else is in it."""
+    """An instance in this process in any case."""
     kind = Fmi3Instance if read_model(path).version == 3 else Fmi2Instance
     return kind(path, instance_name)

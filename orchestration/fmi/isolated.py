@@ -1,7 +1,7 @@
-"""An instance of an FMU in a process of its own, for what cannot be in one process twice.
+"""An instance of an FMU in a separate process, for FMUs that a process cannot have twice.
 
-A list of commands goes there, what came of them comes back. What is written waits for the next step and goes with it,
-and the values of all readers come back with its answer, so that a step of the master costs one round trip.
+A list of commands is sent, and a result comes back. Writes wait for the next step and are sent with it, and the values
+of all readers come back with its result, so that a step of the master costs one round trip.
 """
 
 from collections.abc import Sequence
@@ -22,11 +22,11 @@ Command = tuple[Any, ...]
 """`("write", index, bytes)`, `("reader" or "writer", names)`, `("read",)` or the name of a method and its arguments"""
 
 _PATIENCE = 5.0
-"""[s] in which a process that is asked no more must have ended"""
+"""[s] in which a process must end after its last command"""
 
 
 class IsolatedInstance(Instance):
-    """The instance of a process that was started for it, and ends with it or with this process."""
+    """An instance in a process that is started for it, and ends with it or with this process."""
 
     def __init__(self, path: Path, instance_name: str) -> None:
         self.path = path
@@ -34,13 +34,13 @@ class IsolatedInstance(Instance):
         self.model = read_model(path)
         self.warnings: list[str] = []
         self.failed = self.stopped = False
-        self._waiting: list[Command] = []  # writes
+        self._waiting: list[Command] = []  # writes that have not been sent
         self._values: list[Floats] = []  # of each reader
-        self._fresh = False  # whether these are the values of now
+        self._fresh = False  # whether these values are current
         self._writers = 0
         self._child = Child(subprocesses.command("orchestration.fmi.isolated_process", path.absolute(), instance_name))
         try:
-            self._ask()
+            self._request()
         except Exception:
             self.close()
             raise
@@ -49,40 +49,40 @@ class IsolatedInstance(Instance):
 
     def enter_initialization(self, start: float, stop: float) -> None:
         """As any instance."""
-        self._ask("enter_initialization", start, stop)
+        self._request("enter_initialization", start, stop)
 
     def exit_initialization(self) -> None:
         """As any instance."""
-        self._ask("exit_initialization")
+        self._request("exit_initialization")
 
     def step(self, t: float, h: float) -> None:
-        """As any instance; all readers have their values with it."""
+        """As any instance; updates the values of all readers."""
         self._waiting.append(("step", t, h))
         self._refresh()
 
     def reset(self) -> None:
         """As any instance."""
-        self._ask("reset")
+        self._request("reset")
 
     def save(self) -> bytes:
         """As any instance."""
-        return bytes(self._ask("save"))
+        return bytes(self._request("save"))
 
     def restore(self, state: bytes) -> None:
         """As any instance."""
-        self._ask("restore", state)
+        self._request("restore", state)
 
     def set(self, name: str, value: Value) -> None:
         """As any instance."""
-        self._ask("set", name, value)
+        self._request("set", name, value)
 
     def set_tolerance(self, tolerance: float) -> None:
         """As any instance."""
-        self._ask("set_tolerance", tolerance)
+        self._request("set_tolerance", tolerance)
 
     def get(self, name: str) -> Value:
         """As any instance."""
-        value: Value = self._ask("get", name)
+        value: Value = self._request("get", name)
         return value
 
     def close(self) -> None:
@@ -94,7 +94,7 @@ class IsolatedInstance(Instance):
 
     def reader(self, names: Sequence[str], into: Floats) -> Transfer:
         """As any instance."""
-        self._ask("reader", tuple(names))
+        self._request("reader", tuple(names))
         index = len(self._values)
         self._values.append(np.zeros(len(names)))
 
@@ -106,8 +106,8 @@ class IsolatedInstance(Instance):
         return read
 
     def writer(self, names: Sequence[str], source: Floats) -> Transfer:
-        """As any instance, but that a failure shows in the next step or read."""
-        self._ask("writer", tuple(names))
+        """As any instance, except that a failure is raised by the next step or read."""
+        self._request("writer", tuple(names))
         index, self._writers = self._writers, self._writers + 1
 
         def write() -> None:
@@ -119,13 +119,13 @@ class IsolatedInstance(Instance):
     def _refresh(self) -> None:
         values = np.frombuffer(self._exchange([("read",)]))
         start = 0
-        for known in self._values:
-            known[:] = values[start : start + len(known)]
-            start += len(known)
+        for each in self._values:
+            each[:] = values[start : start + len(each)]
+            start += len(each)
         self._fresh = True
 
-    def _ask(self, *command: Any) -> Any:
-        """What a command gives, once all that waits is done."""
+    def _request(self, *command: Any) -> Any:
+        """The result of a command, after all waiting writes."""
         self._fresh = False
         return self._exchange([command] if command else [])
 
@@ -139,7 +139,7 @@ class IsolatedInstance(Instance):
         except Died as death:
             self.failed = True
             raise SimulatorError(f"{self.name} ({self.model.name}): its process {death}") from None
-        except BaseException:  # whose answer this would be is no longer known
+        except BaseException:  # the next result would be that of these commands
             self.failed = True
             raise
         if error is not None:

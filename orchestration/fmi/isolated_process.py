@@ -1,7 +1,4 @@
-"""The process of an isolated instance.
-
-`python -m orchestration.fmi.isolated_process FMU NAME` answers commands until there are no more.
-"""
+"""The process of an isolated instance: `python -m orchestration.fmi.isolated_process FMU NAME` executes commands."""
 
 import sys
 from collections.abc import Callable
@@ -17,8 +14,8 @@ from orchestration.fmi.native import NativeInstance
 from orchestration.processes.channel import Parent, picklable
 
 
-class _Served:
-    """An instance and the arrays that its transfers use."""
+class _Server:
+    """The instance and the arrays of its transfers."""
 
     def __init__(self, path: Path, name: str) -> None:
         self.instance: NativeInstance | None = None
@@ -26,8 +23,8 @@ class _Served:
         self._readers: list[tuple[Transfer, Floats]] = []
         self._writers: list[tuple[Transfer, Floats]] = []
 
-    def answer(self, commands: list[Command]) -> Any:
-        """What the last of the commands gives."""
+    def execute(self, commands: list[Command]) -> Any:
+        """The result of the last command."""
         if self.instance is None:
             self.instance = open_here(self._path, self._name)
         result = None
@@ -59,17 +56,17 @@ class _Served:
 
 def main(path: Path, name: str) -> None:
     """Serve one instance."""
-    parent, served = Parent(), _Served(path, name)
+    parent, server = Parent(), _Server(path, name)
     for commands in parent:
         result = error = None
         try:
-            result = served.answer(commands)
+            result = server.execute(commands)
         except Exception as raised:
             error = picklable(raised)
-        instance = served.instance
+        instance = server.instance
         parent.send((result, error, instance is None or instance.failed, [] if instance is None else instance.warnings))
-    if served.instance is not None:
-        served.instance.close()
+    if server.instance is not None:
+        server.instance.close()
 
 
 if __name__ == "__main__":

@@ -1,8 +1,7 @@
-"""What FMUs log, collected for each instance.
+"""Log messages of FMUs, collected for each instance.
 
-FMI 2.0 has an FMU log as C prints: a text with places for arguments, and the arguments. What a Python function
-called from C cannot see, fmpy's compiled logger can; it gives the text that comes of it on to one function for the
-whole process, and that one finds the instance.
+In FMI 2.0 an FMU logs like printf, with a format and variable arguments, which a Python callback cannot read. fmpy's
+compiled logger formats the text and passes it to one function for the whole process, which finds the instance.
 """
 
 import ctypes
@@ -19,25 +18,25 @@ from fmpy.fmi1 import printLogMessage
 from orchestration.fmi import pythonfmu
 
 Message: TypeAlias = tuple[int, bytes | None, bytes]
-"""Status, category and text of what an FMU logged"""
+"""Status, category and text of a message"""
 
 WARNING: int = fmi2.fmi2Warning
 
 
 class Messages(list[Message]):
-    """Those that have not been heard, and how many they are where C sees it."""
+    """Messages that have not been processed, and their number in memory that C reads."""
 
     def __init__(self) -> None:
         super().__init__()
         self.waiting = ctypes.c_int64(0)
 
     def append(self, message: Message) -> None:
-        """One more."""
+        """Add a message."""
         super().append(message)
         self.waiting.value = len(self)
 
     def clear(self) -> None:
-        """They have been heard."""
+        """Remove all messages."""
         super().clear()
         self.waiting.value = 0
 
@@ -48,9 +47,9 @@ _by_name: dict[bytes, list[Message]] = {}
 
 
 def collecting_callbacks(messages: list[Message], name: str, folder: Path) -> fmi2.fmi2CallbackFunctions:
-    """Callbacks that collect in `messages` what the instance `name` of the FMU unpacked in `folder` logs.
+    """Callbacks that collect in `messages` the log of the instance `name` of the FMU unpacked in `folder`.
 
-    What pythonfmu logs is taken as it comes, since the compiled logger would cut it off after 2047 bytes.
+    Messages of pythonfmu are not formatted, since the compiled logger would cut them off after 2047 bytes.
     """
     callbacks = fmi2.fmi2CallbackFunctions()
     callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
@@ -64,12 +63,12 @@ def collecting_callbacks(messages: list[Message], name: str, folder: Path) -> fm
     weakref.finalize(callbacks, _forget, environment, name.encode(), messages)
     callbacks.componentEnvironment = environment
     callbacks.logger = _DISPATCHER
-    add_formatting(ctypes.byref(callbacks))  # once more for each: whoever else uses fmpy may have put in another
+    add_formatting(ctypes.byref(callbacks))  # again for each: other users of fmpy may have set another
     return callbacks
 
 
-def words(messages: Sequence[Message], otherwise: str) -> tuple[str, str]:
-    """The first line of the first message of a failure, and what follows it; `otherwise` if there is none."""
+def failure_text(messages: Sequence[Message], otherwise: str) -> tuple[str, str]:
+    """The first line of the first message of a failure, and the rest of it; `otherwise` if there is none."""
     bad = [message for message in messages if message[0] > WARNING]
     text = bad[0][2].decode("utf-8", "replace") if bad else otherwise
     summary, _, details = pythonfmu.without_banner(text).partition("\n")
@@ -86,9 +85,9 @@ def _logger_of(messages: list[Message]) -> Any:
 def _dispatch(
     environment: int | None, instance: bytes | None, status: int, category: bytes | None, message: bytes | None
 ) -> None:
-    """By the environment that the FMU was given; by the name where it does not give it back."""
+    """Find the instance by the environment that the FMU received, or by its name if the FMU does not pass that back."""
     messages = _by_environment.get(environment or 0, _by_name.get(instance or b""))
-    if messages is None:  # an FMU that another user of fmpy has loaded
+    if messages is None:  # an FMU that was loaded by another user of fmpy
         printLogMessage(environment, instance or b"", status, category, message or b"")
     else:
         messages.append((status, category, message or b""))

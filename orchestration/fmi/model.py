@@ -1,4 +1,4 @@
-"""What an FMU says of itself, in one form for FMI 2.0 and FMI 3.0."""
+"""The model of an FMU: its description, in one form for FMI 2.0 and FMI 3.0."""
 
 import difflib
 import functools
@@ -25,7 +25,7 @@ from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 Kind = Literal["Real", "Integer", "Boolean", "Enumeration", "String", "Binary", "Clock"]
 """Types by their FMI 2.0 names; FMI 3.0's Float64 is a Real, its Int32 an Integer"""
 NUMERIC: tuple[Kind, ...] = ("Real", "Integer", "Boolean", "Enumeration")
-"""What can be connected and recorded: as numbers, a Boolean as 0 or 1"""
+"""Types that can be connected and recorded: as numbers, a Boolean as 0 or 1"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +35,7 @@ class Variable:
     name: str
     kind: Kind
     type: str
-    """as the FMU says it: Real, Float64, Int32 …"""
+    """as in the description: Real, Float64, Int32 …"""
     causality: str
     variability: str
     unit: str | None
@@ -58,22 +58,22 @@ class Variable:
 
     @property
     def is_constant(self) -> bool:
-        """Whether it is a parameter that was fixed when the FMU was built: what has its value may be given to it."""
+        """Whether it is a parameter that was fixed when the FMU was built: it can be set to its own value only."""
         return self.variability == "constant" and self.causality == "local" and self.start is not None
 
 
 @dataclass(frozen=True, kw_only=True, repr=False, eq=False)
 class Model:
-    """An FMU file and what its description says; read once, it is told from others by identity."""
+    """An FMU file and its description; it is read once and compared by identity."""
 
     path: Path
-    """Where the FMU is."""
+    """Of the FMU."""
     description: ModelDescription
     """Its model description, as fmpy reads it."""
     variables: Mapping[str, Variable]
     """Its variables by name, arrays by their elements: causality, unit, start value, description."""
     initial_dependencies: Mapping[str, frozenset[str] | None]
-    """By output, the inputs that it depends on at initialisation; None: all."""
+    """By output, the inputs that it depends on at initialisation; None: all of them."""
 
     def __repr__(self) -> str:
         counts = Counter(v.causality for v in self.variables.values())
@@ -81,19 +81,19 @@ class Model:
 
     @cached_property
     def is_of_this_kit(self) -> bool:
-        """Whether it is built on `fmu_kit`, and so has the conventions of its slaves."""
+        """Whether it is built on `fmu_kit`, and follows the conventions of its slaves."""
         return read_source_hash(self.path) is not None
 
     @property
     def waits(self) -> bool:
-        """Whether it is told when its first sample is, and until then is stepped without one."""
+        """Whether the time of its first sample is set by a parameter, and it does not sample in steps before."""
         return self.is_of_this_kit and self.has_clock and SAMPLE_OFFSET in self.variables
 
     @property
     def has_clock(self) -> bool:
-        """Whether it can sample by itself when its parameters say so."""
-        told = [self.variables[name] for name in (SAMPLE_PERIOD, SAMPLE_OFFSET) if name in self.variables]
-        return SAMPLE_PERIOD in self.variables and all(each.is_settable for each in told)
+        """Whether it has its own clock, which its parameters set."""
+        parameters = [self.variables[name] for name in (SAMPLE_PERIOD, SAMPLE_OFFSET) if name in self.variables]
+        return SAMPLE_PERIOD in self.variables and all(each.is_settable for each in parameters)
 
     @property
     def name(self) -> str:
@@ -102,12 +102,12 @@ class Model:
 
     @property
     def version(self) -> int:
-        """2 or 3, of FMI."""
+        """Of FMI: 2 or 3."""
         return int(self.description.fmiMajorVersion)
 
     @property
     def varies_step(self) -> bool:
-        """Whether it takes communication steps of any length."""
+        """Whether it supports communication steps of any length."""
         return bool(self.description.coSimulation.canHandleVariableCommunicationStepSize)
 
     @property
@@ -123,12 +123,12 @@ class Model:
 
     @property
     def tolerance(self) -> float | None:
-        """That of the experiment that it declares, relative; None if it declares none."""
-        found = _number(getattr(self.description.defaultExperiment, "tolerance", None))
-        return found if found is not None and found > 0.0 else None
+        """The relative tolerance of the experiment that it declares; None if it declares none."""
+        tolerance = _number(getattr(self.description.defaultExperiment, "tolerance", None))
+        return tolerance if tolerance is not None and tolerance > 0.0 else None
 
     def variable(self, name: str, place: str) -> Variable:
-        """A variable by name; raises `UsageError` naming the place and the variables that are near."""
+        """A variable by name; raises `UsageError` naming the place and similar variables."""
         if name in self.variables:
             return self.variables[name]
         near = difflib.get_close_matches(name, list(self.variables), n=3)
@@ -137,9 +137,9 @@ class Model:
         raise UsageError(f"{place}: {self.name} has no such variable; {hint}its parameters are {_listed(settable)}")
 
     def base_units(self, unit: str | None) -> BaseUnits | None:
-        """What a unit is by the FMU's definitions; None if they do not say."""
-        found = next((u for u in self.description.unitDefinitions if u.name == unit), None)
-        base = getattr(found, "baseUnit", None)
+        """A unit in base units, by the FMU's definitions; None if they do not define it."""
+        definition = next((u for u in self.description.unitDefinitions if u.name == unit), None)
+        base = getattr(definition, "baseUnit", None)
         if base is None:
             return None
         exponents = tuple(Fraction(getattr(base, key)) for key in BASE)
@@ -147,17 +147,17 @@ class Model:
 
     @cached_property
     def units(self) -> dict[str, Unit]:
-        """By variable, of those that have one."""
+        """The units of the variables that have one, by name."""
         declared = {name: v.unit for name, v in self.variables.items() if v.unit}
-        made = {unit: named(unit, self.base_units(unit)) for unit in dict.fromkeys(declared.values())}
-        return {name: made[unit] for name, unit in declared.items()}
+        parsed = {unit: named(unit, self.base_units(unit)) for unit in dict.fromkeys(declared.values())}
+        return {name: parsed[unit] for name, unit in declared.items()}
 
     def names(self, *causalities: str, kinds: tuple[Kind, ...] = NUMERIC) -> tuple[str, ...]:
         """Variables of these causalities and types, in the order of the description."""
         return tuple(v.name for v in self.variables.values() if v.causality in causalities and v.kind in kinds)
 
     def depends_on(self, output: str) -> frozenset[str] | None:
-        """The inputs that an output depends on at initialisation; None: on all, as far as is known."""
+        """The inputs that an output depends on at initialisation; None: on all of them, or unknown."""
         return self.initial_dependencies.get(output)
 
 
@@ -172,7 +172,7 @@ def read_description(path: Path) -> ModelDescription:
         raise
     except UnicodeEncodeError as error:
         raise no_utf8(error) from error
-    except Exception as error:  # fmpy lets through whatever the readers of zip and XML raise
+    except Exception as error:  # fmpy passes on any exception of the readers of zip and XML
         raise UsageError(f"{path}: expected an FMU with a modelDescription.xml: {error}") from error
     if description.fmiMajorVersion not in (2, 3) or description.coSimulation is None:
         kind = "co-simulation" if description.coSimulation is not None else "model exchange only"
@@ -181,9 +181,9 @@ def read_description(path: Path) -> ModelDescription:
 
 
 def read_model(path: str | Path) -> Model:
-    """Read what a co-simulation FMU says of itself.
+    """Read the model of a co-simulation FMU.
 
-    It is read once in a process, as long as the file is the same. Raises `UsageError` for a file that is no FMU for
+    It is read once in a process while the file stays the same. Raises `UsageError` for a file that is no FMU for
     co-simulation of FMI 2.0 or 3.0.
     """
     path = Path(path)
@@ -213,14 +213,14 @@ _KINDS: dict[str, Kind] = {
 
 
 def _scalars(declared: ModelVariable) -> list[Variable]:
-    """The elements of a variable: itself, or every `name[i,j]`, counted from 1, the last index first."""
+    """The elements of a variable: itself, or every `name[i,j]`, counted from 1, the last index varying fastest."""
     kind: Kind = _KINDS.get(declared.type, "Integer")
     shape = tuple(declared.shape or ())
     starts = (declared.start or "").split() if shape else [declared.start]
-    found = []
+    variables = []
     for element, index in enumerate(itertools.product(*(range(1, n + 1) for n in shape))):
         start = starts[element] if element < len(starts) else (starts[-1] if starts else None)
-        found.append(
+        variables.append(
             Variable(
                 name=declared.name + (f"[{','.join(map(str, index))}]" if shape else ""),
                 kind=kind,
@@ -238,7 +238,7 @@ def _scalars(declared: ModelVariable) -> list[Variable]:
                 choices={i.name: int(i.value) for i in getattr(declared.declaredType, "items", ())},
             )
         )
-    return found
+    return variables
 
 
 def _number(text: str | None) -> float | None:
@@ -250,22 +250,24 @@ def _number(text: str | None) -> float | None:
 
 
 def _dependencies(description: ModelDescription, variables: Mapping[str, Variable]) -> dict[str, frozenset[str] | None]:
-    """Declared dependencies of outputs at initialisation, on inputs; what is not listed depends on nothing."""
+    """Declared dependencies of outputs on inputs at initialisation; an output that is not listed depends on none."""
     names: dict[tuple[str, int], list[str]] = {}  # FMI 2.0 counts references by type
     for variable in variables.values():
         names.setdefault((variable.type, variable.reference), []).append(variable.name)
     inputs = {v.name for v in variables.values() if v.causality == "input"}
     listed = description.initialUnknowns
     nothing: frozenset[str] | None = frozenset() if listed else None
-    found: dict[str, frozenset[str] | None] = {v.name: nothing for v in variables.values() if v.causality == "output"}
+    dependencies: dict[str, frozenset[str] | None] = {
+        v.name: nothing for v in variables.values() if v.causality == "output"
+    }
     for unknown in listed:
         needed = unknown.dependencies
         which = (
             None if needed is None else frozenset(n for v in needed for n in names[v.type, v.valueReference]) & inputs
         )
         for name in names.get((unknown.variable.type, unknown.variable.valueReference), ()):
-            found[name] = which
-    return found
+            dependencies[name] = which
+    return dependencies
 
 
 def _listed(names: list[str], most: int = 20) -> str:

@@ -1,8 +1,8 @@
-"""Whether a run of an FMU is the same again: after a reset, and in a second instance of the process.
+"""Whether runs of an FMU repeat to the bit: after a reset, and in a second instance of a process.
 
-Many FMUs do not come back from a reset as they were, some keep what they learnt from one instance to the next. What
-is not shown to be the same, to the bit, is not relied upon. It is shown once for the content of an FMU on a machine,
-in a confined process, and kept in the user's cache directory.
+A reset of many FMUs is incomplete, and some share state between instances. Only what has been shown to repeat to the
+bit is relied upon. It is tested once for the content of an FMU on a machine, in a confined process, and the result is
+kept in the user's cache directory.
 """
 
 import functools
@@ -21,24 +21,24 @@ from orchestration.processes.child import Child
 from orchestration.processes.limits import Limits
 
 _RULES = "2"
-"""Of how it is shown; another number shows all anew"""
+"""The version of the test; another one repeats all tests"""
 MANNERS = ("moving", "held", "fine")
-"""Of the run that is compared, until one of them works: inputs that move; that keep their start values; with a short
+"""Kinds of the compared run, tried until one works: inputs that vary; inputs that keep their start values; a short
 step"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Repeatability:
-    """What has been shown of an FMU."""
+    """The properties of an FMU that have been shown."""
 
     reset: bool = False
-    """A run after a reset is the run of a fresh process"""
+    """A run after a reset equals that of a fresh process"""
     second_instance: bool = False
-    """A run of a further instance in a process, beside another one or after it, is the run of a fresh process"""
+    """A run of a further instance in a process, beside another one or after it, equals that of a fresh process"""
 
 
 def of(path: Path) -> Repeatability:
-    """What is shown of the FMU at `path`, now if it has not been before; raises `UsageError` for no FMU."""
+    """The repeatability of the FMU at `path`, tested now if it has not been; raises `UsageError` if it is no FMU."""
     return _of(content_hash(path), path)
 
 
@@ -58,7 +58,7 @@ _known: dict[str, Repeatability] = {}
 
 def _of(content: str, path: Path) -> Repeatability:
     if content not in _known:
-        _known[content] = _stored(content) or _shown(content, path)
+        _known[content] = _stored(content) or _tested(content, path)
     return _known[content]
 
 
@@ -72,16 +72,16 @@ def _place(content: str) -> Path:
 
 def _stored(content: str) -> Repeatability | None:
     try:
-        found = json.loads(_place(content).read_text(encoding="utf-8"))
-        return Repeatability(reset=found["reset"] is True, second_instance=found["second_instance"] is True)
+        stored = json.loads(_place(content).read_text(encoding="utf-8"))
+        return Repeatability(reset=stored["reset"] is True, second_instance=stored["second_instance"] is True)
     except (OSError, ValueError, LookupError, TypeError):
         return None
 
 
-def _shown(content: str, path: Path) -> Repeatability:
-    """By a process that runs the FMU; kept unless the process was stopped, which may have had other reasons."""
+def _tested(content: str, path: Path) -> Repeatability:
+    """Test the FMU in a process; the result is kept unless the process was stopped, which may have other reasons."""
     read_model(path)
-    found = Repeatability()
+    result = Repeatability()
     for manner in MANNERS:
         shown: dict[str, bool] = {}
         with tempfile.TemporaryDirectory(prefix="quadcosim-", ignore_cleanup_errors=True) as folder:
@@ -91,18 +91,18 @@ def _shown(content: str, path: Path) -> Repeatability:
         if ending.reached is not None:
             return Repeatability()
         if shown.pop("fresh", False):
-            found = Repeatability(**shown)
+            result = Repeatability(**shown)
             break
-    _keep(_place(content), found)
-    return found
+    _keep(_place(content), result)
+    return result
 
 
-def _keep(path: Path, found: Repeatability) -> None:
-    """For the processes to come; where nothing can be written, each shows it anew."""
+def _keep(path: Path, result: Repeatability) -> None:
+    """Write it for later processes; where nothing can be written, each repeats the test."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         fresh = path.with_name(f"{path.name}.{os.getpid()}")
-        fresh.write_text(json.dumps(asdict(found)), encoding="utf-8")
+        fresh.write_text(json.dumps(asdict(result)), encoding="utf-8")
         fresh.replace(path)
     except OSError:
         pass

@@ -1,8 +1,8 @@
-"""The confined process that shows whether a run of an FMU is the same again.
+"""The confined process that tests whether runs of an FMU repeat.
 
 `python -m orchestration.fmi.repeatability_process FMU MANNER` runs a fresh instance first, in `MANNER` (see
-`repeatability.MANNERS`), and then the same run after others: each time with other parameters, other inputs and
-longer. After each comparison it says what it has shown.
+`repeatability.MANNERS`), and then the same run after other ones, with other parameters, other inputs and longer. After
+each comparison it reports what it has shown.
 """
 
 import math
@@ -23,33 +23,33 @@ from orchestration.processes.limits import Limits, restrict
 
 _STEPS = 25
 _PARAMETERS = 200
-"""How many are moved at most"""
+"""The most that are changed"""
 _FACTOR = 1.0 + 2.0**-10
-"""By which a parameter is moved: little, as many are bound by others"""
+"""By which a parameter is changed: little, as many parameters constrain each other"""
 
 
 class _Runs:
-    """Runs of one FMU in one manner."""
+    """The test runs of one FMU in one manner."""
 
     def __init__(self, path: Path, manner: str) -> None:
         self._path = path
-        self.fresh = self.opened()
+        self.fresh = self.open()
         model = self.model = self.fresh.model
         self._moves = manner == "moving"
         self._step = 1e-3 if manner == "fine" else _default_step(self.fresh)
         self._inputs = [model.variables[name] for name in model.names("input")]
         self._watched = [*model.names("output", "local"), *model.names("parameter", "calculatedParameter")]
 
-    def opened(self) -> NativeInstance:
-        """An instance of its own."""
+    def open(self) -> NativeInstance:
+        """A new instance."""
         return open_here(self._path, "repeated")
 
-    def compared(self, instance: NativeInstance, beside: Callable[[float, float], None] | None = None) -> bytes:
-        """The run that must be the same: every value of every step."""
+    def reference_run(self, instance: NativeInstance, beside: Callable[[float, float], None] | None = None) -> bytes:
+        """The run that must repeat: all values of all steps."""
         return self._run(instance, {}, 0.0, _STEPS, beside)
 
-    def other(self, instance: NativeInstance, parameters: Sequence[Variable]) -> None:
-        """Another run, with these parameters moved."""
+    def other_run(self, instance: NativeInstance, parameters: Sequence[Variable]) -> None:
+        """Another run, with these parameters changed."""
         self._run(instance, {v.name: _moved(v) for v in parameters}, 1.0, 2 * _STEPS, None)
 
     def _run(
@@ -85,20 +85,20 @@ class _Runs:
         return [_moving(v, k, phase + i) if moves else _start(v) for i, v in enumerate(self._inputs)]
 
 
-def main(path: Path, manner: str, say: Callable[[dict[str, bool]], None]) -> None:
-    """Show what can be shown."""
+def main(path: Path, manner: str, report: Callable[[dict[str, bool]], None]) -> None:
+    """Run all tests."""
     restrict(Limits().size)
     runs = _Runs(path, manner)
-    expected = runs.compared(runs.fresh)
-    say({"fresh": True})
+    expected = runs.reference_run(runs.fresh)
+    report({"fresh": True})
     used = _used(runs)
-    say({"reset": used is not None and _is_same(runs, used, expected)})
+    report({"reset": used is not None and _is_same(runs, used, expected)})
     if not runs.model.once_per_process:
-        say({"second_instance": used is not None and _further_is_same(runs, expected)})
+        report({"second_instance": used is not None and _further_is_same(runs, expected)})
 
 
 def _used(runs: _Runs) -> NativeInstance | None:
-    """An instance that has had another run, with all parameters moved that it lets move; None if it takes none."""
+    """An instance after another run, with all parameters changed that it accepts; None if no such run succeeds."""
     settable = [v for v in runs.model.variables.values() if v.causality == "parameter"]
     movable = [v for v in settable if v.kind in ("Real", "Integer", "Boolean", "Enumeration") and v.start is not None]
     try:
@@ -107,10 +107,10 @@ def _used(runs: _Runs) -> NativeInstance | None:
     except QuadcosimError:
         if runs.model.once_per_process:
             return None
-    taken = _taken(runs, movable[:_PARAMETERS])
-    for parameters in (taken, []):
+    accepted = _accepted(runs, movable[:_PARAMETERS])
+    for parameters in (accepted, []):
         try:
-            instance = runs.opened()
+            instance = runs.open()
             return _after_other(runs, instance, parameters)
         except QuadcosimError:
             continue
@@ -118,27 +118,27 @@ def _used(runs: _Runs) -> NativeInstance | None:
 
 
 def _after_other(runs: _Runs, instance: NativeInstance, parameters: Sequence[Variable]) -> NativeInstance:
-    runs.other(instance, parameters)
+    runs.other_run(instance, parameters)
     return instance
 
 
-def _taken(runs: _Runs, parameters: Sequence[Variable]) -> list[Variable]:
-    """Those that the FMU takes moved, found by halves."""
+def _accepted(runs: _Runs, parameters: Sequence[Variable]) -> list[Variable]:
+    """The parameters that the FMU accepts when changed, found by bisection."""
     try:
-        with runs.opened() as instance:
-            runs.other(instance, parameters)
+        with runs.open() as instance:
+            runs.other_run(instance, parameters)
         return list(parameters)
     except QuadcosimError:
         half = len(parameters) // 2
-        return _taken(runs, parameters[:half]) + _taken(runs, parameters[half:]) if half else []
+        return _accepted(runs, parameters[:half]) + _accepted(runs, parameters[half:]) if half else []
 
 
 def _is_same(runs: _Runs, used: NativeInstance, expected: bytes) -> bool:
-    """Whether the run is the same after a reset, and after another run once more."""
+    """Whether the run repeats after a reset, and after another reset."""
     try:
         for _ in range(2):
             used.reset()
-            if runs.compared(used) != expected:
+            if runs.reference_run(used) != expected:
                 return False
         return True
     except QuadcosimError:
@@ -146,24 +146,24 @@ def _is_same(runs: _Runs, used: NativeInstance, expected: bytes) -> bool:
 
 
 def _further_is_same(runs: _Runs, expected: bytes) -> bool:
-    """Whether it is in an instance beside one that takes the same steps, and in one after both."""
+    """Whether it repeats in an instance beside one that takes the same steps, and in one after both."""
     try:
-        with runs.opened() as beside, runs.opened() as instance:
+        with runs.open() as beside, runs.open() as instance:
             beside.enter_initialization(0.0, math.inf)
             beside.exit_initialization()
-            if runs.compared(instance, beside.step) != expected:
+            if runs.reference_run(instance, beside.step) != expected:
                 return False
-        with runs.opened() as instance:
-            return runs.compared(instance) == expected
+        with runs.open() as instance:
+            return runs.reference_run(instance) == expected
     except QuadcosimError:
         return False
 
 
 def _default_step(instance: NativeInstance) -> float:
     experiment, interface = instance.description.defaultExperiment, instance.description.coSimulation
-    given: Any = getattr(interface, "fixedInternalStepSize", None) or getattr(experiment, "stepSize", None)
+    declared: Any = getattr(interface, "fixedInternalStepSize", None) or getattr(experiment, "stepSize", None)
     try:
-        step = float(given)
+        step = float(declared)
     except (TypeError, ValueError):
         return 0.01
     return step if 0.0 < step < math.inf else 0.01

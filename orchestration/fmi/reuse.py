@@ -1,4 +1,4 @@
-"""FMUs loaded once in a process and reset between runs, where that has been shown to change nothing."""
+"""Reuse of instances: an FMU is loaded once in a process and reset between runs, if that has been shown to be safe."""
 
 import weakref
 from collections.abc import Iterator
@@ -12,16 +12,16 @@ from orchestration.fmi.instances import open_instance
 
 
 class Instances:
-    """Gives an instance for each run: one that was there before, reset, or else a fresh one.
+    """Provides an instance for each run: a kept one, reset, or else a fresh one.
 
-    It keeps one instance of each FMU and name if a run after a reset is the run of a fresh instance, to the bit;
-    one that has failed, or ended its run, is left and made anew.
+    It keeps one instance of each FMU and name if a run after a reset equals that of a fresh instance to the bit;
+    one that has failed, or ended its run, is replaced.
     """
 
     def __init__(self) -> None:
         self._kept: dict[tuple[Path, str], Instance] = {}
         self.close = weakref.finalize(self, _free, self._kept)
-        """Free all instances; done in any case when they are no longer used or the process ends."""
+        """Free all instances; called automatically when this object is garbage or the process ends."""
 
     @contextmanager
     def load(self, path: Path, instance_name: str) -> Iterator[Instance]:
@@ -40,7 +40,7 @@ class Instances:
 
 
 def _is_reset(instance: Instance) -> bool:
-    """Whether the instance could be reset; one that could not is given up, which is not the next run's failure."""
+    """Whether the instance could be reset; one that could not is closed, so that the next run does not fail."""
     try:
         instance.reset()
     except SimulatorError:

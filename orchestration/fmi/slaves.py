@@ -1,4 +1,4 @@
-"""fmpy's instances of FMUs for co-simulation, of either version of FMI: what begins alike is one text here."""
+"""fmpy's instances of FMUs for co-simulation, loaded and instantiated alike for both versions of FMI."""
 
 import ctypes
 import zipfile
@@ -18,45 +18,45 @@ FOLDERS: Mapping[int, tuple[str, ...]] = {
     2: (fmpy.platform,) if _IS_X86 else (fmpy.platform_tuple, fmpy.platform),
     3: (fmpy.platform_tuple,),
 }
-"""The folders in `binaries/` that are for this machine, by the version of FMI: the first that there is.
+"""The folders in `binaries/` for this machine, by the version of FMI: the first that exists is used.
 
-For other processors than x86, FMI 2.0 takes the names of FMI 3.0 (FMI 2.0.4, section 2.3), and tools take `linux64`.
+For other processors than x86, FMI 2.0 uses the names of FMI 3.0 (FMI 2.0.4, section 2.3), and tools use `linux64`.
 """
 
 
-class _Known:
-    """As fmpy's, which takes the signatures of all functions apart for each instance: here they are known once.
+class _CachedSignatures:
+    """fmpy derives the signatures of all functions for each instance; here that is done once.
 
-    A validation makes 150 instances, which took it a third of its time.
+    A validation makes 150 instances, and spent a third of its time on that.
     """
 
-    _known: ClassVar[dict[str, tuple[Any, Any, Any]]]
+    _signatures: ClassVar[dict[str, tuple[Any, Any, Any]]]
     _functions: dict[str, Any]
     dll: Any
 
     def _loadFunctions(self) -> None:  # noqa: N802
-        if not self._known:
+        if not self._signatures:
             super()._loadFunctions()  # type: ignore[misc]
-            self._known.update({name: (f.argnames, f.argtypes, f.restype) for name, f in self._functions.items()})
-        for name, (names, types, result) in self._known.items():
+            self._signatures.update({name: (f.argnames, f.argtypes, f.restype) for name, f in self._functions.items()})
+        for name, (names, types, result) in self._signatures.items():
             function = getattr(self.dll, name)
             function.argnames, function.argtypes, function.restype = names, types, result
             self._functions[name] = function
 
 
-class FMU2Slave(_Known, fmi2.FMU2Slave):  # type: ignore[misc]  # fmpy has no types; by this name it knows the version
+class FMU2Slave(_CachedSignatures, fmi2.FMU2Slave):  # type: ignore[misc]  # fmpy is untyped, and derives the version from this name
     """Of FMI 2.0."""
 
-    _known: ClassVar[dict[str, tuple[Any, Any, Any]]] = {}
+    _signatures: ClassVar[dict[str, tuple[Any, Any, Any]]] = {}
 
 
-class FMU3Slave(_Known, fmi3.FMU3Slave):  # type: ignore[misc]
+class FMU3Slave(_CachedSignatures, fmi3.FMU3Slave):  # type: ignore[misc]
     """Of FMI 3.0."""
 
-    _known: ClassVar[dict[str, tuple[Any, Any, Any]]] = {}
+    _signatures: ClassVar[dict[str, tuple[Any, Any, Any]]] = {}
 
     def getString(self, vr: Sequence[int], nValues: int | None = None) -> list[bytes | None]:  # noqa: N802
-        """As they are, which may be none, or no text: fmpy's decodes them."""
+        """The raw bytes, which may be missing or no valid text; fmpy's method decodes them."""
         count = len(vr) if nValues is None else nValues
         values = (ctypes.c_char_p * count)()
         self.fmi3GetString(self.component, (ctypes.c_uint * len(vr))(*vr), len(vr), values, count)
@@ -64,28 +64,28 @@ class FMU3Slave(_Known, fmi3.FMU3Slave):  # type: ignore[misc]
 
 
 def binary_folders(path: Path) -> list[str]:
-    """The folders with binaries of an FMU."""
+    """The folders of an FMU that have binaries."""
     with zipfile.ZipFile(path) as archive:
         parts = [name.split("/") for name in archive.namelist()]
     return sorted({part[1] for part in parts if part[0] == "binaries" and len(part) > 2 and part[2]})
 
 
-def folder_here(version: int, found: Sequence[str]) -> str:
-    """Of the folders with binaries that an FMU has, the one for this machine; raises `QuadcosimError` for none."""
+def folder_here(version: int, folders: Sequence[str]) -> str:
+    """The one for this machine among the folders that have binaries; raises `QuadcosimError` if there is none."""
     for folder in FOLDERS[version]:
-        if folder in found:
+        if folder in folders:
             return folder
-    raise QuadcosimError(f"has no binary for {' or '.join(FOLDERS[version])}, only for {', '.join(found) or 'none'}")
+    raise QuadcosimError(f"has no binary for {' or '.join(FOLDERS[version])}, only for {', '.join(folders) or 'none'}")
 
 
-def loaded(version: int, folder: Path, *, token: str, identifier: str, name: str) -> Any:
-    """The library of an FMU that is unpacked in `folder`, for an instance of that name; `token` is its GUID."""
-    known = {"guid": token, "unzipDirectory": str(folder), "modelIdentifier": identifier, "instanceName": name}
+def load_slave(version: int, folder: Path, *, token: str, identifier: str, name: str) -> Any:
+    """Load the library of an FMU that is unpacked in `folder`, for an instance `name`; `token` is its GUID."""
+    arguments = {"guid": token, "unzipDirectory": str(folder), "modelIdentifier": identifier, "instanceName": name}
     if version == 3:
-        return FMU3Slave(**known)
+        return FMU3Slave(**arguments)
     here = folder_here(version, sorted(each.name for each in (folder / "binaries").iterdir()))
     library = folder / "binaries" / here / f"{identifier}{fmpy.sharedLibraryExtension}"
-    return FMU2Slave(**known, libraryPath=str(library))
+    return FMU2Slave(**arguments, libraryPath=str(library))
 
 
 def instantiate(slave: Any, messages: list[Message]) -> None:

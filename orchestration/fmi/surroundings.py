@@ -1,4 +1,4 @@
-"""What an FMU shares with all that its process runs, and may leave changed: how numbers are rounded, and the folder."""
+"""Global state of the process that an FMU may change: the rounding mode, and the current folder."""
 
 import ctypes
 import os
@@ -8,11 +8,11 @@ from contextlib import suppress
 ROUNDING, FOLDER = "how numbers are rounded", "the current folder"
 _ONE, _LITTLE, _SMALLEST, _HALF, _TINY = 1.0, 2.0**-60, 2.0**-1022, 0.5, 2.0**-1074
 _ENVIRONMENT = 512
-"""[byte] that the C library keeps of how it computes, at most"""
+"""[byte] an upper bound on the size of the floating-point environment"""
 
 
 class Surroundings:
-    """As they are when this is made; whatever calls an FMU has them put back."""
+    """The global state when this object is created; callers of FMUs restore it."""
 
     def __init__(self) -> None:
         self._mode, self._folder = _mode(), current_folder()
@@ -21,24 +21,24 @@ class Surroundings:
         if self._library is not None:
             self._library.fegetenv(self._environment)
 
-    def put_back_rounding(self) -> bool:
-        """Whether numbers were rounded otherwise, or the smallest ones taken for zero; as before from now on."""
+    def restore_rounding(self) -> bool:
+        """Restore the rounding mode and the handling of subnormal numbers; returns whether they had changed."""
         if _mode() == self._mode or self._library is None:
             return False
         self._library.fesetenv(self._environment)
         return True
 
-    def put_back_folder(self) -> bool:
-        """Whether another folder was the current one; it is the one from before again."""
+    def restore_folder(self) -> bool:
+        """Restore the current folder; returns whether it had changed."""
         if self._folder is None or current_folder() == self._folder:
             return False
-        with suppress(OSError):  # it is no longer there
+        with suppress(OSError):  # it no longer exists
             os.chdir(self._folder)
         return True
 
 
 def current_folder() -> str | None:
-    """That of this process; None if it is no longer there."""
+    """That of this process; None if it no longer exists."""
     try:
         return os.getcwd()
     except OSError:
@@ -52,7 +52,7 @@ def sentence(names: Sequence[str], what: str) -> str:
 
 
 def _mode() -> tuple[bool, ...]:
-    """How this thread computes, as far as it can be seen in its results."""
+    """The rounding mode of this thread, and whether it flushes subnormal numbers, as observed in results."""
     return (
         _ONE + _LITTLE != _ONE,
         _ONE - _LITTLE != _ONE,
@@ -63,8 +63,8 @@ def _mode() -> tuple[bool, ...]:
 
 
 def _mathematics() -> ctypes.CDLL | None:
-    """The library of C that knows how numbers are rounded; None where it is not found."""
-    for name in (None, "libm.so.6"):  # Python itself has it, as a rule
+    """The C library with the functions of the floating-point environment; None if it is not found."""
+    for name in (None, "libm.so.6"):  # usually Python itself is linked to it
         with suppress(OSError, AttributeError, TypeError):
             library = ctypes.CDLL(name)
             assert library.fegetenv

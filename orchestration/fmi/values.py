@@ -1,4 +1,4 @@
-"""Values of variables: what each type takes, and what of it can be compared."""
+"""Values of variables: their conversion to the types of FMI, and their comparison."""
 
 import math
 from collections.abc import Mapping
@@ -12,24 +12,24 @@ from orchestration.fmi.model import Variable
 Value: TypeAlias = float | bool | str
 
 _ROUNDING = {"Float32": 1e-6}
-"""Relative differences that are none, by type; 1e-12 for others: an FMU may keep a value in other units"""
+"""Relative differences that count as none, by type; 1e-12 for others: an FMU may store a value in other units"""
 
 INTEGERS: Mapping[str, type[np.signedinteger[Any] | np.unsignedinteger[Any]]] = {
     "Integer": np.int32, "Enumeration": np.int32, "Int8": np.int8, "UInt8": np.uint8, "Int16": np.int16,
     "UInt16": np.uint16, "Int32": np.int32, "UInt32": np.uint32, "Int64": np.int64, "UInt64": np.uint64,
 }  # fmt: skip
-"""What holds the whole numbers of a type"""
+"""The numpy type of each integer type"""
 
 
-def taken(variable: Variable, value: object, place: str) -> Value:
-    """`value` as the variable takes it, an item of an enumeration as its number.
+def convert_value(variable: Variable, value: object, place: str) -> Value:
+    """Convert `value` to the type of the variable, an item of an enumeration to its number.
 
-    Raises `UsageError` that names the place for a value that it cannot take; a constant takes its own.
+    Raises `UsageError` that names the place for an invalid value; a constant accepts its own value only.
     """
-    found = _of_its_type(variable, value, place)
-    if variable.is_constant and number_of(variable, found) != number_of(variable, variable.start):
+    converted = _of_its_type(variable, value, place)
+    if variable.is_constant and number_of(variable, converted) != number_of(variable, variable.start):
         raise UsageError(f"{place} = {shown(value)}: expected {variable.start}, which is fixed in this FMU")
-    return found
+    return converted
 
 
 def _of_its_type(variable: Variable, value: object, place: str) -> Value:
@@ -38,7 +38,7 @@ def _of_its_type(variable: Variable, value: object, place: str) -> Value:
     if variable.kind == "String":
         return _of_kind(value, str, place, "a text")
     if variable.kind in ("Integer", "Enumeration") and isinstance(value, float) and value.is_integer():
-        value = int(value)  # as ranges and the command line have it
+        value = int(value)  # as in ranges and on the command line
     if variable.choices:
         return _chosen(variable.choices, value, place)
     if variable.kind in ("Integer", "Enumeration"):
@@ -52,17 +52,17 @@ def _of_its_type(variable: Variable, value: object, place: str) -> Value:
 
 
 def number_of(variable: Variable, value: object) -> float:
-    """A value that the variable takes, or its start as the description writes it, as it is recorded."""
+    """A value of the variable, or its start value as the description has it, as the number that is recorded."""
     if isinstance(value, str):
         value = {"true": 1, "false": 0, **variable.choices}.get(value, value)
     return float(value)  # type: ignore[arg-type]
 
 
-def same(variable: Variable, given: Value, read: Value) -> bool:
-    """Whether what is read is what was given, as far as the type can hold it."""
-    if isinstance(given, str) or isinstance(read, str):
-        return given == read
-    return math.isclose(given, read, rel_tol=_ROUNDING.get(variable.type, 1e-12))
+def same(variable: Variable, value: Value, read: Value) -> bool:
+    """Whether the value that is read is the one that was set, up to the precision of the type."""
+    if isinstance(value, str) or isinstance(read, str):
+        return value == read
+    return math.isclose(value, read, rel_tol=_ROUNDING.get(variable.type, 1e-12))
 
 
 def _chosen(choices: Mapping[str, int], value: object, place: str) -> int:

@@ -10,7 +10,7 @@ import numpy as np
 from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.basics.simulator import Floats, Transfer
 from orchestration.fmi.fmi2 import Fmi2Instance
-from orchestration.fmi.foreign import computed
+from orchestration.fmi.foreign import isolated_call
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.instances import open_instance
 from orchestration.interop.assignment import Loop, loop_of
@@ -124,7 +124,7 @@ class Flights:
         if key not in self._own:
             system = _in_order(_by_own_clocks(self._system, self._clocks), order, self.step)
 
-            found = computed(self._fmus.values(), _rows, system, self.loop, start)
+            found = isolated_call(self._fmus.values(), _rows, system, self.loop, start)
             if isinstance(found, str):
                 raise QuadcosimError(f"in this project's master, {order}: {found}; nothing to compare")
             self._own[key] = found

@@ -13,7 +13,7 @@ from orchestration.basics.simulator import Floats
 from orchestration.building.inputs import files_of
 from orchestration.figures.palette import BLUE, GREY, ORANGE, RED
 from orchestration.figures.style import SCREEN, Style
-from orchestration.fmi.foreign import LostError, computed
+from orchestration.fmi.foreign import LostError, isolated_call
 from orchestration.limits.evaluation import RELIABILITY, Evaluation
 from orchestration.limits.found import Found
 from orchestration.results import display_names as labels
@@ -158,7 +158,7 @@ def draw_spectral_radius(request: Request, found: Found, folder: Path, style: St
     ends = [limit for limit in (found.local_limit, found.large_signal_limit) if limit is not None]
     last = 1.3 * max(ends, default=0.1)
     values = np.array([0.001 + i / 199.0 * (last - 0.001) for i in range(200)])
-    radii = computed(files_of(system_of(request)).fmus.values(), _radii, known, request, found.of, values)
+    radii = isolated_call(files_of(system_of(request)).fmus.values(), _radii, known, request, found.of, values)
     return (
         []
         if radii is None

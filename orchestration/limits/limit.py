@@ -14,7 +14,7 @@ from orchestration.building.inputs import Files, files_of
 from orchestration.engines.engine import Engine
 from orchestration.engines.wiring import checked
 from orchestration.exact.mean_square import MeanSquareLimit, mean_square_limit
-from orchestration.fmi.foreign import LostError, computed
+from orchestration.fmi.foreign import LostError, isolated_call
 from orchestration.limits.evaluation import RELIABILITY, Evaluator, said
 from orchestration.limits.found import Continuous, Found
 from orchestration.requests.ranges import Varied, default_quantity, search_range
@@ -172,7 +172,7 @@ def _checked(request: Request, of: str, confidence: float) -> tuple[Varied, File
 
 def _local(varied: Varied, span: Range, files: Files) -> LocalLimit:
     try:
-        return computed(files.fmus.values(), local_limits, varied, span)
+        return isolated_call(files.fmus.values(), local_limits, varied, span)
     except LostError as error:
         return LocalLimit(reason=f"no local limit: {error}")
 
@@ -182,7 +182,7 @@ def _mean_square(varied: Varied, span: Range, files: Files, local: LocalLimit) -
     if local.limit is not None and not has_random_timing(varied.at(span.last)):
         return MeanSquareLimit(limit=local.limit)
     try:
-        return computed(files.fmus.values(), mean_square_limit, varied, span, files.models_of(varied.system))
+        return isolated_call(files.fmus.values(), mean_square_limit, varied, span, files.models_of(varied.system))
     except LostError as error:
         return MeanSquareLimit(reason=f"no mean-square limit: {error}")
 

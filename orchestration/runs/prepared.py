@@ -97,7 +97,7 @@ class PreparedRun:
     def restore_folder(self) -> None:
         """Restore the current folder of before the run if an FMU has changed it while it was stepped."""
         foreign = [one for one in self.instances.values() if isinstance(one, NativeInstance) and one.guard is not None]
-        if foreign and foreign[0].guard is not None and foreign[0].guard.put_back_folder():
+        if foreign and foreign[0].guard is not None and foreign[0].guard.restore_folder():
             warning = sentence([f"{one.name} ({one.model.name})" for one in foreign], FOLDER)
             if warning not in foreign[0].warnings:
                 foreign[0].warnings.append(warning)

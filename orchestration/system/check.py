@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from orchestration.basics.errors import UsageError, expected_name
 from orchestration.expressions.syntax import Name, names, parse, parts
 from orchestration.fmi.model import NUMERIC, Model, Variable
-from orchestration.fmi.values import taken
+from orchestration.fmi.values import convert_value
 from orchestration.system.component import Parameter
 from orchestration.system.connection import Connection
 from orchestration.system.conversion import BECOMES, OtherQuantity, conversion
@@ -175,7 +175,7 @@ def expect_parameter(place: str, model: Model, name: str, value: Parameter, *, i
     if not (variable.is_settable or variable.is_constant) or is_fed:
         expected = "a parameter or an input that nothing is connected to"
         raise UsageError(f"{place}: is {'connected' if is_fed else _article(variable)}; expected {expected}")
-    if isinstance(taken(variable, value, place), float) and not is_finite(value):
+    if isinstance(convert_value(variable, value, place), float) and not is_finite(value):
         raise UsageError(f"{place} = {value}: expected a finite number")
     low, high = variable.minimum, variable.maximum
     outside = (low is not None and value < low) or (high is not None and value > high) if is_finite(value) else False

@@ -10,7 +10,7 @@ from orchestration.basics.records import record
 from orchestration.basics.simulator import Floats
 from orchestration.exact.expect import Expected, expected_of
 from orchestration.exact.loops import Loops
-from orchestration.fmi.foreign import computed
+from orchestration.fmi.foreign import isolated_call
 from orchestration.stability.known_loops import rested
 from orchestration.system.model import System
 from orchestration.system.request import errors_in_own_terms
@@ -63,7 +63,7 @@ def search_exactly(tuning: ExactTuning, period: float, seed: int, progress: Call
     def expected(points: Sequence[Sequence[float]]) -> list[Expected]:
         systems = [tuning.system(period, tuning.values(shares)) for shares in points]
         with errors_in_own_terms(tuning.base):
-            return computed(files.fmus.values(), _expected, systems, loops)
+            return isolated_call(files.fmus.values(), _expected, systems, loops)
 
     def costs(points: Sequence[Floats]) -> list[float]:
         return [_cost(each) for each in expected([point.tolist() for point in points])]

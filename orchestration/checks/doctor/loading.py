@@ -102,9 +102,9 @@ def _load(fmu: Fmu, folder: Path) -> None:
     """With what its description must say and no more: it may be odd in what loading does not need."""
     import fmpy
 
-    from orchestration.fmi.messages import Message, words
+    from orchestration.fmi.messages import Message, failure_text
     from orchestration.fmi.pythonfmu import expect_readable_place
-    from orchestration.fmi.slaves import folder_here, instantiate, loaded
+    from orchestration.fmi.slaves import folder_here, instantiate, load_slave
 
     folder_here(fmu.version, [part.platform for part in fmu.platforms])
     fmpy.extract(str(fmu.path), str(folder))
@@ -112,13 +112,13 @@ def _load(fmu: Fmu, folder: Path) -> None:
     messages: list[Message] = []
     call = "loading"
     try:
-        slave = loaded(fmu.version, folder, token=fmu.guid, identifier=fmu.model_identifier, name="doctor")
+        slave = load_slave(fmu.version, folder, token=fmu.guid, identifier=fmu.model_identifier, name="doctor")
         call = "fmi2Instantiate" if fmu.version == 2 else "fmi3InstantiateCoSimulation"
         instantiate(slave, messages)
         for call, make in _initialisation(slave, fmu):  # noqa: B007 - the last one is named where it fails
             make()
     except Exception as error:
-        raise QuadcosimError(f"{call}: {words(messages, str(error))[0]}") from error
+        raise QuadcosimError(f"{call}: {failure_text(messages, str(error))[0]}") from error
     slave.freeInstance()
 
 

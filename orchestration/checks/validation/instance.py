@@ -13,8 +13,8 @@ from fmpy.fmi1 import FMICallException
 from orchestration.basics.errors import QuadcosimError
 from orchestration.checks.validation.declared import Variable
 from orchestration.checks.validation.fmu import Fmu
-from orchestration.fmi.messages import Message, words
-from orchestration.fmi.slaves import instantiate, loaded
+from orchestration.fmi.messages import Message, failure_text
+from orchestration.fmi.slaves import instantiate, load_slave
 
 Value: TypeAlias = float | int | bool | str | bytes
 Values: TypeAlias = Mapping[str, Value]
@@ -42,10 +42,10 @@ class Instance:
         self._beat = beat
         beat()
         try:
-            self._slave = loaded(fmu.version, folder, token=fmu.guid, identifier=fmu.model_identifier, name=name)
+            self._slave = load_slave(fmu.version, folder, token=fmu.guid, identifier=fmu.model_identifier, name=name)
             instantiate(self._slave, self.messages)
         except Exception as error:
-            raise RefusedError(f"{fmu.standard.instantiates}: {words(self.messages, str(error))[0]}") from error
+            raise RefusedError(f"{fmu.standard.instantiates}: {failure_text(self.messages, str(error))[0]}") from error
         beat()
         self._failed = False
 
@@ -171,7 +171,7 @@ class Instance:
 
     def _refusal(self, function: str, otherwise: str) -> RefusedError:
         self._failed = True
-        return RefusedError(f"{function}: {words(self.messages, otherwise)[0]}")
+        return RefusedError(f"{function}: {failure_text(self.messages, otherwise)[0]}")
 
 
 class Instance2(Instance):

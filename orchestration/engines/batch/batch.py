@@ -22,7 +22,7 @@ from orchestration.engines.wiring import source_values
 from orchestration.expressions.recorded import STOP_TIME
 from orchestration.expressions.syntax import Call, names_job_measure
 from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
-from orchestration.fmi.values import number_of, taken
+from orchestration.fmi.values import convert_value, number_of
 from orchestration.schedule.schedule_cache import RunSchedule, ScheduleCache, Timing
 from orchestration.schedule.spans import Instants, Span
 from orchestration.schedule.streams import NOISE, Streams
@@ -344,7 +344,7 @@ class Batch:
                 component = system.components[name]
                 for parameter, value in component.parameters.items():
                     variable = variables[parameter]
-                    memory[variable.reference, lane] = number_of(variable, taken(variable, value, parameter))
+                    memory[variable.reference, lane] = number_of(variable, convert_value(variable, value, parameter))
                 sampling = component.sampling
                 if sampling is not None:
                     self._ratios[index][0, lane] = sampling.clock_ratio

@@ -26,7 +26,8 @@ from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.instances import open_here
 from orchestration.fmi.model import read_model
-from orchestration.fmi.native import NativeInstance, bounds_of
+from orchestration.fmi.native import NativeInstance
+from orchestration.fmi.transfers import bounds_of
 from orchestration.recording.recording import InMemory
 from orchestration.runs import simulation
 from orchestration.runs.outcome import RunInterrupted

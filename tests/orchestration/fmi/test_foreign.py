@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from orchestration.basics.errors import QuadcosimError, UsageError
-from orchestration.fmi.foreign import LostError, computed
+from orchestration.fmi.foreign import LostError, isolated_call
 from orchestration.limits.limit import find
 from orchestration.system.component import Component
 from orchestration.system.connection import Connection
@@ -39,20 +39,20 @@ def unnameable() -> object:
 
 def test_it_is_computed_here_by_fmus_of_this_kit_alone(built: dict[str, Path], tmp_path: Path) -> None:
     ours, other = next(iter(built.values())), small(tmp_path)
-    assert computed([ours], os.getpid) == os.getpid()
-    assert computed([ours, other], os.getpid) != os.getpid()
+    assert isolated_call([ours], os.getpid) == os.getpid()
+    assert isolated_call([ours, other], os.getpid) != os.getpid()
 
 
 def test_what_it_raises_and_how_its_process_ends_is_told(tmp_path: Path) -> None:
     other = small(tmp_path)
     with pytest.raises(UsageError, match=r"^not so$"):
-        computed([other], refused)
+        isolated_call([other], refused)
     with pytest.raises(LostError, match=r"^the process of the FMUs ended by SIGABRT$"):
-        computed([other], os.abort)
+        isolated_call([other], os.abort)
     with pytest.raises(QuadcosimError, match=r"^PickyError: x = 1; it cannot be passed on by its process: "):
-        computed([other], picky)
+        isolated_call([other], picky)
     with pytest.raises(QuadcosimError, match=r"^the result of unnameable; it cannot be passed on by its process: "):
-        computed([other], unnameable)
+        isolated_call([other], unnameable)
 
 
 def test_a_limit_is_measured_though_an_fmu_ends_the_process_of_the_local_one(tmp_path: Path) -> None:
