@@ -23,7 +23,7 @@ from orchestration.engines.batch.batches import Batches
 from orchestration.engines.batch.kernels import preferred_lanes
 from orchestration.engines.batch.shape import Shape
 from orchestration.engines.structures import address
-from orchestration.engines.wiring import checked
+from orchestration.engines.wiring import check_against_fmus
 from orchestration.fmi.model import read_model
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
@@ -50,7 +50,7 @@ def systems(period: float, stop_time: float) -> tuple[Shape, list[System]]:
     """The paper's flight from as many places as there are lanes."""
     one = fmus.native_twins(Scenario(timing=Timing(period=period), stop_time=stop_time).as_system())
     models = {name: read_model(path) for name, path in fmus.of_components(one.fmus).items()}
-    one = checked(one, models).system
+    one = check_against_fmus(one, models).system
     places = np.linspace(0.0, 1.0, preferred_lanes()).tolist()
     return Shape(system=one, models=models, lanes=preferred_lanes()), [changed(one, {X: place}) for place in places]
 

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from orchestration.basics.simulator import Floats
-from orchestration.engines.sources import by_name, gusts
+from orchestration.engines.sources import gusts, motion_values
 from orchestration.figures.palette import BLACK, BLUE, GREEN, GREY, ORANGE, RED
 from orchestration.figures.style import Style
 from orchestration.signals.dryden import DRAWS, Dryden
@@ -29,7 +29,9 @@ def references(style: Style) -> Figure:
     left, right = halves
     above = left.add_subplot(aspect="equal")
     for name, color, line in (("circle", BLUE, "-"), ("lemniscate", RED, "-"), ("paper", GREEN, "--")):
-        motion = by_name(make_signal(name, {"radius": 2.0} if name != "paper" else {}))(np.linspace(0.0, 43.0, 1500))
+        motion = motion_values(make_signal(name, {"radius": 2.0} if name != "paper" else {}))(
+            np.linspace(0.0, 43.0, 1500)
+        )
         above.plot(motion[:, 1], motion[:, 0], line, color=color, label=name)
     above.plot(0.0, 0.0, "o", color=BLACK, markersize=4, label="start")
     above.set(xlabel="east [m]", ylabel="north [m]", ylim=(-2.4, 4.2))

@@ -98,7 +98,7 @@ def _said_by_fmus(system: "System") -> tuple[dict[str, str], str]:
     """
     from orchestration.basics.errors import QuadcosimError
     from orchestration.building import fmus
-    from orchestration.engines.wiring import checked
+    from orchestration.engines.wiring import check_against_fmus
     from orchestration.fmi.model import read_model
 
     try:
@@ -106,7 +106,7 @@ def _said_by_fmus(system: "System") -> tuple[dict[str, str], str]:
         models = {name: read_model(path) for name, path in paths.items() if path is not None}
         if models.keys() != paths.keys():
             return {}, ""
-        found = checked(system, models)
+        found = check_against_fmus(system, models)
     except QuadcosimError:
         return {}, ""
     return found.units, found.follows

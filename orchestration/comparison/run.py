@@ -15,7 +15,7 @@ from orchestration.comparison.bandwidth import Bandwidths, bandwidths
 from orchestration.comparison.cells import CellSummary, cell_summaries, frame_of
 from orchestration.comparison.design import Comparison
 from orchestration.comparison.outcome import Outcome, outcome_of, write
-from orchestration.engines.wiring import checked
+from orchestration.engines.wiring import check_against_fmus
 from orchestration.results import html
 from orchestration.runs.run_directory import keep_run
 from orchestration.runs.simulation import run as fly
@@ -178,7 +178,7 @@ def _prepared(
         with errors_in_own_terms(comparison.base):
             systems = [study.system(index, files.starts_of(study.origin)) for index in indices]
             for system in systems:
-                checked(system, files.models_of(system))
+                check_against_fmus(system, files.models_of(system))
         return systems[0], files
 
     how = choose_execution(engine, comparison.native, first)

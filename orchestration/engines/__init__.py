@@ -1,1 +1,1 @@
-"""What steps components through the instants of a run: the master, in Python and in C, and runs as lanes."""
+"""Engines step components through the instants of a run: the master in Python and in C, and runs in SIMD lanes."""

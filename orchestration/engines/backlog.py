@@ -1,47 +1,47 @@
-"""What a run has recorded and not handed over: rows and events, until a chunk of them is whole."""
+"""Recorded rows and events of a run that have not been handed over, until a chunk of them is complete."""
 
 from typing import Protocol
 
 import numpy as np
 
 from orchestration.basics.simulator import Floats, Integers
-from orchestration.engines.at_work import AtWork
+from orchestration.engines.running_system import RunningSystem
 from orchestration.recording.recording import BYTES, EVENTS, ROWS, Chunk, Recorder
 from orchestration.schedule.run_events import RunEvents
 from orchestration.system.times import NANOSECONDS
 
 
 class Tables(Protocol):
-    """Where rows and events are until they are handed over."""
+    """Storage of rows and events until they are handed over."""
 
     def is_empty(self) -> bool:
-        """Whether nothing is."""
+        """Whether there are neither rows nor events."""
 
     def rows(self) -> Floats:
-        """Of the board, shape (n, number of its columns)."""
+        """Rows of the board, shape (n, number of its columns)."""
 
     def rows_with_sources(self) -> Floats:
-        """The same with what sources say, shape (n, number of `AtWork.columns`)."""
+        """The same with the values of sources, shape (n, number of `RunningSystem.columns`)."""
 
     def events(self) -> Integers:
-        """As the table of `Events`."""
+        """A table as that of `Events`."""
 
-    def keep_rows(self, rows: bytes) -> None:
-        """Have these rows of the board instead."""
+    def replace_rows(self, rows: bytes) -> None:
+        """Store these rows of the board instead."""
 
-    def keep_events(self, events: Integers) -> None:
-        """Have these events instead."""
+    def replace_events(self, events: Integers) -> None:
+        """Store these events instead."""
 
 
-class Listed:
-    """Tables that grow with what Python notes."""
+class ListTables:
+    """Tables that the loop in Python appends to."""
 
-    def __init__(self, work: AtWork) -> None:
+    def __init__(self, running: RunningSystem) -> None:
         self.content = bytearray()
         """rows of the board"""
         self.noted: list[int] = []
-        """a table of `Events`, row after row: no object an event, for the collector to see"""
-        self._work = work
+        """a table of `Events`, row after row: numbers, so that the garbage collector has no objects to track"""
+        self._running = running
 
     def is_empty(self) -> bool:
         """As `Tables`."""
@@ -49,96 +49,96 @@ class Listed:
 
     def rows(self) -> Floats:
         """As `Tables`."""
-        return np.frombuffer(bytes(self.content), dtype=np.float64).reshape(-1, len(self._work.board.columns))
+        return np.frombuffer(bytes(self.content), dtype=np.float64).reshape(-1, len(self._running.board.columns))
 
     def rows_with_sources(self) -> Floats:
         """As `Tables`."""
         rows = self.rows()
-        return np.column_stack([rows, *(values.over(rows[:, 0]) for _, values in self._work.sources)])
+        return np.column_stack([rows, *(values.over(rows[:, 0]) for _, values in self._running.sources)])
 
     def events(self) -> Integers:
         """As `Tables`."""
         return np.fromiter(self.noted, np.int64, len(self.noted)).reshape(-1, 4)
 
-    def keep_rows(self, rows: bytes) -> None:
+    def replace_rows(self, rows: bytes) -> None:
         """As `Tables`."""
         self.content[:] = rows
 
-    def keep_events(self, events: Integers) -> None:
+    def replace_events(self, events: Integers) -> None:
         """As `Tables`."""
         self.noted[:] = events.ravel().tolist()
 
 
 class Backlog:
-    """What is in some tables, on its way to a recorder."""
+    """The contents of some tables, on their way to a recorder."""
 
-    def __init__(self, work: AtWork, tables: Tables, recorder: Recorder) -> None:
-        self._work, self.tables, self._recorder = work, tables, recorder
-        self._run_events = RunEvents(work.system)
+    def __init__(self, running: RunningSystem, tables: Tables, recorder: Recorder) -> None:
+        self._running, self.tables, self._recorder = running, tables, recorder
+        self._run_events = RunEvents(running.system)
         self.handed_over: int | None = None
-        """up to when [ns]; None: nothing has been"""
-        recorder.begin(work.columns)
+        """up to this time [ns]; None: nothing has been handed over"""
+        recorder.begin(running.columns)
 
     def pending(self) -> Chunk:
-        """What was recorded since the last chunk was handed over; messages that go out later are left out."""
+        """What was recorded since the last chunk was handed over, without messages that are sent later."""
         events, _ = self._past_and_later()
         return Chunk(
-            columns=self._work.columns,
+            columns=self._running.columns,
             rows=self.tables.rows_with_sources(),
-            events=self._run_events.with_messages(events, self._work.now),
+            events=self._run_events.with_messages(events, self._running.now),
         )
 
     def hand_over(self) -> None:
-        """Give the recorder what there is."""
+        """Hand the pending chunk over to the recorder."""
         self._recorder.take(self.pending())
-        self.tables.keep_events(self._past_and_later()[1])
-        self.tables.keep_rows(b"")
-        self.handed_over = self._work.now
-        self._run_events.hand_over(self._work.now)
+        self.tables.replace_events(self._past_and_later()[1])
+        self.tables.replace_rows(b"")
+        self.handed_over = self._running.now
+        self._run_events.hand_over(self._running.now)
 
     def hand_over_rest(self) -> None:
-        """At the end of the run: a recorder hears of at least one chunk."""
+        """Hand over the rest at the end of the run; a recorder receives at least one chunk."""
         if self.handed_over is None or not self.tables.is_empty() or len(self.pending().events):
             self.hand_over()
 
     def drop_later_events(self) -> None:
-        """In Jacobi order a message is written down before it goes out; after the end none does."""
-        self.tables.keep_events(self._past_and_later()[0])
+        """Drop the events of messages that would be sent after the end: in Jacobi order they are noted before."""
+        self.tables.replace_events(self._past_and_later()[0])
 
-    def expect_a_row(self) -> None:
-        """A run that has ended before its first row has one of where it was."""
+    def ensure_row(self) -> None:
+        """Add a row with the current values for a run that ended before its first row."""
         if not len(self.tables.rows()) and self.handed_over is None:
-            self._work.board.row[0] = self._work.now / NANOSECONDS
-            self.tables.keep_rows(self._work.board.row.tobytes())
+            self._running.board.row[0] = self._running.now / NANOSECONDS
+            self.tables.replace_rows(self._running.board.row.tobytes())
 
     def rows(self) -> Floats:
-        """Those of the board that are not handed over."""
+        """The rows of the board that are not handed over."""
         return self.tables.rows()
 
     def events(self) -> Integers:
-        """All that are not handed over."""
+        """The events that are not handed over."""
         return self.tables.events()
 
     def restore(self, rows: bytes, events: Integers, *, handed_over: int | None) -> None:
-        """Continue with what a paused run had."""
-        self.tables.keep_rows(rows)
-        self.tables.keep_events(events)
+        """Continue with the rows and events of a paused run."""
+        self.tables.replace_rows(rows)
+        self.tables.replace_events(events)
         self.handed_over = handed_over
         if handed_over is not None:
             self._run_events.hand_over(handed_over)
 
     def _past_and_later(self) -> tuple[Integers, Integers]:
-        """The events up to now, and those of messages that go out later."""
+        """The events up to now, and those of messages that are sent later."""
         table = self.tables.events()
-        past = table[:, 0] <= self._work.now
+        past = table[:, 0] <= self._running.now
         return (table, table[:0]) if past.all() else (table[past], table[~past])
 
 
-def rows_of_a_chunk(work: AtWork) -> int:
-    """How many rows make a chunk whole: `ROWS` of them, or those that come to `BYTES`."""
-    return min(ROWS, max(1, BYTES // work.board.row.nbytes))
+def rows_of_a_chunk(running: RunningSystem) -> int:
+    """The number of rows of a complete chunk: `ROWS`, or as many as have `BYTES`."""
+    return min(ROWS, max(1, BYTES // running.board.row.nbytes))
 
 
 def events_of_a_chunk() -> int:
-    """How many events make a chunk whole."""
+    """The number of events of a complete chunk."""
     return EVENTS

@@ -11,7 +11,7 @@ from orchestration.system.variable_names import component_of, variable_of
 
 
 class Board:
-    """The current row, and where everything in it is.
+    """The current row, and the place of each column in it.
 
     Columns: `time`, then by component, in the order of the file, its connected inputs (of one in continuous
     time, as they are applied), its connected outputs, and what else is recorded of it.
@@ -19,9 +19,9 @@ class Board:
 
     def __init__(self, system: System, recorded: Mapping[str, Sequence[str]]) -> None:
         self.outputs: dict[str, tuple[str, ...]] = {}
-        """what is read of each component"""
+        """the outputs that are read of each component"""
         self.connected: dict[str, int] = {}
-        """how many of its outputs, the first, are connected"""
+        """the number of its outputs that are connected; these are the first"""
         columns = ["time"]
         for name, component in system.components.items():
             inputs = [end for x in system.connections for end in x.end if component_of(end) == name]
@@ -37,13 +37,13 @@ class Board:
         self.place = {column: i for i, column in enumerate(columns)}
 
     def of(self, columns: Sequence[str]) -> Floats:
-        """The part of the row that holds these columns, which are beside each other; a view."""
+        """A view of the part of the row with these columns, which are adjacent."""
         first = self.place[columns[0]] if columns else 0
         return self.row[first : first + len(columns)]
 
     def places(self, columns: Sequence[str]) -> slice | npt.NDArray[np.intp]:
-        """Where these columns are; a slice if they are beside each other."""
-        found = [self.place[column] for column in columns]
-        if found == list(range(found[0], found[0] + len(found))):
-            return slice(found[0], found[0] + len(found))
-        return np.array(found)
+        """The indices of these columns; a slice if they are adjacent."""
+        places = [self.place[column] for column in columns]
+        if places == list(range(places[0], places[0] + len(places))):
+            return slice(places[0], places[0] + len(places))
+        return np.array(places)

@@ -1,4 +1,4 @@
-"""A connection at work: what of the sender's values reaches the receiver, with noise, rounding, and a hold."""
+"""A connection during a run: passes values from sender to receiver, with noise, quantisation, and a hold."""
 
 from collections.abc import Mapping
 from typing import Any, TypeAlias
@@ -26,7 +26,7 @@ class Channel:
         noise: np.random.Generator,
     ) -> None:
         self.received = received
-        """what the receiver has been told, in place"""
+        """the values that the receiver has, in place"""
         self._row, self._places = row, places
         self.write = write
         """sets the receiver's inputs"""
@@ -45,24 +45,24 @@ class Channel:
         self.in_flight: dict[int, Floats] = {}
         """messages on their way"""
         self.applied: list[tuple[int, Floats]] = []
-        """the last two, with their times [ns], of a first-order hold"""
-        self._told, self._sent = received.data, None
+        """the last two values of a first-order hold, with their times [ns]"""
+        self._received, self._sent = received.data, None
         if isinstance(places, slice) and self._plain and not (self._noisy or self._rounds or self._extrapolates):
-            self._sent = row[places].data  # a view: what is sent at any time, and arrives as it is
+            self._sent = row[places].data  # a view of what is sent, which arrives unchanged
 
     def pass_on(self) -> None:
-        """The sender's values as they are reach the receiver: at initialisation, and over a plain wire."""
+        """Pass the current values of the sender on to the receiver: at initialisation, and over a plain wire."""
         self.received[:] = self._row[self._places]
         if not self._plain:
             self._convert(self.received)
         self.write()
 
     def start(self) -> None:
-        """What initialisation exchanged is the first that was applied."""
+        """Take the value of initialisation as the first that was applied."""
         self.applied = [(0, self.received.copy())]
 
     def take(self) -> Floats:
-        """The sender's values as a message carries them."""
+        """A message with the current values of the sender."""
         value: Floats = self._row[self._places].copy()
         if self._noisy:
             self.skip()
@@ -77,17 +77,17 @@ class Channel:
         return value
 
     def hand_over(self, time: int, *, lost: bool) -> None:
-        """A message that arrives, unless it is lost, at the time at which it is sent [ns]."""
+        """Send a message that, unless it is lost, arrives at the time at which it is sent [ns]."""
         if lost:
             self.skip()
         elif self._sent is not None:
-            self._told[:] = self._sent
+            self._received[:] = self._sent
             self.write()
         else:
             self.apply(self.take(), time)
 
     def skip(self, messages: int = 1) -> None:
-        """Noise is drawn for each variable of each message, lost or not, so that nothing shifts another's numbers."""
+        """Draw the noise of lost messages too, so that losses do not shift the random numbers of other messages."""
         if self._noisy:
             for _ in range(messages):
                 self.stream.standard_normal(out=self._noise)
@@ -100,11 +100,11 @@ class Channel:
             self.in_flight[k] = self.take()
 
     def deliver(self, k: int, time: int) -> None:
-        """Message `k` arrives at `time` [ns]."""
+        """Deliver message `k` at `time` [ns]."""
         self.apply(self.in_flight.pop(k), time)
 
     def apply(self, value: Floats, time: int) -> None:
-        """Set the receiver's inputs; of several messages at one time, the last one stays."""
+        """Set the receiver's inputs; of several messages at one time the last one counts."""
         if self._extrapolates:
             before = [past for past in self.applied if past[0] < time]
             self.applied = [*before[-1:], (time, value)]
@@ -112,7 +112,7 @@ class Channel:
         self.write()
 
     def extrapolate(self, time: int) -> None:
-        """First-order hold: the line through the last two that arrived, held over the receiver's next step."""
+        """First-order hold: the line through the last two values that arrived, held over the receiver's next step."""
         if len(self.applied) < 2:
             return
         (t0, before), (t1, last) = self.applied
@@ -123,12 +123,12 @@ class Channel:
         self.write()
 
     def held(self) -> list[Floats]:
-        """The values that what it will pass on depends on, in place: received, on their way, and of the hold."""
+        """The values that determine later ones, in place: received, in flight, and of the hold."""
         past = [value for _, value in self.applied] if self._extrapolates else []
         return [self.received, *self.in_flight.values(), *past]
 
     def state(self) -> dict[str, Any]:
-        """All that what it will pass on depends on, but for how far the noise is, in JSON types."""
+        """The state in JSON types, without that of the noise."""
         return {
             "received": self.received.tolist(),
             "in_flight": [(k, value.tolist()) for k, value in self.in_flight.items()],
@@ -147,7 +147,7 @@ class Channel:
 
 
 def of_each(connection: Connection, values: Mapping[str, float]) -> Floats:
-    """One value for each variable of a message, 0 where none is given; a vector's name stands for its components."""
+    """One value for each variable of a message, 0 by default; the name of a vector applies to all its components."""
     result = np.zeros(len(connection.start))
     for name, value in values.items():
         result[connection.places(name)] = value

@@ -1,7 +1,7 @@
-"""The loop of a run in C: the same rows, events and ends as by the one in Python to the byte, many times as fast.
+"""The loop of a run in C: the same rows, events and endings as those of the loop in Python to the byte, but faster.
 
-All that a run needs lies in arrays that C and Python share; what begins, ends, pauses and explains a run is `Master`.
-C passes through some instants at a time, so that an interruption is heard in between.
+The data of a run is in arrays that C and Python share; `Master` begins, pauses and ends a run and reports errors.
+C processes some instants at a time, so that interruptions are noticed in between.
 """
 
 import ctypes
@@ -13,13 +13,13 @@ import numpy as np
 
 from orchestration.basics.errors import QuadcosimError
 from orchestration.basics.simulator import Floats, Integers, Simulator
-from orchestration.engines.at_work import AtWork, SampledComponent, Terminated
 from orchestration.engines.backlog import Backlog
 from orchestration.engines.board import Board
 from orchestration.engines.condition import Step
 from orchestration.engines.loop import Operation, library
 from orchestration.engines.room import Room, loop_in, private
 from orchestration.engines.run_structures import RunStructures
+from orchestration.engines.running_system import RunningSystem, SampledComponent, Terminated
 from orchestration.engines.shared_tables import SharedTables
 from orchestration.engines.sources import Values
 from orchestration.engines.structures import address, structures
@@ -32,19 +32,19 @@ from orchestration.schedule.schedule import Schedule
 from orchestration.system.times import NANOSECONDS
 
 c = structures(1)
-"""What C has of one run"""
+"""The structures of one run"""
 SLICE = 0.05
-"""[s] that C may be away for, about"""
+"""[s] after which C returns, about"""
 _Look, _Stopped, _Collect = (dict(c.Loop._fields_)[name] for name in ("look", "stopped", "collect"))
 _EXACT = 2**53
-"""Up to here a float holds every whole number"""
+"""Up to here a float represents every integer"""
 
 Condition = Callable[[Board], tuple[Sequence[Step] | None, Sequence[Values]]]
-"""The program of what is watched, None if there is none, and the sources in it"""
+"""The program of the condition of divergence, None if there is none, and the sources in it"""
 
 
 def reason_unavailable(simulators: Mapping[str, Simulator], stop: int) -> str | None:
-    """Why the compiled loop cannot be had for a run up to `stop` [ns], in a line; None: it can be."""
+    """Why the compiled loop is not available for a run up to `stop` [ns], in a line; None: it is."""
     for name, simulator in simulators.items():
         if not isinstance(simulator, NativeInstance):
             return f"components.{name} is not called in this process"
@@ -60,49 +60,51 @@ def reason_unavailable(simulators: Mapping[str, Simulator], stop: int) -> str | 
 
 
 class CompiledLoop:
-    """Passes through the instants of a run for which there is no `reason_unavailable`."""
+    """Processes the instants of a run for which there is no `reason_unavailable`."""
 
     engine = "compiled"
 
-    def __init__(self, work: AtWork, recorder: Recorder, *, condition: Condition, room: Room = private) -> None:
-        self._work = work
+    def __init__(
+        self, running: RunningSystem, recorder: Recorder, *, condition: Condition, room: Room = private
+    ) -> None:
+        self._running = running
         self._pace = 4  # instants of a slice
-        self._shared: list[_OnTheirWay] = []
+        self._shared: list[_MessagesInFlight] = []
         self._run = library()
         self._failure: BaseException | None = None
-        names = work.wires.names
-        instances = cast(Mapping[str, NativeInstance], work.simulators)
+        names = running.wires.names
+        instances = cast(Mapping[str, NativeInstance], running.simulators)
         self._structures = structures = RunStructures([instances[name] for name in names])
         self._loop = loop = loop_in(room)
-        self._tables = SharedTables(work, loop, room)
-        self.backlog = Backlog(work, self._tables, recorder)
-        program, watched = condition(work.board)
+        self._tables = SharedTables(running, loop, room)
+        self.backlog = Backlog(running, self._tables, recorder)
+        program, watched = condition(running.board)
         self._watched = list(watched)
-        self._feed_table = (c.Feed * len(work.feeds))(
-            *(structures.feed(names.index(feed.component), feed) for feed in work.feeds)
+        self._feed_table = (c.Feed * len(running.feeds))(
+            *(structures.feed(names.index(feed.component), feed) for feed in running.feeds)
         )
-        self._channel_table = (c.Channel * len(work.channels))(*map(self._channel_of, range(len(work.channels))))
+        self._channel_table = (c.Channel * len(running.channels))(*map(self._channel_of, range(len(running.channels))))
         self._components = (c.Component * len(names))(*map(self._component_of, range(len(names))))
         self._reached: Integers = np.zeros(len(names), dtype=np.int64)
-        self._track = c.Track(lanes=1, stop=work.stop, now=address(self._reached))
-        begun: dict[str, Any] = {
+        self._track = c.Track(lanes=1, stop=running.stop, now=address(self._reached))
+        fields: dict[str, Any] = {
             "components": ctypes.addressof(self._components),
             "channels": ctypes.addressof(self._channel_table),
             "feeds": ctypes.addressof(self._feed_table),
-            "continuous": structures.indices(work.wires.continuous),
-            "sampled": structures.indices(work.wires.sampled),
+            "continuous": structures.indices(running.wires.continuous),
+            "sampled": structures.indices(running.wires.sampled),
             "tracks": ctypes.addressof(self._track),
             "track_count": 1,
-            "channel_count": len(work.channels),
+            "channel_count": len(running.channels),
             "alive": 1,
-            "some_by_themselves": work.some_by_themselves,
-            "settles": work.settles,
+            "some_by_themselves": running.some_by_themselves,
+            "settles": running.settles,
             "look": _Look(self._look_for_c),
             "stopped": _Stopped(self._stopped_for_c),
             "collect": _Collect(lambda index: structures.instances[index].collect_warnings()),
             "calling": -1,
         }
-        for name, value in begun.items():
+        for name, value in fields.items():
             setattr(loop, name, value)
         if program is not None:
             self._program = (Operation * len(program))(*(Operation(*step) for step in program))
@@ -110,56 +112,56 @@ class CompiledLoop:
 
     def run(self, pause_at: int | None, progress: Callable[[float], None] | None) -> bool:
         """As `PythonLoop.run`."""
-        work = self._work
-        self._loop.pause_at = work.stop if pause_at is None else pause_at
-        while (schedule := work.cursor.schedule()) is not None:
+        running = self._running
+        self._loop.pause_at = running.stop if pause_at is None else pause_at
+        while (schedule := running.cursor.schedule()) is not None:
             self._share(schedule)
             try:
-                over = self._through(schedule, progress)
+                over = self._run_schedule(schedule, progress)
             finally:
                 self._take_back()
             if over is not None:
                 return over
         return True
 
-    def _through(self, schedule: Schedule, progress: Callable[[float], None] | None) -> bool | None:
-        """Go through what is left of a schedule; whether the run is over if it stops before."""
-        work = self._work
-        while work.cursor.at < len(schedule):
+    def _run_schedule(self, schedule: Schedule, progress: Callable[[float], None] | None) -> bool | None:
+        """Process the rest of a schedule; whether the run is over if it stops before its end, else None."""
+        running = self._running
+        while running.cursor.at < len(schedule):
             code = self._slice(schedule)
             if code == c.FULL:
                 self.backlog.hand_over()
             elif code not in (c.AT_END, c.PAUSED):
-                self._fail(code)
-            if work.interrupted() and work.now < work.stop:
-                work.interrupted_at = work.now
+                self._raise(code)
+            if running.interrupted() and running.now < running.stop:
+                running.interrupted_at = running.now
                 return True
             if code == c.PAUSED:
                 return False
             if progress is not None:
-                progress(work.now / work.stop)
+                progress(running.now / running.stop)
         return None
 
     def _slice(self, schedule: Schedule) -> int:
-        """Have C pass through instants for about `SLICE`; the code says why it has come back."""
-        work, loop, begin = self._work, self._loop, clock.perf_counter()
+        """Have C process instants for about `SLICE`; returns the code of why it has returned."""
+        running, loop, begin = self._running, self._loop, clock.perf_counter()
         self._track.count = min(len(schedule), self._track.at + self._pace)
         code = int(self._run(ctypes.addressof(loop)))
         share = SLICE / max(clock.perf_counter() - begin, 1e-9)
         self._pace = min(max(1, int(self._pace * min(share, 8.0))), len(schedule))
-        work.now, work.steps, work.cursor.at = loop.now, loop.steps[0], self._track.at
-        self._hear_of_moves()
+        running.now, running.steps, running.cursor.at = loop.now, loop.steps[0], self._track.at
+        self._collect_rounding_changes()
         return code
 
-    def _hear_of_moves(self) -> None:
-        """Instances whose FMUs have changed how numbers are rounded, which C has put back."""
+    def _collect_rounding_changes(self) -> None:
+        """Add warnings of FMUs that have changed the rounding mode, which C has restored."""
         for instance, component in zip(self._structures.instances, self._components):
             if component.moved:
                 component.moved = 0
                 instance.warn_of_change(ROUNDING)
 
-    def _fail(self, code: int) -> None:
-        """Raise what C has come back with."""
+    def _raise(self, code: int) -> None:
+        """Raise the error for the code that C has returned."""
         index, part = self._loop.outcome_component[0], self._loop.failed
         if code in (c.FAILED, c.REFUSED):
             function, transfer = self._structures.calls[part]
@@ -167,27 +169,27 @@ class CompiledLoop:
                 raise self._structures.instances[index].failure(function)
             transfer()
         elif code == c.NOT_FINITE:
-            self._work.component(index).expect_finite(self._work.now / NANOSECONDS)
+            self._running.component(index).expect_finite(self._running.now / NANOSECONDS)
         elif code == c.OVER:
-            raise Terminated(self._work.termination)
-        elif self._failure is not None:  # of what C has called in Python
+            raise Terminated(self._running.termination)
+        elif self._failure is not None:  # of a Python function that C has called
             raise self._failure
-        raise AssertionError(f"the compiled loop has ended with {code}, and Python sees no reason")
+        raise AssertionError(f"the compiled loop has ended with {code}, and Python finds no reason")
 
     def _look_for_c(self, t: float) -> int:
         """Whether the run has diverged; no exception goes through C."""
         try:
-            self._work.look(t)
+            self._running.check_divergence(t)
         except BaseException as error:
             self._failure = error
             return 1
         return 0
 
     def _stopped_for_c(self, status: int, until: int) -> int:
-        """Whether a step to `until` [ns] that was not simply done is not whole either; no exception goes through C."""
+        """Whether a step to `until` [ns] failed and was not completed; no exception goes through C."""
         try:
             error = self._structures.instances[self._loop.component].step_error(status, self._loop.end)
-            self._work.stopped(error, until)
+            self._running.handle_failed_step(error, until)
         except BaseException as error:
             self._failure = error
             return 1
@@ -196,66 +198,68 @@ class CompiledLoop:
     # -- between Python and C ------------------------------------------------------------------------------------
 
     def _share(self, schedule: Schedule) -> None:
-        """All that a schedule needs goes to where C has it, from the next instant on."""
-        work, loop, track = self._work, self._loop, self._track
-        track.at = work.cursor.at
+        """Copy what a schedule needs to the structures of C, from the next instant on."""
+        running, loop, track = self._running, self._loop, self._track
+        track.at = running.cursor.at
         for name, _ in c.Schedule._fields_:
             setattr(track.schedule, name, address(getattr(schedule, name)))
         self._tables.make_room(schedule)
         self._share_sources(schedule.times[:-1] / NANOSECONDS)
-        for index, component in work.continuous.items():
+        for index, component in running.continuous.items():
             self._reached[index] = component.now
-        loop.now, loop.steps[0] = work.now, work.steps
+        loop.now, loop.steps[0] = running.now, running.steps
         rest = schedule.part(track.at)
         self._shared = [
-            _OnTheirWay(channel, self._channel_table[i], *rest.of(i, work.wires.table(i)))
-            for i, channel in enumerate(work.channels)
+            _MessagesInFlight(channel, self._channel_table[i], *rest.of(i, running.wires.table(i)))
+            for i, channel in enumerate(running.channels)
         ]
 
     def _take_back(self) -> None:
-        """What Python keeps of a run is as C has left it."""
+        """Copy the state that C has left back to the objects of Python."""
         for each in self._shared:
             each.take_back()
         self._shared = []
-        for index, component in self._work.continuous.items():
+        for index, component in self._running.continuous.items():
             component.now = int(self._reached[index])
 
     def _share_sources(self, t: Floats) -> None:
-        self._fed = [np.ascontiguousarray(feed.each(t), dtype=np.float64) for feed in self._work.feeds]
+        self._fed = [np.ascontiguousarray(feed.each(t), dtype=np.float64) for feed in self._running.feeds]
         for place, values in enumerate(self._fed):
             self._feed_table[place].values = address(values)
         if self._watched:
             self._seen = np.ascontiguousarray(np.column_stack([values.over(t) for values in self._watched]))
             self._loop.watched, self._loop.watched_size = address(self._seen), self._seen.shape[1]
 
-    # -- how it is made ------------------------------------------------------------------------------------------
+    # -- construction --------------------------------------------------------------------------------------------
 
     def _channel_of(self, index: int) -> Any:
-        work = self._work
-        x = work.system.connections[index]
-        places = [work.board.place[start] for start in x.start]
-        receiver = work.wires.names.index(x.receiver)
-        made = self._structures.channel(x, work.channels[index], receiver, work.board.row, places)
-        made.read_ahead = index in work.wires.plan.read_ahead
-        return made
+        running = self._running
+        x = running.system.connections[index]
+        places = [running.board.place[start] for start in x.start]
+        receiver = running.wires.names.index(x.receiver)
+        channel = self._structures.channel(x, running.channels[index], receiver, running.board.row, places)
+        channel.read_ahead = index in running.wires.plan.read_ahead
+        return channel
 
     def _component_of(self, index: int) -> Any:
-        work, structures, name = self._work, self._structures, self._work.wires.names[index]
-        component, into = work.component(index), work.wires.into(name)
-        made = structures.component(index, component.read, work.outputs(name), len(component.outputs))
-        made.rank = work.wires.rank(index)
-        made.feeds = structures.indices([work.feeds.index(feed) for feed in component.feeds])
-        made.held, made.ahead, made.behind = map(structures.indices, (into.held, into.ahead, into.behind))
+        running, structures, name = self._running, self._structures, self._running.wires.names[index]
+        component, into = running.component(index), running.wires.into(name)
+        structure = structures.component(index, component.read, running.outputs(name), len(component.outputs))
+        structure.rank = running.wires.rank(index)
+        structure.feeds = structures.indices([running.feeds.index(feed) for feed in component.feeds])
+        structure.held, structure.ahead, structure.behind = map(
+            structures.indices, (into.held, into.ahead, into.behind)
+        )
         if isinstance(component, SampledComponent):
-            made.ratio, made.by_itself = structures.address(np.array([component.ratio])), component.by_itself
-        return made
+            structure.ratio, structure.by_itself = structures.address(np.array([component.ratio])), component.by_itself
+        return structure
 
 
-class _OnTheirWay:
-    """Messages and noise of one connection while C has them."""
+class _MessagesInFlight:
+    """Messages and noise of one connection while C runs."""
 
     def __init__(self, channel: Any, into: Any, count: int, keys: list[int]) -> None:
-        """`count` messages take values, of which those with `keys` are kept until they arrive."""
+        """`count` messages are sent, of which those with `keys` are stored until they arrive."""
         self._channel, self._into, self._size = channel, into, into.size
         self._keys = [*channel.in_flight, *keys]
         self._flight: Floats = np.empty((1 << len(self._keys).bit_length(), self._size))
@@ -272,7 +276,7 @@ class _OnTheirWay:
         into.noise[0] = address(self._noise)
 
     def take_back(self) -> None:
-        """As if Python had done it."""
+        """Set the state of the channel to that which the loop in Python would have left."""
         channel, into = self._channel, self._into
         channel.in_flight = {self._keys[i]: self._flight[i].copy() for i in range(into.first[0], into.last[0])}
         if into.extrapolates:

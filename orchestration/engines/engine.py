@@ -1,4 +1,4 @@
-"""Which engine flies a run: the compiled loop where it can be had, else Python. Both give the same to the byte."""
+"""Choice of the engine of a run: the compiled loop where available, else Python. Both give the same bytes."""
 
 import logging
 from collections.abc import Mapping
@@ -19,13 +19,13 @@ Engine = Literal["python", "compiled"]
 
 
 def engine_named(name: str | None, *others: str) -> Engine | None:
-    """The engine of that name; raises `UsageError` for another name than those that there are, `others` beside."""
+    """The engine of that name; raises `UsageError` for an unknown name, listing `others` too."""
     if name is not None and name not in get_args(Engine):
         raise UsageError(f"--engine {name}: {expected_name(name, [*get_args(Engine), *others])}")
     return cast(Engine | None, name)
 
 
-def master(
+def create_master(
     engine: Engine | None,
     system: System,
     simulators: Mapping[str, Simulator],
@@ -34,10 +34,10 @@ def master(
     room: Room = private,
     **others: Any,
 ) -> Master:
-    """The master of a run, by an engine or, without one, by the compiled loop where it can be had.
+    """The master of a run, with an engine; default: the compiled loop where available.
 
-    The compiled loop keeps what it has not handed over in `room`; `others` are arguments of `Master`. Raises
-    `QuadcosimError` naming what stands in the way of the compiled loop if that was asked for.
+    The compiled loop stores what it has not handed over in `room`; `others` are arguments of `Master`. Raises
+    `QuadcosimError` with the reason if the compiled loop was requested and is not available.
     """
     reason = None if engine == "python" else reason_unavailable(simulators, nanoseconds(system.stop_time))
     if reason:
@@ -45,5 +45,5 @@ def master(
     if engine == "python" or (engine is None and reason):
         return Master(system, simulators, **others)
     if reason:
-        raise QuadcosimError(f"--engine compiled cannot be had: {reason}")
+        raise QuadcosimError(f"--engine compiled is not available: {reason}")
     return Master(system, simulators, loop=partial(CompiledLoop, condition=condition, room=room), **others)

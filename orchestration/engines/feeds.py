@@ -1,4 +1,4 @@
-"""What a source does in a run: sets inputs of one component whenever that component is stepped."""
+"""The feed of a source in a run: sets inputs of one component whenever that component is stepped."""
 
 from collections.abc import Sequence
 
@@ -7,13 +7,13 @@ from orchestration.engines.sources import Values
 
 
 class Feed:
-    """A source at work on some inputs of one component: those of its values that are at `places`."""
+    """A source that sets some inputs of one component, to those of its values that are at `places`."""
 
     def __init__(
         self, component: str, values: Values, places: Sequence[int], into: Floats, transfer: Transfer, *, count: int
     ) -> None:
         self.component, self.into, self.transfer = component, into, transfer
-        """whose inputs they are, where their values lie, and what sets them"""
+        """the component, the array of the inputs, and the call that sets them"""
         self.size = len(places)
         self._at, self._values = values.at, values
         self._places = None if len(places) == count else list(places)
@@ -24,11 +24,11 @@ class Feed:
 
     def write(self, t: float) -> None:
         """Set the inputs to the values at `t` [s]."""
-        found = self._at(t)
-        self.into[:] = found if self._places is None else [found[i] for i in self._places]
+        values = self._at(t)
+        self.into[:] = values if self._places is None else [values[i] for i in self._places]
         self.transfer()
 
     def each(self, t: Floats) -> Floats:
-        """To the bit what `write` sets at times `t` [s], shape (n,): an array of shape (n, number of inputs)."""
-        found = self._values.each(t)
-        return found if self._places is None else found[:, self._places]
+        """The values that `write` sets at times `t` [s], shape (n,), to the bit; shape (n, number of inputs)."""
+        values = self._values.each(t)
+        return values if self._places is None else values[:, self._places]

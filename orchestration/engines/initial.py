@@ -1,4 +1,4 @@
-"""In which order outputs reach inputs before a run begins: that of what depends on what at initialisation."""
+"""The first exchange of values, at initialisation: in the order of dependencies, with iteration around loops."""
 
 from collections.abc import Callable, Collection, Sequence
 from typing import Any
@@ -10,15 +10,15 @@ from orchestration.system.connection import Connection
 from orchestration.system.variable_names import variable_of
 
 ITERATIONS, CONVERGED = 100, 1e-12
-"""How often values go around a loop, until they change by less, relative to what they are"""
+"""The most iterations around a loop, and the relative change below which it has converged"""
 PassOn = Callable[[int, Booleans], tuple[Floats, Floats]]
-"""Carries out a connection in the runs that are open; gives what its receiver had before, and has now"""
+"""Carries out a connection in the runs that have not converged; returns the values of its receiver before and after"""
 Dependencies = Callable[[str, str], Collection[str] | None]
 """The inputs of a component that one of its outputs depends on at initialisation; None: on all of them"""
 
 
 def groups(connections: Sequence[Connection], dependencies: Dependencies) -> tuple[tuple[int, ...], ...]:
-    """Indices of connections in the order of the first exchange; those of one group depend on one another."""
+    """Indices of connections in the order of the first exchange, in groups of mutual dependency."""
     before = {
         i: [j for j, other in enumerate(connections) if _needs(x, other, dependencies)]
         for i, x in enumerate(connections)
@@ -27,9 +27,9 @@ def groups(connections: Sequence[Connection], dependencies: Dependencies) -> tup
 
 
 def exchange(group: Sequence[int], pass_on: PassOn, runs: tuple[int, ...] = ()) -> Booleans:
-    """Pass on what the connections of a group carry; again and again until it stays, if they form a loop.
+    """Carry out the connections of a group, repeatedly until the values converge if they form a loop.
 
-    `runs` is the shape of the runs that go on together. Gives those in which no values were found.
+    `runs` is the shape of the runs that are carried out together. Returns those that have not converged.
     """
     open_: Any = np.ones(runs, dtype=np.bool_)
     for _ in range(ITERATIONS):
@@ -56,11 +56,11 @@ def _needs(x: Connection, other: Connection, dependencies: Dependencies) -> bool
 
 
 def _components(before: dict[int, list[int]]) -> tuple[tuple[int, ...], ...]:
-    """Strongly connected components of a graph, those that others need first (Tarjan), by a stack of one's own."""
+    """Strongly connected components of a graph, those that others need first (Tarjan, with an explicit stack)."""
     index: dict[int, int] = {}
     low: dict[int, int] = {}
     path: list[int] = []
-    found: list[tuple[int, ...]] = []
+    components: list[tuple[int, ...]] = []
     for root in before:
         work = [(root, iter(before[root]))] if root not in index else []
         while work:
@@ -80,6 +80,6 @@ def _components(before: dict[int, list[int]]) -> tuple[tuple[int, ...], ...]:
                     low[work[-1][0]] = min(low[work[-1][0]], low[node])
                 if low[node] == index[node]:
                     place = path.index(node)
-                    found.append(tuple(sorted(path[place:])))
+                    components.append(tuple(sorted(path[place:])))
                     del path[place:]
-    return tuple(found)
+    return tuple(components)

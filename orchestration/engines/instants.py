@@ -1,63 +1,63 @@
-"""What happens at an instant, in Python: the text that the loops in C follow.
+"""What happens at an instant, in Python: the reference that the loops in C follow.
 
-In this order: components in continuous time have reached it; messages that arrive are delivered; sampled components
-that are due read what they have received, step and send, and what arrives without delay is delivered; the row is
-recorded. So a row is the value just after its instant, and at the end nothing samples.
+In this order: components in continuous time are stepped to it; arriving messages are delivered; sampled components
+that are due read their inputs, step and send, and messages without delay are delivered; the row is recorded. So a row
+has the values just after its instant, and nothing samples at the end.
 """
 
 from collections.abc import Callable, Sequence
 from typing import ClassVar
 
 from orchestration.basics.errors import SimulatorError
-from orchestration.engines.at_work import AtWork, SampledComponent, Terminated
-from orchestration.engines.backlog import Backlog, Listed, events_of_a_chunk, rows_of_a_chunk
+from orchestration.engines.backlog import Backlog, ListTables, events_of_a_chunk, rows_of_a_chunk
+from orchestration.engines.running_system import RunningSystem, SampledComponent, Terminated
 from orchestration.recording.recording import ARRIVED, LOST, SAMPLED, SENT, Recorder
 from orchestration.schedule.schedule import Message, SampleInstant
 from orchestration.system.times import NANOSECONDS
 
 
 class PythonLoop:
-    """Passes through the instants of a run."""
+    """Processes the instants of a run."""
 
     engine: ClassVar[str] = "python"
-    """By what it does"""
+    """its name"""
 
-    def __init__(self, work: AtWork, recorder: Recorder) -> None:
-        tables = Listed(work)
-        self._work, self.backlog = work, Backlog(work, tables, recorder)
+    def __init__(self, running: RunningSystem, recorder: Recorder) -> None:
+        tables = ListTables(running)
+        self._running, self.backlog = running, Backlog(running, tables, recorder)
         self._events, self._rows = tables.noted, tables.content
-        self._arrived: list[int] = []  # of this instant: noted after what was sent at it
-        self._instants = work.cursor.instants()
-        self._channels, self._continuous, self._sampled = work.channels, work.continuous, work.sampled
-        self._read_ahead, self._stop = work.wires.plan.read_ahead, work.stop
-        self._row = work.board.row.data.cast("B")
-        self._chunk, self._most_events = rows_of_a_chunk(work) * work.board.row.nbytes, events_of_a_chunk()
+        self._arrived: list[int] = []  # of this instant: noted after the messages that are sent at it
+        self._instants = running.cursor.instants()
+        self._channels, self._continuous, self._sampled = running.channels, running.continuous, running.sampled
+        self._read_ahead, self._stop = running.wires.plan.read_ahead, running.stop
+        self._row = running.board.row.data.cast("B")
+        self._chunk, self._most_events = rows_of_a_chunk(running) * running.board.row.nbytes, events_of_a_chunk()
 
     def run(self, pause_at: int | None, progress: Callable[[float], None] | None) -> bool:
         """Go on to the end, an interruption, or the first instant from `pause_at` [ns]; whether the run is over."""
-        work, stop = self._work, self._stop
+        running, stop = self._running, self._stop
         for count, (time, next_time, stepped, arrivals, posted, measured, samples) in enumerate(self._instants, 1):
-            work.now = time
+            running.now = time
             if stepped:
                 self._step_continuous(time, stepped)
-            if arrivals:  # before what is sent now, which is delivered last if it arrives at once
+            if arrivals:  # before messages without delay, which are sent now and delivered last
                 self._arrive(arrivals, time)
             if posted:
                 self._post(posted, time)
             if measured:
                 self._measure(measured)
-            if work.some_by_themselves:
+            if running.some_by_themselves:
                 self._sample_in_turn(samples, time, next_time)
             else:
                 for due in samples:
                     self._sample(due, time, due.next_time)
-            if work.settles:
+            if running.settles:
                 self._settle(time, stepped)
             self._record(time)
-            if work.termination is not None:
-                raise Terminated(work.termination)
-            if work.interrupted() and time < stop:
-                work.interrupted_at = time
+            if running.termination is not None:
+                raise Terminated(running.termination)
+            if running.interrupted() and time < stop:
+                running.interrupted_at = time
                 return True
             if pause_at is not None and pause_at <= time < stop:
                 return False
@@ -66,7 +66,7 @@ class PythonLoop:
         return True
 
     def _step_continuous(self, time: int, stepped: Sequence[int]) -> None:
-        """Components in continuous time reach `time`; divergence is noticed before any value is passed on."""
+        """Step components in continuous time to `time`; divergence is detected before any value is passed on."""
         moved = False
         t = time / NANOSECONDS
         for index in stepped:
@@ -80,13 +80,13 @@ class PythonLoop:
             try:
                 component.step(start / NANOSECONDS, (time - start) / NANOSECONDS)
             except SimulatorError as error:
-                self._work.stopped(error, time)
-            self._work.steps += 1
+                self._running.handle_failed_step(error, time)
+            self._running.steps += 1
             component.read()
             component.expect_finite(t)
             moved = True
         if moved:
-            self._work.look(t)
+            self._running.check_divergence(t)
 
     def _post(self, messages: Sequence[Message], time: int) -> None:
         for message in messages:
@@ -97,7 +97,7 @@ class PythonLoop:
                 self._deliver(index, k, time)
 
     def _measure(self, messages: Sequence[Message]) -> None:
-        """Values for samples to come."""
+        """Measure values for later samples."""
         for index, k, _, arrival in messages:
             self._channels[index].send(k, lost=arrival < 0)
 
@@ -110,7 +110,7 @@ class PythonLoop:
         self._channels[index].deliver(k, time)
 
     def _sample_in_turn(self, samples: Sequence[SampleInstant], time: int, next_time: int) -> None:
-        """The samples; who has a clock of its own is stepped to the next instant, and also if it does not sample."""
+        """The samples; a component with its own clock is stepped to the next instant, even if it does not sample."""
         due_of = {due.component: due for due in samples}
         for index, task in self._sampled.items():
             if index in due_of:
@@ -137,12 +137,12 @@ class PythonLoop:
         try:
             task.step(task.ratio * start, task.ratio * ((until - time) / NANOSECONDS))
         except SimulatorError as error:
-            self._work.stopped(error, until)
+            self._running.handle_failed_step(error, until)
         task.read()
         task.expect_finite(start)
 
     def _sense(self, messages: Sequence[Message], time: int) -> None:
-        """The sample reads what it measures itself."""
+        """Take the measurements of a sample."""
         for index, k, measured, arrival in messages:
             channel = self._channels[index]
             self._events += (measured, SAMPLED, index, k)
@@ -154,7 +154,7 @@ class PythonLoop:
                 channel.deliver(k, time)
 
     def _send(self, messages: Sequence[Message], time: int) -> None:
-        """What it sends are its outputs, which no arrival changes."""
+        """Send the outputs of a component, which no arrival changes."""
         for message in messages:
             self._note_sending(message)
             index, k, _, arrival = message
@@ -173,7 +173,7 @@ class PythonLoop:
             self._events += (sent, LOST, index, k)
 
     def _settle(self, time: int, stepped: Sequence[int]) -> None:
-        """What components in continuous time hold over the step that begins now."""
+        """Set the inputs that components in continuous time hold over the step that begins now."""
         for index in stepped:
             component = self._continuous[index]
             for channel in component.held:
@@ -187,7 +187,7 @@ class PythonLoop:
         if self._arrived:
             self._events += self._arrived
             self._arrived.clear()
-        self._work.board.row[0] = time / NANOSECONDS
+        self._running.board.row[0] = time / NANOSECONDS
         self._rows += self._row
         if len(self._rows) >= self._chunk or len(self._events) >= 4 * self._most_events:
             self.backlog.hand_over()

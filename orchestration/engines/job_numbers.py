@@ -1,4 +1,4 @@
-"""What expressions say of jobs and frames: numbers of a run that no signal decides."""
+"""Terms of expressions about jobs and frames: numbers of a run that do not depend on signals."""
 
 from collections.abc import Iterable
 
@@ -30,27 +30,27 @@ _JOBS = "jobs"
 
 
 def job_numbers(system: System) -> dict[str, float]:
-    """What the expressions of a system say of jobs, by its text as they name it; NaN where it has no value.
+    """The values of terms about jobs in the expressions of a system, by the text of the term; NaN without a value.
 
-    Raises `UsageError` for a task that there is not, and for jobs of several tasks in one.
+    Raises `UsageError` for an unknown task, and for a term with jobs of several tasks.
     """
-    wanted = dict.fromkeys(
+    terms = dict.fromkeys(
         name for _, expression in expressions(system) for name in names(parse(expression)) if names_job_measure(name)
     )
-    if not wanted:
+    if not terms:
         return {}
     timeline = timeline_of(system)
-    found = {}
-    for name in wanted:
+    values = {}
+    for name in terms:
         call = parse_job_measures(name)
         assert isinstance(call, Call)
         value = evaluate({name: _at_jobs(call)}, lambda call=call: iter([_recorded(timeline, call)]))[name]  # type: ignore[misc]
-        found[name] = np.nan if value is None else value
-    return found
+        values[name] = np.nan if value is None else value
+    return values
 
 
 def _at_jobs(call: Call) -> Call:
-    """The same of a signal that has a value for each job."""
+    """The same term of a signal that has a value for each job."""
     argument, *rest = call.arguments
     return Call(call.function, (Sampled(_JOBS, _named(argument)), *rest))
 
@@ -67,11 +67,11 @@ def _named(node: Node) -> Node:
 
 
 def _recorded(timeline: Timeline, call: Call) -> Recorded:
-    said = [*dict.fromkeys(_of_jobs(call))]
-    if len(said) > 1:
-        both = " and ".join(map(text, said))
+    quantities = [*dict.fromkeys(_of_jobs(call))]
+    if len(quantities) > 1:
+        both = " and ".join(map(text, quantities))
         raise UsageError(f"{text(call)}: expected jobs of one task in one way, not {both}")
-    (of,) = said
+    (of,) = quantities
     jobs = _jobs(timeline, of)
     if of.what == "response":
         times, values = jobs.ended[jobs.done], jobs.responses / NANOSECONDS
@@ -93,10 +93,10 @@ def _of_jobs(node: Node) -> Iterable[JobMeasure]:
 
 
 def _jobs(timeline: Timeline, of: JobMeasure) -> Jobs | Frames:
-    """Those of a task, or the frames of a message, by its name alone where no other has it."""
+    """The jobs of a task, or the frames of a message, by its name alone where that is unique."""
     every: dict[str, Jobs | Frames] = {**timeline.jobs, **timeline.frames}
-    found = [name for name in every if of.task in (name, name.partition(".")[2])]
-    if of.task in every or len(found) == 1:
-        return every[of.task if of.task in every else found[0]]
-    expected = f"one of {', '.join(found)}" if found else expected_name(of.task, list(every))
+    matching = [name for name in every if of.task in (name, name.partition(".")[2])]
+    if of.task in every or len(matching) == 1:
+        return every[of.task if of.task in every else matching[0]]
+    expected = f"one of {', '.join(matching)}" if matching else expected_name(of.task, list(every))
     raise UsageError(f"{text(of)}: {expected}")

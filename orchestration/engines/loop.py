@@ -1,4 +1,4 @@
-"""The compiled loop as a library: made once by the C compiler of this machine, and kept in the user's cache."""
+"""The compiled loop as a library: compiled once on this machine, and kept in the user's cache."""
 
 import ctypes
 import functools
@@ -13,25 +13,25 @@ from orchestration.engines import condition
 from orchestration.engines.structures import HEADER, declared, expect_same_sizes, shared
 
 INSTANTS = Path(__file__).with_name("instants.h")
-"""What happens at an instant, of a run of FMUs and of kernels in lanes"""
+"""What happens at an instant, for runs of FMUs and of kernels in SIMD lanes"""
 FILES = (Path(__file__).with_name("loop.c"), condition.HEADER, INSTANTS, HEADER, FOLDER / "lanes.h")
-"""What it is made of, beside what is written of operators"""
+"""Its sources, beside the generated operators.h"""
 Operation: Any = declared(condition.HEADER.read_text(encoding="utf-8"))["Operation"]
 """One step of a condition"""
 
 
 @functools.cache
 def library() -> Any:
-    """The function `run` of loop.c; raises `QuadcosimError` that says what stands in the way."""
+    """The function `run` of loop.c; raises `QuadcosimError` with the reason if it is not available."""
     sources = {path.name: path.read_bytes() for path in FILES}
     sources["operators.h"] = condition.operators().encode()
     path = cached_library("loop", sources, OPTIONS, lambda: compiled_here(sources, "loop.c", mathematics="libm"))
     try:
-        made = ctypes.CDLL(str(path))
+        loaded = ctypes.CDLL(str(path))
     except OSError as error:
         raise QuadcosimError(str(error)) from error
-    expect_same_sizes(made, {**shared(1), "Operation": Operation})
-    run = made.run
+    expect_same_sizes(loaded, {**shared(1), "Operation": Operation})
+    run = loaded.run
     run.restype = ctypes.c_int
     run.argtypes = (ctypes.c_void_p,)
     return run

@@ -1,4 +1,4 @@
-"""The master of one run: begins it, has a loop pass through its instants, pauses it, and says how it has ended."""
+"""The master of one run: initialises it, has a loop process its instants, pauses it, and states how it ended."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, Protocol
@@ -8,12 +8,12 @@ import numpy as np
 from orchestration.basics.errors import SimulatorError
 from orchestration.basics.simulator import Booleans, Floats, Simulator
 from orchestration.engines import initial
-from orchestration.engines.at_work import AtWork, Diverged, Sources, Terminated
 from orchestration.engines.backlog import Backlog
 from orchestration.engines.board import Board
 from orchestration.engines.channel import Channel
 from orchestration.engines.feeds import Feed
 from orchestration.engines.instants import PythonLoop
+from orchestration.engines.running_system import Diverged, RunningSystem, Sources, Terminated
 from orchestration.engines.watch import Watch
 from orchestration.engines.wires import clock_of
 from orchestration.recording.recording import Chunk, Recorder
@@ -23,24 +23,24 @@ from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS
 
 ROWS_PENDING = "rows"
-"""Beside the names of the components in `Master.saved`"""
+"""Key in `Master.saved` beside the names of the components"""
 
 
 class Loop(Protocol):
-    """Passes through the instants of a run."""
+    """Processes the instants of a run."""
 
     @property
     def engine(self) -> str:
-        """By what it does."""
+        """Its name."""
 
     @property
     def backlog(self) -> Backlog:
-        """What is recorded and not handed over."""
+        """The recorded data that has not been handed over."""
 
     def run(self, pause_at: int | None, progress: Callable[[float], None] | None) -> bool:
         """Go on to the end, an interruption, or the first instant from `pause_at` [ns]; whether the run is over.
 
-        Raises `Diverged`, `Terminated` or `SimulatorError` for what ends it before.
+        Raises `Diverged`, `Terminated` or `SimulatorError` if the run ends before.
         """
 
 
@@ -62,57 +62,59 @@ class Master:
         watch: Callable[[Board], Watch] | None = None,
         first_exchange: Sequence[Sequence[int]] | None = None,
         waiting: Collection[str] = (),
-        loop: Callable[[AtWork, Recorder], Loop] = PythonLoop,
+        loop: Callable[[RunningSystem, Recorder], Loop] = PythonLoop,
     ) -> None:
-        """`waiting` are components that begin at 0 and are stepped to their first sample without one.
+        """`waiting` are components that begin at 0 and are stepped to their first sample without sampling.
 
-        Other sampled components, unless they have a clock of their own, begin at their first sample.
+        Other sampled components, unless they have their own clock, begin at their first sample.
         """
-        self._work = work = AtWork(
+        self._running = running = RunningSystem(
             system, simulators, timetable=timetable, streams=streams, recorded=recorded, sources=sources, feeds=feeds,
             interrupted=interrupted, watch=watch,
         )  # fmt: skip
-        self.board, self.columns, self.recorder = work.board, work.columns, recorder
+        self.board, self.columns, self.recorder = running.board, running.columns, recorder
         self.divergence: str | None = None
         self.divergence_time: int | None = None
-        self._first_exchange = [(i,) for i in range(len(work.channels))] if first_exchange is None else first_exchange
+        self._first_exchange = (
+            [(i,) for i in range(len(running.channels))] if first_exchange is None else first_exchange
+        )
         self._first_samples, self._waiting = timetable.first_samples, waiting
-        self._loop = loop(work, recorder)
+        self._loop = loop(running, recorder)
         self.backlog = self._loop.backlog
         self.engine = self._loop.engine
-        """By what it passes through instants"""
+        """the name of the loop"""
 
-    # -- where it is ---------------------------------------------------------------------------------------------
+    # -- state ---------------------------------------------------------------------------------------------------
 
     @property
     def now(self) -> int:
-        """The instant that it has reached [ns]."""
-        return self._work.now
+        """The current instant [ns]."""
+        return self._running.now
 
     @property
     def steps(self) -> int:
         """Of all components in continuous time."""
-        return self._work.steps
+        return self._running.steps
 
     @property
     def termination(self) -> str | None:
-        """How an FMU has ended the run."""
-        return self._work.termination
+        """How an FMU has ended the run; None if none has."""
+        return self._running.termination
 
     @property
     def interrupted_at(self) -> int | None:
-        """[ns]"""
-        return self._work.interrupted_at
+        """When Ctrl-C has ended the run [ns]; None if it has not."""
+        return self._running.interrupted_at
 
     @property
     def channels(self) -> Sequence[Channel]:
-        """The connections at work, in the order of the system."""
-        return self._work.channels
+        """The connections, in the order of the system."""
+        return self._running.channels
 
     # -- a run ---------------------------------------------------------------------------------------------------
 
     def initialise(self) -> None:
-        """The first exchange, in the order of the dependencies: never lost, late or noisy."""
+        """Initialise with the first exchange, in the order of dependencies: never lost, late or noisy."""
         try:
             self._exchange_first()
         except (Diverged, SimulatorError) as error:
@@ -121,7 +123,7 @@ class Master:
     def run(self, *, pause_at: int | None = None, progress: Callable[[float], None] | None = None) -> bool:
         """Run to the end or to the first instant from `pause_at` [ns]; whether it is over.
 
-        The end may be divergence, or an FMU's. A run is over at the first instant after an interruption too.
+        The end may be divergence, or caused by an FMU. A run is also over at the first instant after an interruption.
         """
         over = self.divergence is not None or self._run(pause_at, progress)
         if over:
@@ -141,13 +143,13 @@ class Master:
         return True
 
     def pending(self) -> Chunk:
-        """What was recorded since the last chunk was handed over; messages that go out later are left out."""
+        """What was recorded since the last chunk was handed over, without messages that are sent later."""
         return self.backlog.pending()
 
     def state(self) -> dict[str, Any]:
-        """Where the run is, what is on its way, and what the recorder does not have yet, but for `saved`."""
+        """The state of the run, of its messages, and of events that are not handed over, without `saved`."""
         return {
-            "instants": self._work.cursor.past,
+            "instants": self._running.cursor.past,
             "row": self.board.row.tolist(),
             "handed_over": self.backlog.handed_over,
             "channels": [channel.state() for channel in self.channels],
@@ -155,18 +157,18 @@ class Master:
         }
 
     def saved(self) -> dict[str, bytes]:
-        """The states of the components, and the rows that the recorder does not have yet, as bytes."""
+        """The states of the components, and the rows that are not handed over, as bytes."""
         return {
-            **{name: simulator.save() for name, simulator in self._work.simulators.items()},
+            **{name: simulator.save() for name, simulator in self._running.simulators.items()},
             ROWS_PENDING: self.backlog.rows().tobytes(),
         }
 
     def restore(self, state: Mapping[str, Any], saved: Mapping[str, bytes]) -> None:
         """Continue where `state` and `saved` were taken, instead of `initialise`."""
-        for name, simulator in self._work.simulators.items():
+        for name, simulator in self._running.simulators.items():
             simulator.restore(saved[name])
-        for schedule in self._work.cursor.move_to(state["instants"]):
-            self._work.pass_over(schedule)
+        for schedule in self._running.cursor.move_to(state["instants"]):
+            self._running.skip(schedule)
         self.board.row[:] = state["row"]
         events = np.array(state["events"], dtype=np.int64).reshape(-1, 4)
         self.backlog.restore(saved[ROWS_PENDING], events, handed_over=state["handed_over"])
@@ -174,48 +176,48 @@ class Master:
             channel.restore(content)
 
     def _ended(self, error: Exception) -> None:
-        """Take divergence, or an FMU that ends the run, as its end; any other failure of an FMU is raised."""
+        """End the run by divergence or by an FMU that ends it; any other failure of an FMU is raised."""
         if isinstance(error, Terminated):
-            self._work.termination = str(error)
+            self._running.termination = str(error)
         elif isinstance(error, SimulatorError) and not error.divergence:
             raise error
         else:
-            self.divergence, self.divergence_time, self._work.termination = str(error), self.now, None
+            self.divergence, self.divergence_time, self._running.termination = str(error), self.now, None
         self.backlog.drop_later_events()
-        self.backlog.expect_a_row()
+        self.backlog.ensure_row()
 
     # -- initialisation ------------------------------------------------------------------------------------------
 
     def _exchange_first(self) -> None:
-        work, stop = self._work, self._work.stop / NANOSECONDS
-        for name in work.wires.names:
-            ratio, first = clock_of(work.system, name, self._first_samples)
-            work.simulators[name].enter_initialization(0.0 if name in self._waiting else ratio * first, ratio * stop)
-        for feed in work.feeds:
+        running, stop = self._running, self._running.stop / NANOSECONDS
+        for name in running.wires.names:
+            ratio, first = clock_of(running.system, name, self._first_samples)
+            running.simulators[name].enter_initialization(0.0 if name in self._waiting else ratio * first, ratio * stop)
+        for feed in running.feeds:
             feed.write(0.0)
         for group in self._first_exchange:
             self._exchange(group)
-        for name in work.wires.names:
-            work.simulators[name].exit_initialization()
-            work.readers[name]()
-        for channel in work.channels:
+        for name in running.wires.names:
+            running.simulators[name].exit_initialization()
+            running.readers[name]()
+        for channel in running.channels:
             channel.start()
-        for index in range(len(work.wires.names)):
-            work.component(index).expect_finite(0.0)
+        for index in range(len(running.wires.names)):
+            running.component(index).expect_finite(0.0)
         for name in self._waiting:
-            ratio, first = clock_of(work.system, name, self._first_samples)
+            ratio, first = clock_of(running.system, name, self._first_samples)
             if first > 0.0:
-                work.simulators[name].step(0.0, ratio * first)
-        work.look(0.0)
+                running.simulators[name].step(0.0, ratio * first)
+        running.check_divergence(0.0)
 
     def _exchange(self, group: Sequence[int]) -> None:
-        work, connections = self._work, self._work.system.connections
+        running, connections = self._running, self._running.system.connections
 
         def pass_on(index: int, open_: Booleans) -> tuple[Floats, Floats]:
-            work.readers[connections[index].sender]()
-            before = work.channels[index].received.copy()
-            work.channels[index].pass_on()
-            return before, work.channels[index].received
+            running.readers[connections[index].sender]()
+            before = running.channels[index].received.copy()
+            running.channels[index].pass_on()
+            return before, running.channels[index].received
 
         if initial.exchange(group, pass_on).any():
             ends = "; ".join(f"{', '.join(connections[i].start)} -> {', '.join(connections[i].end)}" for i in group)

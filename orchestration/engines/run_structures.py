@@ -1,4 +1,4 @@
-"""Components, connections and sources at work, as loop.c has them: everything that C has an address of is kept here."""
+"""Components, connections and sources as structures of loop.c; keeps alive everything that C has an address of."""
 
 import ctypes
 from collections.abc import Sequence
@@ -15,20 +15,20 @@ from orchestration.fmi.transfers import Call, bounds_of
 from orchestration.system.connection import Connection
 
 c = structures(1)
-"""What C has of one run"""
+"""The structures of one run"""
 
 
 class RunStructures:
-    """What the structures of one run point at, and what a call in them is in Python."""
+    """Builds the structures of one run, keeps what they point at, and finds the Python transfer of a call."""
 
     def __init__(self, instances: Sequence[NativeInstance]) -> None:
         self.instances = list(instances)
         self.calls: dict[int, tuple[str, Transfer]] = {}
-        """by the address of a `Part`, the name of its function and the transfer that it belongs to"""
+        """the name of the function and the transfer of a `Part`, by its address"""
         self._kept: list[Any] = []
 
     def address(self, array: Any) -> int:
-        """Where the values of an array are; it is kept."""
+        """The address of the values of an array, which is kept alive."""
         self._kept.append(array)
         return address(array)
 
@@ -46,11 +46,11 @@ class RunStructures:
         return c.Transfer(parts=ctypes.addressof(parts), count=len(calls), array=self.address(array))
 
     def component(self, index: int, read: Transfer, values: Floats, connected: int) -> Any:
-        """A component, but for what its place in the system says."""
+        """The structure of a component, without the fields that its place in the system determines."""
         instance = self.instances[index]
         version = instance.model.version
-        said = [ctypes.addressof(each) for each in instance.step_outputs] or [0, 0, 0, 0]
-        event, ends, early, reached = said
+        outputs = [ctypes.addressof(each) for each in instance.step_outputs] or [0, 0, 0, 0]
+        event, ends, early, reached = outputs
         return c.Component(
             fmu=instance.handle,
             step=instance.address(f"fmi{version}DoStep"),
@@ -67,7 +67,7 @@ class RunStructures:
         )
 
     def channel(self, x: Connection, channel: Channel, receiver: int, row: Floats, places: Sequence[int]) -> Any:
-        """A connection, but for what is on its way."""
+        """The structure of a connection, without messages in flight."""
         sigma, quantum = of_each(x, x.noise), of_each(x, x.quantisation)
         return c.Channel(
             write=self.transfer(receiver, channel.write, channel.received),
@@ -86,7 +86,7 @@ class RunStructures:
         )
 
     def feed(self, component: int, feed: Feed) -> Any:
-        """A source at work."""
+        """The structure of a source."""
         return c.Feed(write=self.transfer(component, feed.transfer, feed.into), size=feed.size)
 
     def _part(self, component: int, call: Call) -> Any:

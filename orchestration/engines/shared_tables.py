@@ -1,28 +1,28 @@
-"""Rows and events of a run that are not handed over, where C notes them too."""
+"""Tables of rows and events that are not handed over, in memory shared with C."""
 
 from typing import Any
 
 import numpy as np
 
 from orchestration.basics.simulator import Floats, Integers
-from orchestration.engines.at_work import AtWork
 from orchestration.engines.backlog import events_of_a_chunk, rows_of_a_chunk
 from orchestration.engines.room import EVENTS, ROWS, Room
+from orchestration.engines.running_system import RunningSystem
 from orchestration.engines.structures import address
 from orchestration.schedule.schedule import Schedule
 
 
 class SharedTables:
-    """Tables in a room, of which C knows the addresses and the numbers."""
+    """Tables in memory of a `Room`; C has their addresses and counts."""
 
-    def __init__(self, work: AtWork, loop: Any, room: Room) -> None:
-        self._work, self._loop, self._room = work, loop, room
-        self._most_rows, self._most_events = rows_of_a_chunk(work), events_of_a_chunk()
+    def __init__(self, running: RunningSystem, loop: Any, room: Room) -> None:
+        self._running, self._loop, self._room = running, loop, room
+        self._most_rows, self._most_events = rows_of_a_chunk(running), events_of_a_chunk()
         self.content: Floats = self._new_rows()
-        """room for the rows of a chunk, in which the columns of sources are filled in when it is handed over"""
+        """memory for the rows of a chunk; the columns of sources are filled in when it is handed over"""
         self._noted: Integers = self._new_events(0)
-        loop.row, loop.rows = address(work.board.row), address(self.content)
-        loop.width, loop.stride = len(work.board.columns), len(work.columns)
+        loop.row, loop.rows = address(running.board.row), address(self.content)
+        loop.width, loop.stride = len(running.board.columns), len(running.columns)
         loop.row_limit, loop.event_limit = self._most_rows, self._most_events
 
     def is_empty(self) -> bool:
@@ -36,7 +36,7 @@ class SharedTables:
     def rows_with_sources(self) -> Floats:
         """As `Tables`."""
         rows, first = self.content[: self._loop.row_count], self._loop.width
-        for signals, values in self._work.sources:
+        for signals, values in self._running.sources:
             rows[:, first : first + len(signals)] = values.over(rows[:, 0])
             first += len(signals)
         return rows
@@ -45,14 +45,14 @@ class SharedTables:
         """As `Tables`."""
         return self._noted[: self._loop.event_count]
 
-    def keep_rows(self, rows: bytes) -> None:
+    def replace_rows(self, rows: bytes) -> None:
         """As `Tables`."""
         table = np.frombuffer(rows, dtype=np.float64).reshape(-1, self._loop.width)
         self.content = self._new_rows()
         self.content[: len(table), : table.shape[1]] = table
         self._loop.rows, self._loop.row_count = address(self.content), len(table)
 
-    def keep_events(self, events: Integers) -> None:
+    def replace_events(self, events: Integers) -> None:
         """As `Tables`."""
         if len(events) > len(self._noted):
             self._noted = self._new_events(len(events))
@@ -60,7 +60,7 @@ class SharedTables:
         self._loop.event_count = len(events)
 
     def make_room(self, schedule: Schedule) -> None:
-        """For the events of any instant beside those that make a chunk whole."""
+        """Make room for the events of any instant beside those of a complete chunk."""
         most = schedule.most_events()
         loop, count = self._loop, self._loop.event_count
         if len(self._noted) < max(self._most_events, count) + most:
@@ -71,7 +71,7 @@ class SharedTables:
         loop.events, loop.arrived = address(self._noted), address(self._arrived)
 
     def _new_rows(self) -> Floats:
-        shape = (self._most_rows, len(self._work.columns))
+        shape = (self._most_rows, len(self._running.columns))
         return self._room(ROWS, 8 * shape[0] * shape[1]).view(np.float64).reshape(shape)
 
     def _new_events(self, count: int) -> Integers:

@@ -18,20 +18,20 @@ from orchestration.system.times import NANOSECONDS, Grid, exact_nanoseconds
 
 
 class Values(Protocol):
-    """What a source says at a time."""
+    """The values of a source over time."""
 
     def at(self, t: float) -> Sequence[float]:
-        """One value for each of its signals at `t` [s]; times are asked for in order."""
+        """One value for each of its signals at `t` [s]; times must not decrease from call to call."""
 
     def over(self, t: Floats) -> Floats:
         """The values at times `t` [s], shape (n,), as an array of shape (n, number of signals)."""
 
     def each(self, t: Floats) -> Floats:
-        """As `over`, but to the bit what `at` says."""
+        """As `over`, with the bits of `at`."""
 
 
 class Constant:
-    """The same values for ever."""
+    """Constant values."""
 
     def __init__(self, values: Sequence[float]) -> None:
         self._values = list(values)
@@ -58,8 +58,8 @@ class Table:
         i = min(max(int(np.searchsorted(self.time, t, side="right")) - 1, 0), len(self.time) - 2)
         share = (t - self.time[i]) / (self.time[i + 1] - self.time[i])
         values: Floats = self.columns[i] + min(max(share, 0.0), 1.0) * (self.columns[i + 1] - self.columns[i])
-        found: list[float] = values.tolist()
-        return found
+        result: list[float] = values.tolist()
+        return result
 
     def over(self, t: Floats) -> Floats:
         """The values at times `t`."""
@@ -78,8 +78,8 @@ class Held(Table):
 
     def at(self, t: float) -> Sequence[float]:
         """The values at `t` [s]."""
-        found: list[float] = self.columns[max(int(np.searchsorted(self.time, t, side="right")) - 1, 0)].tolist()
-        return found
+        row: list[float] = self.columns[max(int(np.searchsorted(self.time, t, side="right")) - 1, 0)].tolist()
+        return row
 
     def over(self, t: Floats) -> Floats:
         """The values at times `t`."""
@@ -100,11 +100,11 @@ NUMPY = ScalarOps(
     where=np.where,
     all=np.all,
 )
-"""Scalars that are numpy arrays, one value a point."""
+"""Scalars that are numpy arrays, with one value for each point."""
 
 
 class BuiltIn:
-    """The positions [m], inertial, of the trajectory that controllers carry."""
+    """The positions [m], inertial, of the trajectory that is built into controllers."""
 
     def __init__(self, trajectory: Trajectory) -> None:
         self._trajectory = trajectory
@@ -119,24 +119,24 @@ class BuiltIn:
         return np.column_stack(list(self._trajectory.position(t, NUMPY)))
 
     def each(self, t: Floats) -> Floats:
-        """As `over`, one after the other: the mathematics of numpy is not that of Python."""
+        """As `over`, one by one: the mathematical functions of numpy differ from those of Python."""
         return np.array([self.at(time) for time in t.tolist()]).reshape(len(t), 3)
 
 
-def _one_by_one(function: Callable[[float], float]) -> Callable[[Floats], Floats]:
-    """Over an array, with the bits that the function has for one value."""
+def _elementwise(function: Callable[[float], float]) -> Callable[[Floats], Floats]:
+    """The function over an array, with the bits that it has for single values."""
     return lambda x: np.array([function(value) for value in x.tolist()])
 
 
-EXACT = replace(NUMPY, sin=_one_by_one(math.sin), cos=_one_by_one(math.cos))
-"""As `NUMPY`, with the mathematics of Python: many points at once give the bits of one after the other"""
+EXACT = replace(NUMPY, sin=_elementwise(math.sin), cos=_elementwise(math.cos))
+"""As `NUMPY`, with the mathematical functions of Python: many points at once have the bits of single ones"""
 
 
 class Moving:
-    """What a motion says of `quantities`, each a derivative from 0 (position) on and an axis of x, y, z."""
+    """Some `quantities` of a motion, each a derivative (0: position) of a coordinate x, y or z."""
 
     def __init__(self, motion: Callable[[Floats], Floats], quantities: Sequence[int]) -> None:
-        """`motion` gives all of them at times (n,), shape (n, 15)."""
+        """`motion` returns all of them at times (n,), shape (n, 15)."""
         self._motion, self._quantities = motion, list(quantities)
 
     def at(self, t: float) -> Sequence[float]:
@@ -151,24 +151,24 @@ class Moving:
     each = over
 
 
-def by_name(motion: Motion) -> Callable[[Floats], Floats]:
+def motion_values(motion: Motion) -> Callable[[Floats], Floats]:
     """A motion of the library, at times (n,) [s] as an array (n, 15)."""
 
     def over(t: Floats) -> Floats:
-        found = motion.at(t, EXACT)
-        orders = (found.position, found.velocity, found.acceleration, found.jerk, found.snap)
+        now = motion.at(t, EXACT)
+        orders = (now.position, now.velocity, now.acceleration, now.jerk, now.snap)
         return np.column_stack([coordinate for order in orders for coordinate in order])
 
     return over
 
 
-def along(curve: Spline) -> Callable[[Floats], Floats]:
-    """The curve through way-points, at times (n,) [s] as an array (n, 15)."""
+def spline_values(curve: Spline) -> Callable[[Floats], Floats]:
+    """The curve through waypoints, at times (n,) [s] as an array (n, 15)."""
     return lambda t: curve.at(t).reshape(len(t), -1)
 
 
 def gusts(air: Dryden, stop_time: float, stream: np.random.Generator) -> Table:
-    """The wind from 0 to `stop_time` [s]: north, east, down [m/s]; what a longer run begins with is the same."""
+    """The wind from 0 to `stop_time` [s]: north, east, down [m/s]; a longer run begins with the same values."""
     count = math.ceil(stop_time / air.step) + 2
     values = air.velocities(stream.standard_normal((count, DRAWS)).tolist())
     return Table(air.step * np.arange(count, dtype=np.float64), np.array(values))
@@ -189,19 +189,19 @@ class Scaled:
         return self._factor * self._values.over(t)
 
     def each(self, t: Floats) -> Floats:
-        """As `over`, to the bit what `at` says."""
+        """As `over`, with the bits of `at`."""
         return self._factor * self._values.each(t)
 
 
 class WhiteNoise:
     """Normal values of variance intensity / period, each held over a period: white noise of that intensity.
 
-    Value k is the k-th of the stream for each signal in turn, whenever it is asked for.
+    Value k is the k-th of the stream for each signal in turn, whenever it is evaluated.
     """
 
     def __init__(self, intensity: float, period: float, count: int, stream: np.random.Generator) -> None:
         self._sigma, self._period, self._count = math.sqrt(intensity / period), exact_nanoseconds(period), count
-        self._grid = Grid(Fraction(0), self._period)  # the timetable's
+        self._grid = Grid(Fraction(0), self._period)  # that of the timetable
         self._stream, self._drawn = stream, np.zeros((0, count))
 
     def at(self, t: float) -> Sequence[float]:

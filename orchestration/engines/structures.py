@@ -1,4 +1,4 @@
-"""The structures that C and Python share: as structures.h declares them, which is read here."""
+"""The structures that C and Python share, parsed from structures.h."""
 
 import ctypes
 import functools
@@ -27,24 +27,24 @@ _FIELD = re.compile(r"(\**)(\w+)(?:\[(.*)\])?")
 
 
 def address(array: npt.NDArray[Any]) -> int:
-    """Where the values of an array, contiguous, are; whoever asks keeps the array."""
+    """The address of the values of a contiguous array; the caller keeps the array alive."""
     return int(array.ctypes.data)
 
 
 @functools.cache
 def structures(lanes: int) -> Any:
-    """The structures and constants of structures.h for so many lanes, by name."""
+    """The structures and constants of structures.h for a number of SIMD lanes, by name."""
     return SimpleNamespace(**constants(HEADER.read_text(encoding="utf-8")), **shared(lanes))
 
 
 @functools.cache
 def shared(lanes: int) -> Mapping[str, Any]:
-    """The structures alone."""
+    """The structures without the constants."""
     return declared(HEADER.read_text(encoding="utf-8"), lanes)
 
 
 def constants(text: str) -> dict[str, int]:
-    """What the enumerations in a text of C count, by name."""
+    """The constants of the enumerations in a text of C, by name."""
     found: dict[str, int] = {}
     for enumeration in _CONSTANTS.findall(_COMMENT.sub("", text)):
         number = 0
@@ -57,7 +57,7 @@ def constants(text: str) -> dict[str, int]:
 
 
 def declared(text: str, lanes: int = 1) -> dict[str, Any]:
-    """The structures in a text of C, by name; those that it names in others stand above them."""
+    """The structures in a text of C, by name; a structure must be declared before it is used in another."""
     found: dict[str, Any] = {}
     for body, name in _STRUCTURE.findall(_COMMENT.sub("", text)):
         declarations = [part.strip() for part in body.split(";") if part.strip()]
@@ -67,7 +67,7 @@ def declared(text: str, lanes: int = 1) -> dict[str, Any]:
 
 
 def _fields(declaration: str, known: Mapping[str, Any], lanes: int) -> Iterator[tuple[str, Any]]:
-    """Names and types of what a declaration declares; a pointer is an address, whatever is there."""
+    """Names and types of the fields of a declaration; any pointer is an address."""
     types = {**_SCALARS, **known}
     if function := _FUNCTION.fullmatch(declaration):
         result, name, arguments = function.groups()
@@ -85,7 +85,7 @@ def _fields(declaration: str, known: Mapping[str, Any], lanes: int) -> Iterator[
 
 
 def expect_same_sizes(library: ctypes.CDLL, types: Mapping[str, Any]) -> None:
-    """Raise `QuadcosimError` naming the first of `types` that a library has with another size, or does not have."""
+    """Raise `QuadcosimError` naming the first of `types` that is missing in a library or has another size there."""
     size = structures(1).Size
     found, place = {}, ctypes.addressof(size.in_dll(library, "sizes"))
     while (each := size.from_address(place)).name:

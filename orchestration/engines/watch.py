@@ -1,4 +1,4 @@
-"""Looks, while a run goes on, whether it has diverged: the condition of its system over the current row."""
+"""The divergence monitor of a run: evaluates the condition of its system over the current row."""
 
 import operator
 from collections.abc import Callable, Mapping, Sequence
@@ -10,7 +10,7 @@ from orchestration.expressions.at_instant import Current, compiled
 from orchestration.expressions.syntax import Node, Operation, names, parse, text
 
 Watch = Callable[[float], str | None]
-"""At t [s], says how the values of the row have diverged, or None"""
+"""Returns how the values of the row at t [s] have diverged; None if they have not"""
 
 
 def watch(
@@ -20,29 +20,31 @@ def watch(
     signals_of: Mapping[str, Sequence[str]],
     numbers: Mapping[str, float],
 ) -> Watch:
-    """The look-out for `condition`, over the board, `time`, the signals of sources and `numbers`, by name.
+    """A divergence monitor for `condition`, over the board, `time`, the signals of sources and `numbers`, by name.
 
-    Raises `UsageError` if the condition names what is not there.
+    Raises `UsageError` if the condition has an unknown name.
     """
     if condition is None:
         return lambda t: None
     node = parse(condition)
-    wanted = set(names(node))
-    columns = [c for c in board.columns if c != "time" and is_wanted(c, wanted)]
-    used = [name for name, signals in signals_of.items() if any(is_wanted(signal, wanted) for signal in signals)]
-    constants = [name for name in numbers if name in wanted]
+    named = set(names(node))
+    columns = [c for c in board.columns if c != "time" and is_named(c, named)]
+    used = [name for name, signals in signals_of.items() if any(is_named(signal, named) for signal in signals)]
+    constants = [name for name in numbers if name in named]
     order = ["", "time", *columns, *(signal for name in used for signal in signals_of[name]), *constants]
     places = {name: i for i, name in enumerate(order)}
     try:
         clauses = [_Clause(clause, places) for clause in _alternatives(node)]
     except UsageError as error:
         raise UsageError(f"criterion.diverged: {error}") from None
-    get = operator.itemgetter(0, 0, *(board.place[column] for column in columns))  # of one it would be no tuple
+    get = operator.itemgetter(
+        0, 0, *(board.place[column] for column in columns)
+    )  # two more than needed, so that it is a tuple
     row = board.row.data
     feeds, fixed = [sources[name].at for name in used], [float(numbers[name]) for name in constants]
     conditions = [clause.holds for clause in clauses]
 
-    def look(t: float) -> str | None:
+    def check(t: float) -> str | None:
         values: list[float] = [*get(row)]
         values[1] = t
         for at in feeds:
@@ -50,15 +52,15 @@ def watch(
         values += fixed
         for holds in conditions:
             if holds(values):
-                return clauses[conditions.index(holds)].complaint(values, t)
+                return clauses[conditions.index(holds)].describe(values, t)
         return None
 
-    return look
+    return check
 
 
-def is_wanted(signal: str, wanted: set[str]) -> bool:
+def is_named(signal: str, named: set[str]) -> bool:
     """Whether a signal is one of the names of an expression, or a component of a vector of them."""
-    return signal in wanted or signal.rpartition(".")[0] in wanted
+    return signal in named or signal.rpartition(".")[0] in named
 
 
 def _alternatives(node: Node) -> tuple[Node, ...]:
@@ -75,8 +77,8 @@ class _Clause:
         if isinstance(node, Operation) and node.sign in _EXPECTED:
             self._left = compiled(node.operands[0], places)
 
-    def complaint(self, values: Sequence[float], t: float) -> str:
-        """What is wrong with the values, and what was expected."""
+    def describe(self, values: Sequence[float], t: float) -> str:
+        """The value that diverged, and what was expected."""
         node = self._node
         if self._left is None or not isinstance(node, Operation):
             return f"{text(node)} at t = {t:g} s"

@@ -1,4 +1,4 @@
-"""A system wired up, for any engine: by index, which connections reach a component, and when they are carried out."""
+"""The wiring of a system, for any engine: by index, the connections into a component and when they are carried out."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,13 +17,13 @@ class Into:
     held: tuple[int, ...]
     """with a first-order hold"""
     ahead: tuple[int, ...]
-    """wires from components that are stepped before it: their new values"""
+    """wires from components that are stepped before it, which carry their new values"""
     behind: tuple[int, ...]
-    """wires from others: their values where its step begins"""
+    """wires from other components, which carry the values at the beginning of its step"""
 
 
 class Wires:
-    """What follows from the structure of a system, and from what is recorded of it."""
+    """The wiring that follows from the structure of a system, and from what is recorded of it."""
 
     def __init__(self, system: System, recorded: Mapping[str, Sequence[str]]) -> None:
         self.system, self.plan = system, Plan(system)
@@ -57,25 +57,25 @@ class Wires:
         return (self.continuous if index in self.continuous else self.sampled).index(index)
 
     def connected(self, name: str) -> tuple[str, ...]:
-        """The outputs of a component that are connected, as they stand in the row."""
+        """The connected outputs of a component, in the order of the row."""
         return tuple(f"{name}.{output}" for output in self.board.outputs[name][: self.board.connected[name]])
 
     def is_by_itself(self, name: str) -> bool:
-        """Whether a component has a clock of its own and is stepped at every instant."""
+        """Whether a component has its own clock and is stepped at every instant."""
         sampling = self.system.components[name].sampling
         return sampling is not None and sampling.clock == "fmu"
 
     def table(self, connection: int) -> str:
-        """Where a schedule has the messages of a connection, each when it takes its values."""
+        """The table of a schedule with the messages of a connection, at the times at which they take their values."""
         if connection in self.plan.posted:
             return "posted"
         return "measured" if connection in self.plan.read_ahead else "exchanged"
 
 
 def clock_of(system: System, name: str, first_samples: Mapping[str, int]) -> tuple[float, float]:
-    """How fast a component's own time passes, and its first sample [s]; 0 for one that is stepped from the start.
+    """The rate of a component's own time, and its first sample [s]; 0 for one that is stepped from the start.
 
-    `first_samples` are in [ns]. FMI has the first step begin where initialisation was, and so do those that hold to it.
+    `first_samples` are in [ns]. In FMI the first step begins at the time of initialisation.
     """
     sampling = system.components[name].sampling
     if sampling is None or sampling.clock == "fmu":

@@ -1,4 +1,4 @@
-"""A system made ready for any engine: held to its FMUs, its sources at work, its columns."""
+"""Prepares a system for any engine: checks it against its FMUs, and provides its sources and its columns."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,9 +17,9 @@ from orchestration.engines.sources import (
     Table,
     Values,
     WhiteNoise,
-    along,
-    by_name,
     gusts,
+    motion_values,
+    spline_values,
 )
 from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD, TRAJECTORY
 from orchestration.fmi.model import NUMERIC, Model
@@ -41,21 +41,21 @@ from orchestration.system.variable_names import variable_of
 
 
 @dataclass(frozen=True, kw_only=True)
-class Checked:
-    """A system that its FMUs fit."""
+class CheckedSystem:
+    """A system that has been checked against its FMUs."""
 
     system: System
-    """with the objectives that they have the variables for, and what each component follows fed to it"""
+    """with the objectives whose variables exist, and with each reference connected to the component that follows it"""
     parameters: dict[str, float]
     """the numeric ones of all components, as COMPONENT.NAME"""
     units: dict[str, str]
-    """of what it comes to, where it has one"""
+    """of the metrics that have one"""
     follows: str
-    """what is followed, and by whom; empty where nothing is"""
+    """which component follows which reference, as text; empty where none does"""
 
 
-def checked(system: System, models: Mapping[str, Model]) -> Checked:
-    """A system held to what its FMUs say; raises `UsageError` for what they do not have, or cannot take."""
+def check_against_fmus(system: System, models: Mapping[str, Model]) -> CheckedSystem:
+    """Check a system against its FMUs; raises `UsageError` for what they do not have or do not accept."""
     check(system, models)
     words, system = describe_references(system, models), connect_references(system, models)
     for name, component in system.components.items():
@@ -63,11 +63,11 @@ def checked(system: System, models: Mapping[str, Model]) -> Checked:
     parameters = _parameters(system, models)
     of_jobs = job_numbers(system)
     system = objectives.with_available_objectives(system, signals_of(system, models), {*parameters, *of_jobs})
-    return Checked(system=system, parameters=parameters, units=units(system, models), follows=words)
+    return CheckedSystem(system=system, parameters=parameters, units=units(system, models), follows=words)
 
 
 def columns_of(system: System) -> tuple[str, ...]:
-    """The columns that a run of `system` has whatever is recorded beside them."""
+    """The columns that every run of `system` has, whatever else is recorded."""
     exchanged = [start for x in system.connections for start in x.start]
     applied = [end for x in system.connections for end in x.end if system.components[x.receiver].sampling is None]
     sources = [signal for name, source in system.sources.items() for signal in source.signals(name)]
@@ -75,7 +75,7 @@ def columns_of(system: System) -> tuple[str, ...]:
 
 
 def _expect_clock(name: str, component: Component, model: Model) -> None:
-    """Raise `UsageError` for a clock that the FMU does not have, or that its parameters would set beside the master."""
+    """Raise `UsageError` for a clock that the FMU does not have, or for parameters of it that the master sets."""
     sampling = component.sampling
     if sampling is None or not model.has_clock:
         if sampling is not None and sampling.clock == "fmu":
@@ -102,13 +102,13 @@ def _parameters(system: System, models: Mapping[str, Model]) -> dict[str, float]
 
 
 def signals_of(system: System, models: Mapping[str, Model]) -> set[str]:
-    """Everything that is recorded, or comes from a source."""
+    """All signals that are recorded or come from a source."""
     found = {f"{name}.{each}" for name, variables in recorded_variables(system, models).items() for each in variables}
     return found.union(columns_of(system)) - {"time"}
 
 
 def source_values(system: System, name: str, parameters: Mapping[str, float], streams: Streams) -> Values:
-    """A source at work in a run; `parameters` are those of the component of a trajectory, as COMPONENT.NAME."""
+    """The values of a source in a run; `parameters` are those of the component of a trajectory, as COMPONENT.NAME."""
     source = system.sources[name]
     if source.constant is not None:
         return Constant([source.constant] * len(source.to))
@@ -123,7 +123,7 @@ def source_values(system: System, name: str, parameters: Mapping[str, float], st
 
 
 def source_signals(system: System, parameters: Mapping[str, float], t: Floats) -> dict[str, Floats]:
-    """What the sources of a run say at instants t [s], by signal, each of the shape of t; `parameters` as above."""
+    """The values of the sources of a run at times t [s], by signal, each of the shape of t; `parameters` as above."""
     streams = Streams(system.seed, system.streams)
     found: dict[str, Floats] = {}
     for name, source in system.sources.items():
@@ -138,11 +138,11 @@ def _of_file_or_signal(system: System, name: str, streams: Streams) -> Values:
     if source.signal is not None:
         signal = make_signal(source.signal, source.parameters)
         if source.is_motion:
-            return Moving(by_name(signal), quantities)
+            return Moving(motion_values(signal), quantities)
         return gusts(signal, system.stop_time, streams.of(f"sources.{name}", VALUE))
     assert source.file is not None
     if source.is_motion:
-        return Moving(along(read_waypoints(source.file, source.parameters)), quantities)
+        return Moving(spline_values(read_waypoints(source.file, source.parameters)), quantities)
     table = read_table(source.file, table_columns(source), system.stop_time)
     return Held(*table) if source.interpolation == "previous" else Table(*table)
 
@@ -153,7 +153,7 @@ def table_columns(source: Source) -> Sequence[str]:
 
 
 def fixed_steps(system: System, models: Mapping[str, Model]) -> dict[str, FixedStep]:
-    """Components in continuous time that take steps of one length only, by name."""
+    """Components in continuous time with a fixed step, by name."""
     found = {}
     for name, component in system.components.items():
         if component.step is not None and not models[name].varies_step:

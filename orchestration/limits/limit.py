@@ -12,7 +12,7 @@ from orchestration.basics.progress import ShareProgress, share_reporter
 from orchestration.basics.terminal import inform
 from orchestration.building.inputs import Files, files_of
 from orchestration.engines.engine import Engine
-from orchestration.engines.wiring import checked
+from orchestration.engines.wiring import check_against_fmus
 from orchestration.exact.mean_square import MeanSquareLimit, mean_square_limit
 from orchestration.fmi.foreign import LostError, isolated_call
 from orchestration.limits.evaluation import RELIABILITY, Evaluator, said
@@ -120,7 +120,7 @@ def find(
     models = files.models_of(varied.system)
     span = search_range(varied, models, first=first, last=last, tolerance=tolerance, scan=scan)
     with errors_in_own_terms(request):
-        fitting = [checked(varied.at(value), models) for value in span.values()]
+        fitting = [check_against_fmus(varied.at(value), models) for value in span.values()]
     units, metric = fitting[0].units, judged(varied.system)
     random = is_random(varied.at(span.last))
     seeds = math.ceil(math.log(1.0 - confidence) / math.log(RELIABILITY)) if random else 1

@@ -9,7 +9,7 @@ from pathlib import Path
 from orchestration.basics import scratch
 from orchestration.basics.interrupt import deferred_interrupts
 from orchestration.engines.engine import Engine
-from orchestration.engines.room import Left, left_in
+from orchestration.engines.room import Unrecorded, read_unrecorded
 from orchestration.processes import subprocesses
 from orchestration.processes.child import Child, Died
 from orchestration.processes.limits import UNLIMITED
@@ -142,14 +142,14 @@ class _Receiver:
 def _lost(resolved: ResolvedRequest, receiver: _Receiver, room: Path, ending: str, started: float) -> RunLost:
     """The error, with all that was recorded, for a run whose process ended before its last message."""
     activity, called = receiver.activity, [name for name in receiver.components if name in resolved.foreign]
-    left = left_in(room, receiver.columns)
-    if left is not None:
-        if left.calling is not None:
-            activity, called = "in a call of", [list(resolved.system.components)[left.calling]]
-        elif len(left.rows) or receiver.recorded_until >= 0.0:
+    unrecorded = read_unrecorded(room, receiver.columns)
+    if unrecorded is not None:
+        if unrecorded.calling is not None:
+            activity, called = "in a call of", [list(resolved.system.components)[unrecorded.calling]]
+        elif len(unrecorded.rows) or receiver.recorded_until >= 0.0:
             called = []
-        if len(left.rows) and left.rows[-1, 0] > receiver.recorded_until:
-            receiver.take(_chunk(resolved, receiver, left))
+        if len(unrecorded.rows) and unrecorded.rows[-1, 0] > receiver.recorded_until:
+            receiver.take(_chunk(resolved, receiver, unrecorded))
     end = receiver.recorded_until
     fmus = [f"{name} ({resolved.models[name].name})" for name in called]
     where = (
@@ -159,22 +159,22 @@ def _lost(resolved: ResolvedRequest, receiver: _Receiver, room: Path, ending: st
         return RunLost(f"the process of the run {ending}{where}")
     text = f"the process of the run {ending}{where}, after t = {end:g} s of {resolved.system.stop_time:g} s"
     outcome = RunOutcome(
-        end=end, steps=0 if left is None else left.steps, divergence=None, divergence_time=None, termination=None,
-        interrupted_at=end,
-        provenance={"engine": "python" if left is None else "compiled"}, warnings=(text,),
+        end=end, steps=0 if unrecorded is None else unrecorded.steps, divergence=None, divergence_time=None,
+        termination=None, interrupted_at=end,
+        provenance={"engine": "python" if unrecorded is None else "compiled"}, warnings=(text,),
     )  # fmt: skip
     wall_time = time.perf_counter() - started
     return RunLost(text, result_of(resolved, outcome, receiver.recorder, wall_time, interrupted=False))
 
 
-def _chunk(resolved: ResolvedRequest, receiver: _Receiver, left: Left) -> Chunk:
+def _chunk(resolved: ResolvedRequest, receiver: _Receiver, unrecorded: Unrecorded) -> Chunk:
     """Rows and events that the compiled loop has not handed over, with the values of sources filled in."""
-    rows, system, columns = left.rows, resolved.system, receiver.columns
+    rows, system, columns = unrecorded.rows, resolved.system, receiver.columns
     for name, values in resolved.sources(Streams(system.seed, system.streams)).items():
         places = [columns.index(signal) for signal in system.sources[name].signals(name)]
         rows[:, places] = values.over(rows[:, 0])
     run_events = RunEvents(system)
     if receiver.recorded_until >= 0.0:
         run_events.hand_over(round(receiver.recorded_until * NANOSECONDS))
-    events = run_events.with_messages(left.events, round(float(rows[-1, 0]) * NANOSECONDS))
+    events = run_events.with_messages(unrecorded.events, round(float(rows[-1, 0]) * NANOSECONDS))
     return Chunk(columns=columns, rows=rows, events=events)

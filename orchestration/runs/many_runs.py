@@ -14,7 +14,7 @@ from orchestration.building import fmus
 from orchestration.engines.batch.batch import MOST_ROWS
 from orchestration.engines.batch.batches import Batches
 from orchestration.engines.batch.shape import expect_lanes
-from orchestration.engines.wiring import checked, columns_of, source_signals
+from orchestration.engines.wiring import check_against_fmus, columns_of, source_signals
 from orchestration.fmi.model import Model, read_model
 from orchestration.requests.request import RequestLike, request_of
 from orchestration.results.objectives import FIXED, Metrics
@@ -81,7 +81,7 @@ def run_many(
         models = {name: read_model(Path(component.fmu)) for name, component in system.components.items()}
         check(system, models)
         system = connect_references(system, models)
-        fits = checked(_recording(system, models, record), models)
+        fits = check_against_fmus(_recording(system, models, record), models)
         names = _outputs(fits.system, outputs)
         runs = columns(loaded, fits.system, models, values)
         reason = _reason_unavailable(fits.system, models)

@@ -14,8 +14,7 @@ from orchestration.basics.interrupt import Interrupt, deferred_interrupts
 from orchestration.basics.simulator import Floats
 from orchestration.engines import initial
 from orchestration.engines.condition import program
-from orchestration.engines.engine import Engine
-from orchestration.engines.engine import master as master_of
+from orchestration.engines.engine import Engine, create_master
 from orchestration.engines.feeds import Feed
 from orchestration.engines.master import Master
 from orchestration.engines.room import Room, private
@@ -136,7 +135,7 @@ def prepared(
             sources = resolved.sources(streams)
             signals = {name: system.sources[name].signals(name) for name in sources}
             watched = (sources, signals, parameters)
-            master = master_of(
+            master = create_master(
                 engine,
                 system,
                 instances,

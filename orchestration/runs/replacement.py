@@ -7,7 +7,7 @@ from typing import Any
 
 from orchestration.basics.errors import UsageError, expected_name
 from orchestration.building import fmus
-from orchestration.engines.wiring import checked
+from orchestration.engines.wiring import check_against_fmus
 from orchestration.fmi.model import Model, read_model
 from orchestration.runs.resolved import ResolvedRequest
 from orchestration.system.model import System
@@ -38,7 +38,7 @@ class Replacement:
             system = changed(self.system, paths) if paths else self.system
             if system.fmus != self.system.fmus:
                 raise UsageError("values: expected those of a run of the same FMUs; others are another Simulation")
-            fits = checked(system, self.models)
+            fits = check_against_fmus(system, self.models)
         return ResolvedRequest(
             request=self.request, system=fits.system, paths=self.paths, models=self.models, parameters=fits.parameters,
             units=fits.units, follows=fits.follows,

@@ -7,7 +7,7 @@ from pathlib import Path
 from orchestration.basics.errors import UsageError
 from orchestration.building import fmus
 from orchestration.engines.sources import Values
-from orchestration.engines.wiring import checked, signals_of, source_values
+from orchestration.engines.wiring import check_against_fmus, signals_of, source_values
 from orchestration.fmi.model import Model, read_model
 from orchestration.results.column_info import ColumnInfo, column_infos
 from orchestration.schedule.streams import Streams
@@ -67,7 +67,7 @@ def resolve(request: Request, announce: Announce | None = None) -> ResolvedReque
 def resolve_with_models(request: Request, models: Mapping[str, Model]) -> ResolvedRequest:
     """As `resolve`, with FMUs whose models have been read."""
     with errors_in_own_terms(request):
-        fits = checked(request.as_system(), models)
+        fits = check_against_fmus(request.as_system(), models)
     return ResolvedRequest(
         request=request, system=fits.system, paths={name: model.path for name, model in models.items()}, models=models,
         parameters=fits.parameters, units=fits.units, follows=fits.follows,

@@ -6,7 +6,7 @@ from typing import Any
 from orchestration.basics.errors import UsageError
 from orchestration.building.inputs import Files
 from orchestration.engines.batch.shape import outline
-from orchestration.engines.wiring import checked, table_columns
+from orchestration.engines.wiring import check_against_fmus, table_columns
 from orchestration.signals.table_file import read_table
 from orchestration.signals.waypoints import read_waypoints
 from orchestration.studies.store import expect_columns
@@ -57,7 +57,7 @@ class _Alike:
         signals = tuple((source.signal, source.file) for source in system.sources.values())
         structure = outline(system), signals, tuple((name, key) for name, key, _ in given)
         if structure not in self._known:
-            self.follows[checked(system, self._files.models_of(system)).follows] = None
+            self.follows[check_against_fmus(system, self._files.models_of(system)).follows] = None
             self._known[structure] = set(given)
             return
         known, models = self._known[structure], None

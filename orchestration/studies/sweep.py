@@ -16,7 +16,7 @@ from orchestration.basics.progress import CountProgress, runs_reporter
 from orchestration.basics.terminal import Count, inform
 from orchestration.building.inputs import Files
 from orchestration.engines.engine import Engine
-from orchestration.engines.wiring import checked
+from orchestration.engines.wiring import check_against_fmus
 from orchestration.requests.ranges import paths_in, unit_at
 from orchestration.results.own_metrics import metrics_from_sources
 from orchestration.runs.result import Result
@@ -280,7 +280,7 @@ def _units(study: Study, files: Files) -> dict[str, str]:
         for axis in study.axes
         if axis.targets and not axis.multiplies
     }
-    return {name: unit for name, unit in of_axes.items() if unit} | checked(first, models).units
+    return {name: unit for name, unit in of_axes.items() if unit} | check_against_fmus(first, models).units
 
 
 def _places(study: Study, files: Files) -> Iterator[store.DesignPoint]:

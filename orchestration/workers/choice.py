@@ -9,7 +9,7 @@ from orchestration.building.fmus import native_twins
 from orchestration.building.inputs import Files, files_of
 from orchestration.engines.batch.shape import expect_lanes
 from orchestration.engines.engine import Engine
-from orchestration.engines.wiring import checked
+from orchestration.engines.wiring import check_against_fmus
 from orchestration.system.model import System
 from orchestration.system.request import Twin, system_of
 
@@ -89,7 +89,7 @@ def choose_execution(
 
 def _expect_lanes(system: System, files: Files) -> None:
     models = files.models_of(system)
-    expect_lanes(checked(system, models).system, models)
+    expect_lanes(check_against_fmus(system, models).system, models)
 
 
 def single_run_execution(request: Twin, engine: Engine | Literal["auto"]) -> tuple[Twin, Execution]:

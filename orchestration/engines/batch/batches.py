@@ -14,7 +14,7 @@ from orchestration.engines.batch.kernels import preferred_lanes
 from orchestration.engines.batch.shape import Shape, outline
 from orchestration.engines.structures import structures
 from orchestration.engines.watch import watch
-from orchestration.engines.wiring import checked, source_values
+from orchestration.engines.wiring import check_against_fmus, source_values
 from orchestration.fmi.model import read_model
 from orchestration.results.objectives import Metrics, metrics_of
 from orchestration.schedule.schedule_cache import ScheduleCache, timing
@@ -94,7 +94,7 @@ class Batches:
     def _flier_of(self, key: Hashable, system: System) -> tuple[Shape, Flier]:
         if key not in self._shapes:
             models = {name: read_model(Path(component.fmu)) for name, component in system.components.items()}
-            shape = Shape(system=checked(system, models).system, models=models, lanes=self._lanes)
+            shape = Shape(system=check_against_fmus(system, models).system, models=models, lanes=self._lanes)
             self._shapes[key] = shape, self._flier(shape, self._schedules)
         return self._shapes[key]
 

@@ -384,14 +384,14 @@ class _Nowhere(InMemory):
             self._chunks.append(chunk)
 
 
-# -- where it cannot be had ------------------------------------------------------------------------------------------
+# -- where it is not available ---------------------------------------------------------------------------------------
 
 
 def test_what_stands_in_the_way_is_said_in_a_line(fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     once = small(tmp_path, once=True)
     parts = {name: Component(fmu=str(once), step=0.01) for name in ("first", "second")}
     system = System(stop_time=0.1, components=parts)
-    with pytest.raises(QuadcosimError, match=r"^engine compiled cannot be had: components.second is not called in "):
+    with pytest.raises(QuadcosimError, match=r"^engine compiled is not available: components.second is not called in "):
         ran(system, "compiled")
     with prepared(system) as run:
         assert run.master.engine == "python"
@@ -399,7 +399,7 @@ def test_what_stands_in_the_way_is_said_in_a_line(fmu: Path, tmp_path: Path, mon
     monkeypatch.setattr(shutil, "which", lambda name: None)
     loop.library.cache_clear()
     try:
-        with pytest.raises(QuadcosimError, match=r"^engine compiled cannot be had: no C compiler that is called cc"):
+        with pytest.raises(QuadcosimError, match=r"^engine compiled is not available: no C compiler that is called cc"):
             ran(of(LOOP, fmu), "compiled")
         with prepared(of(LOOP, fmu)) as run:
             assert run.master.engine == "python"

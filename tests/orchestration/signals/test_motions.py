@@ -8,7 +8,7 @@ import pytest
 import sympy
 
 from fmu_kit.trajectory import Reference, Trajectory
-from orchestration.engines.sources import EXACT, by_name
+from orchestration.engines.sources import EXACT, motion_values
 from orchestration.signals.library import KINDS, SIGNALS, make_signal
 from orchestration.signals.motions import MOTIONS, Circle, Helix, Lemniscate, Motion, Paper, Step
 from orchestration.system.source import MOTION
@@ -106,9 +106,9 @@ def test_the_step_of_degree_nine_is_the_one_whose_four_derivatives_vanish_at_bot
 @pytest.mark.parametrize("name", MOTIONS)
 def test_many_times_at_once_give_the_bits_of_one_after_the_other(name: str) -> None:
     motion, times = of(name), np.linspace(0.0, 9.0, 97)
-    together = by_name(motion)(times)
+    together = motion_values(motion)(times)
     assert together.shape == (97, len(MOTION))
-    assert (together == np.concatenate([by_name(motion)(times[i : i + 1]) for i in range(97)])).all()
+    assert (together == np.concatenate([motion_values(motion)(times[i : i + 1]) for i in range(97)])).all()
     assert EXACT.sin(times).tolist() == [math.sin(t) for t in times.tolist()]
 
 

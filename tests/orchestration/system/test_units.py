@@ -7,7 +7,7 @@ import pytest
 
 from orchestration.basics.errors import UsageError
 from orchestration.building import fmus
-from orchestration.engines.wiring import checked
+from orchestration.engines.wiring import check_against_fmus
 from orchestration.fmi.model import read_model
 from orchestration.quadrotor.translation import quadrotor
 from orchestration.system.system_file import load_system
@@ -53,7 +53,7 @@ def file(tmp_path: Path) -> Path:
 
 def units(file: Path) -> dict[str, str]:
     system = load_system(file)
-    return checked(system, {name: read_model(Path(c.fmu)) for name, c in system.components.items()}).units
+    return check_against_fmus(system, {name: read_model(Path(c.fmu)) for name, c in system.components.items()}).units
 
 
 def test_objectives_have_the_units_of_signals_parameters_sources_and_of_one_another(file: Path) -> None:
@@ -96,7 +96,9 @@ def test_show_says_units_where_the_fmus_are_there(file: Path, main: Main) -> Non
 
 def test_the_quadrotors_metrics_have_units() -> None:
     system = quadrotor()
-    found = checked(system, {name: read_model(fmus.locate(c.fmu)) for name, c in system.components.items()}).units
+    found = check_against_fmus(
+        system, {name: read_model(fmus.locate(c.fmu)) for name, c in system.components.items()}
+    ).units
     effort = ["control_effort.thrust", "control_effort.torque", "total_variation.thrust", "total_variation.torque"]
     assert [found[name] for name in effort] == ["N2.s", "N2.m2.s", "N", "N.m"]
     assert [found[f"position_{name}"] for name in ("rmse", "iae", "itae", "max")] == ["m", "m.s", "m.s2", "m"]

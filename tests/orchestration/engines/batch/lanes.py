@@ -8,7 +8,7 @@ from orchestration.building import fmus
 from orchestration.engines.batch.batch import Batch, BatchResult, Group
 from orchestration.engines.batch.shape import Shape, outline
 from orchestration.engines.structures import structures
-from orchestration.engines.wiring import checked
+from orchestration.engines.wiring import check_against_fmus
 from orchestration.fmi.model import read_model
 from orchestration.runs.result import Result
 from orchestration.schedule.schedule_cache import ScheduleCache, timing
@@ -19,7 +19,7 @@ def located(system: System) -> System:
     """With the native twins of its FMUs, as paths."""
     twins = fmus.native_twins(system)
     paths = fmus.of_components(twins.fmus)
-    return checked(twins, {name: read_model(path) for name, path in paths.items()}).system
+    return check_against_fmus(twins, {name: read_model(path) for name, path in paths.items()}).system
 
 
 CROWD = 8
@@ -29,7 +29,7 @@ CROWD = 8
 def shape_of(system: System) -> Shape:
     """What the batch makes of a system."""
     models = {name: read_model(path) for name, path in fmus.of_components(system.fmus).items()}
-    return Shape(system=checked(system, models).system, models=models, lanes=CROWD)
+    return Shape(system=check_against_fmus(system, models).system, models=models, lanes=CROWD)
 
 
 def in_lanes(shape: Shape, systems: Sequence[System]) -> BatchResult:

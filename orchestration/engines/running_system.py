@@ -1,6 +1,6 @@
-"""A system at work in one run: its components, connections and sources with their values, and how far they are.
+"""The state of a system during one run: its components, connections and sources with their values and times.
 
-What begins, passes through instants and ends a run shares it: `master.py`, `instants.py` and `compiled.py`.
+It is shared by the master (`master.py`) and the loops (`instants.py`, `compiled.py`).
 """
 
 import math
@@ -26,11 +26,11 @@ from orchestration.system.model import System
 from orchestration.system.variable_names import variable_of
 
 Sources = Sequence[tuple[Sequence[str], Values]]
-"""Signals, and what they are"""
+"""Signals of each source, and their values"""
 
 
 class Diverged(Exception):
-    """The loop has left the region that counts as running."""
+    """The condition of divergence of the system holds, or a value is not finite."""
 
 
 class Terminated(Exception):
@@ -38,13 +38,13 @@ class Terminated(Exception):
 
 
 @dataclass(kw_only=True)
-class _Working:
-    """A component at work."""
+class _RunningComponent:
+    """A component during a run."""
 
     step: Callable[[float, float], None]
     read: Transfer
     outputs: Floats
-    """connected ones, in the row"""
+    """the connected ones, in the row"""
     names: tuple[str, ...]
     """of those"""
     feeds: list[Feed]
@@ -61,26 +61,26 @@ class _Working:
 
 
 @dataclass(kw_only=True)
-class SampledComponent(_Working):
-    """A sampled component at work."""
+class SampledComponent(_RunningComponent):
+    """A sampled component during a run."""
 
     ratio: float
     by_itself: bool
-    """whether it has a clock of its own and is stepped at every instant"""
+    """whether it has its own clock and is stepped at every instant"""
 
 
 @dataclass(kw_only=True)
-class ContinuousComponent(_Working):
-    """A component in continuous time at work."""
+class ContinuousComponent(_RunningComponent):
+    """A component in continuous time during a run."""
 
     ahead: list[Channel]
-    """wires from components that are stepped before it: their new values"""
+    """wires from components that are stepped before it, which carry their new values"""
     behind: list[Channel]
-    """wires from others: their values where its step begins"""
+    """wires from other components, which carry the values at the beginning of its step"""
     now: int = 0
 
 
-class AtWork:
+class RunningSystem:
     """A system whose components are instantiated and have their parameters."""
 
     def __init__(
@@ -118,23 +118,23 @@ class AtWork:
         self._watch = watch(board) if watch is not None else lambda t: None
 
     def outputs(self, name: str) -> Floats:
-        """What is read of a component, in the row."""
+        """The outputs of a component that are read, in the row."""
         return self.board.of([f"{name}.{output}" for output in self.board.outputs[name]])
 
     def component(self, index: int) -> SampledComponent | ContinuousComponent:
         """A component by its index."""
         return self.continuous[index] if index in self.continuous else self.sampled[index]
 
-    def look(self, t: float) -> None:
-        """Raise `Diverged` if the values of the row at t [s] have."""
-        complaint = self._watch(t)
-        if complaint is not None:
-            raise Diverged(complaint)
+    def check_divergence(self, t: float) -> None:
+        """Raise `Diverged` if the values of the row at t [s] have diverged."""
+        divergence = self._watch(t)
+        if divergence is not None:
+            raise Diverged(divergence)
 
-    def stopped(self, error: SimulatorError, until: int) -> None:
-        """A step to `until` [ns] was not simply done: raise what that is, unless it was whole and ends the run.
+    def handle_failed_step(self, error: SimulatorError, until: int) -> None:
+        """Raise the error of a step to `until` [ns], unless the step was completed and ends the run.
 
-        Then the instant is gone through, and is the last one. So is that of a discarded step at the end of the run.
+        Then the instant is processed, and is the last one. The same holds for a discarded step at the end of the run.
         """
         if not isinstance(error, StoppedStepError) or not (error.ends or until == self.stop):
             raise error
@@ -142,18 +142,18 @@ class AtWork:
             raise Terminated(str(error))
         self.termination = self.termination or str(error)
 
-    def pass_over(self, schedule: Schedule) -> None:
-        """These instants are past, and what follows from them alone is as if the run had gone through them."""
+    def skip(self, schedule: Schedule) -> None:
+        """Move past these instants, with the state of times, counts and noise that they lead to."""
         self.now = int(schedule.times[-2])
         reached = np.repeat(schedule.times[:-1], np.diff(schedule.stepped_at))
-        self.steps += int(np.count_nonzero(reached))  # nobody steps to the start
+        self.steps += int(np.count_nonzero(reached))  # no step ends at time 0
         for index, component in self.continuous.items():
             component.now = max(component.now, int(reached[schedule.stepped == index].max(initial=0)))
         for index, channel in enumerate(self.channels):
             taken, _ = schedule.of(index, self.wires.table(index))
             channel.skip(taken)
 
-    # -- how it is made ------------------------------------------------------------------------------------------
+    # -- construction --------------------------------------------------------------------------------------------
 
     def _channel(self, index: int, streams: Streams) -> Channel:
         x = self.system.connections[index]
@@ -172,7 +172,7 @@ class AtWork:
     def _continuous(self, name: str) -> ContinuousComponent:
         into = self.wires.into(name)
         return ContinuousComponent(
-            **self._working(name),
+            **self._running_component(name),
             ahead=[self.channels[i] for i in into.ahead],
             behind=[self.channels[i] for i in into.behind],
         )
@@ -181,10 +181,10 @@ class AtWork:
         sampling = self.system.components[name].sampling
         assert sampling is not None
         return SampledComponent(
-            **self._working(name), ratio=sampling.clock_ratio, by_itself=self.wires.is_by_itself(name)
+            **self._running_component(name), ratio=sampling.clock_ratio, by_itself=self.wires.is_by_itself(name)
         )
 
-    def _working(self, name: str) -> dict[str, Any]:
+    def _running_component(self, name: str) -> dict[str, Any]:
         names = self.wires.connected(name)
         return {
             "step": self.simulators[name].step,
