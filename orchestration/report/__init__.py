@@ -1,1 +1,1 @@
-"""A report: runs, a study or a comparison as one HTML file that needs nothing else, also no network."""
+"""Reports: runs, a study or a comparison as one self-contained HTML file that needs no network."""

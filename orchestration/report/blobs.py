@@ -1,4 +1,4 @@
-"""Arrays of numbers as text in a JSON document: each content once, as the bytes that a browser reads."""
+"""Arrays of numbers as text in a JSON document: each content once, in the byte format that a browser reads."""
 
 import base64
 import hashlib
@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 Kind = Literal["float32", "int16"]
 STEPS = 2**15 - 4
-"""of an int16 to each side of the middle; -2**15 is left for what is no number, a few for rounding"""
+"""of an int16 to each side of the middle; -2**15 is reserved for nan, a few for rounding"""
 NOTHING = -(2**15)
-"""The int16 of what is no number; of a logarithmic array, of zero"""
+"""The int16 of nan; in a logarithmic array, of zero"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,14 +27,14 @@ class Blob:
     logarithmic: bool = False
 
     def as_list(self) -> list[str | float | bool]:
-        """As the document has it: its text, and beside that what the numbers of an int16 stand for."""
+        """The form in the document: the text, for int16 with offset and scale."""
         if self.kind == "float32":
             return [self.data]
         return [self.data, self.offset, self.scale, *([True] if self.logarithmic else [])]
 
 
 class Blobs:
-    """Collects arrays; an array is called by its place among them."""
+    """Collects arrays; an array is identified by its index."""
 
     def __init__(self) -> None:
         self.blobs: list[Blob] = []
@@ -42,28 +42,28 @@ class Blobs:
 
     @property
     def size(self) -> int:
-        """Characters that they take in the document."""
+        """Total characters in the document."""
         return sum(len(blob.data) for blob in self.blobs)
 
     def exact(self, values: npt.ArrayLike) -> int:
-        """The place of an array of float32."""
+        """Store an array as float32; its index."""
         array = np.asarray(values, dtype="<f4")
         return self._place(Blob(kind="float32", data=_text(array)))
 
     def compact(self, values: npt.ArrayLike, *, logarithmic: bool = False) -> int:
-        """The place of an array of int16, right to a part in 65,000 of its range, or of that of its logarithm.
+        """Store an array as int16, accurate to 1/65,000 of its range, or of that of its logarithm; its index.
 
-        What is not above zero has none, and counts as zero.
+        In a logarithmic array, values that are not positive count as zero.
         """
-        given = np.asarray(values, dtype=float)
+        numbers = np.asarray(values, dtype=float)
         if logarithmic:
-            given = np.log10(np.where(given > 0.0, given, np.nan))
-        known = given[np.isfinite(given)]
+            numbers = np.log10(np.where(numbers > 0.0, numbers, np.nan))
+        known = numbers[np.isfinite(numbers)]
         low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)
         offset = float(f"{0.5 * (low + high):.9g}")
         scale = float(f"{max(high - offset, offset - low) / STEPS:.9g}") or 1.0
-        steps = np.rint((np.where(np.isfinite(given), given, offset) - offset) / scale)
-        steps[~np.isfinite(given)] = NOTHING
+        steps = np.rint((np.where(np.isfinite(numbers), numbers, offset) - offset) / scale)
+        steps[~np.isfinite(numbers)] = NOTHING
         data = _text(steps.astype("<i2"))
         return self._place(Blob(kind="int16", data=data, offset=offset, scale=scale, logarithmic=logarithmic))
 

@@ -1,4 +1,4 @@
-"""A report as one HTML file: its document, the code of the page and the plotting library, all of it inside."""
+"""A report as one HTML file that contains its data, the code of the page and the plotting library."""
 
 import html
 import re
@@ -12,13 +12,13 @@ SCRIPTS = (
     "data.js", "words.js", "theme.js", "scene.js", "peaks.js", "timeplots.js", "map.js", "shares.js", "run.js",
     "tables.js", "page.js",
 )  # fmt: skip
-"""In the order in which the page takes them; each needs those before it only"""
+"""In the order of loading; each depends only on those before it"""
 _PAGE = resources.files("orchestration.report") / "page"
 _PLACE = re.compile(r"\{\{(\w+)\}\}")
 
 
 def write(report: Report, out: Path) -> Path:
-    """Write the file of a report; raises `UsageError` where it cannot be."""
+    """Write the file of a report; raises `UsageError` if it cannot be written."""
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         out.write_text(as_html(report), encoding="utf-8")
@@ -42,7 +42,7 @@ def as_html(report: Report) -> str:
 
 
 def _in_script(document: str) -> str:
-    """JSON that may stand in a script element, whatever names are in it: no tag begins or ends there."""
+    """JSON escaped for a script element: names in it cannot open or close a tag."""
     return document.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 

@@ -1,4 +1,4 @@
-"""How runs are laid out whose columns say what they are of: panels, what moves in space, columns that are computed."""
+"""Layouts of runs that are recognised by their columns: panels, the scene in space, computed columns."""
 
 from __future__ import annotations
 
@@ -17,33 +17,33 @@ if TYPE_CHECKING:
 
 
 class KnownLayout(Protocol):
-    """Of one kind of runs."""
+    """The layout of one kind of runs."""
 
     @property
     def compact(self) -> tuple[str, ...]:
-        """Columns that a track has, if it is to be short."""
+        """The columns of a short track."""
 
     @property
     def logarithmic(self) -> Collection[str]:
-        """Of the computed columns, those that are kept by their logarithms."""
+        """Computed columns that are stored by their logarithms."""
 
     def fits(self, columns: Collection[str]) -> bool:
-        """Whether columns are those of such a run."""
+        """Whether the columns are those of such a run."""
 
     def computed(self, signals: Signals) -> Signals:
-        """Columns that are made of others, where these are there."""
+        """Columns computed from others, if these exist."""
 
     def panels(self, columns: Collection[str]) -> tuple[Panel, ...]:
-        """For the columns that are there, computed ones among them; what is left over gets panels as in any run."""
+        """Panels for the columns, computed ones included; the remaining columns get panels as in any run."""
 
     def scene(self, columns: Collection[str], system: System | None) -> Scene | None:
-        """What moves in space; None where the system is told in axes that the page does not know."""
+        """The scene in space; None if the page does not know the axes of the system."""
 
 
 LAYOUTS: Registry[KnownLayout] = Registry()
-"""Rooms above enter theirs"""
+"""Rooms above register theirs"""
 
 
 def layout_for(columns: Collection[str]) -> KnownLayout | None:
-    """The first that fits; None for the columns of any system."""
+    """The first layout that fits the columns; None if none does."""
     return next((layout for layout in LAYOUTS.all() if layout.fits(columns)), None)

@@ -1,4 +1,4 @@
-"""Which panels runs get, from the columns that they have: known ones, or the connections of any system."""
+"""The panels of runs by their columns: those of a known layout, or the connections of any system."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
@@ -13,16 +13,16 @@ MOST_LINES = 8
 """in one panel"""
 
 About = Mapping[str, ColumnInfo]
-"""What is known of columns"""
+"""By column"""
 
 
 def layout_of(system: System | None, columns: Collection[str], about: About) -> Layout:
-    """The panels for some columns; `system` is what they are of, where it is known."""
+    """The layout for some columns; `system` is that of the run, if it is known."""
     known = layout_for(columns)
     if known is None:
         return Layout(columns=tuple(columns), panels=(*_of_connections(system, columns, about),), scene=None)
     panels, scene = known.panels(columns), known.scene(columns, system)
-    if scene is None:  # and so nothing that the page computes from it
+    if scene is None:  # then the page computes no columns from it
         panels = tuple(panel for panel in panels if all(line.column in columns for line in panel.lines))
     drawn = {line.column for panel in panels for line in panel.lines}
     if scene is not None:
@@ -32,7 +32,7 @@ def layout_of(system: System | None, columns: Collection[str], about: About) -> 
 
 
 def _of_connections(system: System | None, columns: Collection[str], about: About) -> Iterator[Panel]:
-    """What is exchanged, as the receiver has it; then all else that was recorded."""
+    """Panels of exchanged signals, as received; then of the other recorded ones."""
     drawn: set[str] = set()
     for x in system.connections if system is not None else ():
         ends = [end if end in columns else start for start, end in zip(x.start, x.end)]
@@ -45,7 +45,7 @@ def _of_connections(system: System | None, columns: Collection[str], about: Abou
 
 
 def _of_components(system: System | None, columns: Sequence[str], about: About, *, shown: bool) -> Iterator[Panel]:
-    """Columns by component and vector; those of a component that samples are held."""
+    """Panels by component and vector; signals of a sampled component are held."""
     groups: dict[str, list[str]] = {}
     for name in columns:
         groups.setdefault(name.rpartition(".")[0], []).append(name)
@@ -59,13 +59,13 @@ def _split(
     title: str, names: Sequence[str], about: About, *, held: bool = False, shown: bool = True
 ) -> Iterator[Panel]:
     """Panels of one unit and few lines each."""
-    alike: dict[str | None, list[str]] = {}
+    by_unit: dict[str | None, list[str]] = {}
     for name in names:
-        alike.setdefault(labels.unit(about[name].unit) if name in about else None, []).append(name)
-    for unit, some in alike.items():
-        for first in range(0, len(some), MOST_LINES):
+        by_unit.setdefault(labels.unit(about[name].unit) if name in about else None, []).append(name)
+    for unit, of_unit in by_unit.items():
+        for first in range(0, len(of_unit), MOST_LINES):
             lines = [
                 Line(column=name, label=labels.signal(name, about), held=held)
-                for name in some[first : first + MOST_LINES]
+                for name in of_unit[first : first + MOST_LINES]
             ]
             yield Panel(title=title, unit=unit, lines=(*lines,), shown=shown)

@@ -1,4 +1,4 @@
-"""What a report holds, as the page reads it: JSON whose arrays are numbers of blobs."""
+"""The document of a report, which the page reads: JSON in which arrays are indices of blobs."""
 
 import dataclasses
 import json
@@ -22,7 +22,7 @@ class Line:
     held: bool = False
     """whether it keeps its value until the next one, as a command does"""
     reference: bool = False
-    """whether it is what another line is to follow"""
+    """whether it is the reference of another line"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,38 +34,38 @@ class Panel:
     lines: tuple[Line, ...]
     logarithmic: bool = False
     shown: bool = True
-    """whether the page opens with it"""
+    """whether it is visible when the page opens"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """The columns of what moves in space: quaternions (x, y, z, w) from body to space."""
+    """The columns of a body that moves in space: quaternions (x, y, z, w) from body to space."""
 
     position: tuple[str, str, str]
     quaternion: tuple[str, str, str, str]
     reference: tuple[str, str, str] | None
-    """where it should be"""
+    """the desired position"""
     desired: tuple[str, str, str, str] | None
-    """the attitude that it should have"""
+    """the desired attitude"""
     thrust: str | None
-    """upwards as the vehicle has it [N]"""
+    """upwards in the body [N]"""
     is_enu: bool = False
-    """whether they are east-north-up and of a body forward-left-up, which the page turns; else north-east-down"""
+    """whether axes are east-north-up and forward-left-up, which the page converts; else north-east-down"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Layout:
-    """How the tracks of runs that are alike are drawn."""
+    """The panels and the scene of tracks with the same columns."""
 
     columns: tuple[str, ...]
-    """of such a track"""
+    """of a track"""
     panels: tuple[Panel, ...]
     scene: Scene | None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Track:
-    """Signals of a run, as places of blobs."""
+    """Signals of a run, as indices of blobs."""
 
     layout: int
     time: int
@@ -75,7 +75,7 @@ class Track:
 
 @dataclass(frozen=True, kw_only=True)
 class Bars:
-    """Who has a computer or a network when, in pieces; arrays as places of blobs."""
+    """The occupation of computers and networks over time, in pieces; arrays as indices of blobs."""
 
     rows: tuple[str, ...]
     """tasks and messages"""
@@ -96,11 +96,11 @@ class Run:
     """in the design of a study"""
     settings: Mapping[str, Setting] = field(default_factory=dict)
     metrics: Mapping[str, float | int | bool | str | None] = field(default_factory=dict)
-    """of a run that is in no table"""
+    """of a run that is not in a table"""
     message: str | None = None
     """what diverged"""
     note: str | None = None
-    """what is to be known of its track"""
+    """on its track"""
     track: Track | None = None
     bars: Bars | None = None
     """of a system with computers or networks"""
@@ -108,7 +108,7 @@ class Run:
 
 @dataclass(frozen=True, kw_only=True)
 class Column:
-    """Of a table of runs: numbers, or places in `words`."""
+    """A column of a table of runs: numbers, or indices into `words`."""
 
     name: str
     label: str
@@ -126,28 +126,28 @@ class Table:
     count: int
     """of rows here"""
     total: int
-    """of runs that were flown"""
+    """of runs in the store"""
     columns: tuple[Column, ...]
     tracks: Mapping[str, int]
-    """by row: which of the report's runs it is"""
+    """by row: the index of its run in the report"""
     messages: Mapping[str, str]
-    """by row: what failed or diverged"""
+    """by row: the reason of a failure or divergence"""
     is_grid: bool
     """whether every axis lists its values"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Share:
-    """Of some runs, those that are good."""
+    """The share of good runs among some runs."""
 
     label: str
     value: Number
-    """of the axis, or the middle of what it is taken over"""
+    """of the axis, or the middle of its interval"""
     good: int
     runs: int
     low: Number
     high: Number
-    """Wilson interval at 95 %; None where nothing was left to chance"""
+    """Wilson interval at 95 %; None if nothing is random"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,7 +162,7 @@ class Shares:
 
 @dataclass(frozen=True, kw_only=True)
 class Cell:
-    """Of a comparison: one controller on one vehicle under one condition at one value of the axis."""
+    """A cell of a comparison: one controller on one vehicle under one condition at one value of the axis."""
 
     number: int
     vehicle: str
@@ -177,8 +177,8 @@ class Cell:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Compared:
-    """What a comparison adds to its table of runs."""
+class ComparisonCells:
+    """The cells of a comparison, in addition to its table of runs."""
 
     axis: str
     """the name of its column"""
@@ -190,28 +190,28 @@ class Compared:
 
 @dataclass(frozen=True, kw_only=True)
 class Report:
-    """All of it."""
+    """The whole document."""
 
     kind: Literal["runs", "study", "comparison"]
     title: str
     summary: str
     words: tuple[str, str]
-    """what a good run is called, and one that is not"""
+    """the names of the outcomes of a good run and of one that is not good"""
     layouts: tuple[Layout, ...]
     runs: tuple[Run, ...]
     blobs: Sequence[Blob]
     units: Mapping[str, str] = field(default_factory=dict)
     """of metrics"""
     labels: Mapping[str, str] = field(default_factory=dict)
-    """of metrics: what people call them"""
+    """of metrics"""
     table: Table | None = None
     metric: str | None = None
-    """of the table, that is drawn first"""
+    """the one of the table that is drawn first"""
     overall: Share | None = None
     shares: tuple[Shares, ...] = ()
-    compared: Compared | None = None
+    compared: ComparisonCells | None = None
     contents: tuple[str, ...] = ()
-    """sentences: what is in the file, and what is left out"""
+    """sentences: what the file contains and what it omits"""
     warnings: tuple[str, ...] = ()
     provenance: tuple[tuple[str, str], ...] = ()
     command: str = ""
@@ -219,7 +219,7 @@ class Report:
 
 
 def as_json(report: Report) -> str:
-    """The document of a report; what is not finite is null."""
+    """The document of a report as JSON; values that are not finite are null."""
     content = {each.name: getattr(report, each.name) for each in dataclasses.fields(report) if each.name != "blobs"}
     content["blobs"] = [blob.as_list() for blob in report.blobs]
     return json.dumps(plain(content), allow_nan=False, ensure_ascii=False, separators=(",", ":"))

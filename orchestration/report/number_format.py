@@ -1,11 +1,11 @@
-"""Numbers as sentences have them."""
+"""Numbers as text."""
 
 
 def number(value: float) -> str:
-    """To six digits."""
+    """A number to six digits."""
     return f"{value:.6g}"
 
 
 def percent(share: float) -> str:
-    """A share, finer near the ends."""
+    """A share in percent, to three digits."""
     return f"{100.0 * share:.3g} %"

@@ -1,4 +1,4 @@
-"""The report of runs, from their directories or as they were returned."""
+"""The report of single runs, from their directories or from results."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -23,9 +23,9 @@ MOST_ROWS, LEAST_ROWS = 6000, 200
 """of a run"""
 MOST_RUNS = 200
 MOST_PIECES = 20_000
-"""Of the time of a computer or of a network, of those that are drawn"""
+"""of the timeline of a computer or a network"""
 SETTLING = "settling_time"
-"""The objective that says when a run settles, of systems that have it"""
+"""The objective that is the time at which a run settles, in systems that have it"""
 _CODED = 4.0 * 4.0 / 3.0
 """Characters of a number"""
 
@@ -39,13 +39,13 @@ def report_of(results: Mapping[str, Result], command: str) -> Report:
     columns = sum(len(result.columns) for result in results.values())
     rows = int(min(MOST_ROWS, max(LEAST_ROWS, BYTES / _CODED / columns)))
     runs = [_run(name, result, tracks, blobs, rows) for name, result in results.items()]
-    some = next(iter(results.values()))
-    told = [_told(name, result) for name, result in results.items()]
+    first = next(iter(results.values()))
+    summaries = [_summary(name, result) for name, result in results.items()]
     return Report(
         kind="runs",
         title=next(iter(results)) if len(results) == 1 else f"{len(results)} runs",
-        summary=told[0] if len(results) == 1 else "; ".join(told[:6]) + ("; …" if len(told) > 6 else ""),
-        words=some.system.criterion.outcomes,
+        summary=summaries[0] if len(results) == 1 else "; ".join(summaries[:6]) + ("; …" if len(summaries) > 6 else ""),
+        words=first.system.criterion.outcomes,
         layouts=tuple(tracks.layouts),
         runs=tuple(runs),
         blobs=blobs.blobs,
@@ -77,7 +77,7 @@ def _run(name: str, result: Result, tracks: Tracks, blobs: Blobs, rows: int) -> 
 
 
 def _bars(system: System, blobs: Blobs) -> Bars | None:
-    """Who has its computers and networks when; the first pieces of each where there are very many."""
+    """The timeline of its computers and networks; at most `MOST_PIECES` pieces of each."""
     if not (system.computers or system.networks):
         return None
     timeline = timeline_of(system)
@@ -86,15 +86,15 @@ def _bars(system: System, blobs: Blobs) -> Bars | None:
     for shared in (*timeline.processors.values(), *timeline.links.values()):
         places = np.arange(len(rows), len(rows) + len(shared.owners))
         rows += shared.owners
-        some = slice(MOST_PIECES)
-        pieces.append(np.column_stack([places[shared.owner[some]], shared.begin[some] / 1e9, shared.end[some] / 1e9]))
+        part = slice(MOST_PIECES)
+        pieces.append(np.column_stack([places[shared.owner[part]], shared.begin[part] / 1e9, shared.end[part] / 1e9]))
     row, begin, end = np.vstack(pieces).T
     return Bars(rows=tuple(rows), row=blobs.exact(row), begin=blobs.exact(begin), end=blobs.exact(end))
 
 
 def _settings(result: Result) -> dict[str, Setting]:
-    """What its file says, in words."""
-    found: dict[str, Setting] = {}
+    """The values of its file, by display name."""
+    settings: dict[str, Setting] = {}
     waiting: list[tuple[str, Any]] = [("", tables_in(result.request.to_toml()))]
     while waiting:
         place, value = waiting.pop(0)
@@ -102,35 +102,35 @@ def _settings(result: Result) -> dict[str, Setting]:
             waiting = [(f"{place}.{key}".lstrip("."), each) for key, each in value.items()] + waiting
         elif isinstance(value, float | int | bool | str):
             named = quantities.setting(place, [value])
-            found[named.title] = value if isinstance(value, int | str) else named.factor * value
-    return found
+            settings[named.title] = value if isinstance(value, int | str) else named.factor * value
+    return settings
 
 
-def _told(name: str, result: Result) -> str:
-    """What became of a run, and when."""
+def _summary(name: str, result: Result) -> str:
+    """The outcome of a run and its time."""
     metrics = result.metrics
-    said = "no criterion" if metrics["outcome"] is None else str(metrics["outcome"])
+    outcome = "no criterion" if metrics["outcome"] is None else str(metrics["outcome"])
     settled = metrics.get(SETTLING) if metrics["good"] else None
     if settled is not None:
-        return f"{name}: {said} in {settled:.3g} s"
+        return f"{name}: {outcome} in {settled:.3g} s"
     ended = result.divergence is not None or result.termination is not None
-    return f"{name}: {said} {'at' if ended else 'in a run of'} {number(result.end)} s"
+    return f"{name}: {outcome} {'at' if ended else 'in a run of'} {number(result.end)} s"
 
 
 def _contents(results: Mapping[str, Result], rows: int) -> Sequence[str]:
     longest = max(len(result.recording) for result in results.values())
     if longest <= rows:
-        return ["All that was recorded is in this file, as numbers of 32 bits."]
+        return ["All recorded rows are in this file, as numbers of 32 bits."]
     stride = -(-longest // rows)
     return [
-        f"Of the recorded rows every {stride}th is in this file, and with them those at which a signal is largest or "
-        "smallest; the metrics are of all rows."
+        f"Every {stride}th of the recorded rows is in this file, and those at which a signal is largest or smallest; "
+        "the metrics are of all rows."
     ]
 
 
 def provenance(results: Mapping[str, Result]) -> list[tuple[str, str]]:
-    """Versions, platform, engine and GUIDs of FMUs; what differs from run to run once for each."""
-    found: dict[tuple[str, str], list[str]] = {}
+    """Versions, platform, engine and GUIDs of FMUs; values that differ between runs with the names of their runs."""
+    runs_by_fact: dict[tuple[str, str], list[str]] = {}
     for name, result in results.items():
         notes = result.provenance
         facts = [
@@ -142,8 +142,8 @@ def provenance(results: Mapping[str, Result]) -> list[tuple[str, str]]:
             for component, fmu in notes.get("fmus", {}).items()
         ]
         for key, value in facts:
-            found.setdefault((str(key), str(value)), []).append(name)
+            runs_by_fact.setdefault((str(key), str(value)), []).append(name)
     return [
         (key, value if len(names) == len(results) else f"{value} ({', '.join(names)})")
-        for (key, value), names in found.items()
+        for (key, value), names in runs_by_fact.items()
     ]

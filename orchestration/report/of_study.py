@@ -1,4 +1,4 @@
-"""The report of a study: its store, and flights of some of its runs."""
+"""The report of a study: its store, and signals of some of its runs."""
 
 import json
 from collections import Counter
@@ -12,10 +12,10 @@ import numpy as np
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
 from orchestration.report.blobs import Blobs
-from orchestration.report.flights import Flight, Progress, fastest, fly
 from orchestration.report.model import Report, Run, Setting, Share
 from orchestration.report.number_format import percent
-from orchestration.report.subset import ALONE, MOST, chosen, points_for
+from orchestration.report.reruns import Progress, Rerun, fastest, rerun
+from orchestration.report.subset import MOST_IN_BATCHES, MOST_SINGLY, points_for, select
 from orchestration.report.tables import ColumnAxis, Row, is_good, share_of, shares_along, table_of
 from orchestration.report.tracks import Tracks
 from orchestration.results import display_names as labels
@@ -31,17 +31,17 @@ from orchestration.system.criterion import DIVERGED, TERMINATED
 from orchestration.workers.batching import Agreement
 
 AGREES = 1e-6
-"""Relative difference of the metric that is drawn first, up to which a flight flown again is the one in the store"""
+"""Relative difference of the metric that is drawn first up to which a rerun equals the run in the store"""
 
 Choose = Callable[[int], Sequence[int]]
-"""Picks at most so many runs, by their indices in the design"""
+"""Selects at most this number of runs, by their indices in the design"""
 COLUMNS = 24
-"""About as many of them a track has, its time counted twice"""
+"""Typical number of columns of a track, its time counted twice"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Stored:
-    """What is in a store."""
+    """The content of a store."""
 
     rows: Sequence[Row]
     metrics: Sequence[str]
@@ -50,14 +50,14 @@ class Stored:
 
 
 def read(path: Path, study: Study | None = None) -> Stored:
-    """All of a store; raises `UsageError` for one that has no runs, or is not of `study`."""
+    """The content of a store; raises `UsageError` for one without runs, or of another study."""
     with open_for_reading(path) as opened:
         if study is not None:
             expect_current(opened, study)
         about, rows = opened.about(), list(opened.rows())
         metrics = [name for name in opened.metrics if name not in TEXTS]
     if not rows or "axes" not in about:
-        raise UsageError(f"{path}: expected the store of a study that has begun; quadcosim sweep flies it")
+        raise UsageError(f"{path}: expected a store with runs; quadcosim sweep makes them")
     units: dict[str, str] = json.loads(about.get(UNITS, "{}"))
     return Stored(rows=rows, metrics=metrics, units=units, about=about)
 
@@ -78,16 +78,16 @@ def report_of(
     study: Study | None,
     command: str,
     *,
-    wanted: Sequence[int] = (),
+    required: Sequence[int] = (),
     most: int | None = None,
     progress: Progress | None = None,
     axes: Sequence[ColumnAxis] | None = None,
     choose: Choose | None = None,
 ) -> Report:
-    """The report of a store; of a `study` that is known, runs are flown again for their signals.
+    """The report of a store; if the `study` is known, runs are simulated again for their signals.
 
-    `wanted` are runs that are among them in any case, `most` is how many, which `choose` picks. `axes` are
-    those of the study if none are given. Raises `UsageError` for a run that the study does not have.
+    `required` are included in any case, up to `most` others are selected by `choose`. `axes` are by default those of
+    the study. Raises `UsageError` for a run that the study does not have.
     """
     blobs = Blobs()
     tracks = Tracks(blobs)
@@ -95,7 +95,7 @@ def report_of(
     metric = metric_of(stored, study)
     indices = [row["design_index"] for row in stored.rows if row["status"] == "done"]
     embedded = embed(
-        study, stored, indices, tracks, wanted=wanted, most=most, metric=metric, progress=progress, choose=choose
+        study, stored, indices, tracks, required=required, most=most, metric=metric, progress=progress, choose=choose
     )
     by_chance = is_sample(stored, study)
     overall = share_of("all runs", None, stored.rows, by_chance=by_chance)
@@ -118,7 +118,7 @@ def report_of(
         metric=metric,
         overall=overall,
         shares=tuple(
-            found for axis in axes if (found := shares_along(stored.rows, axis, by_chance=by_chance)) is not None
+            along for axis in axes if (along := shares_along(stored.rows, axis, by_chance=by_chance)) is not None
         ),
         contents=tuple(embedded.contents),
         provenance=tuple(provenance_of(stored.about)),
@@ -127,7 +127,7 @@ def report_of(
 
 
 def axes_of(stored: Stored, study: Study | None) -> list[ColumnAxis]:
-    """The axes, with the units of the store, and with scales where the study is known."""
+    """The axes with the units of the store; with scales if the study is known."""
     if study is None:
         return [
             ColumnAxis(name=name, quantity=quantity(labels.words(name), stored.units.get(name), _values(stored, name)))
@@ -144,7 +144,7 @@ def _values(stored: Stored, axis: str) -> list[Any]:
 
 
 def metric_of(stored: Stored, study: Study | None) -> str:
-    """What is drawn first, as in figures of the study."""
+    """The metric that is drawn first, as in figures of the study."""
 
     def values(name: str) -> Floats:
         return np.array([float(row[name]) for row in stored.rows if is_good(row) and row[name] is not None])
@@ -154,7 +154,7 @@ def metric_of(stored: Stored, study: Study | None) -> str:
 
 
 def words_of(stored: Stored, study: Study | None) -> tuple[str, str]:
-    """What a good run is called, and one that is not."""
+    """The names of the outcomes of a good run and of one that is not good."""
     if study is not None:
         return study.origin.criterion.outcomes
     good = next((str(row["outcome"]) for row in stored.rows if row["good"] == 1), "good")
@@ -164,7 +164,7 @@ def words_of(stored: Stored, study: Study | None) -> tuple[str, str]:
 
 
 def is_sample(stored: Stored, study: Study | None) -> bool:
-    """Whether runs are drawn from what may happen, so that a share of them has an interval; a grid is chosen."""
+    """Whether runs are a random sample, so that a share of them has an interval; a grid is not."""
     if study is None:
         return json.loads(stored.about.get("grid", "null")) is None
     drawn = any(axis.values is None or "seed" in axis.targets for axis in study.axes)
@@ -172,21 +172,21 @@ def is_sample(stored: Stored, study: Study | None) -> bool:
 
 
 def summary_of(overall: Share, words: tuple[str, str], stored: Stored) -> str:
-    """One sentence."""
+    """A sentence with the outcomes of all runs."""
     total = int(stored.about.get("total", overall.runs))
-    flown = f"{overall.runs} runs" if total == overall.runs else f"{overall.runs} of {total} runs are flown so far"
-    said = f"{flown}: {overall.good} {words[0]} ({percent(overall.good / overall.runs)}"
+    runs = f"{overall.runs} runs" if total == overall.runs else f"{overall.runs} of {total} runs are done so far"
+    text = f"{runs}: {overall.good} {words[0]} ({percent(overall.good / overall.runs)}"
     if overall.low is not None and overall.high is not None:
-        said += f", 95 % interval {percent(overall.low)} to {percent(overall.high)}"
+        text += f", 95 % interval {percent(overall.low)} to {percent(overall.high)}"
     outcomes = Counter(row["outcome"] for row in stored.rows)
     failed = sum(row["status"] == "failed" for row in stored.rows)
-    said += f"), {outcomes[DIVERGED]} diverged"
-    said += f", {outcomes[TERMINATED]} terminated" if outcomes[TERMINATED] else ""
-    return said + (f", {failed} failed" if failed else "") + "."
+    text += f"), {outcomes[DIVERGED]} diverged"
+    text += f", {outcomes[TERMINATED]} terminated" if outcomes[TERMINATED] else ""
+    return text + (f", {failed} failed" if failed else "") + "."
 
 
 def messages_of(rows: Sequence[Row], places: Mapping[int, int]) -> dict[int, str]:
-    """Why runs failed; of those whose signals are there also what diverged."""
+    """Reasons of failures by index; of runs with signals also reasons of divergence."""
     return {
         row["design_index"]: row["message"]
         for row in rows
@@ -200,80 +200,81 @@ def embed(
     indices: Sequence[int],
     tracks: Tracks,
     *,
-    wanted: Sequence[int],
+    required: Sequence[int],
     most: int | None,
     metric: str,
     progress: Progress | None,
     choose: Choose | None,
 ) -> Embedded:
-    """Fly some of the runs with these indices again, and keep what the page needs of them."""
+    """Rerun some of the runs with these indices, and keep the signals that the page needs."""
     known = {row["design_index"]: row for row in stored.rows}
-    for index in wanted:
+    for index in required:
         if index not in known:
             raise UsageError(f"--run {index}: expected the number of a run that is in the store")
     if study is None:
         return Embedded(
             runs=[], places={},
-            contents=["No flight is in this file: a store has none. Make the report from the study file to see some."],
+            contents=["This file has no signals: a store has none. Make the report from the study file to see some."],
         )  # fmt: skip
-    flown_study, files, lanes = fastest(study)
-    limit = (MOST if lanes else ALONE) if most is None else most
-    some = chosen(indices, wanted, limit) if choose is None else sorted({*wanted, *choose(limit)})
+    variant, files, lanes = fastest(study)
+    limit = (MOST_IN_BATCHES if lanes else MOST_SINGLY) if most is None else most
+    selected = select(indices, required, limit) if choose is None else sorted({*required, *choose(limit)})
     runs: list[Run] = []
     places: dict[int, int] = {}
     differing = 0
-    points = points_for(len(some), COLUMNS)
-    for flight in fly(flown_study, files, some, lanes=lanes, progress=progress):
-        note = _difference(flight, known[flight.index], metric)
+    points = points_for(len(selected), COLUMNS)
+    for again in rerun(variant, files, selected, lanes=lanes, progress=progress):
+        note = _difference(again, known[again.index], metric)
         differing += note is not None
-        about = column_infos(flight.system, files.models_of(flown_study.origin), flight.signals)
-        places[flight.index] = len(runs)
-        settings: dict[str, Setting] = dict(known[flight.index]["settings"])
-        track = tracks.compact(flight.system, flight.signals, about, points)
+        about = column_infos(again.system, files.models_of(variant.origin), again.signals)
+        places[again.index] = len(runs)
+        settings: dict[str, Setting] = dict(known[again.index]["settings"])
+        track = tracks.compact(again.system, again.signals, about, points)
         runs.append(
             Run(
-                name=f"run {flight.index}", index=flight.index, settings=settings, message=flight.message, note=note,
+                name=f"run {again.index}", index=again.index, settings=settings, message=again.message, note=note,
                 track=track,
             )
         )  # fmt: skip
     return Embedded(runs=runs, places=places, contents=[*_contents(len(runs), len(known), points, differing)])
 
 
-def _difference(flight: Flight, row: Row, metric: str) -> str | None:
-    """How a flight flown again differs from its row in the store; None if it does not."""
-    if flight.metrics["outcome"] != row["outcome"]:
-        return f"flown again it is {flight.metrics['outcome']}; the store has {row['outcome']}"
-    again, before = flight.metrics.get(metric), row.get(metric)
-    if again is None or before is None:
-        return None if again is before else f"flown again, {labels.metric(metric)} has a value only once"
-    if abs(float(again) - float(before)) > AGREES * max(abs(float(again)), abs(float(before))):
-        return f"flown again, {labels.metric(metric)} is {float(again):.6g}; the store has {float(before):.6g}"
+def _difference(again: Rerun, row: Row, metric: str) -> str | None:
+    """How a rerun differs from its row in the store; None if it does not."""
+    if again.metrics["outcome"] != row["outcome"]:
+        return f"the rerun is {again.metrics['outcome']}; the store has {row['outcome']}"
+    new, old = again.metrics.get(metric), row.get(metric)
+    if new is None or old is None:
+        has, lacks = ("the store", "the rerun") if new is None else ("the rerun", "the store")
+        return None if new is old else f"{has} has a value of {labels.metric(metric)}, {lacks} has none"
+    if abs(float(new) - float(old)) > AGREES * max(abs(float(new)), abs(float(old))):
+        return f"in the rerun {labels.metric(metric)} is {float(new):.6g}; the store has {float(old):.6g}"
     return None
 
 
 def _contents(count: int, total: int, points: int, differing: int) -> Sequence[str]:
-    said = [
-        f"Metrics of all {total} runs are in this file, and the signals of {count} of them: flown again when it was "
-        f"made, at most {points} points each, most of them where most happens. The page draws straight lines between "
-        "them, so that what is faster is not to be seen."
+    texts = [
+        f"Metrics of all {total} runs are in this file, and the signals of {count} of them, which were rerun for it: "
+        f"at most {points} points each, most of them where signals change most. The page draws straight lines between "
+        "them, so faster changes are not visible."
     ]
     if count < total:
-        said.append(
-            "The flights are spread evenly over the design. A run without one opens with its metrics; "
-            "--run N puts the flight of run N into the file, --flights N more of them."
+        texts.append(
+            "These runs are spread evenly over the design. The others open with their metrics only; "
+            "--run N includes the signals of run N, --flights N those of N runs."
         )
     if differing:
-        said.append(
-            f"{differing} of them came out otherwise than the store has it (their pages say how): the software or the "
-            "machine is another one than that of the study."
+        texts.append(
+            f"{differing} of the reruns differ from the store (see their notes): the software or the machine is not "
+            "that of the study."
         )
     elif count:
-        said.append("All of them came out as the store has it.")
-    return said
+        texts.append("All reruns agree with the store.")
+    return texts
 
 
 def provenance_of(about: Mapping[str, str]) -> list[tuple[str, str]]:
-    """Versions and GUIDs that a store tells, and its machine."""
+    """Versions and GUIDs in a store, and its machine."""
     place: dict[str, Any] = json.loads(about.get("place", "{}"))
     versions = {f"version of {name}": text for name, text in json.loads(about.get("versions", "{}")).items()}
     guids = {f"GUID of the {name}": text for name, text in json.loads(about.get("guids", "{}")).items()}

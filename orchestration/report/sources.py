@@ -1,4 +1,4 @@
-"""What a report can be of: directories of runs, one study or its store, one comparison."""
+"""The sources of a report: directories of runs, one study or its store, one comparison."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -6,8 +6,8 @@ from pathlib import Path
 from orchestration.basics.documents import read_toml
 from orchestration.basics.errors import UsageError
 from orchestration.report import of_runs
-from orchestration.report.flights import Progress
 from orchestration.report.model import Report
+from orchestration.report.reruns import Progress
 from orchestration.runs.result import Result
 from orchestration.runs.run_directory import METRICS, load_run
 
@@ -20,14 +20,14 @@ def report_of(
     command: str,
     *,
     store: Path | None = None,
-    wanted: Sequence[int] = (),
+    required: Sequence[int] = (),
     most: int | None = None,
     progress: Progress | None = None,
 ) -> Report:
-    """The report of what is at these paths; raises `UsageError` for what none can be made of.
+    """The report of the runs, study or comparison at these paths; raises `UsageError` for anything else.
 
-    `store` is the folder of the store of a study or a comparison, default `results/NAME`. `wanted` and `most` are
-    for studies: runs whose flights are in it, and how many.
+    `store` is the folder of the store of a study or a comparison, default `results/NAME`. `required` and `most` are
+    for studies: runs whose signals are included, and the number of such runs.
     """
     if not what:
         raise UsageError(f"expected {EXPECTED}")
@@ -35,10 +35,10 @@ def report_of(
     if len(what) > 1 and set(kinds) != {"run"}:
         raise UsageError(f"{', '.join(map(str, what))}: expected directories of runs, or one study or comparison alone")
     if kinds[0] == "run":
-        if wanted or most is not None:
+        if required or most is not None:
             raise UsageError("--run and --flights: expected a study or a comparison with them")
         return of_runs.report_of(dict(_runs(what)), command)
-    return _of_many(what[0], kinds[0], command, store=store, wanted=wanted, most=most, progress=progress)
+    return _of_many(what[0], kinds[0], command, store=store, required=required, most=most, progress=progress)
 
 
 def _kind(path: Path) -> str:
@@ -55,7 +55,7 @@ def _kind(path: Path) -> str:
 
 
 def _runs(paths: Sequence[Path]) -> Iterator[tuple[str, Result]]:
-    """Runs by the name of their directory; by their path where that is another's too."""
+    """Runs by the name of their directory; by their path if that is not unique."""
     names = [path.resolve().name for path in paths]
     for path, name in zip(paths, names):
         yield (name if names.count(name) == 1 else str(path)), load_run(path)
@@ -67,24 +67,24 @@ def _of_many(
     command: str,
     *,
     store: Path | None,
-    wanted: Sequence[int],
+    required: Sequence[int],
     most: int | None,
     progress: Progress | None,
 ) -> Report:
-    # what reads stores comes with an extra
+    # reading stores needs an extra
     from orchestration.comparison.file import load_comparison
     from orchestration.report import of_comparison, of_study
     from orchestration.studies.store import store_path
     from orchestration.studies.study_file import load_study
 
     if kind == "store":
-        there = path / STORE if path.is_dir() else path
-        name = there.resolve().parent.name
-        return of_study.report_of(name, of_study.read(there), None, command, wanted=wanted, most=most)
+        file = path / STORE if path.is_dir() else path
+        name = file.resolve().parent.name
+        return of_study.report_of(name, of_study.read(file), None, command, required=required, most=most)
     if kind == "study":
         study = load_study(path)
         stored = of_study.read(store_path(study.name, store), study)
-        return of_study.report_of(study.name, stored, study, command, wanted=wanted, most=most, progress=progress)
+        return of_study.report_of(study.name, stored, study, command, required=required, most=most, progress=progress)
     comparison = load_comparison(path)
-    there = store_path(comparison.name, store)
-    return of_comparison.comparison_report(comparison, there, command, wanted=wanted, most=most, progress=progress)
+    file = store_path(comparison.name, store)
+    return of_comparison.comparison_report(comparison, file, command, required=required, most=most, progress=progress)

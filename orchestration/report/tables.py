@@ -1,4 +1,4 @@
-"""The rows of a store as the table of a report, and what shares of them are good."""
+"""The rows of a store as the table of a report, and the shares of good runs."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,9 +17,9 @@ from orchestration.results import display_names as labels
 from orchestration.results.quantities import Quantity
 
 MOST_ROWS = 50_000
-"""of a table; of a larger study every n-th row is in it"""
+"""of a table; a larger study is thinned evenly"""
 MOST_VALUES = 40
-"""of an axis, of which each has a share of its own; others are cut into parts"""
+"""of an axis with a share for each value; other axes are divided into parts"""
 PARTS = 8
 OUTCOME = "outcome"
 
@@ -33,7 +33,7 @@ class ColumnAxis:
     name: str
     """of the column"""
     quantity: Quantity
-    """what it is of, and how its values are read"""
+    """with the unit in which its values are displayed"""
     logarithmic: bool = False
 
 
@@ -90,7 +90,7 @@ def _words(name: str, values: Sequence[Any], blobs: Blobs, kind: Any) -> Column:
 
 
 def _metrics(rows: Sequence[Row], metrics: Sequence[str], units: Mapping[str, str], blobs: Blobs) -> Iterator[Column]:
-    """Those that have a value in some run."""
+    """Columns of the metrics that have a value in some run."""
     for name in metrics:
         values = np.array([math.nan if row[name] is None else float(row[name]) for row in rows])
         known = values[np.isfinite(values)]
@@ -107,14 +107,14 @@ def is_good(row: Row) -> bool:
 
 
 def share_of(label: str, value: float | None, rows: Sequence[Row], *, by_chance: bool) -> Share:
-    """The share of some rows that is good; with its interval if the runs are a sample of what may happen."""
+    """The share of good runs in some rows; with its interval if the runs are a random sample."""
     good = sum(map(is_good, rows))
     low, high = wilson(good, len(rows)) if by_chance else (None, None)
     return Share(label=label, value=value, good=good, runs=len(rows), low=low, high=high)
 
 
 def shares_along(rows: Sequence[Row], axis: ColumnAxis, *, by_chance: bool) -> Shares | None:
-    """Shares by value of an axis, or by part of its range; None for an axis of one value."""
+    """The shares by value of an axis, or by part of its range; None for an axis of one value."""
     values = [row["settings"][axis.name] for row in rows]
     distinct = list(dict.fromkeys(values))
     if len(distinct) < 2:
@@ -123,12 +123,12 @@ def shares_along(rows: Sequence[Row], axis: ColumnAxis, *, by_chance: bool) -> S
         groups: dict[Any, list[Row]] = {value: [] for value in _ordered(distinct)}
         for row, value in zip(rows, values):
             groups[value].append(row)
-        read = {value: _read(value, axis.quantity) for value in groups}
-        found = [share_of(_text(read[v]), _number(read[v]), some, by_chance=by_chance) for v, some in groups.items()]
+        shown = {value: _displayed(value, axis.quantity) for value in groups}
+        shares = [share_of(_text(shown[v]), _number(shown[v]), of, by_chance=by_chance) for v, of in groups.items()]
     else:
-        found = [*_by_part(rows, axis.quantity.of(values), axis, by_chance=by_chance)]
+        shares = [*_by_part(rows, axis.quantity.of(values), axis, by_chance=by_chance)]
     unit = labels.unit(axis.quantity.unit)
-    return Shares(axis=axis.quantity.name, unit=unit, logarithmic=axis.logarithmic, shares=tuple(found))
+    return Shares(axis=axis.quantity.name, unit=unit, logarithmic=axis.logarithmic, shares=tuple(shares))
 
 
 def _by_part(rows: Sequence[Row], values: Floats, axis: ColumnAxis, *, by_chance: bool) -> Iterator[Share]:
@@ -137,12 +137,12 @@ def _by_part(rows: Sequence[Row], values: Floats, axis: ColumnAxis, *, by_chance
     part = np.clip(np.digitize(scaled, edges) - 1, 0, PARTS - 1)
     ends = np.exp(edges) if axis.logarithmic else edges
     for i in range(PARTS):
-        some = [rows[k] for k in np.flatnonzero(part == i).tolist()]
-        if some:
+        of_part = [rows[k] for k in np.flatnonzero(part == i).tolist()]
+        if of_part:
             middle = 0.5 * (edges[i] + edges[i + 1])
             label = f"{ends[i]:.3g} to {ends[i + 1]:.3g}"
             value = float(np.exp(middle) if axis.logarithmic else middle)
-            yield share_of(label, value, some, by_chance=by_chance)
+            yield share_of(label, value, of_part, by_chance=by_chance)
 
 
 def _ordered(values: list[Any]) -> list[Any]:
@@ -154,8 +154,8 @@ def _text(value: Any) -> str:
     return number(value) if isinstance(value, float) else str(value)
 
 
-def _read(value: Any, quantity: Quantity) -> Any:
-    """A value in the unit in which it is read; a word as it is."""
+def _displayed(value: Any, quantity: Quantity) -> Any:
+    """A value in its display unit; a text as it is."""
     return value if quantity.factor == 1.0 else float(quantity.of(value))
 
 

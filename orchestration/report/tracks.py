@@ -1,4 +1,4 @@
-"""Signals of runs, thinned to what a page needs."""
+"""Signals of runs, decimated for a page."""
 
 from collections.abc import Mapping
 
@@ -16,21 +16,21 @@ Signals = Mapping[str, Floats]
 
 
 class Tracks:
-    """Puts the signals of runs into blobs, and finds the layouts that they share."""
+    """Stores the signals of runs in blobs, and collects their distinct layouts."""
 
     def __init__(self, blobs: Blobs) -> None:
         self._blobs = blobs
         self.layouts: list[Layout] = []
 
     def whole(self, system: System | None, signals: Signals, about: About, rows: int) -> Track:
-        """Every n-th row, so that they are about `rows`, and with them those at which a signal is at an end."""
+        """Every n-th row, about `rows` in all, and the rows with the largest or smallest value of a signal."""
         signals = _with_computed(signals)
         kept = _rows(signals, rows)
         columns = {name: self._blobs.exact(values[kept]) for name, values in signals.items() if name != "time"}
         return self._track(system, columns, about, self._blobs.exact(signals["time"][kept]))
 
     def compact(self, system: System, signals: Signals, about: About, points: int) -> Track:
-        """Values at some times, more where more happens: on the line between rows, of what is held the row before's."""
+        """Values at `points` times, denser where signals change more: interpolated, of held signals the row before."""
         signals = _with_computed(signals)
         time = signals["time"]
         at = _instants(signals, points)
@@ -42,8 +42,8 @@ class Tracks:
         columns = {}
         for name, values in signals.items():
             if name != "time":
-                found = values[before] if name in held else np.interp(at, time, values)
-                columns[name] = self._blobs.compact(found, logarithmic=name in logarithmic)
+                thinned = values[before] if name in held else np.interp(at, time, values)
+                columns[name] = self._blobs.compact(thinned, logarithmic=name in logarithmic)
         return self._track(system, columns, about, self._blobs.exact(at))
 
     def _track(self, system: System | None, columns: Mapping[str, int], about: About, time: int) -> Track:
@@ -54,13 +54,13 @@ class Tracks:
 
 
 def _with_computed(signals: Signals) -> Signals:
-    """With what is computed of signals by whoever knows them, as the position error of a flight."""
+    """The signals, and those computed by their known layout, such as the position error of a flight."""
     known = layout_for(signals)
     return signals if known is None else {**signals, **known.computed(signals)}
 
 
 def _instants(signals: Signals, most: int) -> Floats:
-    """Times between which equal parts of the run go by: half by the clock, half by how far the signals move."""
+    """Times that divide the run equally, half by time and half by the total variation of the signals."""
     time = signals["time"]
     if len(time) <= most:
         return time
@@ -71,9 +71,9 @@ def _instants(signals: Signals, most: int) -> Floats:
             steps = np.abs(np.diff(values))
             moved += steps / steps.sum()
     share = np.diff(time) / (time[-1] - time[0]) + moved / max(moved.sum(), 1e-300)
-    gone = np.concatenate([[0.0], np.cumsum(share)])
-    found: Floats = np.interp(np.linspace(0.0, gone[-1], most), gone, time)
-    return found
+    passed = np.concatenate([[0.0], np.cumsum(share)])
+    instants: Floats = np.interp(np.linspace(0.0, passed[-1], most), passed, time)
+    return instants
 
 
 def _rows(signals: Signals, most: int) -> np.ndarray[tuple[int], np.dtype[np.intp]]:

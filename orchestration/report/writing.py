@@ -7,7 +7,7 @@ from pathlib import Path
 from orchestration.basics.errors import UsageError
 from orchestration.basics.extras import needs
 from orchestration.report import html, of_runs
-from orchestration.report.flights import Progress
+from orchestration.report.reruns import Progress
 from orchestration.report.sources import report_of
 from orchestration.runs.result import Result
 
@@ -24,11 +24,11 @@ def report(
 ) -> Path:
     """Write one HTML file of results or directories of runs, or of a study, its store or a comparison; its path.
 
-    It holds all that it needs and loads nothing. `out` is the file, by default `report_NAME.html`, or the folder that
-    has the store of the study, by default `results/NAME`; the file of that name goes there then. Of a study so many
-    `flights` are flown again for their signals, those of the runs with the numbers `runs` among them.
+    The file is self-contained. `out` is the file, by default `report_NAME.html`, or the folder of the store of the
+    study, by default `results/NAME`, which the file is then written to. Of a study, the signals of `flights` runs are
+    included, those of the runs with the numbers `runs` among them.
 
-    Raises `UsageError` for what no report can be made of, `QuadcosimError` without the plotting library.
+    Raises `UsageError` for anything else, `QuadcosimError` without the plotting library.
     """
     if not what:
         raise UsageError("report: expected runs, a study or a comparison")
@@ -41,16 +41,16 @@ def report(
         to = folder / name
     elif to.suffix.lower() not in ENDINGS:
         raise UsageError(f"--out {to}: expected a file that ends in .html, or the folder of a store")
-    command = _again(paths, folder, flights, runs)
+    command = _command(paths, folder, flights, runs)
     if results:
         if paths:
             raise UsageError("report: expected results or paths, not both")
         named = {f"run {number}" if len(results) > 1 else "run": one for number, one in enumerate(results, start=1)}
         return html.write(of_runs.report_of(named, "quadcosim.report(...) in Python"), to)
-    return html.write(report_of(paths, command, store=folder, wanted=runs, most=flights, progress=progress), to)
+    return html.write(report_of(paths, command, store=folder, required=runs, most=flights, progress=progress), to)
 
 
-def _again(what: Sequence[Path], folder: Path | None, flights: int | None, runs: Sequence[int]) -> str:
+def _command(what: Sequence[Path], folder: Path | None, flights: int | None, runs: Sequence[int]) -> str:
     """The command that makes this report."""
     words = ["quadcosim", "report", *map(str, what)]
     words += ["--out", str(folder)] if folder is not None else []

@@ -61,10 +61,10 @@ function addAnglesOf(signals, quaternion, suffix) {
   signals.columns[`yaw${suffix}`] = degrees((a, b, c, d) => Math.atan2(2 * (d * c + a * b), 1 - 2 * (b * b + c * c)));
 }
 
-/** The columns of what moves in space, north-east-down: of other axes they are turned, as fmu_kit/frames.py does. */
+/** The columns of the body in space, north-east-down: other axes are converted, as fmu_kit/frames.py does. */
 function inSpace({ layout, columns }) {
-  const told = layout.scene;
-  if (!told || !told.is_enu) return told;
+  const scene = layout.scene;
+  if (!scene || !scene.is_enu) return scene;
   const half = Math.SQRT1_2;
   const attitude = ([x, y, z, w]) => [half * (x + y), half * (x - y), half * (w - z), half * (w + z)];
   const turned = (names, turn) => names && names.map((name, k) => {
@@ -73,9 +73,9 @@ function inSpace({ layout, columns }) {
     return `${name} turned`;
   });
   const place = ([east, north, up]) => [north, east, -up];
-  const { position, reference, quaternion, desired } = told;
+  const { position, reference, quaternion, desired } = scene;
   const turns = { position: turned(position, place), reference: turned(reference, place), quaternion: turned(quaternion, attitude), desired: turned(desired, attitude) };
-  return { ...told, ...turns };
+  return { ...scene, ...turns };
 }
 
 /** The last place whose time is not after t. */

@@ -81,16 +81,16 @@ function drawMap() {
 }
 
 function mapHint() {
-  const flights = report.runs.length ? ` ${report.runs.length} of ${report.table.count} have their flight in this file.` : "";
+  const flights = report.runs.length ? ` ${report.runs.length} of ${report.table.count} have their signals in this file.` : "";
   const there = new Set(map.rows.map((row) => kindOf(outcomeOf(row))));
   const [good, bad] = report.words;
   const signs = map.isGrid
     ? { good: `Colour: ${good}`, bad: `light grey ✕: ${bad}`, diverged: "dark grey ▽: diverged" }
     : { good: `Discs: ${good}`, bad: `✕: ${bad}`, diverged: "▽: diverged" };
-  const told = ["good", "bad", "diverged"].filter((kind) => there.has(kind)).map((kind) => signs[kind]);
-  if (map.isGrid && there.has("good") && there.size > 1) told.push(`orange line: edge of what is ${good}`);
+  const parts = ["good", "bad", "diverged"].filter((kind) => there.has(kind)).map((kind) => signs[kind]);
+  if (map.isGrid && there.has("good") && there.size > 1) parts.push(`orange line: edge of what is ${good}`);
   const clipped = map.shades.isClipped ? " Some values lie beyond the colours, which are for the others." : "";
-  return `${told.join("; ")}.${clipped} Click, or move with the arrow keys, to open a run.${flights}`;
+  return `${parts.join("; ")}.${clipped} Click, or move with the arrow keys, to open a run.${flights}`;
 }
 
 function rowOfPoint(point) {
@@ -210,7 +210,7 @@ function symbolTraces(kinds, across, up) {
   });
 }
 
-/** The ends of the cells around values that grow. */
+/** The edges of the cells around increasing values. */
 function edgesOf(values) {
   if (typeof values[0] === "string") return [...values.keys(), values.length].map((i) => i - 0.5);
   if (values.length === 1) return [values[0] - 0.5, values[0] + 0.5];

@@ -123,14 +123,14 @@ function openRun(run, row) {
 }
 
 function runText(run, row, index) {
-  const said = row === null ? [] : [axes.map((axis) => `${axis.label} ${withUnit(cellOf(axis, row), axis.unit)}`).join(", ")];
+  const texts = row === null ? [] : [axes.map((axis) => `${axis.label} ${withUnit(cellOf(axis, row), axis.unit)}`).join(", ")];
   const message = row === null ? run.message : report.table.messages[row];
-  if (message) said.push(message);
-  if (run && run.note) said.push(`Note: ${run.note}.`);
-  const parts = [said.join(". ")];
+  if (message) texts.push(message);
+  if (run && run.note) texts.push(`Note: ${run.note}.`);
+  const parts = [texts.join(". ")];
   if (run === null && report.runs.length) {
     const near = nearestFlight(row);
-    parts.push(element("br"), `Its flight is not in this file; with --run ${index} it will be. `, button(`Show the nearest that is: run ${near.index}`, () => openIndex(near.index)));
+    parts.push(element("br"), `Its signals are not in this file; --run ${index} includes them. `, button(`Show the nearest that is: run ${near.index}`, () => openIndex(near.index)));
   }
   return parts;
 }
@@ -166,8 +166,8 @@ let pending = 0;
 function showSignals() {
   const signals = signalsOf(player.run);
   const beside = player.beside === player.run ? null : signalsOf(player.beside);
-  const flies = Boolean(signals && signals.space);
-  byId("replay").hidden = !flies;
+  const hasScene = Boolean(signals && signals.space);
+  byId("replay").hidden = !hasScene;
   byId("player").hidden = !signals;
   byId("signals").hidden = !signals;
   document.body.classList.toggle("no-signals", !signals);
@@ -175,7 +175,7 @@ function showSignals() {
   if (!signals) return;
   controlsOf.time.max = signals.time[signals.time.length - 1];
   controlsOf.time.step = Number(((signals.time[signals.time.length - 1] - signals.time[0]) / 300).toPrecision(1));
-  if (flies) {
+  if (hasScene) {
     showInScene([signals, beside]);
     nameScene(beside);
   }

@@ -97,7 +97,7 @@ def test_who_has_a_computer_is_drawn_over_the_same_time_as_the_signals(show: Sho
 
 @pytest.fixture(scope="module")
 def of_study(show: Show, tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """A grid of four runs, of which three have their flight in the file."""
+    """A grid of four runs, of which three have their signals in the file."""
     folder = tmp_path_factory.mktemp("study")
     name = "grid"
     study = Study(name=name, base=scenario(), axes=(axis("timing.period", 0.01, 0.2), axis("timing.delay", 0.0, 0.01)))
@@ -117,7 +117,7 @@ def of_study(show: Show, tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 @pytest.fixture(scope="module")
 def of_comparison(show: Show, tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """Two cells of three starts each, of which two have their flight in the file."""
+    """Two cells of three initial conditions each, of which two have their signals in the file."""
     folder = tmp_path_factory.mktemp("comparison")
     file = folder / "comparison.toml"
     file.write_text(
@@ -342,7 +342,7 @@ def test_a_run_whose_flight_is_not_in_the_file_shows_its_metrics_and_the_nearest
 def test_the_page_says_what_is_in_it_and_how_it_was_made(of_study: Any) -> None:
     contents = of_study.inner_text("#contents")
     assert "Metrics of all 4 runs are in this file, and the signals of 3 of them" in contents
-    assert "All of them came out as the store has it." in contents
+    assert "All reruns agree with the store." in contents
     assert "quadcosim report" in contents
     assert "GUID of the plant" in contents
 

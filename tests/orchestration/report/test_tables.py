@@ -9,9 +9,9 @@ import pytest
 
 from orchestration.basics.statistics import wilson
 from orchestration.report.blobs import Blobs
-from orchestration.report.flights import Flight
 from orchestration.report.of_study import Stored, _difference, is_sample
-from orchestration.report.subset import LEAST_POINTS, MOST_POINTS, chosen, evenly, points_for
+from orchestration.report.reruns import Rerun
+from orchestration.report.subset import LEAST_POINTS, MOST_POINTS, evenly, points_for, select
 from orchestration.report.tables import ColumnAxis, share_of, shares_along, table_of
 from orchestration.results.quantities import quantity
 from orchestration.studies.axes import Axis
@@ -59,16 +59,16 @@ def test_a_share_has_wilsons_interval_only_where_runs_are_drawn_by_chance() -> N
     assert (listed.low, listed.high) == (None, None)
 
 
-def flown_again(error: float) -> Flight:
-    flight: Any = SimpleNamespace(metrics={"outcome": "settled", "error": error})
-    return flight
+def rerun_with(error: float) -> Rerun:
+    again: Any = SimpleNamespace(metrics={"outcome": "settled", "error": error})
+    return again
 
 
 @pytest.mark.parametrize(("apart", "agrees"), [(0.0, True), (0.9e-6, True), (-0.9e-6, True), (1.1e-6, False)])
-def test_a_flight_flown_again_is_the_one_in_the_store_up_to_a_millionth(apart: float, agrees: bool) -> None:
-    note = _difference(flown_again(0.1 * (1.0 + apart)), ROWS[0], "error")
+def test_a_rerun_is_the_run_in_the_store_up_to_a_millionth(apart: float, agrees: bool) -> None:
+    note = _difference(rerun_with(0.1 * (1.0 + apart)), ROWS[0], "error")
     assert (note is None) is agrees
-    assert agrees or "flown again, error is 0.1" in str(note)
+    assert agrees or "in the rerun error is 0.1" in str(note)
 
 
 SEEDS, PERIODS = axis("seed", 1, 2), axis("timing.period", 0.01, 0.02)
@@ -116,8 +116,8 @@ def test_more_places_leave_those_that_are() -> None:
 
 
 def test_runs_that_are_asked_for_are_chosen_first() -> None:
-    assert chosen(range(100), [17, 3], 2) == [3, 17]
-    found = chosen(range(100), [17], 10)
+    assert select(range(100), [17, 3], 2) == [3, 17]
+    found = select(range(100), [17], 10)
     assert 17 in found
     assert len(found) == 10
 
