@@ -1,1 +1,1 @@
-"""Who has a processor or a network when: a scheduler in integer nanoseconds, which knows no FMU and no file."""
+"""The scheduler of processors and networks, in integer nanoseconds, without FMUs or files; and bounds of theory."""

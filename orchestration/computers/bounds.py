@@ -1,7 +1,7 @@
-"""What theory says of response times: bounds that no job and no frame exceeds, whatever its offsets and its luck.
+"""Response-time analysis: bounds that no job and no frame exceeds, for any offsets and any random numbers.
 
 Times are whole nanoseconds; a period may be any fraction of them, as instants are those of a grid, rounded. Responses
-count from the nominal release, so that its lateness is in them. None stands where theory has no bound.
+count from the nominal release, and so include its lateness. None stands for no bound.
 
 Fixed priorities, preemptive: Joseph and Pandya 1986, Lehoczky 1990 for deadlines beyond the period, Tindell, Burns and
 Wellings 1994 for release jitter. Not preemptive, and CAN: Davis, Burns, Bril and Lukkien 2007. Earliest deadline: the
@@ -15,7 +15,7 @@ from fractions import Fraction
 from functools import partial
 
 STEPS = 100_000
-"""of an iteration, or jobs of a busy period: what takes more, as close to a full load, is given up"""
+"""Steps of an iteration, or jobs of a busy period: beyond them, as near full load, there is no bound"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,31 +23,31 @@ class Periodic:
     """A task, or a message whose frames are its jobs."""
 
     execution: int
-    """the most that a job takes, or the length of a frame"""
+    """the worst-case execution time of a job, or the length of a frame"""
     period: int | Fraction | None
-    """from one nominal release to the next; None: releases come by chance, or nobody knows when"""
+    """from one nominal release to the next; None: releases are random or unknown"""
     jitter: int = 0
     """the largest lateness of a release"""
     deadline: int = 0
-    """from the nominal release; for earliest deadlines only"""
+    """from the nominal release; only used for earliest deadline first"""
     priority: int = 1
     """1 is more urgent than 2"""
     counts_when_queued: bool = False
-    """whether its responses count from when it is released, however late that is"""
+    """whether its responses count from the actual release"""
 
 
 def fixed_priority(tasks: Sequence[Periodic], *, preemptive: bool, switch: int) -> list[int | None]:
-    """Of each task on one processor with fixed priorities, the most that its responses can be.
+    """Bounds on the responses of the tasks on one processor with fixed priorities.
 
-    Tasks of equal priority count as more urgent than each other. Every begin and every resume costs `switch`: a job
-    that displaces another costs its own and the other's second.
+    Tasks of equal priority count as more urgent than each other. Every start and every resume costs `switch`: a job
+    that preempts another adds its own and a second one of the other.
     """
     tasks = [_on_grid(task) for task in tasks]
     return [_of_task(tasks, i, preemptive, switch) for i in range(len(tasks))]
 
 
 def can(frames: Sequence[Periodic], *, bit: int) -> list[int | None]:
-    """Of each message on a CAN bus, the most that its responses can be; `bit` is the time of one, rounded up."""
+    """Bounds on the responses of the messages on a CAN bus; `bit` is the time of a bit, rounded up."""
     frames = [_on_grid(frame) for frame in frames]
     found = []
     for i, frame in enumerate(frames):
@@ -58,7 +58,7 @@ def can(frames: Sequence[Periodic], *, bit: int) -> list[int | None]:
 
 
 def earliest_deadline(tasks: Sequence[Periodic], *, preemptive: bool, switch: int) -> list[int | None]:
-    """The deadline of each task, if the processor can give all jobs by theirs what they take; else None of each."""
+    """The deadlines of the tasks, if all jobs always meet them; else None for each."""
     begins = 2 * switch if preemptive else switch
     tasks = [_costing(_on_grid(task), begins) for task in tasks]
     holds = _load(tasks) <= 1 and _meets_demand(tasks, preemptive)
@@ -66,37 +66,37 @@ def earliest_deadline(tasks: Sequence[Periodic], *, preemptive: bool, switch: in
 
 
 def _on_grid(task: Periodic) -> Periodic:
-    """Releases on a grid that is no whole number of nanoseconds are late or early by half of one."""
+    """The task with the rounding of its releases as jitter, if its period is no whole number of nanoseconds."""
     if task.period is None or task.period == int(task.period):
         return task if task.period is None else replace(task, period=int(task.period))
     return replace(task, jitter=task.jitter + 1)
 
 
 def _costing(task: Periodic, more: int) -> Periodic:
-    """With what a job takes besides; one that takes no time counts as 1 ns, for those of one task begin 1 ns apart."""
+    """The task with `more` overhead; at least 1 ns in all, as jobs of one task start 1 ns apart."""
     return replace(task, execution=max(task.execution + more, 1))
 
 
 def _load(tasks: Sequence[Periodic]) -> Fraction:
-    """The share of the time that they take; more than 1 if nobody knows."""
+    """The utilisation by the tasks; above 1 if it is unknown."""
     if any(task.period is None for task in tasks):
         return Fraction(2)
     return sum((Fraction(task.execution) / Fraction(task.period or 1) for task in tasks), Fraction(0))
 
 
 def _released(task: Periodic, within: int) -> int:
-    """How many jobs at most are released in a time that begins with a release, its end not included."""
+    """The most jobs that are released in an interval `within` that begins with a release, without its end."""
     assert task.period is not None
     return int(-(-(within + task.jitter) // task.period))
 
 
 def _after(work: int, tasks: Sequence[Periodic], within: int, seen_after: int = 0) -> int:
-    """When `work` is done, if so long after the begin, and what is released `seen_after` later, tasks come before."""
+    """`work`, with all jobs of `tasks` that are released in the interval `within` and `seen_after` beyond it."""
     return work + sum(_released(task, within + seen_after) * task.execution for task in tasks)
 
 
 def _settled(first: int, following: Callable[[int], int]) -> int | None:
-    """Where an iteration that only grows comes to rest; None: not in `STEPS`."""
+    """The fixed point of an increasing iteration; None: not within `STEPS`."""
     before = first
     for _ in range(STEPS):
         after = following(before)
@@ -117,7 +117,7 @@ def _of_task(tasks: Sequence[Periodic], i: int, preemptive: bool, switch: int) -
 
 
 def _interrupted(own: Periodic, above: Sequence[Periodic]) -> int | None:
-    """The response of a job that all above may interrupt, over all jobs of the longest busy period."""
+    """The largest response in the longest busy period of jobs that those of `above` preempt."""
     if _load([own, *above]) > 1:
         return None
     assert own.period is not None
@@ -135,9 +135,9 @@ def _interrupted(own: Periodic, above: Sequence[Periodic]) -> int | None:
 
 
 def _uninterrupted(own: Periodic, above: Sequence[Periodic], *, blocking: int, seen_after: int) -> int | None:
-    """The response of a job that is not interrupted once it has begun, over all jobs of the longest busy period.
+    """The largest response in the longest busy period of jobs that are not preempted once started.
 
-    What is released `seen_after` ns before it begins, or later, does not come before it.
+    Releases less than `seen_after` ns after the start of a job count as before it.
     """
     if _load([own, *above]) > 1:
         return None
@@ -159,7 +159,7 @@ def _uninterrupted(own: Periodic, above: Sequence[Periodic], *, blocking: int, s
 
 
 def _meets_demand(tasks: Sequence[Periodic], preemptive: bool) -> bool:
-    """Whether up to each deadline of the longest busy period no more is demanded than there is time."""
+    """Whether the demand up to each deadline of the longest busy period is at most the time."""
     allowed = [task.deadline - task.jitter for task in tasks]
     block = 0 if preemptive else max((task.execution - 1 for task in tasks), default=0)
     longest = _settled(sum(task.execution for task in tasks), partial(_after, block, tasks))
@@ -174,7 +174,7 @@ def _meets_demand(tasks: Sequence[Periodic], preemptive: bool) -> bool:
 
 
 def _demand(tasks: Sequence[Periodic], allowed: Sequence[int], time: int) -> int:
-    """What jobs take that are released and due within a time."""
+    """The execution time of the jobs that are released and due within a time."""
     total = 0
     for task, first in zip(tasks, allowed, strict=True):
         assert task.period is not None
@@ -183,7 +183,7 @@ def _demand(tasks: Sequence[Periodic], allowed: Sequence[int], time: int) -> int
 
 
 def _blocked(tasks: Sequence[Periodic], allowed: Sequence[int], time: int, preemptive: bool) -> int:
-    """What a job that is due later takes of it, if it cannot be interrupted."""
+    """The blocking by a job that is due later, if it is not preempted."""
     if preemptive:
         return 0
     return max((task.execution - 1 for task, first in zip(tasks, allowed, strict=True) if first > time), default=0)

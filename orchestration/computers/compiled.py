@@ -1,4 +1,4 @@
-"""The scheduler in C: the same notes as of the one in Python, to the bit. Compiled once, and kept in the cache."""
+"""The scheduler in C, with the same notes as the one in Python, to the bit; compiled once, and cached."""
 
 import ctypes
 import functools
@@ -35,9 +35,9 @@ from orchestration.computers.scheduler import Scheduler
 SOURCE = Path(__file__).with_name("scheduler.c")
 _FASTER = ("-O3",)
 _NO_MEMORY = -1
-"""What C gives in place of a number of notes"""
+"""The result of C in place of a number of notes"""
 _ROOM = 4096
-"""Notes that C keeps until Python takes them"""
+"""Notes that C collects until Python takes them"""
 _TABLES: dict[str, tuple[str, ...]] = {
     "PROCESSOR": Processor._fields,
     "TASK": Task._fields,
@@ -46,7 +46,7 @@ _TABLES: dict[str, tuple[str, ...]] = {
     "LEG": ("message", "place", "is_last", *Leg._fields),
     "LINK": Link._fields,
 }
-"""What a row of each table has; where parts have others in them, C has where these begin"""
+"""The columns of each table; nested parts are replaced by the index of the first"""
 _KINDS = ("PROCESSORS", "TASKS", "CARRIERS", "MESSAGES", "LEGS", "LINKS")
 _DRAW, _TAKE = (ctypes.CFUNCTYPE(None, ctypes.c_int64) for _ in range(2))
 
@@ -63,7 +63,7 @@ class _Arguments(ctypes.Structure):
         ("used", ctypes.c_void_p),
         ("notes", ctypes.c_void_p),
         ("room", ctypes.c_int64),
-        ("noted", ctypes.c_int64),
+        ("note_count", ctypes.c_int64),
         ("kept", ctypes.c_void_p),
         ("draw", _DRAW),
         ("take", _TAKE),
@@ -71,7 +71,7 @@ class _Arguments(ctypes.Structure):
 
 
 class Schedules(Protocol):
-    """A scheduler, in whatever language."""
+    """A scheduler, in Python or C."""
 
     @property
     def next_instant(self) -> int:
@@ -81,22 +81,22 @@ class Schedules(Protocol):
         """Go through all instants before `until` [ns], up to the end."""
 
     def take_notes(self) -> Integers:
-        """The notes since they were taken last, a row each: time, what, whose, which, a number more."""
+        """The notes since the last call, one per row: time, kind, owner, index of its job or frame, one more value."""
 
 
-def scheduler(parts: Parts, noted: Collection[int] = ALL_KINDS) -> Schedules:
-    """What goes through the instants of `parts`, in C where there is a compiler; notes are kept of kinds `noted`."""
+def scheduler(parts: Parts, kinds: Collection[int] = ALL_KINDS) -> Schedules:
+    """A scheduler of `parts` that keeps notes of these `kinds`; in C where there is a compiler."""
     try:
         _library()
     except QuadcosimError:
-        return Scheduler(parts, noted)
-    return CompiledScheduler(parts, noted)
+        return Scheduler(parts, kinds)
+    return CompiledScheduler(parts, kinds)
 
 
 class CompiledScheduler:
     """The scheduler in C; raises `QuadcosimError` without a compiler."""
 
-    def __init__(self, parts: Parts, noted: Collection[int] = ALL_KINDS) -> None:
+    def __init__(self, parts: Parts, kinds: Collection[int] = ALL_KINDS) -> None:
         self._library, self._parts = _library(), parts
         self._tables = tables = _tables(
             tuple(parts.processors),
@@ -106,8 +106,8 @@ class CompiledScheduler:
             tuple(parts.links),
         )
         self._numbers, self._notes = _Numbers(parts.streams), _Notes()
-        self._kept = np.array([kind in noted for kind in range(len(ALL_KINDS))], dtype=np.uint8)
-        self._draw, self._take = _DRAW(self._numbers.draw), _TAKE(self._notes.take)
+        self._kept = np.array([kind in kinds for kind in range(len(ALL_KINDS))], dtype=np.uint8)
+        self._draw, self._take = _DRAW(self._numbers.draw), _TAKE(self._notes.collect)
         arguments = _Arguments(
             stop=parts.stop,
             counts=tuple(len(tables[name.lower()]) for name in _KINDS),
@@ -126,19 +126,19 @@ class CompiledScheduler:
 
     @property
     def next_instant(self) -> int:
-        """As of the one in Python."""
+        """As in Python."""
         return int(self._library.scheduler_next_instant(self._handle))
 
     def run(self, until: int) -> None:
-        """As by the one in Python."""
-        noted = int(self._library.scheduler_run(self._handle, until))
-        self._expect(noted != _NO_MEMORY)
-        if noted < _NO_MEMORY:
-            raise self._parts.overfull(-2 - noted)
-        self._notes.take(noted)
+        """As in Python."""
+        count = int(self._library.scheduler_run(self._handle, until))
+        self._expect(count != _NO_MEMORY)
+        if count < _NO_MEMORY:
+            raise self._parts.overfull(-2 - count)
+        self._notes.collect(count)
 
     def take_notes(self) -> Integers:
-        """As of the one in Python."""
+        """As in Python."""
         return self._notes.take_notes()
 
     def _expect(self, has_memory: bool) -> None:
@@ -149,9 +149,9 @@ class CompiledScheduler:
 
 
 class _Numbers:
-    """Streams as C reads them: a row of each, and how many of it are used.
+    """The streams as C reads them: a row of each, and the number of its used values.
 
-    It knows nothing of the scheduler that holds it, so that both go as soon as nobody has them.
+    It does not refer to its scheduler, so that both are freed at once.
     """
 
     def __init__(self, streams: Sequence[Stream]) -> None:
@@ -165,29 +165,29 @@ class _Numbers:
         self.failure: BaseException | None = None
 
     def draw(self, stream: int) -> None:
-        """More numbers of a stream; no exception goes through C."""
+        """Draw more numbers of a stream; an exception is kept, as none can pass through C."""
         try:
             self._table[stream] = self._streams[stream](AT_ONCE)
         except BaseException as error:
             self.failure = error
-            self._table[stream] = LATER // 2  # nothing comes any more
+            self._table[stream] = LATER // 2  # nothing happens any more
 
 
 class _Notes:
-    """Notes from C, likewise."""
+    """The notes from C, likewise."""
 
     def __init__(self) -> None:
         self.room = np.empty((_ROOM, COLUMNS), dtype=np.int64)
-        self._noted: list[Integers] = []
+        self._batches: list[Integers] = []
 
-    def take(self, noted: int) -> None:
-        """Those that C has made."""
-        self._noted.append(self.room[:noted].copy())
+    def collect(self, count: int) -> None:
+        """Copy the notes that C has made."""
+        self._batches.append(self.room[:count].copy())
 
     def take_notes(self) -> Integers:
-        """All since they were taken last."""
-        found = self._noted[0] if len(self._noted) == 1 else np.concatenate([self.room[:0], *self._noted])
-        self._noted.clear()
+        """All notes since the last call."""
+        found = self._batches[0] if len(self._batches) == 1 else np.concatenate([self.room[:0], *self._batches])
+        self._batches.clear()
         return found
 
 
@@ -196,7 +196,7 @@ def _tables(
     processors: tuple[Processor, ...], tasks: tuple[Task, ...], carriers: tuple[Carrier, ...],
     messages: tuple[Message, ...], links: tuple[Link, ...],
 ) -> dict[str, Integers]:  # fmt: skip
-    """The tables of parts, which are the same in many runs, by their names."""
+    """The tables of parts by name; cached, as many runs share them."""
     ends = np.cumsum([0, *(len(each.releases) for each in carriers)])
     tables = {
         "processors": processors,
@@ -216,7 +216,7 @@ def _tables(
 
 @functools.cache
 def _library() -> Any:
-    """scheduler.c as a library; raises `QuadcosimError` that says what stands in the way."""
+    """scheduler.c as a library; raises `QuadcosimError`, naming the reason, if there is none."""
     sources = {"scheduler.c": SOURCE.read_bytes(), "constants.h": _constants().encode()}
     path = cached_library(
         "scheduler", sources, (*OPTIONS, *_FASTER), lambda: compiled_here(sources, "scheduler.c", options=_FASTER)
@@ -237,7 +237,7 @@ def _library() -> Any:
 
 
 def _constants() -> str:
-    """What parts.py counts and names, for C."""
+    """The constants and columns of parts.py as a C header."""
     found = {name: value for name, value in vars(constants).items() if name.isupper() and isinstance(value, int)}
     found |= {name: i for i, name in enumerate(_KINDS)} | {"PART_KINDS": len(_KINDS)}
     for table, columns in _TABLES.items():

@@ -1,6 +1,6 @@
-"""What the scheduler is told: processors, tasks, networks and messages as whole numbers, and where others come from.
+"""The input of the scheduler: processors, tasks, networks and messages as whole numbers, and streams of numbers.
 
-Parts name one another by their place in the lists of `Parts`; NONE stands for nobody.
+Parts refer to one another by their index in the lists of `Parts`; NONE stands for no part.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,34 +14,34 @@ from orchestration.basics.simulator import Integers
 
 NONE = -1
 LATER = 2**62
-"""[ns], after every time that there is"""
+"""[ns], after all other times"""
 
 Stream: TypeAlias = Callable[[int], Integers]
-"""The next so many numbers: times [ns], or 0 and 1"""
+"""The next `count` numbers: times [ns], or 0 and 1"""
 AT_ONCE = 1024
-"""Numbers that are drawn at once"""
+"""Numbers drawn at once"""
 STAYS = -1
-"""In place of how many numbers of a stream are used: it has one, for good"""
+"""In place of the used numbers of a stream: it is constant"""
 
 MOST_WAITING = 2**20
-"""Jobs of a task, or frames of a message on a link, that may wait: 100 MB or less"""
+"""The most jobs of a task, or frames of a message on a link, that may wait: 100 MB or less"""
 
 FIXED_PRIORITY, EARLIEST_DEADLINE, FIRST_COME = range(3)
 QUEUE, SKIP, ABORT = range(3)
 
 
 class Processor(NamedTuple):
-    """What jobs run on."""
+    """A processor."""
 
     policy: int
     """FIXED_PRIORITY, EARLIEST_DEADLINE or FIRST_COME"""
     preemptive: int
     switch: int
-    """[ns], before a job begins or goes on"""
+    """[ns], the overhead before a job starts or resumes"""
 
 
 class Task(NamedTuple):
-    """What is released again and again; tasks stand in the order of the file."""
+    """A task; tasks are in the order of the file."""
 
     processor: int
     priority: int
@@ -56,68 +56,68 @@ class Task(NamedTuple):
     late: int
     """the stream of how late they are"""
     execution: int
-    """the stream of what its jobs take"""
+    """the stream of execution times of its jobs"""
     reports_samples: int = 1
-    """whether anybody is told of its samples"""
+    """whether it notes SAMPLED"""
 
 
 class Carrier(NamedTuple):
-    """A connection that tasks or frames write to."""
+    """A connection of a task or a message."""
 
     sender: int
-    """the task whose jobs write to it; NONE: instants of the message do"""
+    """the task whose jobs write to it; NONE: it is sent at the instants of the message"""
     message: int
-    """over which it goes; NONE: over no network"""
+    """the message over which it goes; NONE: it goes over no network"""
     late: int
-    """the stream of its own delays, which count from when a message is received"""
+    """the stream of the delays of the connection itself, which count from when a frame is received"""
     lost: int
-    """the stream of what the receiver loses, 1"""
+    """the stream of losses, 1 for a lost message"""
     releases: tuple[int, ...]
     """tasks that its arrivals release"""
 
 
 class Message(NamedTuple):
-    """What goes over a network as frames; messages stand in the order of the file."""
+    """A message that goes over a network as frames; messages are in the order of the file."""
 
     rank: int
-    """the least of those that wait goes first; then who was queued first, then who stands first"""
+    """the least of the waiting ones is sent first; then the first queued, then the first in the file"""
     legs: tuple["Leg", ...]
-    """the links that it takes, one after the other"""
+    """its links, in order"""
     pause: int
-    """[ns] from the end of a leg to where it is queued for the next one"""
+    """[ns] from the end of a leg until it is queued for the next one"""
     nominal: int
-    """the stream of its nominal instants; NONE: it is queued when somebody writes"""
+    """the stream of its nominal instants; NONE: it is queued when its task writes"""
     late: int
     corrupted: int
-    """the stream of which attempts fail, 1"""
+    """the stream of errors, 1 for a corrupted attempt"""
     carrier: int
-    """the connection that it belongs to; NONE: load"""
+    """its connection; NONE: load"""
 
 
 class Leg(NamedTuple):
-    """A frame's way over one link."""
+    """The way of a frame over one link."""
 
     link: int
     slot: int
-    """of a link with slots, the one that it goes in"""
+    """its slot, on a link with slots"""
     length: int
     """[ns]"""
     corrupted_length: int
-    """[ns], of one that has to be sent again"""
+    """[ns], of a corrupted frame"""
 
 
 class Link(NamedTuple):
-    """What carries one frame at a time."""
+    """A link, which carries one frame at a time."""
 
     slots: int
-    """how many a cycle has; 0: it can be taken whenever it is free"""
+    """the number of slots in a cycle; 0: a frame can start whenever the link is free"""
     begins: int
-    """the stream of when slots begin, one after the other"""
+    """the stream of the begins of slots, in order"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Parts:
-    """All of them."""
+    """All parts."""
 
     stop: int
     """[ns]: nothing is released from here on"""
@@ -131,7 +131,7 @@ class Parts:
     """the paths of tasks, then of messages, for errors"""
 
     def overfull(self, owner: int) -> UsageError:
-        """What is said of a task, or with a number after those of all tasks of a message, of which too many wait."""
+        """The error for a task, or with an index after those of all tasks a message, of which too many wait."""
         place = self.places[owner] if owner < len(self.places) else str(owner)
         if owner < len(self.tasks):
             expected = "that it gets its processor as often, or overrun skip or abort"
@@ -139,7 +139,7 @@ class Parts:
         return UsageError(f"{place}: more than {MOST_WAITING} of its frames wait: expected a network that carries them")
 
 
-# What is noted: rows of time, what, whose, which, and one number more.
+# Kinds of notes; a note is a row of time, kind, owner, index of its job or frame, and one more value.
 
 RELEASED, STARTED, PREEMPTED, RESUMED, FINISHED, ABORTED, SKIPPED, SWITCHING, INTERRUPTED, SAMPLED, WRITTEN = range(11)
 """Of a task: the number of a job, and of RELEASED and SKIPPED the nominal release. SAMPLED has the time of the sample
@@ -160,7 +160,7 @@ ALL_KINDS = frozenset(range(KINDS))
 
 @dataclass(frozen=True)
 class Constant:
-    """The stream of a number that is the same each time."""
+    """The stream of a constant number."""
 
     value: int
 

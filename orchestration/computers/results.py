@@ -1,6 +1,6 @@
-"""What has become of tasks and messages: their jobs and frames, and who had a processor or a network when.
+"""The timeline of tasks and messages: their jobs and frames, and the use of processors and networks.
 
-Times are in nanoseconds; NEVER stands where something did not happen before the end.
+Times are in nanoseconds; NEVER stands for what did not happen before the end.
 """
 
 from collections.abc import Callable, Mapping
@@ -10,25 +10,25 @@ from orchestration.basics.simulator import Booleans, Integers
 from orchestration.recording.recording import Events
 
 NEVER = -1
-"""Of what did not happen"""
+"""The time of what did not happen"""
 DONE, UNFINISHED, SKIPPED, ABORTED = range(4)
-"""What becomes of a job: what is under way or waits at the end is unfinished"""
+"""Outcomes of a job: one that is under way or waits at the end is unfinished"""
 RUN, SWITCH, CORRUPTED = range(3)
-"""What a processor or a network does: work, the switch before it, or a frame that has to be sent again"""
+"""Uses of a processor or a network: work, the switch before it, or a corrupted frame"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Served:
-    """What was asked of a processor or a network, in the order in which it was."""
+    """Jobs or frames, in the order of their release."""
 
     nominal: Integers
-    """when each should be released or queued; responses and deadlines count from here"""
+    """the nominal releases, from which responses and deadlines count"""
     started: Integers
-    """when its own first instruction was, or its first bit was sent the first time"""
+    """when its first instruction ran, or its first bit was first sent"""
     ended: Integers
     """when it was done, or received"""
     deadline: Integers
-    """the largest number where it has none"""
+    """the largest number for none"""
     stop: int
 
     def __len__(self) -> int:
@@ -42,7 +42,7 @@ class _Served:
 
     @property
     def responses(self) -> Integers:
-        """Of those that are done, from the nominal instant to the end."""
+        """The times from nominal release to end, of those that are done."""
         found: Integers = (self.ended - self.nominal)[self.done]
         return found
 
@@ -54,27 +54,27 @@ class _Served:
 
     @property
     def missed(self) -> Booleans:
-        """Which of those that are `due` were not done by their deadline, skipped and aborted ones included."""
+        """Which of those that are `due` were not done by their deadline, including skipped and aborted ones."""
         found: Booleans = self.due & ((self.ended == NEVER) | (self.ended > self.deadline))
         return found
 
 
 @dataclass(frozen=True, kw_only=True)
 class Jobs(_Served):
-    """The jobs of one task, a number each in the order of their releases, those included that a skip left out."""
+    """The jobs of one task, by index in the order of release, including skipped ones."""
 
     released: Integers
-    """when it was"""
+    """the releases"""
     written: Integers
-    """when its outputs were sent"""
+    """when outputs were sent"""
     preemptions: Integers
-    """how often another took the processor from it"""
+    """the number of preemptions of each"""
     outcome: Integers
     """DONE, UNFINISHED, SKIPPED or ABORTED"""
 
     @property
     def done(self) -> Booleans:
-        """Which of them are done: an aborted one has ended too."""
+        """Which of them are done, without aborted ones."""
         found: Booleans = self.outcome == DONE
         return found
 
@@ -85,19 +85,19 @@ class Frames(_Served):
 
     queued: Integers
     attempts: Integers
-    """how often it was sent, the last time included; over two links twice"""
+    """the number of transmissions; over two links at least two"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Slices:
-    """Who has one processor, or one link of a network, when: pieces that follow each other."""
+    """The use of one processor, or of one link of a network, as consecutive slices."""
 
     owners: tuple[str, ...]
     """the names of its tasks, or of the messages over it"""
     owner: Integers
-    """the index of each piece's among them"""
+    """the index of the owner of each slice"""
     number: Integers
-    """which job or frame of it"""
+    """the index of its job or frame"""
     begin: Integers
     end: Integers
     kind: Integers
@@ -106,7 +106,7 @@ class Slices:
 
 @dataclass(frozen=True, kw_only=True)
 class Timeline:
-    """What has become of all computers and networks of a system, up to a time."""
+    """The timeline of all computers and networks of a system, up to a time."""
 
     stop: int
     jobs: Mapping[str, Jobs]
@@ -118,4 +118,4 @@ class Timeline:
     links: Mapping[str, Slices]
     """by network or, where it has several links, as `NETWORK: NODE -> switch`"""
     happenings: Callable[[], Events]
-    """what happened, in order"""
+    """the events, in order"""

@@ -1,6 +1,5 @@
-/* What happens on processors and networks, as scheduler.py has it, to the bit; what a part says is in constants.h, which
-   is made of parts.py, a name for each column of its table. Numbers of streams and room for notes come from Python, when
-   there are none left. */
+/* The scheduler of scheduler.py, to the bit. constants.h is generated from parts.py, with a name for each column of the
+   tables of parts. Python provides more numbers of a stream, and room for notes, when there are none left. */
 
 #include <stdint.h>
 #include <stdlib.h>
@@ -52,7 +51,7 @@ typedef struct {
     int64_t counts[PART_KINDS];
     const int64_t *processors, *tasks, *carriers, *releases, *messages, *legs, *links;
     int64_t **numbers; /* of each stream, AT_ONCE of them */
-    int64_t *used;     /* how many of these are, or STAYS */
+    int64_t *used;     /* how many of these are used, or STAYS */
     int64_t *notes, room, note_count;
     const uint8_t *kept; /* which kinds of notes are kept */
     void (*draw)(int64_t stream);
@@ -314,7 +313,7 @@ static void abort_job(Scheduler *s, int64_t i, int64_t now) {
 
 /* -- processors ---------------------------------------------------------------------------------------------------- */
 
-/* Whether the job of task i comes before that of task j: tasks stand in the order of the file. */
+/* Whether the job of task i ranks before that of task j; tasks are in the order of the file. */
 static int precedes(Scheduler *s, int64_t policy, int64_t i, int64_t j) {
     const Job *a = first_job(s, i), *b = first_job(s, j);
     int64_t p = TASK(i, PRIORITY), q = TASK(j, PRIORITY);
@@ -441,7 +440,7 @@ static void arrive(Scheduler *s, int64_t now) {
     }
 }
 
-/* Goes through an instant; when the next one is, at the earliest: what was due may have been put off. */
+/* Processes an instant; returns a lower bound of the next one: what is due there may be postponed. */
 static int64_t process_instant(Scheduler *s, int64_t now) {
     int64_t next;
     do {
@@ -488,7 +487,7 @@ static void *zeros(Scheduler *s, int64_t count, size_t size) {
     return found;
 }
 
-/* NULL where there is no memory. */
+/* NULL without memory. */
 EXPORTED Scheduler *scheduler_new(const Arguments *arguments) {
     Scheduler *s = calloc(1, sizeof(Scheduler));
     if (!s) return NULL;
@@ -532,8 +531,8 @@ EXPORTED int64_t scheduler_next_instant(Scheduler *s) {
     return due <= s->g.stop ? due : LATER;
 }
 
-/* Passes through all instants before a time, up to the end; how many notes are left to be taken, -1 without memory, and
-   less where too many wait. */
+/* Processes all instants before a time, up to the end; returns the number of notes left, -1 without memory, and less
+   where too many wait. */
 EXPORTED int64_t scheduler_run(Scheduler *s, int64_t until) {
     int64_t last = until - 1 < s->g.stop ? until - 1 : s->g.stop, now = least(s->due, s->due_count);
     while (now <= last && !s->no_memory) now = process_instant(s, now);

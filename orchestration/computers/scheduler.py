@@ -1,8 +1,8 @@
-"""What happens on processors and networks, instant by instant, in Python: the text that scheduler.c follows.
+"""The scheduler of processors and networks, instant by instant, in Python; scheduler.c mirrors it.
 
-At an instant, in this order: what ends does so, and writes; deadlines, first those at which jobs are aborted, then
-those at which outputs are written; arrivals and releases. When nothing of that is left processors choose; what they
-start and ends at once makes it all begin again. At last networks choose.
+The order at one instant: jobs and frames end, and jobs write; deadlines, first those at which jobs are aborted, then
+those at which outputs are written; arrivals and releases. When none of these is left, processors choose a job; if one
+ends at once, everything is repeated. Finally networks choose a frame.
 """
 
 from collections import deque
@@ -48,7 +48,7 @@ from orchestration.computers.parts import (
 
 
 class _Numbers:
-    """A stream, number by number."""
+    """A stream of numbers, one by one."""
 
     __slots__ = ("_draw", "_drawn")
 
@@ -64,7 +64,7 @@ class _Numbers:
 
 
 class _Job:
-    """A job that is released and not over."""
+    """A job that is released and has not ended."""
 
     __slots__ = ("deadline", "left", "nominal", "number", "released", "sample", "started")
 
@@ -74,7 +74,7 @@ class _Job:
 
 
 class _TaskState:
-    """A task at work: its jobs that are not over, the oldest first, and what is still to be written."""
+    """The state of a task: its jobs that have not ended, the oldest first, and those that still have to write."""
 
     __slots__ = ("carriers", "jobs", "next_late", "next_nominal", "number", "part", "sampled_at", "samples",
                  "started_at", "unwritten")  # fmt: skip
@@ -88,23 +88,23 @@ class _TaskState:
 
 
 class _ProcessorState:
-    """A processor at work."""
+    """The state of a processor."""
 
     __slots__ = ("at_work", "changed", "ready_at", "running", "tasks")
 
     def __init__(self, tasks: list[int]) -> None:
         self.tasks = tasks
         self.running = NONE
-        """the task whose job has it"""
+        """the task whose job has the processor"""
         self.at_work = False
-        """whether that has come to its own instructions"""
+        """whether that job executes, after its switch"""
         self.ready_at = 0
-        """when it does, or did, since it was given the processor"""
+        """when its switch is over, or when it started to execute"""
         self.changed = False
 
 
 class _Frame:
-    """A frame on its way."""
+    """A frame that is queued or under way."""
 
     __slots__ = ("late", "lost", "nominal", "number", "queued", "sample")
 
@@ -114,7 +114,7 @@ class _Frame:
 
 
 class _LegState:
-    """Frames of one message that wait for one link, and those that are still on their way to that queue."""
+    """The state of a leg: frames that wait for its link, and those that are not in that queue yet."""
 
     __slots__ = ("coming", "frames", "is_last", "message", "part", "place", "rank")
 
@@ -127,7 +127,7 @@ class _LegState:
 
 
 class _LinkState:
-    """A link at work."""
+    """The state of a link."""
 
     __slots__ = ("changed", "corrupted", "legs", "sending", "slot", "slots")
 
@@ -137,17 +137,17 @@ class _LinkState:
         """the leg whose frame it carries"""
         self.corrupted = False
         self.slot = NONE
-        """that which begins now"""
+        """the slot that begins now"""
         self.changed = False
 
 
 class Scheduler:
-    """Goes through the instants, and keeps notes of them."""
+    """Processes the instants in order, and keeps notes of them."""
 
-    def __init__(self, parts: Parts, noted: Collection[int] = ALL_KINDS) -> None:
-        """`noted` are the kinds of notes that are kept."""
+    def __init__(self, parts: Parts, kinds: Collection[int] = ALL_KINDS) -> None:
+        """`kinds` are the kinds of notes that are kept."""
         self._parts, self._stop = parts, parts.stop
-        self._noted = [kind in noted for kind in range(len(ALL_KINDS))]
+        self._kept = [kind in kinds for kind in range(len(ALL_KINDS))]
         self._notes: list[int] = []
         self._numbers = [_Numbers(stream) for stream in parts.streams]
         carriers = range(len(parts.carriers))
@@ -176,7 +176,7 @@ class Scheduler:
         self._pending: list[deque[int]] = [deque() for _ in carriers]
         self._last_arrival = [0] * len(parts.carriers)
 
-        # When something is due next, one place for each cause.
+        # The next instants, one place for each cause.
         counts = [
             len(self._processors), len(self._links), len(self._tasks), len(parts.carriers), len(self._tasks),
             len(parts.messages), len(self._legs), len(self._links),
@@ -203,25 +203,25 @@ class Scheduler:
         return due if due <= self._stop else LATER
 
     def run(self, until: int) -> None:
-        """Go through all instants before `until` [ns], up to the end."""
+        """Process all instants before `until` [ns], up to the end."""
         last, now = min(until - 1, self._stop), min(self._due, default=LATER)
         while now <= last:
             now = self._process_instant(now)
 
     def take_notes(self) -> Integers:
-        """The notes since they were taken last, a row each: time, what, whose, which, a number more."""
+        """The notes since the last call, one per row: time, kind, owner, index of its job or frame, one more value."""
         found = np.array(self._notes, dtype=np.int64).reshape(-1, COLUMNS)
         self._notes.clear()
         return found
 
-    def _note(self, now: int, kind: int, whose: int, which: int, more: int) -> None:
-        if self._noted[kind]:
-            self._notes += (now, kind, whose, which, more)
+    def _note(self, now: int, kind: int, owner: int, item: int, extra: int) -> None:
+        if self._kept[kind]:
+            self._notes += (now, kind, owner, item, extra)
 
     # -- an instant ------------------------------------------------------------------------------------------------
 
     def _process_instant(self, now: int) -> int:
-        """Go through an instant; when the next one is, at the earliest: what was due may have been put off."""
+        """Process an instant; return a lower bound of the next one: what is due there may be postponed."""
         due, then = self._due, now
         while then == now:
             while then == now:
@@ -327,7 +327,7 @@ class Scheduler:
         self._processors[task.part.processor].changed = True
 
     def _sample(self, i: int, task: _TaskState, job: _Job, now: int) -> None:
-        """What a job computes with is that of its release or of now, but a nanosecond after the sample before it."""
+        """A job reads its inputs: at its release or now, at least a nanosecond after the sample before it."""
         time = job.released if task.part.reads_at_release else now
         job.sample, task.samples = task.samples, task.samples + 1
         task.sampled_at = max(time, task.sampled_at + 1)
@@ -378,7 +378,7 @@ class Scheduler:
     # -- processors ------------------------------------------------------------------------------------------------
 
     def _dispatch(self, p: int, processor: _ProcessorState, now: int) -> None:
-        """Give the processor to the job that comes first, and have it go on when its switch is over."""
+        """Give the processor to the job of the highest rank, which executes when its switch is over."""
         processor.changed = False
         part, waits = self._parts.processors[p], False
         chosen, least = processor.running, None
@@ -390,7 +390,7 @@ class Scheduler:
                 if i == processor.running or not task.jobs:
                     continue
                 if task.started_at == now and not (part.switch or task.jobs[0].started):
-                    waits = True  # jobs of one task begin a nanosecond apart
+                    waits = True  # jobs of one task start a nanosecond apart
                     continue
                 order = self._order(part.policy, i)
                 if least is None or order < least:
@@ -418,7 +418,7 @@ class Scheduler:
         return job.released, priority, i
 
     def _preempt(self, processor: _ProcessorState, now: int) -> None:
-        """The job that has the processor has it no more, if there is one."""
+        """Take the processor from the job that has it, if any."""
         i = processor.running
         if i == NONE:
             return
@@ -431,7 +431,7 @@ class Scheduler:
         processor.running, processor.at_work = NONE, False
 
     def _resume(self, processor: _ProcessorState, now: int) -> None:
-        """The switch is over."""
+        """Execute the job that has the processor: its switch is over."""
         i = processor.running
         task = self._tasks[i]
         job = task.jobs[0]
@@ -456,7 +456,7 @@ class Scheduler:
         self._due[self._slot + k] = time if time < self._stop else LATER
 
     def _post(self, m: int, message: Message, now: int) -> None:
-        """A message has its instant."""
+        """Send a message at its instant."""
         nominal, _ = self._message_next[m]
         if message.carrier == NONE:
             self._enqueue(m, _Frame(self._frame_number[m], nominal, NONE, 0, 0), now)
@@ -464,7 +464,7 @@ class Scheduler:
             self._send(message.carrier, self._frame_number[m], nominal, now)
 
     def _send(self, c: int, sample: int, nominal: int, now: int) -> None:
-        """A message of a connection leaves."""
+        """Send a message of a connection."""
         carrier = self._parts.carriers[c]
         late, lost = self._numbers[carrier.late].next(), self._numbers[carrier.lost].next()
         self._note(now, SENT, c, sample, lost)
@@ -475,7 +475,7 @@ class Scheduler:
             self._enqueue(m, _Frame(self._frame_number[m], nominal, sample, late, lost), now)
 
     def _receive(self, c: int, sample: int, late: int, lost: int, now: int) -> None:
-        """A message has come so far; its connection's own delay counts from here. Messages never overtake."""
+        """A message is received; the delay of its connection counts from here. Messages never overtake each other."""
         if lost:
             return
         arrival = self._last_arrival[c] = max(self._last_arrival[c], now + late)
@@ -498,7 +498,7 @@ class Scheduler:
         self._links[leg.part.link].changed = True
 
     def _choose_frame(self, k: int, link: _LinkState, now: int) -> None:
-        """A link that is free takes the frame that comes first; with slots, of those in the slot that begins."""
+        """A free link starts the first frame in its order; with slots, of those in the slot that begins."""
         link.changed = False
         chosen, least = NONE, None
         if link.sending == NONE and (link.slot != NONE or not link.slots):
@@ -519,7 +519,7 @@ class Scheduler:
         self._note(now, FRAME_STARTED, leg.message, leg.frames[0].number, leg.place)
 
     def _end_frame(self, link: _LinkState, now: int) -> None:
-        """The last bit of what a link carries is over."""
+        """The last bit of a frame is transmitted."""
         j, link.sending = link.sending, NONE
         leg = self._legs[j]
         message = self._parts.messages[leg.message]

@@ -1,4 +1,4 @@
-"""The bounds of theory for the tasks and messages of a system."""
+"""The bounds of theory on the responses of the tasks and messages of a system."""
 
 import math
 from dataclasses import replace
@@ -14,14 +14,14 @@ from orchestration.system.sampling import SamplingOnArrival
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds, nanoseconds
 
 Bounds = dict[str, int | None]
-"""[ns], by COMPUTER.TASK or NETWORK.MESSAGE; None where theory has none"""
+"""[ns], by COMPUTER.TASK or NETWORK.MESSAGE; None without a bound"""
 
 
 def bounds_of(system: System) -> Bounds:
-    """The most that responses can be, whatever the seed.
+    """Upper bounds on responses, for any seed.
 
-    There is none for what comes by chance or on arrivals, nor for first come, TDMA, Ethernet and frames that are sent
-    again. A message of a task is late by what the task's response may vary, as far as that has a bound.
+    There is none for random arrivals and releases by messages, nor for first come, TDMA, Ethernet and networks with
+    errors. The jitter of a message of a task is the variation of the task's response, if that has a bound.
     """
     found: Bounds = {}
     for name, computer in system.computers.items():
@@ -68,10 +68,10 @@ def _of_network(system: System, network: Network, bounds: Bounds) -> Bounds:
 
 
 def _sent(system: System, message: Message, bounds: Bounds) -> dict[str, Any]:
-    """When frames of a message are queued, as fields of `Periodic`."""
+    """The times at which frames of a message are queued, as fields of `Periodic`."""
     if message.connection is None or message.period is not None:
-        known = None if message.period is None else exact_nanoseconds(message.period)
-        return {"period": known, "jitter": nanoseconds(highest(message.jitter))}
+        period = None if message.period is None else exact_nanoseconds(message.period)
+        return {"period": period, "jitter": nanoseconds(highest(message.jitter))}
     sender = next(x.sender for x in system.connections if x.name == message.connection)
     for name, computer in system.computers.items():
         for task_name, task in computer.tasks.items():
@@ -85,7 +85,7 @@ def _sent(system: System, message: Message, bounds: Bounds) -> dict[str, Any]:
 
 
 def _written(task: Task, computer: Computer, bound: int | None) -> dict[str, Any]:
-    """The messages of a task: each job writes when it is done, or at its deadline if it is done by then."""
+    """The times at which a task writes: when a job is done, or at its deadline if it is done by then."""
     if task.period is None or bound is None:
         return {}
     least = nanoseconds(lowest(task.execution)) + nanoseconds(computer.switch)

@@ -1,4 +1,4 @@
-"""From what the scheduler has noted to what has become of each task and message."""
+"""The timeline of tasks and messages from the notes of the scheduler."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -53,7 +53,7 @@ NEEDED = frozenset((*_OF_TASKS, *_OF_MESSAGES))
 
 @dataclass(frozen=True, kw_only=True)
 class Names:
-    """What the parts are called."""
+    """The names of the parts."""
 
     processors: Sequence[str]
     tasks: Sequence[str]
@@ -64,16 +64,16 @@ class Names:
 
     @property
     def all(self) -> Sequence[str]:
-        """Of all that things happen to."""
+        """The names in events."""
         return (*self.tasks, *self.messages)
 
 
 def timeline(
     parts: Parts, names: Names, deadlines: Sequence[int], notes: Integers, without: Collection[str] = ()
 ) -> Timeline:
-    """What all notes of a run come to; `deadlines` are those of the messages, LATER for none.
+    """The timeline from all notes of a run; `deadlines` are those of the messages, LATER for none.
 
-    Processors and tasks of names `without` are left out.
+    Processors and tasks whose names are in `without` are left out.
     """
     until, what = parts.stop, notes[:, 1]
     of_tasks, of_messages = notes[_are(what, _OF_TASKS)], notes[_are(what, _OF_MESSAGES)]
@@ -153,7 +153,7 @@ def _frames(notes: Integers, deadline: int, legs: int, stop: int) -> Frames:
 
 
 def _slices_of_processor(notes: Integers, parts: Parts, processor: int, names: Sequence[str], stop: int) -> Slices:
-    """Each note of who has the processor ends the piece that the one before it has begun."""
+    """The slices of a processor: each note about its use ends the slice before it."""
     owners = [i for i, task in enumerate(parts.tasks) if task.processor == processor]
     kept = notes[_are(notes[:, 1], _ON_A_PROCESSOR) & np.isin(notes[:, 2], owners)]
     kinds = np.where(kept[:, 1] == SWITCHING, SWITCH, RUN)

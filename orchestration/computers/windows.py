@@ -1,7 +1,7 @@
-"""Between which instants a component samples, and between which its messages arrive, whatever the scheduler is dealt.
+"""Windows in which a component samples and in which its messages arrive, for any random numbers.
 
-It follows from the bounds of theory: a job that is done by its bound R, whatever it takes, began before R less the most
-that it can take.
+They follow from the bounds of theory: a job that is done by its bound R, whatever its execution time, started before R
+less the largest execution time.
 """
 
 from __future__ import annotations
@@ -21,46 +21,46 @@ from orchestration.system.times import NANOSECONDS, exact_nanoseconds, nanosecon
 
 @dataclass(frozen=True, kw_only=True)
 class Window:
-    """Of one component, from each nominal sample [ns]."""
+    """The windows of one component, after each nominal sample [ns]."""
 
     earliest: int
-    """its samples"""
+    """of its samples"""
     latest: int
     at_deadline: bool
     """whether it writes at its deadline"""
     least: int
-    """what lies at least between a sample and the arrival of its messages; of a task that writes at its deadline,
-    between the nominal sample and that"""
+    """the least time from a sample to the arrival of its messages; from the nominal sample if it writes at its
+    deadline"""
     most: int
-    """what lies at most between them, likewise"""
+    """the largest, likewise"""
     end: int
     """the last instant at which messages arrive"""
 
     @property
     def is_certain(self) -> bool:
-        """Whether there is one instant for each."""
+        """Whether samples and arrivals have one possible instant each."""
         return self.shift == 0 and self.spread == 0
 
     @property
     def shift(self) -> int:
-        """By how much samples may differ [ns]."""
+        """The width of the window of samples [ns]."""
         return self.latest - self.earliest
 
     @property
     def spread(self) -> int:
-        """By how much messages may differ of samples that come equally late [ns]."""
+        """The width of the window of arrivals after samples of equal lateness [ns]."""
         return self.most - self.least if self.at_deadline else min(self.most, self.end - self.earliest) - self.least
 
     @property
     def together(self) -> int:
-        """What both may come to in sum [ns]."""
+        """The largest sum of both variations [ns]."""
         return self.shift + self.spread if self.at_deadline else self.end - self.earliest - self.least
 
 
 def windows_of(system: System) -> dict[str, Window]:
-    """By component: of those that run on a computer or send over a network.
+    """The windows of the components that run on a computer or send over a network, by component.
 
-    Raises `UsageError` where theory has no bound, where a job or frame may still be under way when the next one comes,
+    Raises `UsageError` where there is no bound, where a job or frame may still be under way when the next one comes,
     and for what is neither a periodic task nor sent by a sampled component.
     """
     tasks, messages, bounds = tasks_of(system), messages_by_connection(system), bounds_of(system)
@@ -112,14 +112,14 @@ def _of_task(of: PlacedTask, bounds: Bounds) -> Window:
 
 
 def _is_uninterrupted(of: PlacedTask) -> bool:
-    """Whether a job that has begun runs to its end."""
+    """Whether no job is preempted."""
     others = [task for name, task in of.computer.tasks.items() if name != of.name]
     comes_first = of.computer.scheduling == "fixed-priority" and all(x.priority > of.task.priority for x in others)
     return comes_first or not of.computer.preemptive
 
 
 def _sent(window: Window, of: PlacedMessage, bounds: Bounds) -> Window:
-    """With a frame between the sample and the arrival."""
+    """The window with a frame between the sample and the arrival."""
     bound = bounds[f"{of.network_name}.{of.name}"]
     if bound is None:
         raise UsageError(f"{of.place}: theory has no bound of its responses, or the network has too much to carry")

@@ -1,1 +1,1 @@
-"""What happens when, without any FMU: the timetable, and what of it is drawn at random."""
+"""The timetable of a run, without any FMU: its instants, regular and random."""

@@ -1,4 +1,4 @@
-"""Where a run is in its timetable: all of what happens when that a pause has to keep is how many instants are past."""
+"""The position of a run in its timetable: the number of past instants, which is all that a pause has to save of it."""
 
 from collections.abc import Iterator
 
@@ -6,27 +6,27 @@ from orchestration.schedule.schedule import Instant, Schedule
 from orchestration.schedule.timetable import Timetable
 
 INSTANTS = 2**13
-"""Of one schedule, about: so many are made at once"""
+"""Approximate number of a schedule, made at once"""
 TOGETHER = 2**9
-"""of these so many are made into objects, few enough to stay in the processor's cache"""
+"""Number made into objects at once, few enough to stay in the processor's cache"""
 
 
 class Cursor:
-    """A timetable, gone through from its begin to its end."""
+    """Iterates over a timetable from its begin to its end."""
 
     def __init__(self, timetable: Timetable) -> None:
         self.at = 0
-        """the instant of the schedule that comes next"""
+        """the next instant of the schedule"""
         self._timetable, self._before = timetable, 0
         self._schedule: Schedule | None = None
 
     @property
     def past(self) -> int:
-        """How many instants are past."""
+        """The number of past instants."""
         return self._before + self.at
 
     def schedule(self) -> Schedule | None:
-        """Where the next instant is; None at the end.
+        """The schedule of the next instant; None at the end.
 
         Raises `UsageError` if the run cannot go through it.
         """
@@ -35,14 +35,14 @@ class Cursor:
         return self._schedule
 
     def instants(self) -> Iterator[Instant]:
-        """Those to come, each past as soon as it is given."""
+        """The instants to come, each past as soon as it is yielded."""
         while (schedule := self.schedule()) is not None:
             for instant in schedule.part(self.at, self.at + TOGETHER).instants():
                 self.at += 1
                 yield instant
 
     def move_to(self, past: int) -> Iterator[Schedule]:
-        """Go on until so many are past; gives what is passed over."""
+        """Move on until so many instants are past; yields those skipped."""
         while self.past < past and (schedule := self.schedule()) is not None:
             begin, self.at = self.at, min(len(schedule), self.at + past - self.past)
             yield schedule.part(begin, self.at)

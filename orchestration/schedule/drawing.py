@@ -1,4 +1,4 @@
-"""Numbers that are not the same each time, one after the other, as their distribution or their trace has them."""
+"""Streams of numbers from distributions and traces."""
 
 import math
 from collections.abc import Callable
@@ -15,19 +15,19 @@ from orchestration.system.distribution import Distribution, Varying
 from orchestration.system.times import NANOSECONDS, nanoseconds
 
 Stream = Callable[[], np.random.Generator]
-"""Gives the generator; called only if something is drawn"""
+"""Returns the generator; called only if something is drawn"""
 Lateness = Callable[[int], Integers]
-"""The next so many times [ns]"""
+"""The next `count` times [ns]"""
 
 _AWAY = 1e-3
-"""[ns] from a half, from where on a product of doubles is rounded as the decimal number that it stands for"""
+"""Distance from a half [ns] beyond which a product of doubles is rounded as its decimal number"""
 _BELOW_1 = math.nextafter(1.0, 0.0)
 
 Values = TypeVar("Values", bound=np.generic)
 
 
 def times(of: Varying, stream: Stream) -> Lateness:
-    """Times [ns] as they come; of a number it is that, each time. Nothing is drawn for what is not random.
+    """The stream of times [ns] of a constant number or a distribution. Nothing is drawn for what is not random.
 
     Raises `UsageError` for a trace that cannot be read.
     """
@@ -40,7 +40,7 @@ def times(of: Varying, stream: Stream) -> Lateness:
 
 
 def times_from(of: Distribution) -> Callable[[Floats], Integers]:
-    """What makes times [ns] of numbers u from [0, 1), one of each, the larger the larger they are but for a table."""
+    """The function from numbers u in [0, 1) to times [ns]; it increases, but for a table."""
     if of.uniform is not None:
         least, most = map(nanoseconds, of.uniform)
         return lambda u: least + (u * (most - least)).astype(np.int64)
@@ -51,7 +51,7 @@ def times_from(of: Distribution) -> Callable[[Floats], Integers]:
 
 
 def index_from(of: Distribution) -> Callable[[Floats], Integers]:
-    """What makes of numbers u from [0, 1) the places in the table of a distribution."""
+    """The function from numbers u in [0, 1) to indices of the table of a distribution."""
     if of.probabilities is None:
         count = len(of.table())
         return lambda u: np.floor(u * count).astype(np.int64)
@@ -61,7 +61,7 @@ def index_from(of: Distribution) -> Callable[[Floats], Integers]:
 
 
 def in_order(values: npt.NDArray[Values]) -> Callable[[int], npt.NDArray[Values]]:
-    """The next so many of these values, which begin anew after the last."""
+    """The stream of these values in order, beginning anew after the last."""
     past = 0
 
     def following(count: int) -> npt.NDArray[Values]:
@@ -88,7 +88,7 @@ def _cut_normal(of: Distribution) -> Callable[[Floats], Integers]:
 
 
 def _whole(seconds: Floats) -> Integers:
-    """Times in nanoseconds, as `nanoseconds` rounds each."""
+    """Times in nanoseconds, rounded as `nanoseconds` does."""
     about = seconds * NANOSECONDS
     result = np.rint(about).astype(np.int64)
     for i in np.flatnonzero(np.abs(about - np.floor(about) - 0.5) < np.maximum(_AWAY, about * 1e-15)).tolist():

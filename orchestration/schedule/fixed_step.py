@@ -1,4 +1,4 @@
-"""Components that take steps of one length only: what happens to them moves to their next point, or cannot be."""
+"""Components of fixed step: an instant between two of their points moves to the next one, or is an error."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -11,16 +11,16 @@ from orchestration.system.times import NANOSECONDS, Grid
 
 
 class Refusal(NamedTuple):
-    """What a run cannot go through."""
+    """An instant at which a run cannot continue."""
 
     time: int
-    """[ns], of the instant that it would be"""
+    """[ns], of that instant"""
     text: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class FixedStep:
-    """The grid of a component that takes no other step, and whether what happens to it moves to its next point."""
+    """The grid of a component of fixed step, and whether instants between its points move to the next one."""
 
     name: str
     grid: Grid
@@ -44,7 +44,7 @@ class FixedStep:
         return points
 
     def expect_end(self, stop: int) -> None:
-        """Raise `UsageError` unless `stop` [ns] is on the grid: the end moves for nobody."""
+        """Raise `UsageError` unless `stop` [ns] is on the grid: the end never moves."""
         point = self.grid.from_(stop)
         if point != stop:
             raise UsageError(
@@ -58,5 +58,5 @@ class FixedStep:
 
 
 def seconds(time: int) -> str:
-    """A time [ns] in words."""
+    """A time [ns] as text in seconds."""
     return f"{time / NANOSECONDS:.9g}"

@@ -1,4 +1,4 @@
-"""What of a timetable no seed changes: who is stepped when if nothing is left to chance, and what cannot be."""
+"""The part of a timetable that no seed changes: the regular instants, and checks of the system."""
 
 from collections import OrderedDict
 from collections.abc import Mapping
@@ -20,14 +20,14 @@ from orchestration.system.sampling import has_scheduled_instants
 from orchestration.system.times import Grid, exact_nanoseconds, nanoseconds
 
 _KEPT = 8
-"""Spans of which the regular instants are kept"""
+"""Spans whose regular instants are cached"""
 
 
 class Frame:
-    """What the timetables of a system have in common, whatever is drawn."""
+    """The common part of all timetables of a system."""
 
     def __init__(self, system: System, fixed: Mapping[str, FixedStep]) -> None:
-        """`fixed` has the components that take steps of one length only.
+        """`fixed` has the components of fixed step.
 
         Raises `UsageError` if the end is between two points of one of them, or for times beyond `LONGEST`.
         """
@@ -41,22 +41,22 @@ class Frame:
         self.continuous = np.array([names.index(name) for name in self.plan.continuous], dtype=np.int64)
         """indices of components in continuous time, in the order in which they are stepped"""
         self.place = np.full(len(names), -1)
-        """of each component among those, -1 of one that is sampled"""
+        """the position of each component among those, -1 for a sampled one"""
         self.place[self.continuous] = np.arange(len(self.continuous))
         self.points = {
             i: Grid(Fraction(0), exact_nanoseconds(system.components[names[i]].step or 0.0))
             for i in sorted(self.continuous.tolist())
         }
-        """of the components in continuous time, by their indices"""
+        """the grids of the components in continuous time, by their indices"""
         self.sender = np.array([names.index(x.sender) for x in system.connections], dtype=np.int64)
         self.receiver = np.array([names.index(x.receiver) for x in system.connections], dtype=np.int64)
-        """components at the ends of the connections"""
+        """the components at the ends of the connections"""
         self.uses_scheduler = bool(system.computers or system.networks) or any(
             each.sampling is not None and has_scheduled_instants(each.sampling) for each in system.components.values()
         )
-        """whether the scheduler finds the instants of any component or connection"""
+        """whether the scheduler computes the instants of any component or connection"""
         self.mean_interval = _mean_interval(system)
-        """from one instant to the next [ns], about"""
+        """the approximate mean time between instants [ns]"""
         self._changes = [
             (Grid(Fraction(0), exact_nanoseconds(source.period)), [names.index(end.split(".")[0]) for end in source.to])
             for source in system.sources.values()
@@ -66,10 +66,10 @@ class Frame:
 
     @cached_property
     def resources(self) -> Resources:
-        """What the scheduler takes of the computers and networks, up to where it has to know what becomes of them.
+        """The computers and networks for the scheduler, up to the time until which it has to run.
 
-        What is measured is measured ahead of its sample, which may be after the end; and what a job has read at its
-        release may be open up to its deadline.
+        That is after the end for measurements ahead of a sample after the end, and up to the deadlines of jobs that
+        read at their release.
         """
         measured = (self.system.connections[i] for i in self.plan.measured)
         ahead = (nanoseconds(highest(x.delay)) + nanoseconds(highest(x.delay_jitter)) for x in measured)
@@ -78,9 +78,7 @@ class Frame:
         return Resources(self.system, self.stop + max(ahead, default=0) + max(open_for, default=0))
 
     def regular(self, begin: int, end: int) -> Instants:
-        """Points, changes of sources, the start, and the end, to which everybody is stepped: from `begin` to before
-        `end` [ns].
-        """
+        """The regular instants from `begin` to before `end` [ns]: points, changes of sources, the start and the end."""
         if (begin, end) in self._kept:
             self._kept.move_to_end((begin, end))
             return self._kept[begin, end]
@@ -89,7 +87,7 @@ class Frame:
             found.add(grid.between(grid.index_from(begin), grid.index_from(end)), int(self.place[component]))
         if begin == 0:
             found.add(np.zeros(1, dtype=np.int64))
-        for grid, receivers in self._changes:  # the value of the start is that of initialisation
+        for grid, receivers in self._changes:  # the value at the start is that of initialisation
             times = grid.between(max(grid.index_from(begin), 1), max(grid.index_from(end), 1))
             found.add(times, *self.place[receivers].tolist())
         if end > self.stop:
@@ -101,7 +99,7 @@ class Frame:
 
 
 def _expect_moves(system: System, fixed: Mapping[str, FixedStep]) -> None:
-    """Raise `UsageError` for a component of fixed steps that a task or a network meets between two of its points."""
+    """Raise `UsageError` for a component of fixed steps beside a task or a network unless its instants may move."""
     tasks, over = tasks_of(system), messages_by_connection(system)
     for x in system.connections:
         places = [of.place for of in (tasks.get(x.sender), tasks.get(x.receiver), over.get(x.name)) if of is not None]
@@ -114,7 +112,7 @@ def _expect_moves(system: System, fixed: Mapping[str, FixedStep]) -> None:
 
 
 def _mean_interval(system: System) -> float:
-    """From one instant to the next [ns], about."""
+    """The approximate mean time between instants [ns]."""
     periods = [component.step for component in system.components.values()]
     periods += [source.period for source in system.sources.values()]
     rates = [1.0 / float(exact_nanoseconds(period)) for period in periods if period is not None]

@@ -1,4 +1,4 @@
-"""The longest times that there may be: beyond them a whole number of nanoseconds needs more than 64 bits."""
+"""The limit of times: beyond it, whole nanoseconds need more than 64 bits."""
 
 from orchestration.basics.errors import UsageError
 from orchestration.system.computers import require_less
@@ -10,9 +10,9 @@ from orchestration.system.sampling import Sampling
 from orchestration.system.times import NANOSECONDS
 
 LONGEST = 2**60
-"""[ns], 36 years: a few of them together still are a whole number of 64 bits"""
+"""[ns], 36 years: the sum of a few of them still fits into 64 bits"""
 MOST_AHEAD = 10**6
-"""Samples that a measurement may be late by: all of them are drawn before the first one"""
+"""The largest delay of a measurement in samples: all of them are drawn before the first one"""
 
 
 def expect_no_longer(system: System) -> None:

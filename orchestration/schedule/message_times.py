@@ -1,4 +1,4 @@
-"""What is left to chance about instants and messages: how late they are, and whether they are lost."""
+"""Random lateness of instants and messages, and random losses."""
 
 import math
 from collections.abc import Callable
@@ -13,11 +13,11 @@ from orchestration.system.distribution import Distribution, Varying
 from orchestration.system.times import nanoseconds
 
 Losses = Callable[[int], Booleans]
-"""Whether the next so many messages are lost"""
+"""Whether each of the next `count` messages is lost"""
 
 
 def lateness(jitter: Varying, spread: str, stream: Stream) -> Lateness:
-    """Latenesses [ns] up to a largest one, or as they are distributed; nothing is drawn if that is 0."""
+    """The stream of latenesses [ns], up to a largest one or of a distribution; nothing is drawn if that is 0."""
     if isinstance(jitter, Distribution):
         return times(jitter, stream)
     largest = nanoseconds(jitter)
@@ -30,9 +30,9 @@ def lateness(jitter: Varying, spread: str, stream: Stream) -> Lateness:
 
 
 def losses(probability: Varying, burst_length: float | None, stream: Stream) -> Losses:
-    """Losses, independent or in bursts of a mean length (Gilbert-Elliott), or of values of 0 and 1.
+    """The stream of losses, independent or in bursts of a mean length (Gilbert-Elliott), or of values 0 and 1.
 
-    Nothing is drawn if nothing is ever lost.
+    Nothing is drawn for the probability 0.
     """
     if isinstance(probability, Distribution):
         return _recorded_losses(probability, stream)

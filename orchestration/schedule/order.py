@@ -1,13 +1,13 @@
-"""Who comes first at one instant: an order that follows the connections where it can, and the file where it cannot."""
+"""The order of components at one instant: by their connections where possible, else as in the file."""
 
 from collections.abc import Iterable, Sequence
 
 
 def ranked(members: Sequence[str], before: Iterable[tuple[str, str]]) -> tuple[str, ...]:
-    """`members` so that the first of each pair in `before` precedes the second.
+    """`members` sorted so that the first of each pair in `before` precedes the second.
 
-    Pairs are taken in their order; one that would close a circle with those before it is left out. Members that
-    no pair puts in order keep the order in which they are given.
+    Pairs are used in their order; one that would close a cycle with those before it is ignored. Members that no pair
+    orders keep their given order.
     """
     followers: dict[str, set[str]] = {member: set() for member in members}
     for first, second in before:

@@ -1,4 +1,4 @@
-"""How the connections of a system are carried out, and who comes first at one instant."""
+"""The classes of the connections of a system, and the order of its components at one instant."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,13 +11,13 @@ from orchestration.system.placement import messages_by_connection
 
 @dataclass(frozen=True)
 class Plan:
-    """A system, sorted: indices of connections by what their ends are, components in the order of an instant."""
+    """The connections of a system, as indices, by kinds of their ends; its components in the order of an instant."""
 
     system: System
 
     @cached_property
     def wires(self) -> tuple[int, ...]:
-        """Between components in continuous time, nothing late, lost or noisy: read whenever the receiver is stepped."""
+        """Between components in continuous time, without faults: read whenever the receiver is stepped."""
         return tuple(
             i
             for i, x in enumerate(self._connections)
@@ -26,8 +26,8 @@ class Plan:
 
     @cached_property
     def posted(self) -> tuple[int, ...]:
-        """Between components in continuous time otherwise, a message at each point of the sender; over networks,
-        from these to anyone at the instants of the message.
+        """From components in continuous time: to others, a message at each point of the sender if it is no wire; over a
+        network, to any component, at the instants of the message.
         """
         return tuple(
             i
@@ -53,7 +53,7 @@ class Plan:
 
     @cached_property
     def read_ahead(self) -> frozenset[int]:
-        """Of `measured`, those whose messages can be read before the sample that they are for."""
+        """Those of `measured` whose messages can be read before their sample."""
         return frozenset(i for i in self.measured if self._connections[i].delay or self._connections[i].delay_jitter)
 
     @cached_property
@@ -96,7 +96,7 @@ class Plan:
 
 
 def is_plain(x: Connection) -> bool:
-    """Whether what arrives is what was sent, at once."""
+    """Whether its messages arrive unchanged, at once."""
     return not (
         x.delay or x.delay_jitter or x.loss or any(x.noise.values()) or any(x.quantisation.values()) or x.hold != "zero"
     )

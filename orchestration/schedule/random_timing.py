@@ -1,4 +1,4 @@
-"""What is drawn of one connection and of one sampled component: when its messages and samples are, in order."""
+"""Random times of the samples of one component and of the messages of one connection, in order."""
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
@@ -20,12 +20,12 @@ from orchestration.system.times import Grid, exact_nanoseconds, nanoseconds
 
 
 class Link:
-    """A connection, and the random numbers that it has not used."""
+    """A connection with its random streams."""
 
     def __init__(
         self, index: int, x: Connection, streams: Streams, fixed: FixedStep | None, refused: list[Refusal]
     ) -> None:
-        """`fixed` is who is stepped to its messages, if that takes steps of one length only."""
+        """`fixed` is the component that is stepped to its messages, if it has a fixed step."""
         owner = f"connections.{x.name}"
         self.index, self.jacobi = index, x.order == "jacobi"
         self.longest = nanoseconds(highest(x.delay)) + nanoseconds(highest(x.delay_jitter))
@@ -37,12 +37,12 @@ class Link:
         self._last = 0
 
     def messages(self, sent: Integers) -> Integers:
-        """Arrivals of the next messages, sent at these times; -1 for one that is lost."""
+        """Arrivals of the next messages, sent at these times; -1 for a lost one."""
         own = sum((late(len(sent)) for late in self._late), sent)
         return self.arrivals(self._without_lost(own))
 
     def arrivals(self, own: Integers) -> Integers:
-        """When the next messages arrive that would by themselves at these times, -1 for one that is lost."""
+        """Arrivals of the next messages from their separate ones, so that none overtakes; -1 for a lost one."""
         found = self._in_order(own, "an arrival")
         return found if own.min(initial=0) == 0 else np.where(own < 0, -1, found)
 
@@ -52,11 +52,11 @@ class Link:
         return self._in_order(own, "a measurement"), self._without_lost(samples)
 
     def _without_lost(self, arrivals: Integers) -> Integers:
-        """Of the next messages, -1 for those that are lost."""
+        """The arrivals of the next messages, with -1 for lost ones."""
         return arrivals if self._lost is None else np.where(self._lost(len(arrivals)), -1, arrivals)
 
     def _in_order(self, own: Integers, what: str) -> Integers:
-        """Messages never overtake."""
+        """The times `own`, delayed so that no message overtakes another."""
         times: Integers = np.maximum(np.maximum.accumulate(own), self._last)
         if self._fixed is not None:
             times = self._fixed.aligned(times, f"{what} over {self._name}", self._refused)
@@ -89,37 +89,37 @@ class TimedComponent:
 
     @property
     def numbers(self) -> Integers:
-        """Which samples they are."""
+        """The indices of the samples."""
         return self._columns[0]
 
     @property
     def times(self) -> Integers:
-        """[ns]"""
+        """The times of the samples [ns]."""
         return self._columns[1]
 
     @property
     def following(self) -> Integers:
-        """Of each the time of the next [ns]."""
+        """The time of the sample after each [ns]."""
         return self._columns[2]
 
     def measured(self, place: int) -> Integers:
-        """When the values of an incoming link are measured for them."""
+        """When the messages of an incoming link are measured for the samples [ns]."""
         return self._columns[_OF_LINKS + 2 * place]
 
     def sent(self, place: int) -> Integers:
-        """When they send over an outgoing link."""
+        """When the samples send over an outgoing link [ns]."""
         return self._columns[_OF_LINKS + 2 * (len(self.incoming) + place)]
 
     def arrivals(self, place: int) -> Integers:
-        """When that arrives."""
+        """When those messages arrive [ns]."""
         return self._columns[_OF_LINKS + 2 * (len(self.incoming) + place) + 1]
 
     def draw_until(self, end: int) -> None:
-        """Draw until no sample that is still to be drawn has anything to do with what is before `end` [ns]."""
+        """Draw samples until no later one affects anything before `end` [ns]."""
         raise NotImplementedError
 
     def messages(self, which: slice) -> Integers:
-        """Of these samples, in the order in which they are exchanged, shape (n, number, 4)."""
+        """The messages of these samples in the order of exchange, shape (n, messages of a sample, 4)."""
         numbers, links = self.numbers[which], [*self.incoming, *self.outgoing]
         result = np.empty((len(numbers), len(links), 4), dtype=np.int64)
         for i, link in enumerate(links):
@@ -139,7 +139,7 @@ class TimedComponent:
         self._columns = [np.concatenate([a, b]) if len(a) else b for a, b in zip(self._columns, drawn, strict=True)]
 
     def _moved(self, times: Integers, first: int, before: int) -> Integers:
-        """Samples from number `first` on, on points of who is read; `before` is the one before them [ns]."""
+        """Samples from index `first` on, moved to points of what they read; `before` is the one before them [ns]."""
         if not self._fixed:
             return times
         found = []
@@ -155,7 +155,7 @@ class TimedComponent:
         return np.array(found, dtype=np.int64)
 
     def _aligned(self, time: int) -> int:
-        """The next point from `time` [ns] of all that it reads and that take steps of one length only."""
+        """The next common point, from `time` [ns] on, of all components of fixed step that it reads."""
         before = None
         while time < self._stop + self._ahead and time != before:
             before = time
@@ -165,7 +165,7 @@ class TimedComponent:
 
 
 class SampledComponent(TimedComponent):
-    """One that samples by its own clock."""
+    """A component that samples by its own clock."""
 
     def __init__(
         self,
@@ -186,11 +186,11 @@ class SampledComponent(TimedComponent):
         self.first = int(self._next[0])
 
     def _times(self, first: int, end: int, before: int) -> Integers:
-        """Of samples `first` up to `end`, without that one; `before` is that of the one before them [ns]."""
+        """The times of samples `first` to before `end`; `before` is that of the one before them [ns]."""
         return self._moved(self._grid.between(first, end) + self._late(end - first), first, before)
 
     def draw_until(self, end: int) -> None:
-        """Draw until no sample that is still to be drawn has anything to do with what is before `end` [ns]."""
+        """Draw samples until no later one affects anything before `end` [ns]."""
         while self._next[0] - self._ahead < end:
             last = max(self._grid.index_from(end + self._ahead), self._k + 1)
             times = np.append(self._next, self._times(self._k + 1, last + 1, int(self._next[0])))
@@ -205,15 +205,15 @@ class SampledComponent(TimedComponent):
             self._k, self._next = last, times[-1:]
 
 
-@lru_cache(64)  # the runs of a study have most of them in common
+@lru_cache(64)  # most are common to the runs of a study
 def _grid(offset: float, period: float, ratio: float) -> Grid:
-    """Of a clock that believes so many seconds to pass in one."""
+    """The instants of a clock that counts `ratio` seconds per true second."""
     exact = Fraction(repr(float(ratio)))
     return Grid(exact_nanoseconds(offset) / exact, exact_nanoseconds(period) / exact)
 
 
 class ScheduledComponent(TimedComponent):
-    """One whose samples and messages the scheduler finds: a task, or what messages release."""
+    """A component whose samples and messages the scheduler computes: a task, or one that messages release."""
 
     def __init__(
         self,
@@ -235,7 +235,7 @@ class ScheduledComponent(TimedComponent):
         self.first = int(first[0]) if len(first) else NEVER
 
     def draw_until(self, end: int) -> None:
-        """As in any other."""
+        """As in `TimedComponent`."""
         lookahead, samples = self._lookahead, self._samples
         end += self._ahead
         lookahead.advance_to(end)
@@ -246,7 +246,7 @@ class ScheduledComponent(TimedComponent):
             lookahead.advance()
 
     def _draw(self, count: int) -> None:
-        """So many more are drawn."""
+        """Add the next `count` samples."""
         if not count:
             return
         times, then = self._samples.take(count)

@@ -1,6 +1,6 @@
-"""The computers and networks of a system, as the scheduler takes them: whole numbers, and streams of them.
+"""The computers and networks of a system in the form of the scheduler: whole numbers, and streams of them.
 
-All but the streams is the same in all runs of a timing, and made once for them.
+Everything but the streams is common to all runs of a timing, and made once for them.
 """
 
 import math
@@ -65,11 +65,11 @@ _OVERRUNS = {"queue": QUEUE, "skip": SKIP, "abort": ABORT}
 _NO_DEADLINE = LATER // 2
 
 OfRun: TypeAlias = Callable[[Streams], Stream]
-"""Gives a stream of numbers of a run from the generators of that run"""
+"""Makes a stream of numbers from the generators of a run"""
 
 
 class Resources:
-    """Parts, with their names and with what they are of the system."""
+    """The parts of the scheduler, with their names and their places in the system."""
 
     def __init__(self, system: System, stop: int) -> None:
         """Up to `stop` [ns]."""
@@ -81,7 +81,7 @@ class Resources:
         placed, self._over = [*placed_tasks(system.computers)], [*placed_messages(system.networks)]
         released = released_by(system)
         self.tasks = {each.task.component: i for i, each in enumerate(placed) if each.task.component is not None}
-        """by component, that whose jobs are its steps"""
+        """the task whose jobs are the steps of a component, by component"""
         by_network = messages_by_connection(system)
         sending = {x.sender for x in system.connections if x.name in by_network or x.name in released}
         for name, component in system.components.items():
@@ -99,7 +99,7 @@ class Resources:
                 if x.name in by_network or (x.sender in self.tasks and x.order == "gauss-seidel")
             )
         }
-        """by connection"""
+        """the carriers of connections, by connection"""
         processors = [
             Processor(_POLICIES[each.scheduling], each.preemptive, nanoseconds(each.switch))
             for each in system.computers.values()
@@ -121,7 +121,7 @@ class Resources:
             places=[*(each.place for each in placed), *(f"components.{name}" for name in self._alone),
                     *(each.place for each in self._over)],
         )  # fmt: skip
-        """without the streams, which are of a run"""
+        """without the streams, which belong to a run"""
         self._names = Names(
             processors=[*system.computers, *self._alone],
             tasks=[*(f"{each.computer_name}.{each.name}" for each in placed), *self._alone],
@@ -130,21 +130,21 @@ class Resources:
         )
 
     def of_run(self, streams: Streams) -> Parts:
-        """What a scheduler takes of a run with these streams."""
+        """The parts of a run with these streams."""
         drawn = [each if isinstance(each, Constant) else each(streams) for each in self._streams]
         return replace(self.parts, streams=drawn)
 
     def timeline(self, streams: Streams) -> Timeline:
-        """What becomes of all computers and networks up to the end in a run with these streams."""
+        """The timeline of all computers and networks in a run with these streams."""
         parts = self.of_run(streams)
-        at_work = scheduler(parts, NEEDED)
-        at_work.run(LATER)
+        running = scheduler(parts, NEEDED)
+        running.run(LATER)
         dues = [each.message.due for each in self._over]
         deadlines = [LATER if due is None else nanoseconds(due) for due in dues]
-        return timeline(parts, self._names, deadlines, at_work.take_notes(), without=self._alone)
+        return timeline(parts, self._names, deadlines, running.take_notes(), without=self._alone)
 
     def event_builder(self) -> EventBuilder:
-        """What makes events of the notes of a scheduler of these parts."""
+        """The builder of events from notes of a scheduler of these parts."""
         return EventBuilder(self.parts, self._names.all, without=self._alone)
 
     # -- tasks -----------------------------------------------------------------------------------------------------
@@ -168,7 +168,7 @@ class Resources:
         )
 
     def _task_alone(self, name: str, processor: int) -> Task:
-        """A sampled component on no computer, which takes no time."""
+        """The task of a sampled component that is on no computer; its jobs take no time."""
         sampling = self._system.components[name].sampling
         assert sampling is not None
         ratio, nominal, late = Fraction(repr(float(sampling.clock_ratio))), NONE, self._zero
@@ -189,7 +189,7 @@ class Resources:
         )
 
     def _indices(self, released: tuple[str, ...]) -> tuple[int, ...]:
-        """Tasks by their paths, or components that messages release."""
+        """The indices of tasks, given by their paths or by components that messages release."""
         paths = {each.place: i for i, each in enumerate(placed_tasks(self._system.computers))}
         return tuple(paths[one] if one in paths else self.tasks[one] for one in released)
 
@@ -272,7 +272,7 @@ class Resources:
         return self._stream(lambda streams: lateness(jitter, spread, partial(streams.of, owner, JITTER)))
 
     def _losses(self, probability: Varying, burst_length: float | None, owner: str, cause: str) -> int:
-        """1 with a probability, else 0."""
+        """The stream of losses: 1 with a probability, else 0."""
         if probability == 0.0:
             return self._zero
 
@@ -288,20 +288,20 @@ class Resources:
         start = exact_nanoseconds(offset) / ratio
         if arrivals is not None:
             rate, begin = arrivals.poisson, round(start)
-            return self._stream(lambda streams: _by_chance(begin, rate, streams.of(place, ARRIVALS)))
+            return self._stream(lambda streams: _poisson(begin, rate, streams.of(place, ARRIVALS)))
         assert period is not None
         return self._stream(_InTurn([Grid(start, exact_nanoseconds(period) / ratio)], self._stop).of_run)
 
 
 class _InTurn:
-    """The first instant of each grid, the second of each, and so on; LATER in place of those past the end."""
+    """The first instant of each grid, the second of each, and so on; LATER in place of those after the end."""
 
     def __init__(self, grids: Sequence[Grid], stop: int) -> None:
         self._grids, self._lasts = grids, [grid.index_from(stop) for grid in grids]
         self._kept = lru_cache(_KEPT)(self._between)
 
     def of_run(self, _streams: Streams) -> Stream:
-        """They are the same in each run."""
+        """The stream of a run; the same in each."""
         first = 0
 
         def following(count: int) -> Integers:
@@ -324,11 +324,11 @@ class _InTurn:
 
 
 _KEPT = 64
-"""Times that some instants of a grid are asked for in a run; those of longer ones are found anew"""
+"""Cached parts of a grid; those of longer runs are computed again"""
 
 
-def _by_chance(start: int, rate: float, generator: np.random.Generator) -> Stream:
-    """Instants of a Poisson process; numpy's logarithm of many numbers at once would give other bits."""
+def _poisson(start: int, rate: float, generator: np.random.Generator) -> Stream:
+    """Instants of a Poisson process; numpy's logarithm of arrays would give other bits."""
     last = start
 
     def drawn(count: int) -> Integers:
@@ -344,6 +344,6 @@ def _by_chance(start: int, rate: float, generator: np.random.Generator) -> Strea
 
 
 def timeline_of(system: System) -> Timeline:
-    """What becomes of the tasks and messages of a system up to its end; raises `UsageError` for times beyond all."""
+    """The timeline of a system up to its end; raises `UsageError` for times beyond `LONGEST`."""
     expect_no_longer(system)
     return Resources(system, nanoseconds(system.stop_time)).timeline(Streams(system.seed, system.streams))

@@ -1,4 +1,4 @@
-"""What the tasks and messages of a system come to: how long they take, how often they are late, and what theory says.
+"""Statistics of the tasks and messages of a system: responses, missed deadlines, and the bounds of theory.
 
 Times are in seconds.
 """
@@ -18,12 +18,12 @@ from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS
 
 NO_DEADLINE = 2**60
-"""[ns], from where on a deadline is none"""
+"""[ns], from which on a deadline counts as none"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Spread:
-    """Of times, from the least to the most."""
+    """The spread of times."""
 
     min: float
     mean: float
@@ -33,7 +33,7 @@ class Spread:
 
     @classmethod
     def of(cls, times: Integers) -> "Spread | None":
-        """Of times [ns]; None if there are none."""
+        """The spread of times [ns]; None if there are none."""
         if not len(times):
             return None
         ordered = np.sort(times)
@@ -44,59 +44,59 @@ class Spread:
 
 @dataclass(frozen=True, kw_only=True)
 class Responses:
-    """Of one task or message."""
+    """Statistics of one task or message."""
 
     jobs: int
-    """how many were released, or queued; not those that a skip left out"""
+    """the number released, or queued; without skipped ones"""
     utilisation: float
-    """the share of the time that they ask of the processor, or of a link: what one takes on average, by what there is
-    from one to the next"""
+    """the demanded share of the time of the processor or link: the mean demand of one, divided by the mean time
+    between them"""
     response: Spread | None
     """from the nominal release to the end, of those that are done"""
     bound: float | None
-    """the most that it can be, by theory; None where theory has no bound"""
+    """the bound of theory on the response; None where there is none"""
     start_jitter: float | None
-    """from the least to the most between nominal release and begin"""
+    """the range of the times from nominal release to start"""
     end_jitter: float | None
-    """likewise to the end"""
+    """the range of those to the end"""
     latency: Spread | None
     """of a task, from reading its inputs to writing its outputs"""
     deadline: float | None
     missed: float | None
-    """the share that is not done by its deadline, of all whose deadline is within the run; None if there are none"""
+    """the share not done by its deadline, of those whose deadline is within the run; None if there are none"""
     skipped: int
     aborted: int
     unfinished: int
-    """how many are under way at the end, or wait"""
+    """the number waiting or under way at the end"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SystemResponses:
-    """Of all tasks and messages of a system, up to its end."""
+    """Statistics of all tasks and messages of a system, up to its end."""
 
     tasks: Mapping[str, Responses]
     """by COMPUTER.TASK"""
     messages: Mapping[str, Responses]
     """by NETWORK.MESSAGE"""
     busy: Mapping[str, float]
-    """the share of the time that a computer was at work, switches included, or a link carried a frame"""
+    """the share of the time in which a computer was busy, switches included, or a link carried a frame"""
 
 
 def responses_of(system: System, timeline: Timeline) -> SystemResponses:
-    """What has become of the tasks and messages of a system."""
+    """The statistics of the tasks and messages of a system."""
     bounds, tasks, messages = bounds_of(system), {}, {}
     for name, computer in system.computers.items():
         for task_name, task in computer.tasks.items():
             place = f"{name}.{task_name}"
             jobs = timeline.jobs[place]
-            asked = mean(task.execution) * _rate(task, computer.clock_ratio, jobs)
-            tasks[place] = _of_jobs(jobs, asked, bounds[place], task.read == "release")
+            demand = mean(task.execution) * _rate(task, computer.clock_ratio, jobs)
+            tasks[place] = _of_jobs(jobs, demand, bounds[place], task.read == "release")
     for name, network in system.networks.items():
         for message_name, message in network.messages.items():
             place = f"{name}.{message_name}"
             frames = timeline.frames[place]
-            asked = _s(frame_nanoseconds(network, message)) * _rate(message, 1.0, frames)
-            messages[place] = _of_frames(frames, asked, bounds[place])
+            demand = _s(frame_nanoseconds(network, message)) * _rate(message, 1.0, frames)
+            messages[place] = _of_frames(frames, demand, bounds[place])
     shared = {**timeline.processors, **timeline.links}
     busy = {name: float((each.end - each.begin).sum()) / timeline.stop for name, each in shared.items()}
     return SystemResponses(tasks=tasks, messages=messages, busy=busy)
@@ -139,15 +139,15 @@ def _of_frames(frames: Frames, utilisation: float, bound: int | None) -> Respons
     )
 
 
-def _rate(of: Task | Message, clock_ratio: float, found: Jobs | Frames) -> float:
-    """How many there are a second: as it says itself, or else as many as came."""
+def _rate(of: Task | Message, clock_ratio: float, timeline: Jobs | Frames) -> float:
+    """The rate [1/s]: as declared, else as observed."""
     if of.period is not None:
         return clock_ratio / of.period
-    return of.arrivals.poisson if of.arrivals is not None else len(found) / _s(found.stop)
+    return of.arrivals.poisson if of.arrivals is not None else len(timeline) / _s(timeline.stop)
 
 
 def _deadline(of: Jobs | Frames) -> float | None:
-    """From the nominal release."""
+    """The deadline after the nominal release [s]."""
     after = (of.deadline - of.nominal)[:1]
     return _s(int(after[0])) if len(after) and after[0] < NO_DEADLINE else None
 

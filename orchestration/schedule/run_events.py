@@ -1,4 +1,4 @@
-"""The events of a run: what its engine notes of messages, beside what becomes of tasks and frames meanwhile."""
+"""The events of a run: those of messages from its engine, and those of tasks and frames from the scheduler."""
 
 import numpy as np
 
@@ -12,11 +12,11 @@ from orchestration.system.model import System
 from orchestration.system.times import nanoseconds
 
 _AT_ONCE = 1_000_000_000
-"""[ns] of events that nobody wants are gone through at a time"""
+"""[ns], the time advanced at once over unneeded events"""
 
 
 class _OnComputers:
-    """What happens to the tasks and frames of a system, as far as it was asked for."""
+    """The events of the tasks and frames of a system, computed as far as requested."""
 
     def __init__(self, system: System) -> None:
         resources = Resources(system, nanoseconds(system.stop_time))
@@ -26,14 +26,14 @@ class _OnComputers:
         self.reached = -1
 
     def up_to(self, time: int) -> Integers:
-        """What happens after that which was asked for last up to `time` [ns]."""
+        """The events after the last requested time, up to `time` [ns]."""
         self.reached = time
         self._scheduler.run(time + 1)
         return self._events.before(time + 1, self._scheduler.take_notes())
 
 
 class RunEvents:
-    """Events that are not handed over yet."""
+    """The events of a run that are not handed over yet."""
 
     def __init__(self, system: System) -> None:
         connections = tuple(x.name for x in system.connections)
@@ -43,7 +43,7 @@ class RunEvents:
         self._kept: Integers = np.zeros((0, 4), dtype=np.int64)
 
     def with_messages(self, events: Integers, time: int) -> Events:
-        """Those of tasks and frames up to `time` [ns] and `events` of messages, as a table of `Events`, in order.
+        """Events of tasks and frames up to `time` [ns] and `events` of messages, as a table of `Events`, in order.
 
         At one instant computers and networks come first.
         """
@@ -55,7 +55,7 @@ class RunEvents:
         return Events(self._names, _in_order(events))
 
     def hand_over(self, time: int) -> None:
-        """Those up to `time` [ns] are wanted no more."""
+        """Discard the events up to `time` [ns]."""
         if self._on_computers is not None:
             begin = self._on_computers.reached
             for until in range(begin, time, max(_AT_ONCE, (time - begin) // 1000)):

@@ -1,4 +1,4 @@
-"""What happens when, as arrays: some thousand instants that follow each other, and the same one by one."""
+"""A schedule: some thousand consecutive instants as arrays, and one by one."""
 
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
@@ -11,8 +11,8 @@ import numpy as np
 from orchestration.basics.simulator import Integers
 
 Message: TypeAlias = Sequence[int]
-"""Index of its connection; k, which message of it; when it is sent [ns] or, of one that is measured for a sample, when
-that is; when it arrives [ns], negative if it is lost on the way"""
+"""Index of its connection; its index k there; when it is sent, or measured for a sample [ns]; when it arrives [ns],
+negative if it is lost"""
 
 
 class SampleInstant(NamedTuple):
@@ -20,15 +20,15 @@ class SampleInstant(NamedTuple):
 
     component: int
     next_time: int
-    """true time of the sample after it [ns], also if that lies beyond the end"""
+    """true time of the next sample [ns], even after the end"""
     received: Sequence[Message]
-    """what it reads of components in continuous time"""
+    """messages that it reads from components in continuous time"""
     sent: Sequence[Message]
-    """what it sends; a message whose arrival is this instant is delivered at once"""
+    """messages that it sends; one that arrives at this instant is delivered at once"""
 
 
 class Instant(NamedTuple):
-    """A point at which something happens, in this order."""
+    """One instant; its parts are processed in this order."""
 
     time: int
     """[ns]"""
@@ -37,34 +37,34 @@ class Instant(NamedTuple):
     stepped: Sequence[int]
     """components in continuous time that are stepped to this time, in this order"""
     arrivals: Sequence[Message]
-    """messages on their way that arrive, in the order of sending"""
+    """messages that arrive, in the order of sending"""
     posted: Sequence[Message]
-    """of components in continuous time to one another, where a message can be late or lost"""
+    """messages between components in continuous time that can be late or lost"""
     measured: Sequence[Message]
-    """values that are measured now for samples to come"""
+    """messages measured now for samples to come"""
     samples: Sequence[SampleInstant]
     """samples, in the order in which they are processed"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Schedule:
-    """Instants that follow each other; of what happens at instant i, the part from `…_at[i]` to `…_at[i + 1]`."""
+    """Consecutive instants; instant i has the rows of each table from `…_at[i]` to before `…_at[i + 1]`."""
 
     times: Integers
-    """[ns], shape (n + 1,): the last one is the time of the instant after these"""
+    """[ns], shape (n + 1,), the last one of the instant after these"""
     stepped: Integers
     """components in continuous time, in the order in which they are stepped"""
     stepped_at: Integers
     posted: Integers
-    """messages, shape (m, 4), as `Message`; -1 is the arrival of one that is lost"""
+    """messages, shape (m, 4), as `Message`; -1 is the arrival of a lost one"""
     posted_at: Integers
     measured: Integers
     measured_at: Integers
     arrivals: Integers
     arrivals_at: Integers
     samples: Integers
-    """shape (m, 5): component, time of its next sample [ns], and where in `exchanged` what it receives begins, what it
-    sends begins, and that ends"""
+    """shape (m, 5): component, time of its next sample [ns], and the indices in `exchanged` of the first message that
+    it receives, of the first that it sends, and of the end of these"""
     samples_at: Integers
     exchanged: Integers
     """messages that samples read and send"""
@@ -73,7 +73,7 @@ class Schedule:
         return len(self.times) - 1
 
     def instants(self) -> Iterator[Instant]:
-        """One by one."""
+        """The instants one by one."""
         times, messages = self.times.tolist(), self.exchanged.tolist()
         samples = [
             _made(SampleInstant, (component, next_time, messages[received:sent], messages[sent:end]))
@@ -89,7 +89,7 @@ class Schedule:
         return map(partial(_made, Instant), zip(times, times[1:], *parts))
 
     def part(self, begin: int, end: int | None = None) -> "Schedule":
-        """Instants from `begin` on, up to `end` of them without that one, as a schedule of their own."""
+        """The instants from index `begin` to before `end`, as a separate schedule."""
         end = len(self) if end is None else min(end, len(self))
         found = {"times": self.times[begin : end + 1]}
         for table in TABLES:
@@ -101,16 +101,13 @@ class Schedule:
         return Schedule(exchanged=self.exchanged[first:last], **found)
 
     def most_events(self) -> int:
-        """More than any instant has."""
+        """An upper bound on the events of one instant."""
         exchanged = np.append(self.samples[:, 2], len(self.exchanged))[self.samples_at]
         counts = 2 * np.diff(self.posted_at + exchanged) + np.diff(self.arrivals_at + self.posted_at + exchanged)
         return int(counts.max(initial=0)) + 1
 
     def of(self, connection: int, table: str) -> tuple[int, list[int]]:
-        """Of a connection, whose messages take their values as `table` has them.
-
-        How many they are, and which of them are kept until they arrive.
-        """
+        """The number of messages of a connection in `table`, and the indices of those that are under way for a time."""
         messages = getattr(self, table)
         which = messages[:, 0] == connection
         kept = which & (messages[:, 3] >= 0)
@@ -125,11 +122,11 @@ class Schedule:
 TABLES = ("stepped", "posted", "measured", "arrivals", "samples")
 
 _made = tuple.__new__
-"""Makes a named tuple from a tuple, as its class does by way of a Python function"""
+"""Makes a named tuple from a tuple, without the Python function that its class calls"""
 
 
 def _parts(rows: list[Any], at: Integers) -> Iterable[list[Any]]:
-    """What each instant has of a table."""
+    """The rows of each instant in a table."""
     if not rows:
         return itertools.repeat(rows)
     return [rows[begin:end] for begin, end in itertools.pairwise(at.tolist())]

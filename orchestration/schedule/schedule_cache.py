@@ -1,4 +1,4 @@
-"""The schedules of runs: runs of one timing in which nothing is left to chance share one."""
+"""A cache of the schedules of runs: those without randomness share one."""
 
 from collections import OrderedDict
 from collections.abc import Hashable, Iterator, Mapping, Sequence
@@ -14,27 +14,27 @@ from orchestration.system.distribution import content
 from orchestration.system.model import System
 
 INSTANTS = 2**15
-"""Of one span, about"""
+"""Approximate number of a span"""
 MOST = 2**17
-"""Instants of a schedule that is kept"""
+"""The most instants of a cached schedule"""
 _KEPT = 8
 
 
 @dataclass(frozen=True)
 class Timing:
-    """What the schedule of a system follows from."""
+    """The key of a schedule: everything in a system that determines it."""
 
     regular: Hashable
-    """without what is drawn"""
+    """of the regular part"""
     drawn: Hashable
-    """None: nothing is left to chance"""
+    """the seed and the streams; None: nothing is random"""
 
 
 def timing(system: System) -> Timing:
-    """What the schedule of a system follows from."""
+    """The key of the schedule of a system."""
     samplings = [c.sampling for c in system.components.values() if c.sampling is not None]
-    chance = any(each.is_random for each in samplings) or any(x.is_random for x in system.connections)
-    chance = chance or placement.is_random(system)
+    is_random = any(each.is_random for each in samplings) or any(x.is_random for x in system.connections)
+    is_random = is_random or placement.is_random(system)
     regular = (
         system.stop_time,
         tuple((name, c.step, c.sampling) for name, c in system.components.items()),
@@ -46,27 +46,27 @@ def timing(system: System) -> Timing:
         placement.content_of(system),
         tuple((source.to, source.period) for source in system.sources.values() if source.period is not None),
     )
-    return Timing(regular, (system.seed, tuple(sorted(system.streams.items()))) if chance else None)
+    return Timing(regular, (system.seed, tuple(sorted(system.streams.items()))) if is_random else None)
 
 
 @dataclass(frozen=True, kw_only=True)
 class RunSchedule:
-    """What happens when in a run."""
+    """The schedule of one run."""
 
     first_samples: Mapping[str, int]
-    """as of a `Timetable`"""
+    """as in a `Timetable`"""
     spans: Iterator[Span]
 
 
 class ScheduleCache:
-    """Gives what happens when in runs, what is asked for again from memory."""
+    """Makes the schedules of runs, and caches the last ones."""
 
     def __init__(self) -> None:
         self._frames: OrderedDict[Hashable, Frame] = OrderedDict()
         self._kept: OrderedDict[Hashable, tuple[Mapping[str, int], Sequence[Span]]] = OrderedDict()
 
     def of(self, outline: Hashable, timing: Timing, system: System) -> RunSchedule:
-        """What happens when in a system that has an outline and a timing; raises `UsageError` as a `Timetable`."""
+        """The schedule of a system with this outline and timing; raises `UsageError` as `Timetable`."""
         key = outline, timing
         if key in self._kept:
             self._kept.move_to_end(key)
@@ -95,7 +95,7 @@ class ScheduleCache:
 
 
 def _keep(kept: OrderedDict[Hashable, Any], key: Hashable, value: Any) -> None:
-    """The last few."""
+    """Add an item, dropping the oldest beyond `_KEPT`."""
     kept[key] = value
     while len(kept) > _KEPT:
         kept.popitem(last=False)

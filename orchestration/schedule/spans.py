@@ -1,4 +1,4 @@
-"""What happens in a span of time: what is regular of it, which many runs share, and what a run has of its own."""
+"""Spans of time: their regular instants, which many runs share, and those of a single run."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -11,18 +11,18 @@ from orchestration.schedule.schedule import Schedule
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Instants:
-    """Instants in order, each once, and who is stepped to them."""
+    """Instants in order, each once, and the components that are stepped to them."""
 
     times: Integers
     """[ns], shape (n,)"""
     stepped: Booleans
-    """shape (n, components in continuous time), these in the order in which they are stepped"""
+    """shape (n, components in continuous time), in the order of stepping"""
 
     def __len__(self) -> int:
         return len(self.times)
 
     def merged_with(self, others: "Instants") -> "Instants":
-        """These and some others."""
+        """The union of these and others."""
         at = np.searchsorted(self.times, others.times)
         new = np.ones(len(others), dtype=np.bool_)
         inside = at < len(self)
@@ -33,18 +33,19 @@ class Instants:
 
 
 class InstantCollector:
-    """Instants as they are found, and who is stepped to them: components in continuous time by their places."""
+    """Collects instants, each with the components in continuous time that are stepped to it, by their places."""
 
     def __init__(self, count: int) -> None:
-        """`count` components are in continuous time."""
+        """`count` is the number of components in continuous time."""
         self._count = count
         self._times: list[Integers] = [np.zeros(0, dtype=np.int64)]
         self._places: list[Any] = [[]]
-        """of all times that were added together, or of each of them one"""
+        """a list for all times that were added together, or an array with one place for each"""
 
     def add(self, times: Integers, *places: int) -> None:
-        """Something happens at each of these times, in order, to which the components in these places are stepped; -1
-        is none. The same array once more adds to what happens then.
+        """Add instants, in order, to which the components in these places are stepped; -1 is none.
+
+        The same array again adds to these instants.
         """
         if times is not self._times[-1]:
             self._times.append(times)
@@ -52,16 +53,16 @@ class InstantCollector:
         self._places[-1] += [place for place in places if place >= 0]
 
     def add_each(self, times: Integers, places: Integers) -> None:
-        """The same, of each the component in one place."""
+        """Add instants, each with the component in its place."""
         self._times.append(times)
         self._places.append(places)
 
     def instants(self) -> Instants:
-        """All of them."""
+        """All instants in order."""
         times = instants = np.concatenate(self._times)
         which = np.arange(len(times))
         if not (times[1:] > times[:-1]).all():
-            order = np.argsort(times, kind="stable")  # what is in order already is only merged
+            order = np.argsort(times, kind="stable")  # sorted parts are only merged
             times = times[order]
             first = np.empty(len(times), dtype=np.bool_)
             first[0:1] = True
@@ -82,17 +83,17 @@ class InstantCollector:
 
 @dataclass(frozen=True, kw_only=True)
 class Span:
-    """What happens from one time to another, each table in the order of time; tables as a `Schedule` has them."""
+    """Everything from one time to another, in order; the tables are those of a `Schedule`."""
 
     end: int
     """[ns], of the instant after these"""
     regular: Instants
-    """those that are the same whatever is drawn"""
+    """those that do not depend on the seed"""
     own: Instants
-    """at which something else happens too; some are regular ones"""
+    """those of this run; some are regular ones too"""
     posted: Integers
     measured: Integers
-    """both happen when they are sent"""
+    """both at the time of sending"""
     arrivals: Integers
     samples: Integers
     sampled: Integers
@@ -105,11 +106,11 @@ class Span:
         return min(int(each.times[0]) for each in (self.regular, self.own) if len(each))
 
     def count_of(self, connection: int, table: str) -> int:
-        """How many messages of a connection take their values, as `table` has them."""
+        """The number of messages of a connection in `table`."""
         return int(np.count_nonzero(getattr(self, table)[:, 0] == connection))
 
     def schedule(self, continuous: Integers) -> Schedule:
-        """The same instant by instant; `continuous` are the components in continuous time, in their order."""
+        """The schedule of the span; `continuous` are the components in continuous time, in their order."""
         instants = self.regular.merged_with(self.own)
         of, places = np.nonzero(instants.stepped)
 
@@ -133,6 +134,6 @@ class Span:
 
 
 def _begins(instants: Integers, count: int) -> Integers:
-    """Where what belongs to each of `count` instants begins, and the last ends, given the instant of each in order."""
+    """The index at which the rows of each of `count` instants begin, from the instant of each row in order."""
     ends = np.concatenate([[-1], instants, [count]])
     return np.repeat(np.arange(len(instants) + 1), np.diff(ends))

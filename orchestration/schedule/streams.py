@@ -1,4 +1,4 @@
-"""Random numbers: one seed for a run, and a stream of its own for every cause of every component and connection."""
+"""Random numbers: one seed for a run, and a separate stream for every cause of every component and connection."""
 
 import hashlib
 from collections.abc import Mapping
@@ -12,11 +12,11 @@ EXECUTION, ARRIVALS, ERROR = "execution", "arrivals", "error"
 
 
 class Streams:
-    """The generators of one run, each made from the seed and the name of what it belongs to.
+    """The generators of one run, each from the seed and the name of its owner and cause.
 
-    The key of `components.controller.jitter`, say, is the first four 32-bit words, big-endian, of the SHA-256
-    of that name, so that adding a component or a cause changes no number of another. `numbered` names streams
-    that have a whole number for a key instead: those that the quadrotor had before there were names.
+    The key of `components.controller.jitter`, for instance, is the first four 32-bit words, big-endian, of the SHA-256
+    of that name, so that adding a component or a cause changes no number of another. `numbered` has the streams
+    with a whole number as key instead: those of the quadrotor from before there were names.
     """
 
     def __init__(self, seed: int, numbered: Mapping[str, int] | None = None) -> None:
@@ -30,7 +30,7 @@ class Streams:
         return np.random.Generator(np.random.PCG64(np.random.SeedSequence(self._seed, spawn_key=key)))
 
 
-@lru_cache(4096)  # the runs of a study have them in common
+@lru_cache(4096)  # they are common to the runs of a study
 def _words(name: str) -> tuple[int, ...]:
     digest = hashlib.sha256(name.encode()).digest()
     return tuple(int.from_bytes(digest[i : i + 4], "big") for i in range(0, 16, 4))

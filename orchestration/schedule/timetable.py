@@ -1,7 +1,7 @@
-"""What happens when: the instants of one run, in integer nanoseconds, as arrays. Nothing here knows an FMU.
+"""The timetable of one run: its instants in integer nanoseconds, as arrays. Nothing here knows an FMU.
 
-All of it follows from the system, the stop time and the seed; no value of a signal is needed. It is made a window of
-time after the other: samples and messages of each component and connection are drawn up to its end, and sorted into
+It follows from the system, the stop time and the seed alone; no value of a signal is needed. It is computed window by
+window: samples and messages of each component and connection are drawn up to the end of the window, and sorted into
 instants.
 """
 
@@ -29,7 +29,7 @@ from orchestration.system.model import System
 
 
 class Timetable:
-    """Gives the schedules of one run, in order."""
+    """Makes the schedules of one run, in order."""
 
     def __init__(
         self,
@@ -38,7 +38,7 @@ class Timetable:
         fixed: Mapping[str, FixedStep] | None = None,
         frame: Frame | None = None,
     ) -> None:
-        """`fixed` has the components that take steps of one length only; `frame` is that of the system, if known.
+        """`fixed` has the components of fixed step; `frame` is that of the system, if known.
 
         Raises `UsageError` as `Frame`.
         """
@@ -56,7 +56,7 @@ class Timetable:
         self.first_samples = {
             name: task.first for name, task in zip(self._plan.sampled, self._tasks) if task.first < self.stop
         }
-        """[ns], by sampled component that samples at all"""
+        """[ns], by sampled component, of those that sample before the end"""
         own = [j for j in self._plan.posted if j not in self._plan.over_networks]
         self._posted = {i: [self._links[j] for j in own if frame.sender[j] == i] for i in frame.points}
         self._over_networks = [self._links[j] for j in self._plan.posted if j in self._plan.over_networks]
@@ -72,8 +72,8 @@ class Timetable:
     def next_schedule(self, most: int) -> Schedule | None:
         """The next instants, about `most` of them; None at the end.
 
-        Raises `UsageError` for what cannot be on the grid of a component of fixed steps, when all instants before it
-        have been given.
+        Raises `UsageError` for an instant off the grid of a component of fixed step, once all instants before it have
+        been returned.
         """
         found = self._ahead or self._window(most)
         if found is not None:
@@ -84,7 +84,7 @@ class Timetable:
         return found
 
     def spans(self, most: int) -> Iterator[Span]:
-        """All of a run none of whose components takes steps of one length only, about `most` instants in each."""
+        """All spans of a run without components of fixed step, about `most` instants in each."""
         before: Span | None = None
         while self._begin < self._end:
             span = self._span(most)
@@ -96,7 +96,7 @@ class Timetable:
             yield replace(before, end=self._end)
 
     def _window(self, most: int) -> Schedule | None:
-        """The instants of the next window that has any."""
+        """The schedule of the next window with instants."""
         while self._begin < self._end:
             schedule = self._span(most).schedule(self._frame.continuous)
             if self._refused:
@@ -107,7 +107,7 @@ class Timetable:
         return None
 
     def _span(self, most: int) -> Span:
-        """About `most` instants from where the one before ended, or none."""
+        """The next window, of about `most` instants, or none."""
         begin = self._begin
         self._begin = end = min(self._end, begin + max(int(most * self._frame.mean_interval), 1))
         for task in self._tasks:
@@ -132,7 +132,7 @@ class Timetable:
         )
 
     def _post(self, begin: int, end: int, found: InstantCollector) -> tuple[Integers, Integers]:
-        """Messages of components in continuous time to one another: all in order, and those that arrive later."""
+        """Messages between components in continuous time: all in order, and those that arrive later."""
         tables, later = [_NO_MESSAGES], [_NO_MESSAGES]
         for component, links in self._posted.items():
             if not links:
@@ -157,7 +157,7 @@ class Timetable:
         return np.ascontiguousarray(table[:, :4]), np.concatenate(later)
 
     def _networked(self, link: Link, end: int) -> tuple[Integers, Integers, Integers]:
-        """Messages of a component in continuous time over a network before `end` [ns]: k, when they go and arrive."""
+        """Messages of a component in continuous time over a network before `end` [ns]: k, sending and arrival."""
         lookahead = self._lookahead
         assert lookahead is not None
         messages, end = lookahead.messages[self._connections[link.index].name], min(end, self.stop)
@@ -173,7 +173,7 @@ class Timetable:
         return np.arange(first, first + count), sent, link.arrivals(np.where(own < 0, -1, np.maximum(own, sent)))
 
     def _measure(self, begin: int, end: int, found: InstantCollector) -> Integers:
-        """What is measured for samples to come."""
+        """Messages measured for samples to come."""
         tables = [_NO_MESSAGES[:, :4]]
         for task in self._tasks:
             for i, link in enumerate(task.incoming):
@@ -186,7 +186,7 @@ class Timetable:
         return table[np.argsort(table[:, 2], kind="stable")]
 
     def _sample(self, end: int, found: InstantCollector) -> tuple[Integers, Integers, Integers, Integers]:
-        """Times of samples, these, what they exchange, and of what they send that which arrives later."""
+        """Times of samples, the samples, the messages that they exchange, and those sent that arrive later."""
         times, samples, exchanged, later = (
             [_NO_MESSAGES[:, 0]],
             [_NO_MESSAGES[:, :5]],
@@ -194,7 +194,7 @@ class Timetable:
             [_NO_MESSAGES],
         )
         sender, place = self._frame.sender, self._frame.place
-        for task in self._tasks:  # those that come first at one instant come first
+        for task in self._tasks:  # in the order of one instant
             to_end, count = np.searchsorted(task.times, (end, min(end, self.stop))).tolist()
             now = task.times[:count]
             now_read = [link.index for link in task.incoming if link.index not in self._plan.read_ahead]
@@ -213,7 +213,7 @@ class Timetable:
         return *_one_after_the_other(_concatenated(times), _concatenated(samples), exchanged), _concatenated(later)
 
     def _under_way(self, sent: "_Sent", found: InstantCollector) -> Integers:
-        """Messages that arrive later; for those that arrive at once their receiver is stepped."""
+        """The messages that arrive later; the receivers of the others are stepped at once."""
         at_once = sent.arrival == sent.time
         found.add(
             sent.time if at_once.all() else sent.time[at_once], self._frame.place[self._frame.receiver[sent.link.index]]
@@ -221,7 +221,7 @@ class Timetable:
         return _NO_MESSAGES if at_once.all() else sent.table(sent.arrival > sent.time)
 
     def _arrive(self, end: int, more: Sequence[Integers], found: InstantCollector) -> Integers:
-        """Messages that arrive before `end`; the others stay on their way."""
+        """The messages that arrive before `end`; the others remain under way."""
         table = _concatenated([self._on_their_way, *more])
         if not len(table):
             return table[:, :4]
@@ -232,14 +232,13 @@ class Timetable:
 
 
 _ORDER = 4
-"""Columns by which messages are put in order: the instant at which they were sent, whether by a sample, by whom, and
-which of those of one sender they are"""
+"""Columns that order messages: the instant of sending, whether a sample sent it, the sender, and the place among those
+of one sender"""
 _NO_MESSAGES: Integers = np.zeros((0, _ORDER + 4), dtype=np.int64)
-"""No messages"""
 
 
 class _Sent(NamedTuple):
-    """Messages of a link, and by what they are put in order."""
+    """Messages of a link, with the values that order them."""
 
     link: Link
     k: Integers
@@ -247,13 +246,13 @@ class _Sent(NamedTuple):
     arrival: Integers
     time: Integers
     phase: int
-    whom: int
+    sender: int
     place: int
 
     def table(self, which: Booleans | None = None) -> Integers:
-        """All of them, or these: a row each."""
+        """All of them, or those of `which`, one per row."""
         rows = np.empty((len(self.k) if which is None else int(which.sum()), _ORDER + 4), dtype=np.int64)
-        rows[:, 0], rows[:, 5], rows[:, 6], rows[:, 7] = self.link.index, self.phase, self.whom, self.place
+        rows[:, 0], rows[:, 5], rows[:, 6], rows[:, 7] = self.link.index, self.phase, self.sender, self.place
         if len(rows):
             for i, column in enumerate((self.k, self.sent, self.arrival, self.time)):
                 rows[:, i + 1] = column if which is None else column[which]
@@ -261,7 +260,7 @@ class _Sent(NamedTuple):
 
 
 def _concatenated(tables: Sequence[Integers]) -> Integers:
-    """All rows, one table after another; the only one that is not empty is not copied."""
+    """The rows of all tables; a single one that is not empty is not copied."""
     some = [table for table in tables if len(table)]
     return np.concatenate(some or tables[:1]) if len(some) != 1 else some[0]
 
@@ -269,9 +268,9 @@ def _concatenated(tables: Sequence[Integers]) -> Integers:
 def _one_after_the_other(
     times: Integers, samples: Integers, exchanged: Sequence[Integers]
 ) -> tuple[Integers, Integers, Integers]:
-    """Samples in order of time, and what they exchange: their last three columns say from where on in it.
+    """Samples in order of time, and the messages that they exchange, which their last three columns index.
 
-    These begin as 0, the number that is received, and that of all; `exchanged` has the messages task after task.
+    These begin as 0, the number received, and the number of all; `exchanged` has the messages of each task.
     """
     alone = sum(len(messages) > 0 for messages in exchanged) <= 1
     order = slice(None) if alone else np.argsort(times, kind="stable")
