@@ -6,7 +6,6 @@ and turns any failure into one readable message.
 """
 
 import contextlib
-import difflib
 import enum
 import functools
 import math
@@ -21,6 +20,7 @@ from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
 from fmu_kit import model_description
+from fmu_kit.declared_names import expect_declared, expect_free_names
 from fmu_kit.errors import DivergenceError, FmuError, require
 from fmu_kit.failure import Failure, printf_safe, report
 from fmu_kit.interface import Declaration, declarations_in, initial_values, variables_of
@@ -28,7 +28,7 @@ from fmu_kit.saved_state import State, deserialise, expect_state, serialise
 from fmu_kit.scalar import FLOAT
 from fmu_kit.unloading import release_at_exit
 from fmu_kit.variables import INDEX, Variable
-from fmu_kit.variants import Value
+from fmu_kit.variants import Value, with_fixed_values
 
 
 class Phase(enum.IntEnum):
@@ -106,10 +106,11 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
                 f"{cls.__name__}.variables: expected variables as attributes, as fmu_kit.interface has them"
             )
         declared = declarations_in(cls)
-        _expect_free_names(cls, declared)
+        expect_free_names(cls, Slave, declared)
         if declared == getattr(cls, "_declared", None) and "fixed" not in cls.__dict__:
             return  # those of its base: pythonfmu 0.7.0 leaks the class of each instance, so it should be small
-        cls.variables, cls._initial = _with_fixed(cls, variables_of(declared)), initial_values(declared)
+        cls.variables = with_fixed_values(cls.__name__, cls.fixed, variables_of(declared))
+        cls._initial = initial_values(declared)
         cls._index = {v.name: i for i, v in enumerate(cls.variables)}
         for i, variable in enumerate(cls.variables):
             if cls._index[variable.name] != i:
@@ -244,7 +245,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         """fmi2ExitInitializationMode: parameters are checked together here."""
         self._expect(Phase.INITIALIZATION, "fmi2ExitInitializationMode")
         self._initialise()
-        self._expect_declared(self._initialise)
+        expect_declared(self, self._initialise)
         self._phase = Phase.STEPPING
         self._initialised = True
         self._quickly_settable = self._inputs
@@ -256,7 +257,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._expect_in_time(current_time, step_size)
         self._advance(current_time, step_size)
         if len(self.__dict__) != self._known_attributes:
-            self._expect_declared(lambda: self._advance(current_time, step_size))
+            expect_declared(self, lambda: self._advance(current_time, step_size))
         self._reached = current_time + step_size
         return True
 
@@ -426,28 +427,6 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         if t + h - self._stop_time > slack:
             raise FmuError(f"communicationStepSize = {h} from {t}: expected no step past stopTime = {self._stop_time}")
 
-    def _expect_declared(self, again: Callable[[], None]) -> None:
-        """Raise `AttributeError` for an attribute that was set without being declared, probably by a typing error.
-
-        The statement that sets it is found by running it `again`: checking each assignment would slow down all steps.
-        """
-        undeclared = [name for name in vars(self) if self._is_undeclared(name)]
-        self._known_attributes = len(vars(self))
-        if undeclared:
-            type(self).__setattr__ = _set_declared  # type: ignore[method-assign, assignment]
-            try:
-                again()
-            finally:
-                del type(self).__setattr__
-            self._raise_undeclared(undeclared[0])
-
-    def _is_undeclared(self, name: str) -> bool:
-        return not (name.startswith("_") or name in self._base_attributes or hasattr(type(self), name))
-
-    def _raise_undeclared(self, name: str) -> None:
-        own = ", ".join(self._own)
-        raise AttributeError(f"self.{name}: no such variable; expected {own}, or a name that begins with _")
-
     def _settable(self, vr: int, *types: str) -> Variable:
         """The variable of `vr`; raises `FmuError` if it is not of one of the types, or must not be set now."""
         self._of_type([vr], *types)
@@ -486,38 +465,6 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         return failure
 
 
-def _with_fixed(slave: type[Slave], variables: tuple[Variable, ...]) -> tuple[Variable, ...]:
-    """The variables, with the fixed ones as constants; raises `FmuError` for a name or a value that cannot be fixed."""
-    fixed, names = dict(slave.fixed), {v.name: v for v in variables}
-    for name, value in slave.fixed.items():
-        beside = name.removesuffix(INDEX)
-        if name not in names:
-            near = difflib.get_close_matches(name, names, n=1)
-            raise FmuError(f"{name}: no parameter of {slave.__name__}{f'; did you mean {near[0]}?' if near else ''}")
-        if beside != name and names.get(beside, names[name]).items:
-            raise FmuError(f"{name}: expected {beside}, which fixes both")
-        if names[name].items:
-            fixed[f"{name}{INDEX}"] = names[name].items.get(str(value), value)
-    return tuple(v.fixed_at(fixed[v.name]) if v.name in fixed else v for v in variables)
-
-
 def _first_line(text: str) -> str:
     """The first paragraph of a docstring, in one line without its full stop."""
     return " ".join(text.strip().partition("\n\n")[0].split()).removesuffix(".")
-
-
-def _set_declared(slave: Slave, name: str, value: Any) -> None:
-    """Set an attribute; raises `AttributeError` for one that is not declared."""
-    if slave._is_undeclared(name):
-        slave._raise_undeclared(name)
-    object.__setattr__(slave, name, value)
-
-
-def _expect_free_names(slave: type[Slave], declared: Iterable[Declaration]) -> None:
-    """Raise `TypeError` for a variable whose name every slave already uses."""
-    for each in declared:
-        if hasattr(Slave, each.attribute) or each.attribute in (*Slave.__annotations__, *_OF_PYTHONFMU):
-            raise TypeError(f"{slave.__name__}.{each.attribute}: every slave has this name; expected another one")
-
-
-_OF_PYTHONFMU = ("vars", "instance_name", "resources", "visible", "log_queue", "guid", "version", "modelName")

@@ -1,8 +1,12 @@
 """A slave with values that are fixed when it is built: they are constants of its FMU, and unused code is left out."""
 
+import difflib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+
+from fmu_kit.errors import FmuError
+from fmu_kit.variables import INDEX, Variable
 
 Value = float | int | bool | str
 """The value of a parameter; for an Enumeration, the name of its item or its number"""
@@ -48,3 +52,18 @@ class Variant:
         """A description in one line."""
         listed = ", ".join(f"{name} = {value}" for name, value in self.fixed)
         return f"{model} with {listed or 'another name'}"
+
+
+def with_fixed_values(model: str, fixed: Mapping[str, Value], variables: tuple[Variable, ...]) -> tuple[Variable, ...]:
+    """The variables, with the fixed ones as constants; raises `FmuError` for a name or a value that cannot be fixed."""
+    values, names = dict(fixed), {v.name: v for v in variables}
+    for name, value in fixed.items():
+        beside = name.removesuffix(INDEX)
+        if name not in names:
+            near = difflib.get_close_matches(name, names, n=1)
+            raise FmuError(f"{name}: no parameter of {model}{f'; did you mean {near[0]}?' if near else ''}")
+        if beside != name and names.get(beside, names[name]).items:
+            raise FmuError(f"{name}: expected {beside}, which fixes both")
+        if names[name].items:
+            values[f"{name}{INDEX}"] = names[name].items.get(str(value), value)
+    return tuple(v.fixed_at(values[v.name]) if v.name in values else v for v in variables)

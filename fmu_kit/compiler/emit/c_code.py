@@ -3,50 +3,24 @@
 from __future__ import annotations
 
 import itertools
-import math
-import re
-from collections import Counter
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Container, Mapping
 from typing import ClassVar
 
+from fmu_kit.compiler.emit.c_expressions import ExpressionWriter
+from fmu_kit.compiler.emit.c_names import c_name, c_string, c_type, identifier, place_names, unused_name
 from fmu_kit.compiler.trace.statements import (
     TANGENT,
     Block,
     Call,
     Function,
-    Place,
     Statement,
     all_statements,
     ends,
     used_symbols,
 )
-from fmu_kit.compiler.trace.symbols import Kind, Symbol, TraceError, closure, integer_of, node, value_of
+from fmu_kit.compiler.trace.symbols import Symbol, closure
 from fmu_kit.compiler.trace.tracing import Program
 
-_BINARY = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
-_CALLED = {
-    **{name: f"q_{name}" for name in (
-        "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "tanh", "exp", "expm1", "log", "pow",
-        "floor", "ceil", "copysign", "isfinite", "isinf", "isnan",
-    )},
-    "abs": "q_fabs",
-    "mod": "q_modulo",
-    "floordiv": "q_floor_divide",
-}  # fmt: skip
-_OF_BITS = ("bit_and", "bit_or", "bit_xor")
-_SIGNED_ZEROS = ("neg", "mul", "mod", "floordiv", "floor", "ceil")
-"""Operations on real numbers that may give a signed zero."""
-_WIDE_COMPARED = {
-    "lt": ("less", False, False),
-    "ge": ("less", False, True),
-    "gt": ("less", True, False),
-    "le": ("less", True, True),
-    "eq": ("equal", False, False),
-    "ne": ("equal", False, True),
-}
-"""Comparisons of wide numbers: the function, whether its operands are swapped, whether its result is negated"""
-_LONGEST_PART = 60
-"""length of an expression within another, in characters"""
 _FORMATS = {"g": "general", "e": "exponential", "f": "fixed"}
 ERRORS = ("FmuError", "DivergenceError", "ZeroDivisionError", "OverflowError", "ValueError")
 """The errors of a function; it returns their position here, from 1 on."""
@@ -58,34 +32,18 @@ def c_code(program: Program) -> str:
     return "\n\n".join(FunctionWriter(function, program, names).text() for function in program.functions) + "\n"
 
 
-def place_names(places: Iterable[Place]) -> dict[str, str]:
-    """The name in C of each place."""
-    found: dict[str, str] = {}
-    for place in places:
-        kept = f"KEPT_{identifier(place.name.removeprefix('self')).strip('_')}"
-        name = (kept if place.reference is None else f"AT_{identifier(place.name)}").upper()
-        found[place.name] = _unused(name, found.values())
-    return found
-
-
-class FunctionWriter:
+class FunctionWriter(ExpressionWriter):
     """Writes one function for an FMU, whose memory is an array and whose messages contain numbers."""
 
     def __init__(self, function: Function, program: Program, places: dict[str, str]) -> None:
         self.function = function
+        super().__init__(function.name, used_symbols(all_statements(function.body), self._named))
+        self.uses.update(id(symbol) for each in all_statements(function.body) for symbol in self._named(each))
         self.program = program
         self.places = places
-        self.declared: list[str] = []
-        self.pinned: dict[int, str] = {}
-        self.scopes: list[dict[int, str]] = [{}]
-        self.lines: list[list[str]] = [[]]
-        self.count = 0
         self.parameters: list[str] = []
         for name in function.names:
-            self.parameters.append(_unused(f"p_{identifier(name)}", self.parameters))
-        self.used = used_symbols(all_statements(function.body), self._named)
-        self.uses = Counter(id(arg) for symbol in self.used.values() for arg in symbol.args)
-        self.uses.update(id(symbol) for each in all_statements(function.body) for symbol in self._named(each))
+            self.parameters.append(unused_name(f"p_{identifier(name)}", self.parameters))
         self.definitions: dict[int, set[tuple[str, int]]] = {}
 
     def text(self) -> str:
@@ -150,143 +108,6 @@ class FunctionWriter:
     def _load(self, symbol: Symbol) -> str:
         value = self._place(symbol.data[0])
         return f"q_ne({value}, 0.0)" if symbol.kind == "bool" else value
-
-    # -- lines and names -------------------------------------------------------------------------------------
-
-    def _line(self, text: str) -> None:
-        self.lines[-1].append("    " * len(self.scopes) + text)
-
-    def _name(self, prefix: str = "x") -> str:
-        self.count += 1
-        return f"{prefix}{self.count}"
-
-    def _define(self, symbol: Symbol, expression: str) -> str:
-        name = self._name()
-        self._line(f"const {c_type(symbol)} {name} = {expression};")
-        return name
-
-    def _pin(self, symbol: Symbol) -> str:
-        """The variable of a symbol that statements assign; it is declared at the start of the function."""
-        if id(symbol) not in self.pinned:
-            name = self.pinned[id(symbol)] = self._name("y")
-            unknown = "q_known(0)" if symbol.kind == "bool" else self.zero
-            self.declared.append(f"{c_type(symbol)} {name} = {unknown};")
-        return self.pinned[id(symbol)]
-
-    # -- values ----------------------------------------------------------------------------------------------
-
-    def value(self, symbol: Symbol) -> str:
-        """The name of a value; it is computed here unless it is known."""
-        for scope in reversed(self.scopes):
-            if id(symbol) in scope:
-                return scope[id(symbol)]
-        if id(symbol) in self.pinned:
-            return self.pinned[id(symbol)]
-        if symbol.op == "constant":
-            return _constant(symbol)
-        if symbol.op in ("load", "result", "failed", "phi", "outcome", "variable", "index", "parameter"):
-            if symbol.op in ("load", "result", "failed", "phi", "outcome"):
-                return self._pin(symbol)
-            raise TraceError(f"{self.function.name}: {symbol.op} {symbol.data} is used outside of its loop")
-        for waiting in _unknown_below(symbol, self._is_known):
-            text = self._expression(waiting)
-            is_part = waiting is not symbol and self.uses[id(waiting)] == 1 and waiting.kind == "real"
-            if is_part and len(text) <= _LONGEST_PART:
-                self.scopes[-1][id(waiting)] = f"({text})"
-            else:
-                self.scopes[-1][id(waiting)] = self._define(waiting, text)
-        return self.scopes[-1][id(symbol)]
-
-    def _is_known(self, symbol: Symbol) -> bool:
-        return not symbol.args or symbol.op == "phi" or any(id(symbol) in scope for scope in self.scopes)
-
-    def _real(self, symbol: Symbol) -> str:
-        if symbol.kind == "bool" and symbol.op == "constant":
-            return self._everywhere(f"{value_of(symbol)!r}")
-        name = self.value(symbol)
-        return f"q_select({name}, {self._everywhere('1.0')}, {self.zero})" if symbol.kind == "bool" else name
-
-    def _lanes(self, symbol: Symbol) -> str:
-        """A value as an argument of a function; constants are broadcast to all lanes."""
-        text = self._real(symbol)
-        is_number = symbol.op == "constant" and symbol.kind != "bool" and text.strip("(-")[0].isdigit()
-        return self._everywhere(text) if is_number else text
-
-    zero: ClassVar[str] = "0.0"
-
-    def _everywhere(self, number: str) -> str:
-        """A constant in the type of a variable."""
-        return number
-
-    def _as(self, kind: Kind, symbol: Symbol) -> str:
-        """A value converted to a kind."""
-        return self.value(symbol) if kind == "bool" else self._lanes(symbol)
-
-    def _expression(self, symbol: Symbol) -> str:
-        op, args = symbol.op, symbol.args
-        if op in _OF_BITS or any(each.kind == "wide" for each in (symbol, *args)):
-            return self._of_wide(symbol)
-        if symbol.kind == "int" and op in _SIGNED_ZEROS:
-            return f"({self._of_reals(symbol)}) + 0.0"  # a whole number has no zero with a sign
-        return self._of_reals(symbol)
-
-    def _of_wide(self, symbol: Symbol) -> str:
-        """An operation with operands or result that are whole numbers of more bits than a real number has."""
-        op, given = symbol.op, [self._wide(arg) for arg in symbol.args]
-        if op in ("narrow", "beyond"):
-            return f"{'q_narrow' if op == 'narrow' else 'q_wide_beyond'}({given[0]})"
-        if op in _WIDE_COMPARED:
-            name, turned, negated = _WIDE_COMPARED[op]
-            text = f"q_wide_compared(q_int128_{name}, {', '.join(given[::-1] if turned else given)})"
-            return f"q_not({text})" if negated else text
-        text = f"q_wide_{len(given)}(q_int128_{op}, {', '.join(given)})"
-        return text if symbol.kind == "wide" else f"q_narrow({text})"
-
-    def _wide(self, symbol: Symbol) -> str:
-        """A whole number in its wide form."""
-        if symbol.op == "constant":
-            high, low = divmod(integer_of(symbol) % 2**128, 2**64)
-            return f"q_wide_known({high:#x}u, {low:#x}u)"
-        return self.value(symbol) if symbol.kind == "wide" else f"q_wide_of({self._lanes(symbol)})"
-
-    def _of_reals(self, symbol: Symbol) -> str:
-        op, args = symbol.op, symbol.args
-        if op in _BINARY:
-            first = self._lanes(args[0]) if args[1].op == "constant" else self._real(args[0])
-            return f"{first} {_BINARY[op]} {self._real(args[1])}"
-        if op in ("lt", "le", "gt", "ge", "eq", "ne"):
-            return f"q_{op}({self._real(args[0])}, {self._real(args[1])})"
-        if op == "neg":
-            return f"-{self._real(args[0])}"
-        if op in ("and", "or"):
-            return f"{self.value(args[0])} {'&' if op == 'and' else '|'} {self.value(args[1])}"
-        if op == "not":
-            return f"q_not({self.value(args[0])})"
-        if op == "select":
-            if symbol.kind == "bool":
-                c, a, b = map(self.value, args)
-                return f"({c} & {a}) | (q_not({c}) & {b})"
-            return f"q_select({self.value(args[0])}, {self._lanes(args[1])}, {self._lanes(args[2])})"
-        if op in ("sin", "cos") and id(self._other_of_the_pair(symbol)) in self.used:
-            return f"{self._pair(args[0])}.{op}"
-        if op in _CALLED:
-            return f"{_CALLED[op]}({', '.join(map(self._lanes, args))})"
-        raise TraceError(f"{op} of computed values cannot be written in C")
-
-    @staticmethod
-    def _other_of_the_pair(symbol: Symbol) -> Symbol:
-        """The cosine for a sine, the sine for a cosine."""
-        return node("cos" if symbol.op == "sin" else "sin", symbol.args, "real")
-
-    def _pair(self, angle: Symbol) -> str:
-        """The name of sine and cosine of an angle, computed together."""
-        both = node("sin and cos", (angle,), "real")
-        for scope in self.scopes:
-            if id(both) in scope:
-                return scope[id(both)]
-        name = self.scopes[-1][id(both)] = self._name("p")
-        self._line(f"const q_sines {name} = q_sin_cos({self._lanes(angle)});")
-        return name
 
     # -- statements ------------------------------------------------------------------------------------------
 
@@ -481,60 +302,6 @@ class FunctionWriter:
                 self._line(f"q_text_{_FORMATS[spec[-1]]}(&m->text, {self.value(symbol)}, {precision});")
 
 
-def identifier(name: str) -> str:
-    """A name of ASCII letters, digits and underscores."""
-    return "".join(c if c.isascii() else f"u{ord(c):04x}" for c in re.sub(r"\W+", "_", name))
-
-
-def _unused(name: str, used: Iterable[str]) -> str:
-    """A name, with underscores appended if it is already used."""
-    taken = set(used)
-    while name in taken:
-        name += "_"
-    return name
-
-
-def c_name(name: str) -> str:
-    """The name of a function of the model in C, with a prefix that avoids conflicts."""
-    of = name.removeprefix(TANGENT)
-    return f"{'model' if of == name else 'tangents'}_{identifier(of)}"
-
-
-KEYWORDS = frozenset({
-    "auto", "case", "char", "const", "default", "do", "double", "enum", "extern", "float", "goto", "inline", "int",
-    "long", "register", "restrict", "short", "signed", "sizeof", "static", "struct", "switch", "typedef", "union",
-    "unsigned", "void", "volatile",
-    "asm", "bool", "catch", "delete", "explicit", "export", "false", "friend", "mutable", "namespace", "new",
-    "operator", "private", "protected", "public", "template", "this", "throw", "true", "typename", "using", "virtual",
-    "linux", "unix", "I", "NAN", "INFINITY", "NULL",
-})  # fmt: skip
-"""Keywords of C and C++ that are not keywords of Python, and names defined by headers and compilers."""
-
-
-def c_string(text: str) -> str:
-    """A text as a string literal of C."""
-    escaped = "".join(
-        c if 32 <= ord(c) < 127 and c not in '"\\?' else "".join(f"\\{byte:03o}" for byte in c.encode()) for c in text
-    )
-    return f'"{escaped}"'
-
-
-def c_type(symbol: Symbol) -> str:
-    """The type of a value in C."""
-    return {"bool": "q_mask", "wide": "q_wide"}.get(symbol.kind, "q_real")
-
-
-def _constant(symbol: Symbol) -> str:
-    value = value_of(symbol)
-    if symbol.kind == "bool":
-        return f"q_known({int(value)})"
-    if math.isnan(value):
-        return "Q_NAN"
-    if math.isinf(value):
-        return "Q_INFINITY" if value > 0.0 else "(-Q_INFINITY)"
-    return f"({value!r})" if value < 0 or repr(value).startswith("-") else repr(value)
-
-
 def _definition_of(symbol: Symbol) -> tuple[str, int] | None:
     """The statement that defines a symbol, if any."""
     if symbol.op == "phi":
@@ -544,17 +311,3 @@ def _definition_of(symbol: Symbol) -> tuple[str, int] | None:
     if symbol.op in ("load", "result", "failed"):
         return "call", symbol.data[1]
     return None
-
-
-def _unknown_below(symbol: Symbol, is_known: object) -> list[Symbol]:
-    """The unknown symbols that must be computed for a symbol, in order."""
-    found: dict[int, Symbol] = {}
-    stack: list[tuple[Symbol, bool]] = [(symbol, False)]
-    while stack:
-        one, visited = stack.pop()
-        if visited:
-            found[id(one)] = one
-        elif id(one) not in found and not is_known(one):  # type: ignore[operator]
-            stack.append((one, True))
-            stack += [(arg, False) for arg in reversed(one.args)]
-    return list(found.values())

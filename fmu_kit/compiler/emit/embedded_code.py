@@ -10,7 +10,8 @@ from ctypes import c_float
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from fmu_kit.compiler.emit.c_code import ERRORS, KEYWORDS, FunctionWriter, identifier
+from fmu_kit.compiler.emit.c_code import ERRORS, FunctionWriter
+from fmu_kit.compiler.emit.c_names import KEYWORDS, identifier
 from fmu_kit.compiler.trace.statements import Block, Statement
 from fmu_kit.compiler.trace.tracing import Program
 from fmu_kit.variables import Variable

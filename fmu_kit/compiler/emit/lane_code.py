@@ -9,7 +9,8 @@ from __future__ import annotations
 import itertools
 from typing import ClassVar
 
-from fmu_kit.compiler.emit.c_code import ERRORS, FunctionWriter, c_name, place_names
+from fmu_kit.compiler.emit.c_code import ERRORS, FunctionWriter
+from fmu_kit.compiler.emit.c_names import c_name, place_names
 from fmu_kit.compiler.trace.statements import Block, Function, Statement, ends
 from fmu_kit.compiler.trace.symbols import Symbol
 from fmu_kit.compiler.trace.tracing import Program

@@ -9,11 +9,12 @@ import inspect
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
-from fmu_kit.compiler.emit.c_code import ERRORS, c_string, place_names
+from fmu_kit.compiler.emit.c_code import ERRORS
+from fmu_kit.compiler.emit.c_names import c_string, place_names
 from fmu_kit.compiler.emit.standards import Standard
+from fmu_kit.compiler.trace.errors import TraceError
 from fmu_kit.compiler.trace.memory import Memory, attribute_name
 from fmu_kit.compiler.trace.statements import Place
-from fmu_kit.compiler.trace.symbols import TraceError
 from fmu_kit.compiler.trace.tracing import Program
 from fmu_kit.compiler.trace.tree import is_number, leaves
 from fmu_kit.errors import FmuError

@@ -36,7 +36,7 @@ from fmu_kit.compiler.passes.derivatives import with_tangents
 from fmu_kit.compiler.passes.precomputing import precompute
 from fmu_kit.compiler.passes.straightening import straightened
 from fmu_kit.compiler.runtime import FOLDER
-from fmu_kit.compiler.trace.symbols import TraceError
+from fmu_kit.compiler.trace.errors import TraceError
 from fmu_kit.compiler.trace.tracing import Program, trace
 from fmu_kit.documentation import BuildNotes
 from fmu_kit.model_description import GUID_PLACEHOLDER

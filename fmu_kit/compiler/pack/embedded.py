@@ -13,7 +13,7 @@ from string import Template
 
 from fmu_kit import packaging
 from fmu_kit.bundle import PackagingError, Target
-from fmu_kit.compiler.emit.c_code import c_name, c_string
+from fmu_kit.compiler.emit.c_names import c_name, c_string
 from fmu_kit.compiler.emit.embedded_code import (
     GROUPS,
     MessageTable,
@@ -28,8 +28,8 @@ from fmu_kit.compiler.emit.tables import start_of
 from fmu_kit.compiler.pack.building import modules_of
 from fmu_kit.compiler.passes.precomputing import precompute
 from fmu_kit.compiler.runtime import FOLDER
+from fmu_kit.compiler.trace.errors import TraceError
 from fmu_kit.compiler.trace.memory import attribute_name
-from fmu_kit.compiler.trace.symbols import TraceError
 from fmu_kit.compiler.trace.tracing import Program, trace
 from fmu_kit.packaging import slave_class
 from fmu_kit.versions import generation_tool, version_of

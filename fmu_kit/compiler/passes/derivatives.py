@@ -10,8 +10,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
+from fmu_kit.compiler.trace.errors import TraceError
 from fmu_kit.compiler.trace.statements import TANGENT, Block, Call, Function, Statement, statement
-from fmu_kit.compiler.trace.symbols import Symbol, TraceError, constant, lifted, node, select
+from fmu_kit.compiler.trace.symbols import Symbol, constant, lifted, node, select
 from fmu_kit.compiler.trace.tracing import Program
 
 Rule = Callable[[Symbol, tuple[Symbol, ...], tuple[Any, ...]], Any]

@@ -6,8 +6,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from fmu_kit.compiler.trace.errors import TraceError
 from fmu_kit.compiler.trace.statements import Block, Place, Statement, statement
-from fmu_kit.compiler.trace.symbols import Kind, Symbol, TraceError, common_kind, lifted, node
+from fmu_kit.compiler.trace.symbols import Kind, Symbol, common_kind, lifted, node
 from fmu_kit.compiler.trace.tree import (
     USUAL_LEAVES,
     Path,

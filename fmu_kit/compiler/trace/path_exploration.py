@@ -1,4 +1,4 @@
-"""Exploration of all paths through a slave's code, and merging them to functions.
+"""Exploration of all paths through a slave's code, which become functions.
 
 Code that is run on symbols takes one branch wherever it tests a condition. So it is run again for the other branch,
 until all have been taken; then the paths are merged where they meet again: at the end of each function.
@@ -15,27 +15,25 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from fmu_kit.compiler.trace.errors import TraceError
 from fmu_kit.compiler.trace.memory import Memory
-from fmu_kit.compiler.trace.statements import Block, Call, Function, Statement, branch, statement
-from fmu_kit.compiler.trace.symbols import (
-    Kind,
-    Piece,
-    Symbol,
-    TraceError,
-    common_kind,
-    decided,
-    hooks,
-    lifted,
-    node,
-    pieces,
-    select,
-    storable,
-    token,
-    truth,
+from fmu_kit.compiler.trace.merging import Merge, PathEnd, storable_value
+from fmu_kit.compiler.trace.messages import error_class, raise_statement, warn_statement
+from fmu_kit.compiler.trace.statements import (
+    Block,
+    Call,
+    Function,
+    Statement,
+    branch,
+    has_effect,
+    raises_of,
+    statement,
+    stores_of,
 )
+from fmu_kit.compiler.trace.symbols import Kind, Symbol, common_kind, decided, hooks, lifted, node, truth
+from fmu_kit.compiler.trace.texts import marker
 from fmu_kit.compiler.trace.tree import (
     bare_leaves,
-    difference,
     expect_no_aliases,
     expect_unchanged,
     is_number,
@@ -43,7 +41,7 @@ from fmu_kit.compiler.trace.tree import (
     map_leaves,
     shape,
 )
-from fmu_kit.errors import DivergenceError, FmuError
+from fmu_kit.errors import FmuError
 from fmu_kit.failure import is_model_code
 
 
@@ -69,20 +67,9 @@ class _Path:
 
 
 @dataclass(frozen=True)
-class _Leaf:
-    """The end of a path that did not fail."""
-
-    value: Any
-    view: Any
-    holders: dict[Any, int]
-    written: dict[str, Symbol]
-    version: int
-
-
-@dataclass(frozen=True)
 class _Tree:
     block: Block
-    end: _Leaf | tuple[Symbol, _Tree, _Tree] | None
+    end: PathEnd | tuple[Symbol, _Tree, _Tree] | None
 
 
 class Explorer:
@@ -101,7 +88,7 @@ class Explorer:
         """Have the symbols call this explorer."""
         hooks.decide = self._decide
         hooks.fail_if = self.fail_if
-        hooks.effects = lambda: sum(_has_effect(each) for each in _statements(self._current.entries))
+        hooks.effects = lambda: sum(has_effect(each) for each in _statements(self._current.entries))
         hooks.is_running = lambda: self._path is not None
 
     # -- statements of a path -------------------------------------------------------------------------------
@@ -117,13 +104,12 @@ class Explorer:
             raise error
         known = self._current.known
         if condition is not False and known.get(id(condition)) is not False:
-            self.add(*branch(truth(condition), (_raise(error),), ()))
+            self.add(*branch(truth(condition), (raise_statement(error),), ()))
             known[id(condition)] = False
 
     def warn(self, key: str, text: str) -> None:
         """Append a statement: a warning, the first time only."""
-        found = pieces(text)
-        self.add(statement("warn", _values(found), (key, _words(found))))
+        self.add(warn_statement(key, text))
 
     @property
     def _current(self) -> _Path:
@@ -162,7 +148,7 @@ class Explorer:
 
     def _explored(
         self, body: Callable[[], Any], roots: Any, restore: Callable[[], None]
-    ) -> tuple[Block, _Leaf | None, bool]:
+    ) -> tuple[Block, PathEnd | None, bool]:
         tree, forked = self._tree(body, roots, restore)
         block, leaf = self._merged(tree)
         return block, leaf, forked
@@ -171,7 +157,7 @@ class Explorer:
         outer = self._path
         runs = 0
 
-        def run(script: tuple[bool, ...]) -> tuple[_Path, _Leaf | None]:
+        def run(script: tuple[bool, ...]) -> tuple[_Path, PathEnd | None]:
             nonlocal runs
             if runs:
                 restore()
@@ -186,7 +172,7 @@ class Explorer:
             except _EndedError:
                 pass
             except (FmuError, ArithmeticError, ValueError) as error:
-                path.entries.append(_raise(error))
+                path.entries.append(raise_statement(error))
             finally:
                 self._path = outer
             return path, leaf
@@ -210,12 +196,12 @@ class Explorer:
 
         return grown(()), runs > 1
 
-    def _leaf(self, value: Any, roots: Any) -> _Leaf:
+    def _leaf(self, value: Any, roots: Any) -> PathEnd:
         view, holders = self.memory.view(roots)
-        value, view = _storable(value), _storable(view)
-        return _Leaf(value, view, holders, dict(self.memory.written), self.memory.version)
+        value, view = storable_value(value), storable_value(view)
+        return PathEnd(value, view, holders, dict(self.memory.written), self.memory.version)
 
-    def _merged(self, tree: _Tree) -> tuple[Block, _Leaf | None]:
+    def _merged(self, tree: _Tree) -> tuple[Block, PathEnd | None]:
         if not isinstance(tree.end, tuple):
             return tree.block, tree.end
         condition, then, otherwise = tree.end
@@ -223,8 +209,8 @@ class Explorer:
         block_b, b = self._merged(otherwise)
         leaf = a or b
         if a is not None and b is not None:
-            merge = _Merge(condition, self.memory, bool(block_a or block_b))
-            leaf = merge.leaf(a, b)
+            merge = Merge(condition, self.memory, bool(block_a or block_b))
+            leaf = merge.end(a, b)
             block_a, block_b = (*block_a, *merge.then), (*block_b, *merge.otherwise)
         return (*tree.block, *branch(condition, block_a, block_b)), leaf
 
@@ -251,7 +237,7 @@ class Explorer:
         if self._catches:
             for kind in sorted(function.raises):
                 if node("failed", (), "bool", (kind, after)):
-                    raise error_class(kind)(token(node("failure", (), "real"), "failure"))
+                    raise error_class(kind)(marker(node("failure", (), "real"), "failure"))
         numbers = [leaf for _, leaf in leaves(returned) if is_number(leaf)]
         results = iter([node("result", (), lifted(leaf).kind, (k, after)) for k, leaf in enumerate(numbers)])
         return map_leaves(returned, lambda _, leaf: next(results) if is_number(leaf) else leaf)
@@ -317,8 +303,8 @@ class Explorer:
                 names=names,
                 body=block,
                 results=results,
-                stores=frozenset(_stores(block)),
-                raises=frozenset(_raises(block)),
+                stores=frozenset(stores_of(block)),
+                raises=frozenset(raises_of(block)),
                 doc=(getattr(method, "func", method).__doc__ or "").strip().partition("\n")[0],
             )
             self._by_content[key] = made
@@ -394,65 +380,9 @@ def _loops_in(path: str) -> tuple[range, ...]:
     return tuple(range(loop.lineno, (loop.end_lineno or loop.lineno) + 1) for loop in loops)
 
 
-class _Merge:
-    """The merge of two paths at their ends."""
-
-    def __init__(self, condition: Symbol, memory: Memory, branches: bool) -> None:
-        self.condition = condition
-        self.memory = memory
-        self.branches = branches
-        self.then: list[Statement] = []
-        self.otherwise: list[Statement] = []
-
-    def leaf(self, a: _Leaf, b: _Leaf) -> _Leaf:
-        """The merged end."""
-        version = a.version if a.version == b.version else self.memory.joined(self.condition, a.version, b.version)
-        return _Leaf(
-            self.value(a.value, b.value, "what is returned"),
-            self.value(a.view, b.view, "what is kept"),
-            {path: holder for path, holder in a.holders.items() if b.holders.get(path) == holder},
-            {name: self.number(a.written[name], b.written[name]) for name in a.written.keys() & b.written.keys()},
-            version,
-        )
-
-    def value(self, a: Any, b: Any, what: str) -> Any:
-        if shape(a) != shape(b):
-            found = difference(a, b, self.memory.name_in_view)
-            raise TraceError(f"{what} differs in more than numbers between two paths: {found}")
-        others = iter(list(bare_leaves(b)))
-
-        def either(_: Any, leaf: Any) -> Any:
-            other = next(others)
-            return self.number(leaf, other) if is_number(leaf) else leaf
-
-        return map_leaves(a, either)
-
-    def number(self, a: Any, b: Any) -> Any:
-        """The number that is `a` on one path and `b` on the other."""
-        left, right = lifted(a), lifted(b)
-        if left is right:
-            return a
-        if not self.branches and _is_cheap(left) and _is_cheap(right):
-            return select(self.condition, a, b)
-        if isinstance(a, bool) and isinstance(b, bool):
-            return select(self.condition, a, b)
-        merged = node("phi", (self.condition, left, right), common_kind(left, right))
-        if not any(each.symbols[0] is merged for each in self.then):
-            self.then.append(statement("assign", (merged, left)))
-            self.otherwise.append(statement("assign", (merged, right)))
-        return merged
-
-
 def _numbered(name: str) -> Iterator[str]:
     """Names for the functions traced from one method."""
     return itertools.chain((name,), (f"{name}__{k}" for k in itertools.count(2)))
-
-
-def _storable(value: Any) -> Any:
-    """A value with its wide whole numbers narrowed, so that they can be stored."""
-    if any(isinstance(leaf, Symbol) and leaf.kind == "wide" for leaf in bare_leaves(value)):
-        return map_leaves(value, lambda _, leaf: storable(leaf) if isinstance(leaf, Symbol) else leaf)
-    return value
 
 
 def _with_numbers(state: Any, op: str, kinds: list[Kind], of: Any) -> Any:
@@ -469,70 +399,5 @@ def _is_same(a: Any, b: Any) -> bool:
     return all(lifted(x) is lifted(y) for (_, x), (_, y) in zip(leaves(a), leaves(b)) if is_number(x))
 
 
-def _is_cheap(symbol: Symbol) -> bool:
-    return not symbol.args or (symbol.op in ("neg", "not") and _is_cheap(symbol.args[0]))
-
-
 def _statements(entries: list[Statement | _Fork]) -> Block:
     return tuple(entry for entry in entries if isinstance(entry, Statement))
-
-
-# -- errors ------------------------------------------------------------------------------------------------------
-
-_CLASSES: dict[str, type[Exception]] = {
-    each.__name__: each for each in (FmuError, DivergenceError, ZeroDivisionError, OverflowError, ValueError)
-}
-
-
-def error_class(name: str) -> type[Exception]:
-    """The error class of a name."""
-    return _CLASSES[name]
-
-
-def _raise(error: Exception) -> Statement:
-    name = next(name for name, each in reversed(_CLASSES.items()) if isinstance(error, each))
-    if type(error).__name__ in _CLASSES:
-        name = type(error).__name__
-    found = pieces(str(error))
-    return statement("raise", _values(found), (name, _words(found)))
-
-
-def _values(text: list[Piece]) -> list[Symbol]:
-    return [piece[0] for piece in text if not isinstance(piece, str)]
-
-
-def _words(text: list[Piece]) -> tuple[str | tuple[str], ...]:
-    """The text without its values: a format in place of each."""
-    return tuple(piece if isinstance(piece, str) else (piece[1],) for piece in text)
-
-
-def _has_effect(each: Statement) -> bool:
-    """Whether a statement may fail, warn, or change the memory; a store only writes what was changed before."""
-    if each.op == "call":
-        function: Function = each.data.function
-        return bool(function.stores or function.raises) or any(map(_has_effect, function.body))
-    return each.op in ("raise", "warn") or any(_has_effect(inner) for block in each.blocks for inner in block)
-
-
-def _stores(block: Block) -> set[str]:
-    found: set[str] = set()
-    for each in block:
-        if each.op == "store":
-            found.add(each.data)
-        elif each.op == "call":
-            found |= each.data.function.stores
-        for inner in each.blocks:
-            found |= _stores(inner)
-    return found
-
-
-def _raises(block: Block) -> set[str]:
-    found: set[str] = set()
-    for each in block:
-        if each.op == "raise":
-            found.add(each.data[0])
-        elif each.op == "call":
-            found |= each.data.function.raises
-        for inner in each.blocks:
-            found |= _raises(inner)
-    return found

@@ -161,3 +161,37 @@ def symbols_of(block: Block) -> list[Symbol]:
         for inner in each.blocks:
             found += symbols_of(inner)
     return found
+
+
+def has_effect(each: Statement) -> bool:
+    """Whether a statement may fail, warn, or change the memory; a store only writes what was changed before."""
+    if each.op == "call":
+        function: Function = each.data.function
+        return bool(function.stores or function.raises) or any(map(has_effect, function.body))
+    return each.op in ("raise", "warn") or any(has_effect(inner) for block in each.blocks for inner in block)
+
+
+def stores_of(block: Block) -> set[str]:
+    """The names of the places that a block changes, by itself or in what it calls."""
+    found: set[str] = set()
+    for each in block:
+        if each.op == "store":
+            found.add(each.data)
+        elif each.op == "call":
+            found |= each.data.function.stores
+        for inner in each.blocks:
+            found |= stores_of(inner)
+    return found
+
+
+def raises_of(block: Block) -> set[str]:
+    """The classes of the errors that a block raises, by itself or in what it calls."""
+    found: set[str] = set()
+    for each in block:
+        if each.op == "raise":
+            found.add(each.data[0])
+        elif each.op == "call":
+            found |= each.data.function.raises
+        for inner in each.blocks:
+            found |= raises_of(inner)
+    return found

@@ -13,10 +13,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from fmu_kit import scalar
+from fmu_kit.compiler.trace.errors import TraceError
 from fmu_kit.compiler.trace.symbols import (
     PowerErrors,
     Symbol,
-    TraceError,
     both,
     either,
     error_raised_by,

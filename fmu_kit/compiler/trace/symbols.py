@@ -9,24 +9,18 @@ from __future__ import annotations
 
 import math
 import operator
-import re
 import struct
 from collections.abc import Callable, Iterable, Sequence
 from ctypes import c_float
 from typing import Any, Literal, NamedTuple
 
 from fmu_kit.compiler.trace import integers
+from fmu_kit.compiler.trace.errors import TraceError
+from fmu_kit.compiler.trace.texts import marker
 from fmu_kit.errors import FmuError
 
 Kind = Literal["real", "int", "wide", "bool"]
 """A whole number is `int` where C can store it as a real number, and `wide` within an expression, where it is larger"""
-
-
-class TraceError(Exception):
-    """The code cannot be traced; the text says why, and what to do instead."""
-
-    place: str | None = None
-    """file and line, if it is not the line that is being run"""
 
 
 class Symbol:
@@ -191,10 +185,10 @@ class Symbol:
     # -- text ------------------------------------------------------------------------------------------------
 
     def __format__(self, spec: str) -> str:
-        return token(self, spec)
+        return marker(storable(_rounded_as_stored(self)), spec)
 
     def __repr__(self) -> str:
-        return token(self, "")
+        return format(self)
 
     __str__ = __repr__
 
@@ -583,43 +577,4 @@ def closure(symbols: Iterable[Symbol]) -> dict[int, Symbol]:
                 stack.append((symbol, True))
                 if symbol.op != "phi":
                     stack += [(arg, False) for arg in symbol.args]
-    return found
-
-
-# -- texts: values within messages -------------------------------------------------------------------------------
-
-OPENING, CLOSING = "\x02", "\x03"
-_NAMES: dict[Kind, str] = {"int": "an integer", "real": "a float", "bool": "a truth value"}
-_FORMATS: dict[Kind, str] = {"int": " or {value:d}", "real": " or a format as :g, :.3g, :.3f or :.3e", "bool": ""}
-_tokens: list[tuple[Symbol, str]] = []
-_numbers: dict[tuple[int, str], int] = {}
-
-Piece = str | tuple[Symbol, str]
-"""A part of a text: words, or a value and its format."""
-
-
-def token(symbol: Symbol, spec: str) -> str:
-    """The marker of a value in a text; raises `TraceError` for a format that the C runtime does not have."""
-    symbol = storable(_rounded_as_stored(symbol))
-    known = {"int": r"d?", "real": r"(\.\d+)?g|\.\d+[ef]|", "bool": ""}[symbol.kind]
-    if spec != "failure" and not re.fullmatch(known, spec):
-        raise TraceError(
-            f"{{value:{spec}}} of {_NAMES[symbol.kind]} in a text: expected {{value}}{_FORMATS[symbol.kind]}"
-        )
-    key = (id(symbol), spec)
-    if key not in _numbers:
-        _numbers[key] = len(_tokens)
-        _tokens.append((symbol, spec))
-    return f"{OPENING}{_numbers[key]}{CLOSING}"
-
-
-def pieces(text: str) -> list[Piece]:
-    """A text split at the values in it."""
-    first, *rest = text.split(OPENING)
-    found: list[Piece] = [first] if first else []
-    for part in rest:
-        number, _, words = part.partition(CLOSING)
-        found.append(_tokens[int(number)])
-        if words:
-            found.append(words)
     return found

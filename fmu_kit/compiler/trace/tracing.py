@@ -21,10 +21,11 @@ from pythonfmu.fmi2slave import Fmi2Slave
 
 from fmu_kit import scalar
 from fmu_kit.compiler.trace import symbolic_builtins as stand_ins
+from fmu_kit.compiler.trace.errors import TraceError
 from fmu_kit.compiler.trace.memory import KnownMemory, Memory, attribute_name
 from fmu_kit.compiler.trace.path_exploration import Explorer
 from fmu_kit.compiler.trace.statements import Function, Place, Statement, all_statements, used_symbols
-from fmu_kit.compiler.trace.symbols import Kind, Symbol, TraceError, constant, hooks
+from fmu_kit.compiler.trace.symbols import Kind, Symbol, constant, hooks
 from fmu_kit.compiler.trace.tree import leaves
 from fmu_kit.failure import place_of
 from fmu_kit.slave import Phase, Slave

@@ -12,7 +12,8 @@ import random
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Literal
 
-from fmu_kit.compiler.trace.symbols import Symbol, TraceError
+from fmu_kit.compiler.trace.errors import TraceError
+from fmu_kit.compiler.trace.symbols import Symbol
 
 Path = tuple[Any, ...]
 USUAL_LEAVES = frozenset({Symbol, float, int, bool, str, bytes, type(None)})

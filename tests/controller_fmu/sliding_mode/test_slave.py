@@ -532,7 +532,7 @@ def test_instance_that_failed_makes_no_more_steps() -> None:
 
 
 def test_failure_can_be_logged_as_a_printf_format() -> None:
-    assert "100 %%s" in repr(started()._failed(ValueError("100 %s")))
+    assert "100 %%s" in repr(started()._failure_of(ValueError("100 %s")))
 
 
 def test_an_error_of_python_is_reported_with_its_place_in_the_first_line(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from fmu_kit.bundle import Target
-from fmu_kit.compiler.emit.c_code import KEYWORDS
+from fmu_kit.compiler.emit.c_names import KEYWORDS
 from fmu_kit.compiler.emit.standards import STANDARDS
 from fmu_kit.compiler.pack.building import c_sources, modules_of
 from fmu_kit.compiler.pack.c_compiler import compiled_here
@@ -18,8 +18,9 @@ from fmu_kit.compiler.pack.lanes import compiled_lanes
 from fmu_kit.compiler.passes.precomputing import precompute
 from fmu_kit.compiler.runtime import FOLDER
 from fmu_kit.compiler.trace.tracing import trace
+from fmu_kit.declared_names import PYTHONFMU_NAMES
 from fmu_kit.packaging import slave_class
-from fmu_kit.slave import _OF_PYTHONFMU, Slave
+from fmu_kit.slave import Slave
 from tests.fmu_kit.compiler.compiled import compiler
 from tests.fmu_kit.compiler.embedded import _succeeds, made
 from tests.fmu_kit.compiler.probes import Kept
@@ -58,7 +59,7 @@ PERVERSE = {
     "model",
     "warning",
 }
-OF_A_SLAVE = {name.lstrip("_") for name in (*dir(Kept(instance_name="kept")), *Slave.__annotations__, *_OF_PYTHONFMU)}
+OF_A_SLAVE = {name.lstrip("_") for name in (*dir(Kept(instance_name="kept")), *Slave.__annotations__, *PYTHONFMU_NAMES)}
 NAMES = sorted(name for name in HERE | ELSEWHERE | PERVERSE | KEYWORDS if not keyword.iskeyword(name))
 NAMES = [name for name in NAMES if name not in OF_A_SLAVE and not hasattr(Slave, name)]
 SLAVE = """\
