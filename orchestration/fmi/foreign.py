@@ -25,9 +25,10 @@ def isolated_call(fmus: Iterable[Path], function: Callable[..., T], *arguments: 
     """
     if all(read_model(path).is_of_this_kit for path in fmus):
         return function(*arguments)
-    command = subprocesses.command("orchestration.fmi.foreign_process")
     try:
-        with Child(command, limits=replace(UNLIMITED, memory=Limits.memory)) as child:
+        with Child(
+            subprocesses.Module.of("orchestration.fmi.foreign_process"), limits=replace(UNLIMITED, memory=Limits.memory)
+        ) as child:
             child.send((function, arguments))
             result, error = child.receive()
     except Died as death:

@@ -38,7 +38,9 @@ class IsolatedInstance(Instance):
         self._values: list[Floats] = []  # of each reader
         self._fresh = False  # whether these values are current
         self._writers = 0
-        self._child = Child(subprocesses.command("orchestration.fmi.isolated_process", path.absolute(), instance_name))
+        self._child = Child(
+            subprocesses.Module.of("orchestration.fmi.isolated_process", path.absolute(), instance_name)
+        )
         try:
             self._request()
         except Exception:

@@ -54,9 +54,9 @@ class _Server:
         return b"".join(values.tobytes() for _, values in self._readers)
 
 
-def main(path: Path, name: str) -> None:
+def main(path: str, name: str) -> None:
     """Serve one instance."""
-    parent, server = Parent(), _Server(path, name)
+    parent, server = Parent(), _Server(Path(path), name)
     for commands in parent:
         result = error = None
         try:
@@ -70,4 +70,4 @@ def main(path: Path, name: str) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), sys.argv[2])
+    main(*sys.argv[1:])

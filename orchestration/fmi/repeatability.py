@@ -85,8 +85,8 @@ def _tested(content: str, path: Path) -> Repeatability:
     for manner in MANNERS:
         shown: dict[str, bool] = {}
         with tempfile.TemporaryDirectory(prefix="quadcosim-", ignore_cleanup_errors=True) as folder:
-            command = subprocesses.command("orchestration.fmi.repeatability_process", path.absolute(), manner)
-            with Child(command, environment=subprocesses.environment(TMPDIR=folder), limits=Limits()) as child:
+            module = subprocesses.Module.of("orchestration.fmi.repeatability_process", path.absolute(), manner)
+            with Child(module, environment=subprocesses.environment(TMPDIR=folder), limits=Limits()) as child:
                 ending = child.receive_all(shown.update)
         if ending.reached is not None:
             return Repeatability()

@@ -85,16 +85,17 @@ class _Runs:
         return [_moving(v, k, phase + i) if moves else _start(v) for i, v in enumerate(self._inputs)]
 
 
-def main(path: Path, manner: str, report: Callable[[dict[str, bool]], None]) -> None:
-    """Run all tests."""
+def main(path: str, manner: str) -> None:
+    """Run all tests, and report which runs are the same."""
+    parent = Parent()
     restrict(Limits().size)
-    runs = _Runs(path, manner)
+    runs = _Runs(Path(path), manner)
     expected = runs.reference_run(runs.fresh)
-    report({"fresh": True})
+    parent.send({"fresh": True})
     used = _used(runs)
-    report({"reset": used is not None and _is_same(runs, used, expected)})
+    parent.send({"reset": used is not None and _is_same(runs, used, expected)})
     if not runs.model.once_per_process:
-        report({"second_instance": used is not None and _further_is_same(runs, expected)})
+        parent.send({"second_instance": used is not None and _further_is_same(runs, expected)})
 
 
 def _used(runs: _Runs) -> NativeInstance | None:
@@ -199,4 +200,4 @@ def _within(variable: Variable, value: float) -> float:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), sys.argv[2], Parent().send)
+    main(*sys.argv[1:])

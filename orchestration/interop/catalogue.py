@@ -47,10 +47,10 @@ class Tool:
             raise self._no_python() from None
         return dict(zip(self.packages, done.stdout.split(), strict=True))
 
-    def command(self, job: Path, rows: Path) -> list[str]:
+    def command(self, job: Path, rows: Path) -> list[str] | subprocesses.Module:
         """What flies a job in a process of its own and writes the rows."""
         if self.python is None:
-            return subprocesses.command("orchestration.interop.tool_process", self.name, job, rows)
+            return subprocesses.Module.of("orchestration.interop.tool_process", self.name, job, rows)
         module, _, function = self.call.partition(":")
         script = Path(__file__).parent / "tools" / f"{module}.py"
         return [self._other_python(), "-I", str(script), function, str(job), str(rows)]

@@ -105,7 +105,7 @@ class Flights:
             raise QuadcosimError(f"{tool.name}: {ending.last_line or ending.description.removeprefix('ended with ')}")
         return np.asarray(np.load(folder / "rows.npy"))
 
-    def _started(self, command: Sequence[str], folder: Path) -> Child:
+    def _started(self, command: Sequence[str] | subprocesses.Module, folder: Path) -> Child:
         with self._lock:
             if self._over:  # copies were made meanwhile
                 raise QuadcosimError("the flights have ended")

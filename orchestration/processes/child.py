@@ -15,7 +15,10 @@ from typing import IO, Any
 
 from orchestration.processes.channel import LongError, read_frame, to_frame, write_frame
 from orchestration.processes.family import Family
+from orchestration.processes.fork_server import forked
 from orchestration.processes.limits import UNLIMITED, Limits
+from orchestration.processes.process import Process
+from orchestration.processes.subprocesses import Module
 from orchestration.processes.subprocesses import environment as usual_environment
 from orchestration.processes.watch import Watch
 
@@ -72,25 +75,18 @@ class Child:
 
     def __init__(
         self,
-        command: Sequence[str],
+        what: Module | Sequence[str],
         *,
         environment: Mapping[str, str] | None = None,
         folder: Path | None = None,
         limits: Limits = UNLIMITED,
         communicates: bool = True,
     ) -> None:
-        """`folder` is its working directory."""
+        """`what` is a module of this project, or a command; `folder` is its working directory."""
         family = Family(limited=math.isfinite(limits.time))
         keeps = not communicates or math.isfinite(limits.output)
-        self._process = process = subprocess.Popen(
-            command,
-            env={**(usual_environment() if environment is None else environment), **family.mark},
-            cwd=folder,
-            stdin=subprocess.PIPE if communicates else subprocess.DEVNULL,
-            stdout=subprocess.PIPE if communicates else subprocess.DEVNULL,
-            stderr=subprocess.PIPE if keeps else None,
-            start_new_session=True,
-        )
+        environment = {**(usual_environment() if environment is None else environment), **family.mark}
+        self._process = process = _started(what, environment, folder, (communicates, communicates, keeps))
         _limit_processor_time(process, limits)
         self.pid = process.pid
         self._is_limited = math.isfinite(limits.time)
@@ -180,6 +176,20 @@ class Child:
         return self.ending(None if self._is_limited else _PATIENCE)
 
 
+def _started(
+    what: Module | Sequence[str], environment: Mapping[str, str], folder: Path | None, piped: tuple[bool, bool, bool]
+) -> Process:
+    """In a new session; `piped` as in `forked`."""
+    if isinstance(what, Module) and sys.platform == "linux":
+        return forked(what, environment=environment, folder=folder, piped=piped)
+    unpiped = (subprocess.DEVNULL, subprocess.DEVNULL, None)
+    stdin, stdout, stderr = (subprocess.PIPE if pipe else other for pipe, other in zip(piped, unpiped))
+    return subprocess.Popen(
+        what.command if isinstance(what, Module) else what,
+        env=environment, cwd=folder, stdin=stdin, stdout=stdout, stderr=stderr, start_new_session=True,
+    )  # fmt: skip
+
+
 class _Output:
     """The output of a process, read as it comes; only its end is kept."""
 
@@ -211,7 +221,7 @@ def _signal(number: int) -> str:
         return f"signal {number}"
 
 
-def _limit_processor_time(process: "subprocess.Popen[bytes]", limits: Limits) -> None:
+def _limit_processor_time(process: Process, limits: Limits) -> None:
     """Limit the processor time of it and its descendants by the system too, in case this process is killed.
 
     An existing limit (`ulimit -t`) remains, with the soft limit a second below the hard one: SIGXCPU identifies it.
@@ -229,7 +239,7 @@ def _limit_processor_time(process: "subprocess.Popen[bytes]", limits: Limits) ->
             resource.prlimit(process.pid, resource.RLIMIT_CPU, (soft, hard))
 
 
-def _terminate(process: "subprocess.Popen[bytes]", family: Family, watch: Watch) -> None:
+def _terminate(process: Process, family: Family, watch: Watch) -> None:
     watch.close()
     family.kill(process)
     process.wait()

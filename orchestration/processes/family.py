@@ -1,6 +1,7 @@
 """A process with all its descendants, identified by an environment variable that children inherit (Linux)."""
 
 import contextlib
+import ctypes
 import os
 import signal
 import subprocess
@@ -10,12 +11,15 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from orchestration.processes.process import Process
 from orchestration.processes.waiting import waits
 
 _MARK = "QUADCOSIM_FAMILY"
 """Lists the names of the families that a process belongs to, outermost first"""
 _LIMITED = "L"
 """Suffix of the name of a family that is limited in time"""
+_ROOM = "/" + 64 * "-"
+"""Follows the names of a server that forks: room for one more"""
 _ROUNDS = 50
 """How often the remaining processes are killed: they may start others meanwhile"""
 
@@ -60,7 +64,7 @@ class Family:
                 )
         return members
 
-    def kill(self, first: "subprocess.Popen[bytes]") -> None:
+    def kill(self, first: Process) -> None:
         """Kill the process that was started `first`, and all others."""
         if sys.platform == "win32":
             subprocess.run(["taskkill", "/T", "/F", "/PID", str(first.pid)], capture_output=True, check=False)
@@ -84,3 +88,28 @@ class Family:
                     _, match, rest = Path(f"/proc/{name}/environ").read_bytes().partition(mark)
                     if match:
                         yield int(name), rest.partition(b"\0")[0].decode("ascii", "replace")
+
+
+def room_for_names() -> dict[str, str]:
+    """The variable of a process that will fork members of one more family (`NamesInPlace`)."""
+    return {_MARK: os.environ.get(_MARK, "") + _ROOM}
+
+
+class NamesInPlace:
+    """The names of this process's families where the system shows the environment that it was started with.
+
+    A process that is forked shows that of the one that it was forked from, until it overwrites it (Linux).
+    """
+
+    def __init__(self) -> None:
+        getenv = ctypes.CDLL(None).getenv
+        getenv.restype = ctypes.c_void_p
+        self._address = getenv(_MARK.encode())
+        self._size = len(os.environ[_MARK])
+
+    def write(self) -> None:
+        """Overwrite them by those of the present environment."""
+        names = os.environ[_MARK].encode()
+        assert len(names) <= self._size
+        ctypes.memset(self._address, 0, self._size)
+        ctypes.memmove(self._address, names, len(names))

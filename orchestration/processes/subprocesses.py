@@ -2,6 +2,7 @@
 
 import os
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = str(Path(__file__).resolve().parents[2])
@@ -11,6 +12,24 @@ _MISLEADING = ("PYTHONHOME", "PYTHONPATH")
 _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
 """NumPy's BLAS starts a thread per core when it is loaded, which wait busily: 0.1 s of CPU time of each process. No
 matrix here is large enough to profit, and sums of several threads may differ in the last bits."""
+
+
+@dataclass(frozen=True)
+class Module:
+    """A module of this project with a function `main` of texts, which is to be a process."""
+
+    name: str
+    arguments: tuple[str, ...]
+
+    @classmethod
+    def of(cls, name: str, *arguments: object) -> "Module":
+        """With its arguments as texts."""
+        return cls(name, tuple(map(str, arguments)))
+
+    @property
+    def command(self) -> list[str]:
+        """What runs it in a new Python."""
+        return command(self.name, *self.arguments)
 
 
 def command(module: str, *arguments: object) -> list[str]:

@@ -1,13 +1,13 @@
 """Ends a process and its descendants when it exceeds a limit."""
 
 import math
-import subprocess
 import threading
 import time
 from typing import Protocol
 
 from orchestration.processes.family import Family
 from orchestration.processes.limits import Limits
+from orchestration.processes.process import Process
 from orchestration.processes.used_time import UsedTime
 
 _POLL = 0.05
@@ -35,7 +35,7 @@ class Watch:
 
     def __init__(
         self,
-        process: "subprocess.Popen[bytes]",
+        process: Process,
         family: Family,
         limits: Limits,
         output: Counted | None,

@@ -55,7 +55,7 @@ def simulate(
         with deferred_interrupts() as interrupt:
             order = Order(request=resolved.request, course=course, engine=engine, level=_MESSAGES.getEffectiveLevel())
             with Child(
-                subprocesses.command("orchestration.runs.apart_process", room.path),
+                subprocesses.Module.of("orchestration.runs.apart_process", room.path),
                 limits=replace(UNLIMITED, memory=memory_limit),
             ) as child:
 

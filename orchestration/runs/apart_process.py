@@ -60,7 +60,7 @@ class _Reporter(logging.Handler):
             yield instance
 
 
-def main(room: Path) -> None:
+def main(room: str) -> None:
     """Run what is ordered."""
     parent = Parent(interrupt=signal.default_int_handler)
     order: Order = parent.receive()
@@ -68,7 +68,7 @@ def main(room: Path) -> None:
     _MESSAGES.handlers[:] = [reporter]
     _MESSAGES.setLevel(order.level)
     try:
-        _simulate(order, reporter, room)
+        _simulate(order, reporter, Path(room))
     except BaseException as error:
         if not reporter.is_over:
             reporter.report("error", picklable(error))
@@ -88,4 +88,4 @@ def _simulate(order: Order, reporter: _Reporter, room: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(*sys.argv[1:])

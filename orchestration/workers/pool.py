@@ -65,7 +65,7 @@ class WorkerProcess:
         self._folder = tempfile.TemporaryDirectory(dir=root, prefix="worker-", ignore_cleanup_errors=True)
         path = self._folder.name
         self._child = Child(
-            subprocesses.command("orchestration.workers.worker_process", path),
+            subprocesses.Module.of("orchestration.workers.worker_process", path),
             environment=subprocesses.environment(**dict.fromkeys(("TMPDIR", "TEMP", "TMP"), path)),
         )
 

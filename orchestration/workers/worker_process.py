@@ -20,12 +20,12 @@ from orchestration.workers.task import (
 )
 
 
-def main(own_folder: Path) -> None:
+def main(own_folder: str) -> None:
     """Answer tasks until the coordinator closes the channel."""
-    tempfile.tempdir = str(own_folder)  # no fallback to other folders if it is full
+    tempfile.tempdir = own_folder  # no fallback to other folders if it is full
 
     def orphaned() -> None:
-        for folder in scratch.abandoned(iter([own_folder.parent])):
+        for folder in scratch.abandoned(iter([Path(own_folder).parent])):
             shutil.rmtree(folder, ignore_errors=True)
 
     # An FMU must not be blamed for an interrupt.
@@ -46,4 +46,4 @@ def _run(runner: Runner, task: RunTask | Chunk) -> Outcome | list[Outcome] | Env
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(*sys.argv[1:])

@@ -269,7 +269,7 @@ def test_the_child_reports_an_error_in_a_rule(low_pass: Path, monkeypatch: pytes
     monkeypatch.setattr(confined_process, "restrict", lambda size: None)  # which would hold for the process of the test
     told = Told()
     with pytest.raises(KeyError):
-        confined_process.main(low_pass, tmp_path, Limits(), Report(told.hear))
+        confined_process.check(low_pass, tmp_path, Limits(), Report(told.hear))
     assert (told.rule, told.error, told.ended) == ("odd", "KeyError: 3", False)
 
 

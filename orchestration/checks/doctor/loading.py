@@ -53,9 +53,9 @@ def attempt(path: Path, limits: Limits) -> Trial:
 
 def _attempt(path: Path, limits: Limits, environment: Mapping[str, str]) -> Trial:
     with tempfile.TemporaryDirectory(prefix="quadcosim-", ignore_cleanup_errors=True) as folder:
-        command = subprocesses.command("orchestration.checks.doctor.loading", path.resolve(), folder, limits.size)
+        module = subprocesses.Module.of("orchestration.checks.doctor.loading", path.resolve(), folder, limits.size)
         found: dict[str, Any] = {}
-        with Child(command, environment=environment, limits=limits) as child:
+        with Child(module, environment=environment, limits=limits) as child:
             ending = child.receive_all(found.update)
     if isinstance(found.get("error"), OtherVersionError):
         raise found["error"]
@@ -79,23 +79,27 @@ def _failure(found: dict[str, Any], ending: Ending) -> str | None:
     return None if "loads" in found and ending.code == 0 else f"took its process down: it {ending.description}"
 
 
-def main(path: Path, folder: Path, size_limit: float, say: Callable[[object], None]) -> None:
+def main(path: str, folder: str, size: str) -> None:
     """Read, unpack, instantiate, initialise and free the FMU."""
+    _try(Path(path), Path(folder), float(size), Parent().send)
+
+
+def _try(path: Path, folder: Path, size_limit: float, send: Callable[[object], None]) -> None:
     restrict(size_limit)
     importlib.import_module("pydantic")  # as every command that runs an FMU does: it may be that of another Python
     try:
         fmu = read_fmu(path, size_limit)
     except UnreadableFmuError as error:
-        say({"error": error})
+        send({"error": error})
         return
-    say({"fmu": fmu})
+    send({"fmu": fmu})
     if CO_SIMULATION in fmu.kinds:
         try:
             _load(fmu, folder)
         except (QuadcosimError, OSError) as error:
-            say({"failure": " ".join(str(error).split())})
+            send({"failure": " ".join(str(error).split())})
         else:
-            say({"loads": True})
+            send({"loads": True})
 
 
 def _load(fmu: Fmu, folder: Path) -> None:
@@ -134,4 +138,4 @@ def _initialisation(slave: Any, fmu: Fmu) -> Iterator[tuple[str, Callable[[], ob
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), Path(sys.argv[2]), float(sys.argv[3]), Parent().send)
+    main(*sys.argv[1:])

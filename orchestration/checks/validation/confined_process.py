@@ -28,8 +28,13 @@ READABLE, PLATFORM = "readable", "platform"
 """Rules that are kept here: there is an FMU to look at, and this machine can run it"""
 
 
-def main(path: Path, folder: Path, limits: Limits, report: Report) -> None:
-    """Try every rule that is meant for the FMU."""
+def main(path: str, folder: str, time: str, size: str) -> None:
+    """Try every rule that is meant for the FMU; limits in [s] and [MB]."""
+    check(Path(path), Path(folder), Limits(time=float(time), size=float(size)), Report(Parent().send))
+
+
+def check(path: Path, folder: Path, limits: Limits, report: Report) -> None:
+    """Try every rule that is meant for the FMU; raises what fails in a rule itself."""
     restrict(limits.size)
     try:
         fmu = look(path, limits.size, report)
@@ -81,5 +86,4 @@ def _run(probe: Probe, report: Report) -> None:
 
 
 if __name__ == "__main__":
-    _path, _folder, _time, _size = sys.argv[1:]
-    main(Path(_path), Path(_folder), Limits(time=float(_time), size=float(_size)), Report(Parent().send))
+    main(*sys.argv[1:])

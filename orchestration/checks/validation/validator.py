@@ -25,10 +25,10 @@ def validate(path: str | Path, *, limits: Limits | None = None) -> list[Finding]
     """
     path, limits = Path(path), limits or Limits()
     with tempfile.TemporaryDirectory(prefix="quadcosim-", ignore_cleanup_errors=True) as folder:
-        command = subprocesses.command(
+        module = subprocesses.Module.of(
             "orchestration.checks.validation.confined_process", path.resolve(), folder, limits.time, limits.size
         )
-        with Child(command, limits=limits) as child:
+        with Child(module, limits=limits) as child:
             told = Told(lambda: child.spent)
             ending = child.receive_all(told.hear)
     silent = None if told.beaten is None else child.spent - told.beaten

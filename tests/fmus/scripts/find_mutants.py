@@ -45,7 +45,7 @@ def found(mutant: Mutant, path: Path) -> list[Said]:
     told = Told()
     with tempfile.TemporaryDirectory() as folder:
         limits = Limits(time=mutant.time_limit)
-        confined_process.main(path, Path(folder), limits, Narrowed(told.hear, mutant.rule))
+        confined_process.check(path, Path(folder), limits, Narrowed(told.hear, mutant.rule))
     return [(finding.rule, finding.text, finding.note) for finding in told.findings]
 
 

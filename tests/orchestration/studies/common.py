@@ -206,12 +206,12 @@ def rows_in(path: Path) -> int:
 
 
 def workers_of(parent: int) -> list[int]:
-    """Ids of the worker processes that a coordinator started."""
+    """Ids of the worker processes of a coordinator: forked by the server that it started."""
     found = []
     for folder in Path("/proc").iterdir():
         try:
-            is_child = folder.name.isdigit() and parent_of(folder) == parent
-            if is_child and b"orchestration.workers.worker_process" in (folder / "cmdline").read_bytes():
+            is_forked = folder.name.isdigit() and parent_of(Path(f"/proc/{parent_of(folder)}")) == parent
+            if is_forked and b"orchestration.workers.worker_process" in (folder / "cmdline").read_bytes():
                 found.append(int(folder.name))
         except OSError:  # has ended meanwhile
             continue

@@ -101,12 +101,12 @@ def one_start(folder: Path, workers: int, kills: int, draw: random.Random, tally
 
 
 def processes_in(folder: Path) -> list[int]:
-    """Processes with their temporary files in `folder`: the workers of its sweeps."""
+    """Processes with their temporary files in `folder`: those of its sweeps."""
     found = []
     for process in Path("/proc").iterdir():
         try:
             of_here = process.name.isdigit() and str(folder / TEMPORARY).encode() in (
-                process / "cmdline"
+                process / "environ"
             ).read_bytes()  # fmt: skip
         except OSError:  # has ended meanwhile
             continue

@@ -1,0 +1,208 @@
+"""Processes forked from one that has already imported their module (Linux).
+
+Importing a module of this project takes a new Python up to 0.4 s, a fork takes milliseconds. A server is a process that
+has imported one module and does nothing but fork; there is one for each module and each set of the variables that a
+process reads when it starts. A server ends with this process.
+"""
+
+import contextlib
+import os
+import pickle
+import select
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import threading
+import weakref
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+from orchestration.processes.family import room_for_names
+from orchestration.processes.subprocesses import Module
+
+LENGTH = struct.Struct("<Q")
+"""of a request, before it"""
+NUMBER = struct.Struct("<q")
+"""The answers: the process's id, or minus the error number if there is none; then, at its end, its exit code"""
+_READ_AT_START = ("PYTHON", "LD_", "LC_", "LANG", "OPENBLAS_", "OMP_", "MKL_", "MALLOC_", "GLIBC_", "COVERAGE_")
+"""How the names of variables begin that a process reads when it starts, or when it loads a library"""
+_Pipes = tuple[IO[bytes] | None, IO[bytes] | None, IO[bytes] | None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """What a forked process is to be."""
+
+    arguments: tuple[str, ...]
+    environment: Mapping[str, str]
+    folder: str
+    """its working directory"""
+    umask: int
+
+
+class ForkedProcess:
+    """A process that a server has forked, with what `Child` uses of a `subprocess.Popen`."""
+
+    def __init__(self, pid: int, pipes: _Pipes, channel: socket.socket) -> None:
+        """`channel` is where its exit code will be reported."""
+        self.pid = pid
+        self.stdin, self.stdout, self.stderr = pipes
+        self.returncode: int | None = None
+        self._channel, self._reading = channel, threading.Lock()
+
+    def poll(self) -> int | None:
+        """Its exit code; None while it runs."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self.wait(0.0)
+        return self.returncode
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Its exit code, when it has ended; raises `subprocess.TimeoutExpired` after `timeout` [s]."""
+        if self.returncode is None and not _readable(self._channel, timeout):
+            raise subprocess.TimeoutExpired(f"process {self.pid}", timeout or 0.0)
+        with self._reading:
+            if self.returncode is None:
+                try:
+                    self.returncode = _answer(self._channel)
+                except (EOFError, ConnectionError):  # the server has ended, and this process with it
+                    self.returncode = -signal.SIGKILL
+                self._channel.close()
+        return self.returncode
+
+    def send_signal(self, sig: int) -> None:
+        """Send it a signal, unless it has ended."""
+        if self.poll() is None:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(self.pid, sig)
+
+
+class ForkServer:
+    """The process that has imported a module."""
+
+    def __init__(self, module: str, environment: Mapping[str, str]) -> None:
+        own, its = socket.socketpair()
+        with its:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "orchestration.processes.fork_server_process", module, str(its.fileno())],
+                env={**environment, **room_for_names()},
+                stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                pass_fds=[its.fileno()], start_new_session=True,
+            )  # fmt: skip
+        self.pid = self._process.pid
+        self._connection, self._owner = own, os.getpid()
+        self.close: Callable[[], None] = weakref.finalize(self, _end, own, self._process, self._owner)
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether it serves this process, which may be a fork of the one that has started it."""
+        return self._owner == os.getpid() and self._process.poll() is None
+
+    def fork(self, request: Request, piped: tuple[bool, bool, bool]) -> ForkedProcess:
+        """A process; `piped` as in `forked`.
+
+        Raises `ConnectionError` or `EOFError` if the server has ended, `OSError` if it cannot fork.
+        """
+        channel, its = socket.socketpair()  # of this process alone: an interrupt here disturbs no other
+        ends = [_ends(stream, is_piped) for stream, is_piped in enumerate(piped)]
+        stdin, stdout, stderr = (own for _, own in ends)
+        try:
+            with its:
+                socket.send_fds(self._connection, [b"!"], [*(end for end, _ in ends), its.fileno()])
+            content = pickle.dumps(request)
+            channel.sendall(LENGTH.pack(len(content)) + content)
+            pid = _answer(channel)
+            if pid < 0:
+                raise OSError(-pid, os.strerror(-pid))
+        except BaseException:
+            for own in (channel, stdin, stdout, stderr):
+                if own is not None:
+                    own.close()
+            raise
+        finally:
+            for end, _ in ends:
+                os.close(end)
+        return ForkedProcess(pid, (stdin, stdout, stderr), channel)
+
+
+servers: dict[tuple[object, ...], ForkServer] = {}
+"""by module and variables"""
+_lock = threading.Lock()
+
+
+def forked(
+    module: Module, *, environment: Mapping[str, str], folder: Path | None, piped: tuple[bool, bool, bool]
+) -> ForkedProcess:
+    """A process in a new session that runs `main` of a module.
+
+    `piped` states which of its standard streams are pipes to this process; of the others, input is empty, output is
+    discarded, and errors go where those of this process go. Raises `OSError` if it cannot be started.
+    """
+    request = Request(
+        arguments=module.arguments, environment=dict(environment), folder=str(folder or os.getcwd()), umask=_umask()
+    )
+    for _ in range(2):  # the server may just have been killed
+        server = _server_for(module.name, environment)
+        with contextlib.suppress(ConnectionError, EOFError):
+            return server.fork(request, piped)
+        server.close()
+    raise OSError(f"the process from which {module.name} is forked has ended")
+
+
+def _server_for(module: str, environment: Mapping[str, str]) -> ForkServer:
+    key = (module, *sorted(item for item in environment.items() if item[0].startswith(_READ_AT_START)))
+    with _lock:
+        server = servers.get(key)
+        if server is None or not server.is_usable:
+            server = servers[key] = ForkServer(module, environment)
+        return server
+
+
+def _end(connection: socket.socket, process: "subprocess.Popen[bytes]", owner: int) -> None:
+    """Close the connection to a server, which ends then; a fork of its owner only forgets it."""
+    connection.close()
+    if os.getpid() == owner:
+        process.wait()
+    else:
+        process.returncode = 0
+
+
+def exactly(connection: socket.socket, count: int) -> bytes:
+    """So many bytes; raises `EOFError` if the other end is closed before."""
+    content = b""
+    while len(content) < count:
+        block = connection.recv(count - len(content))
+        if not block:
+            raise EOFError
+        content += block
+    return content
+
+
+def _answer(channel: socket.socket) -> int:
+    (number,) = NUMBER.unpack(exactly(channel, NUMBER.size))
+    return int(number)
+
+
+def _ends(stream: int, is_piped: bool) -> tuple[int, IO[bytes] | None]:
+    """Of a standard stream the file descriptor for the new process, and this process's end of its pipe."""
+    if is_piped:
+        reading, writing = os.pipe()
+        return (reading, open(writing, "wb")) if stream == 0 else (writing, open(reading, "rb"))
+    return os.dup(2) if stream == 2 else os.open(os.devnull, os.O_RDONLY if stream == 0 else os.O_WRONLY), None
+
+
+def _umask() -> int:
+    """Of this process, from where the system shows it: `os.umask` cannot read it without changing it."""
+    return int(Path("/proc/self/status").read_text().partition("Umask:")[2].split()[0], 8)
+
+
+def _readable(channel: socket.socket, timeout: float | None) -> bool:
+    try:
+        poll = select.poll()
+        poll.register(channel, select.POLLIN)
+        return bool(poll.poll(None if timeout is None else 1000.0 * timeout))
+    except ValueError:  # another thread has read the answer and closed it
+        return True

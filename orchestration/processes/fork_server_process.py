@@ -1,0 +1,102 @@
+"""A server of `fork_server`: imports a module, and forks processes that run its `main`.
+
+`python -m orchestration.processes.fork_server_process MODULE SOCKET` serves until the other end of the socket (a file
+descriptor) is closed. With each byte come four file descriptors: the standard streams of the new process, and the
+channel from which it reads its `Request` and on which its id and its exit code are answered.
+"""
+
+import contextlib
+import gc
+import importlib
+import os
+import pickle
+import select
+import signal
+import socket
+import sys
+import tempfile
+
+from orchestration.processes.family import NamesInPlace
+from orchestration.processes.fork_server import LENGTH, NUMBER, Request, exactly
+
+
+def main(module: str, connection: socket.socket) -> Request | None:
+    """Serve; returns its request in each forked process, and None in the server at its end."""
+    names = NamesInPlace()
+    with contextlib.suppress(Exception):  # a forked process imports it again, and reports what is wrong
+        importlib.import_module(module)
+    gc.collect()
+    gc.freeze()  # what garbage collection does not touch is not copied by a forked process
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGCHLD, lambda *_: None)
+    woken, waking = os.pipe()
+    os.set_blocking(waking, False)
+    signal.set_wakeup_fd(waking)
+    running: dict[int, socket.socket] = {}
+    while True:
+        readable, _, _ = select.select([connection.fileno(), woken], [], [])
+        if woken in readable:
+            os.read(woken, 4096)
+            _report(running)
+        if connection.fileno() not in readable:
+            continue
+        byte, descriptors, _, _ = socket.recv_fds(connection, 1, 4)
+        if not byte:
+            return None
+        streams, channel = descriptors[:3], socket.socket(fileno=descriptors[3])
+        try:
+            pid = os.fork()
+        except OSError as error:
+            channel.sendall(NUMBER.pack(-(error.errno or 1)))
+            channel.close()
+        else:
+            if pid == 0:
+                signal.set_wakeup_fd(-1)
+                for each in (woken, waking):
+                    os.close(each)
+                for other in (connection, *running.values()):
+                    other.close()
+                return _become(channel, streams, names)
+            running[pid] = channel
+        for stream in streams:
+            os.close(stream)
+
+
+def _report(running: dict[int, socket.socket]) -> None:
+    """Answer the exit codes of processes that have ended."""
+    while running:
+        pid, status = os.waitpid(-1, os.WNOHANG)
+        if pid == 0:
+            return
+        with running.pop(pid) as channel, contextlib.suppress(OSError):  # nobody may be left to read it
+            channel.sendall(NUMBER.pack(os.waitstatus_to_exitcode(status)))
+
+
+def _become(channel: socket.socket, streams: list[int], names: NamesInPlace) -> Request:
+    """Make this fork what a process is that was started with the environment, folder and streams of its request."""
+    request: Request = pickle.loads(exactly(channel, *LENGTH.unpack(exactly(channel, LENGTH.size))))
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    os.setsid()
+    for number, stream in enumerate(streams):
+        os.dup2(stream, number)
+        os.close(stream)
+    os.environ.clear()
+    os.environ.update(request.environment)
+    names.write()
+    os.umask(request.umask)
+    os.chdir(request.folder)
+    sys.path[0] = request.folder
+    tempfile.tempdir = None
+    with channel:  # whoever knows the id may end the process, with its session and its family
+        channel.sendall(NUMBER.pack(os.getpid()))
+    return request
+
+
+if __name__ == "__main__":
+    name, descriptor = sys.argv[1:]
+    asked = main(name, socket.socket(fileno=int(descriptor)))
+    if asked is not None:
+        module = importlib.import_module(name)
+        sys.argv = [str(module.__file__), *asked.arguments]
+        sys.exit(module.main(*asked.arguments))

@@ -1,0 +1,42 @@
+"""What `test_fork_server` has forked: does what its first argument says, and sends what is asked."""
+
+import os
+import signal
+import sys
+import tempfile
+from pathlib import Path
+
+from orchestration.processes.channel import Parent
+
+IMPORTED_BY = os.getpid()
+"""The process that has imported this module"""
+
+
+def main(what: str, *arguments: str) -> None:
+    """`look`, `fail`, `exit`, `kill` or `print`."""
+    if what == "look":
+        shown = Path("/proc/self/environ").read_bytes().split(b"\0")
+        Parent().send(
+            {
+                "arguments": arguments,
+                "imported by": IMPORTED_BY,
+                "process": os.getpid(),
+                "session": os.getsid(0),
+                "folder": os.getcwd(),
+                "path": sys.path[0],
+                "variable": os.environ.get("OF_ITS_OWN"),
+                "other variable": os.environ.get("OF_ANOTHER"),
+                "temporary": tempfile.gettempdir(),
+                "families": [each.decode() for each in shown if each.startswith(b"QUADCOSIM_FAMILY=")],
+                "interrupt": signal.getsignal(signal.SIGINT) is signal.SIG_IGN,  # `Parent` has set it so
+                "open": sorted(os.listdir("/proc/self/fd")),
+            }
+        )
+    if what == "fail":
+        raise KeyError("what was wrong")
+    if what == "exit":
+        sys.exit(int(arguments[0]))
+    if what == "kill":
+        os.kill(os.getpid(), int(arguments[0]))
+    if what == "print":
+        print(arguments[0], file=sys.stderr)

@@ -1,0 +1,146 @@
+"""A forked process is what a new Python with its environment would be, without importing anything again."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from orchestration.processes import fork_server, subprocesses
+from orchestration.processes.child import Child
+from orchestration.processes.limits import Limits
+from tests.orchestration.processes.test_child import gone
+from tests.patience import PATIENCE
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes are forked on Linux only")
+MODULE = "tests.orchestration.processes.forked_module"
+
+
+def module(*arguments: object) -> subprocesses.Module:
+    return subprocesses.Module.of(MODULE, *arguments)
+
+
+def seen(*arguments: object, folder: Path | None = None, **variables: str) -> dict[str, Any]:
+    with Child(module("look", *arguments), folder=folder, environment=subprocesses.environment(**variables)) as child:
+        found: dict[str, Any] = child.receive()
+        assert child.ending(PATIENCE).code == 0
+    return found
+
+
+def servers(name: str) -> list[int]:
+    return [server.pid for key, server in fork_server.servers.items() if key[0] == name]
+
+
+def test_it_has_its_own_arguments_folder_environment_and_session(tmp_path: Path) -> None:
+    other = seen(1, OF_ANOTHER="x")
+    found = seen("two", tmp_path, folder=tmp_path, OF_ITS_OWN="y", TMPDIR=str(tmp_path))
+    assert found["arguments"] == ("two", str(tmp_path))
+    assert found["folder"] == found["path"] == found["temporary"] == str(tmp_path)
+    assert (found["variable"], found["other variable"]) == ("y", None)
+    assert found["session"] == found["process"] != other["process"]
+    assert found["interrupt"]
+
+
+def test_one_process_has_imported_the_module_for_all() -> None:
+    first, second = seen(), seen()
+    assert first["imported by"] == second["imported by"]
+    assert first["imported by"] in servers(MODULE)
+    assert first["process"] not in servers(MODULE)
+
+
+def test_a_variable_that_python_reads_when_it_starts_has_a_server_of_its_own() -> None:
+    assert seen()["imported by"] != seen(PYTHONUTF8="1")["imported by"]
+
+
+def test_no_file_of_another_process_is_open_there() -> None:
+    with open(os.devnull) as _, Child(module("look")) as one:
+        found = one.receive()
+        again = seen()
+    assert found["open"] == again["open"]
+    # The standard streams, the two of `Parent`, and the folder that is listed.
+    assert len(found["open"]) == 6
+
+
+def test_the_system_shows_its_family_and_no_other() -> None:
+    first, second = seen()["families"], seen()["families"]
+    assert len(first) == len(second) == 1
+    assert first != second
+    assert first[0].startswith("QUADCOSIM_FAMILY=" + os.environ.get("QUADCOSIM_FAMILY", ""))
+
+
+def test_how_it_ends_is_how_a_python_would() -> None:
+    def ending(*arguments: object) -> tuple[int | None, str]:
+        with Child(module(*arguments), limits=Limits()) as child:
+            found = child.ending()
+        return found.code, found.last_line
+
+    assert ending("fail") == (1, "KeyError: 'what was wrong'")
+    assert ending("exit", 3) == (3, "")
+    assert ending("kill", int(signal.SIGTERM))[0] == -signal.SIGTERM
+    assert ending("no such thing")[0] == 0
+
+
+def test_its_errors_go_where_those_of_this_process_go_now(capfd: pytest.CaptureFixture[str]) -> None:
+    for text in ("one", "two"):
+        with Child(module("print", text)) as child:
+            child.ending(PATIENCE)
+        assert capfd.readouterr().err == f"{text}\n"
+
+
+def test_a_module_that_cannot_be_imported_is_reported_by_the_process() -> None:
+    with Child(subprocesses.Module.of("tests.orchestration.processes.there_is_none"), limits=Limits()) as child:
+        found = child.ending()
+    assert (found.code, found.last_line.split(":")[0]) == (1, "ModuleNotFoundError")
+
+
+def test_what_a_killed_server_has_forked_ends_and_it_is_replaced() -> None:
+    waiting = subprocesses.Module.of("orchestration.fmi.foreign_process")
+    first = Child(waiting)
+    (server,) = servers(waiting.name)
+    os.kill(server, signal.SIGKILL)
+    assert gone(first.pid)
+    assert first.ending(PATIENCE).code == -signal.SIGKILL
+    with Child(waiting) as second:
+        assert not gone_now(second.pid)
+        assert servers(waiting.name) != [server]
+
+
+def gone_now(pid: int) -> bool:
+    return not Path(f"/proc/{pid}").exists()
+
+
+PROGRAM = """
+import os, sys
+from orchestration.processes.child import Child
+from orchestration.processes.subprocesses import Module
+child = Child(Module.of("tests.orchestration.processes.forked_module", "look"))
+server = child.receive()["imported by"]
+waiting = Child(Module.of("orchestration.fmi.foreign_process"))
+if sys.argv[1] == "forks" and os.fork() == 0:
+    other = Child(Module.of("tests.orchestration.processes.forked_module", "look")).receive()["imported by"]
+    print(other != server, flush=True)
+    os._exit(0)
+if sys.argv[1] == "forks":
+    os.wait()
+print(server, waiting.pid, flush=True)
+if sys.argv[1] == "killed":
+    os.kill(os.getpid(), 9)
+"""
+
+
+@pytest.mark.parametrize("how", ["ends", "killed", "forks"])
+def test_servers_and_what_they_forked_end_with_the_process(how: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, how],
+        env=subprocesses.environment(),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (-signal.SIGKILL if how == "killed" else 0, "")
+    *before, pids = done.stdout.splitlines()
+    assert before == (["True"] if how == "forks" else [])
+    assert all(gone(int(pid)) for pid in pids.split())
