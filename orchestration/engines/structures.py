@@ -45,25 +45,25 @@ def shared(lanes: int) -> Mapping[str, Any]:
 
 def constants(text: str) -> dict[str, int]:
     """The constants of the enumerations in a text of C, by name."""
-    found: dict[str, int] = {}
+    numbers: dict[str, int] = {}
     for enumeration in _CONSTANTS.findall(_COMMENT.sub("", text)):
         number = 0
         for each in enumeration.split(","):
             name, _, value = each.partition("=")
             number = int(value) if value else number
-            found[name.strip()] = number
+            numbers[name.strip()] = number
             number += 1
-    return found
+    return numbers
 
 
 def declared(text: str, lanes: int = 1) -> dict[str, Any]:
     """The structures in a text of C, by name; a structure must be declared before it is used in another."""
-    found: dict[str, Any] = {}
+    types: dict[str, Any] = {}
     for body, name in _STRUCTURE.findall(_COMMENT.sub("", text)):
         declarations = [part.strip() for part in body.split(";") if part.strip()]
-        fields = [field for declaration in declarations for field in _fields(declaration, found, lanes)]
-        found[name] = type(name, (ctypes.Structure,), {"_fields_": fields})
-    return found
+        fields = [field for declaration in declarations for field in _fields(declaration, types, lanes)]
+        types[name] = type(name, (ctypes.Structure,), {"_fields_": fields})
+    return types
 
 
 def _fields(declaration: str, known: Mapping[str, Any], lanes: int) -> Iterator[tuple[str, Any]]:
@@ -87,13 +87,13 @@ def _fields(declaration: str, known: Mapping[str, Any], lanes: int) -> Iterator[
 def expect_same_sizes(library: ctypes.CDLL, types: Mapping[str, Any]) -> None:
     """Raise `QuadcosimError` naming the first of `types` that is missing in a library or has another size there."""
     size = structures(1).Size
-    found, place = {}, ctypes.addressof(size.in_dll(library, "sizes"))
+    sizes, place = {}, ctypes.addressof(size.in_dll(library, "sizes"))
     while (each := size.from_address(place)).name:
-        found[ctypes.string_at(each.name).decode()] = each.size
+        sizes[ctypes.string_at(each.name).decode()] = each.size
         place += ctypes.sizeof(size)
     for name, structure in types.items():
-        if found.get(name) != ctypes.sizeof(structure):
+        if sizes.get(name) != ctypes.sizeof(structure):
             raise QuadcosimError(
-                f"structures.h: {name} has {found.get(name, 'no')} bytes in C: expected {ctypes.sizeof(structure)}, as "
+                f"structures.h: {name} has {sizes.get(name, 'no')} bytes in C: expected {ctypes.sizeof(structure)}, as "
                 "in Python"
             )

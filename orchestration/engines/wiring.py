@@ -90,21 +90,21 @@ def _expect_clock(name: str, component: Component, model: Model) -> None:
 
 
 def _parameters(system: System, models: Mapping[str, Model]) -> dict[str, float]:
-    found = {}
+    parameters = {}
     for name, model in models.items():
-        given = system.components[name].parameters
+        values = system.components[name].parameters
         for variable in model.variables.values():
-            value = given.get(variable.name, variable.start)
+            value = values.get(variable.name, variable.start)
             is_one = variable.causality == "parameter" or variable.is_constant
             if is_one and variable.kind in NUMERIC and value is not None:
-                found[f"{name}.{variable.name}"] = number_of(variable, value)
-    return found
+                parameters[f"{name}.{variable.name}"] = number_of(variable, value)
+    return parameters
 
 
 def signals_of(system: System, models: Mapping[str, Model]) -> set[str]:
     """All signals that are recorded or come from a source."""
-    found = {f"{name}.{each}" for name, variables in recorded_variables(system, models).items() for each in variables}
-    return found.union(columns_of(system)) - {"time"}
+    signals = {f"{name}.{each}" for name, variables in recorded_variables(system, models).items() for each in variables}
+    return signals.union(columns_of(system)) - {"time"}
 
 
 def source_values(system: System, name: str, parameters: Mapping[str, float], streams: Streams) -> Values:
@@ -117,19 +117,19 @@ def source_values(system: System, name: str, parameters: Mapping[str, float], st
     if not source.is_built_in:
         values = _of_file_or_signal(system, name, streams)
         return values if source.scale == 1.0 else Scaled(values, source.scale)
-    own = {f"{source.trajectory}.{name}": field for name, field in TRAJECTORY.items()}
-    given = {field: parameters[name] for name, field in own.items() if name in parameters}
-    return BuiltIn(Trajectory(**given))
+    fields = {f"{source.trajectory}.{name}": field for name, field in TRAJECTORY.items()}
+    values_of_fields = {field: parameters[name] for name, field in fields.items() if name in parameters}
+    return BuiltIn(Trajectory(**values_of_fields))
 
 
 def source_signals(system: System, parameters: Mapping[str, float], t: Floats) -> dict[str, Floats]:
     """The values of the sources of a run at times t [s], by signal, each of the shape of t; `parameters` as above."""
     streams = Streams(system.seed, system.streams)
-    found: dict[str, Floats] = {}
+    signals: dict[str, Floats] = {}
     for name, source in system.sources.items():
         values = source_values(system, name, parameters, streams).over(t)
-        found |= dict(zip(source.signals(name), values.T))
-    return found
+        signals |= dict(zip(source.signals(name), values.T))
+    return signals
 
 
 def _of_file_or_signal(system: System, name: str, streams: Streams) -> Values:
@@ -154,9 +154,9 @@ def table_columns(source: Source) -> Sequence[str]:
 
 def fixed_steps(system: System, models: Mapping[str, Model]) -> dict[str, FixedStep]:
     """Components in continuous time with a fixed step, by name."""
-    found = {}
+    steps = {}
     for name, component in system.components.items():
         if component.step is not None and not models[name].varies_step:
             grid = Grid(Fraction(0), exact_nanoseconds(component.step))
-            found[name] = FixedStep(name=name, grid=grid, moves=component.align == "next")
-    return found
+            steps[name] = FixedStep(name=name, grid=grid, moves=component.align == "next")
+    return steps

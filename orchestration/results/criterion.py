@@ -54,6 +54,6 @@ def _missed(part: Node, metrics: Mapping[str, Any], units: Mapping[str, str]) ->
             if value is not None and _HOLDS[operation](value, bound):
                 return None
             unit = f" {units[name]}" if name in units else ""
-            found = "has no value" if value is None else f"= {value:.4g}{unit}"
-            return f"{name} {found}, expected {operation} {bound:g}{unit}"
+            text = "has no value" if value is None else f"= {value:.4g}{unit}"
+            return f"{name} {text}, expected {operation} {bound:g}{unit}"
     return None

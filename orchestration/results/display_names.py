@@ -152,7 +152,7 @@ def unit(text: str | None) -> str | None:
     """A unit in print: N·m for N.m, m/s² for m/s2; None for none and for 1."""
     if text in (None, "", "1"):
         return None
-    raised = re.sub(r"(?<=[A-Za-zµΩ°%)])\^?(-?\d+)", lambda found: found[1].translate(_RAISED), str(text))
+    raised = re.sub(r"(?<=[A-Za-zµΩ°%)])\^?(-?\d+)", lambda match: match[1].translate(_RAISED), str(text))
     return raised.replace(".", "·").replace("*", "·")
 
 

@@ -47,8 +47,8 @@ class Columns:
 
     def alone(self, run: int) -> System:
         """The system of one run, with all of its values."""
-        own = {_path(name): float(column[run]) for name, column in self.parameters.items()}
-        return changed(self.systems[run], own)
+        parameters = {_path(name): float(column[run]) for name, column in self.parameters.items()}
+        return changed(self.systems[run], parameters)
 
 
 def columns(request: Request, system: System, models: Mapping[str, Model], values: Mapping[str, Any]) -> Columns:

@@ -62,8 +62,8 @@ class Environment(gymnasium.Env[Floats, Floats]):  # type: ignore[misc]
         """Begin an episode; `options` are values by path on top of those that `starts` draws."""
         super().reset(seed=seed)
         values = {} if self._starts is None else dict(self._starts(self.np_random))
-        own = int(self.np_random.integers(2**63 - 1))
-        return self.simulation.reset(own, {**values, **(options or {})}), {}
+        seed_of_episode = int(self.np_random.integers(2**63 - 1))
+        return self.simulation.reset(seed_of_episode, {**values, **(options or {})}), {}
 
     def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
         """Go on to the next sample; returns observation, reward, whether terminated or truncated, and `info`."""
