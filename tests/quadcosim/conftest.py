@@ -16,6 +16,6 @@ def native(**fields: Any) -> Scenario:
 
 
 @pytest.fixture(scope="session")
-def flown() -> Result:
+def result() -> Result:
     """A flight of 0.2 s."""
     return quadcosim.run(native())

@@ -25,9 +25,9 @@ from quadcosim import (
     UsageError,
 )
 
-Made = Callable[[], object]
+Construct = Callable[[], object]
 
-SCENARIOS: list[tuple[str, Made]] = [
+SCENARIOS: list[tuple[str, Construct]] = [
     ("stop_time = -1.0", lambda: Scenario(stop_time=-1.0)),
     ("seed = -1", lambda: Scenario(seed=-1)),
     ('model_mismatch = "yes"', lambda: Scenario(model_mismatch="yes")),  # type: ignore[arg-type]
@@ -41,9 +41,9 @@ SCENARIOS: list[tuple[str, Made]] = [
     ("[controller]\ngain.eta = [1.0]", lambda: FmuChoice(fmu="x", parameters={"gain.eta": [1.0]})),  # type: ignore[dict-item]
     ("[controller]\nsample_period = 0.1", lambda: Scenario(controller=_controller({"sample_period": 0.1}))),
 ]
-"""Texts of files, and what somebody writes who means the same: both are refused, the latter by the end of the former"""
+"""Texts of files, and the same in Python: both are refused, the latter by the end of the former"""
 
-OTHER_WORDS: list[tuple[str, Made]] = [
+OTHER_WORDS: list[tuple[str, Construct]] = [
     ('stop_time = "long"', lambda: Scenario(stop_time="long")),  # type: ignore[arg-type]
     ("stop_time = true", lambda: Scenario(stop_time=True)),
     ("seed = 0.5", lambda: Scenario(seed=0.5)),  # type: ignore[arg-type]
@@ -66,7 +66,7 @@ OTHER_WORDS: list[tuple[str, Made]] = [
 TANK = '[components.tank]\nfmu = "tank.fmu"\n'
 TWO = 'stop_time = 1.0\n[components]\na = { fmu = "a.fmu", step = 0.1 }\nb = { fmu = "b.fmu", step = 0.1 }\n'
 WIRE = '[[connections]]\nname = "wire"\nfrom = ["a.y"]\nto = ["b.u"]\n'
-SYSTEMS: list[tuple[str, Made]] = [
+SYSTEMS: list[tuple[str, Construct]] = [
     (f"stop_time = 1.0\n{TANK}step = -0.1", lambda: Component(fmu="tank.fmu", step=-0.1)),
     (f"stop_time = 1.0\n{TANK}", lambda: _system(component=Component(fmu="tank.fmu"))),
     (f"stop_time = 0.0\n{TANK}step = 0.1", lambda: _system(stop_time=0.0)),
@@ -84,7 +84,7 @@ SYSTEMS: list[tuple[str, Made]] = [
     (f"{TWO}[criterion]\noutcomes = ['diverged', 'bad']", lambda: Criterion(outcomes=("diverged", "bad"))),
     (f"{TWO}[streams]\nwind = 1", lambda: _two(streams={"wind": 1})),
 ]
-SYSTEMS_IN_OTHER_WORDS: list[tuple[str, Made]] = [
+SYSTEMS_IN_OTHER_WORDS: list[tuple[str, Construct]] = [
     (f'{TWO}{WIRE}delay = "long"', lambda: _wire(delay="long")),
     (f"{TWO}[objectives]\npeak = 3", lambda: _two(objectives={"peak": 3})),
     (f"{TWO}{WIRE}dealy = 0.1", lambda: _wire(dealy=0.1)),
@@ -109,13 +109,13 @@ def _two(**keys: object) -> System:
     return System(stop_time=1.0, components=components, **keys)  # type: ignore[arg-type]
 
 
-def refusals(path: Path, text: str, made: Made, load: Callable[[Path], object]) -> tuple[str, str]:
-    """What is said of the file, without its name, and of the value made in Python; quotes apart, each in one line."""
+def refusals(path: Path, text: str, construct: Construct, load: Callable[[Path], object]) -> tuple[str, str]:
+    """The message for the file, without its name, and that for the value in Python; quotes apart, each in one line."""
     path.write_text(text)
     with pytest.raises(UsageError) as of_file:
         load(path)
     with pytest.raises(UsageError) as of_value:
-        made()
+        construct()
     of_file_, of_value_ = str(of_file.value).removeprefix(f"{path}: "), str(of_value.value)
     assert of_value_
     assert "\n" not in of_file_ + of_value_
@@ -129,36 +129,36 @@ def expect_same_place(of_file: str, of_value: str) -> None:
     assert "expected" in of_value
 
 
-@pytest.mark.parametrize(("text", "made"), SCENARIOS, ids=[text for text, _ in SCENARIOS])
-def test_a_scenario_is_refused_in_the_words_of_its_file(tmp_path: Path, text: str, made: Made) -> None:
-    of_file, of_value = refusals(tmp_path / "scenario.toml", text, made, quadcosim.load_scenario)
+@pytest.mark.parametrize(("text", "construct"), SCENARIOS, ids=[text for text, _ in SCENARIOS])
+def test_a_scenario_is_refused_in_the_words_of_its_file(tmp_path: Path, text: str, construct: Construct) -> None:
+    of_file, of_value = refusals(tmp_path / "scenario.toml", text, construct, quadcosim.load_scenario)
     assert of_file.endswith(of_value.removeprefix("parameters."))
 
 
-@pytest.mark.parametrize(("text", "made"), OTHER_WORDS, ids=[text for text, _ in OTHER_WORDS])
-def test_a_scenario_is_refused_at_the_place_where_its_file_is(tmp_path: Path, text: str, made: Made) -> None:
-    expect_same_place(*refusals(tmp_path / "scenario.toml", text, made, quadcosim.load_scenario))
+@pytest.mark.parametrize(("text", "construct"), OTHER_WORDS, ids=[text for text, _ in OTHER_WORDS])
+def test_a_scenario_is_refused_at_the_place_where_its_file_is(tmp_path: Path, text: str, construct: Construct) -> None:
+    expect_same_place(*refusals(tmp_path / "scenario.toml", text, construct, quadcosim.load_scenario))
 
 
-@pytest.mark.parametrize(("text", "made"), SYSTEMS, ids=range(len(SYSTEMS)))
-def test_a_system_is_refused_in_the_words_of_its_file(tmp_path: Path, text: str, made: Made) -> None:
-    of_file, of_value = refusals(tmp_path / "system.toml", text, made, quadcosim.load_system)
+@pytest.mark.parametrize(("text", "construct"), SYSTEMS, ids=range(len(SYSTEMS)))
+def test_a_system_is_refused_in_the_words_of_its_file(tmp_path: Path, text: str, construct: Construct) -> None:
+    of_file, of_value = refusals(tmp_path / "system.toml", text, construct, quadcosim.load_system)
     assert of_file.endswith(of_value)
 
 
-@pytest.mark.parametrize(("text", "made"), SYSTEMS_IN_OTHER_WORDS, ids=range(len(SYSTEMS_IN_OTHER_WORDS)))
-def test_a_system_is_refused_at_the_place_where_its_file_is(tmp_path: Path, text: str, made: Made) -> None:
-    expect_same_place(*refusals(tmp_path / "system.toml", text, made, quadcosim.load_system))
+@pytest.mark.parametrize(("text", "construct"), SYSTEMS_IN_OTHER_WORDS, ids=range(len(SYSTEMS_IN_OTHER_WORDS)))
+def test_a_system_is_refused_at_the_place_where_its_file_is(tmp_path: Path, text: str, construct: Construct) -> None:
+    expect_same_place(*refusals(tmp_path / "system.toml", text, construct, quadcosim.load_system))
 
 
 def test_a_study_is_refused_as_its_file_is(tmp_path: Path) -> None:
     axis = '[[axes]]\nname = "timing.period"\n'
-    cases: list[tuple[str, Made]] = [
+    cases: list[tuple[str, Construct]] = [
         (f"{axis}values = []", lambda: Axis(name="timing.period", targets=("timing.period",), values=())),
         ("name = 'x'", lambda: Study(name="x", base=Scenario(), axes=())),
     ]
-    for text, made in cases:
-        of_file, of_value = refusals(tmp_path / "study.toml", text, made, load_study)
+    for text, construct in cases:
+        of_file, of_value = refusals(tmp_path / "study.toml", text, construct, load_study)
         assert of_file.endswith(of_value)
 
 

@@ -1,4 +1,4 @@
-"""The package: what is found in it, how it is told, and that programs which use it are typed."""
+"""The package: its names, their documentation, and that programs which use it are typed."""
 
 import ast
 import dataclasses
@@ -53,9 +53,9 @@ def test_everything_has_a_docstring_that_begins_with_a_sentence(name: str) -> No
 def test_every_field_has_a_sentence_of_its_own(name: str) -> None:
     cls = getattr(quadcosim, name)
     declared = [base for base in reversed(cls.__mro__) if "__dataclass_fields__" in vars(base)]
-    told = {name: text for base in declared for name, text in documented(base).items()}
+    documented_fields = {name: text for base in declared for name, text in documented(base).items()}
     for field in dataclasses.fields(cls):
-        text = told.get(field.name, "")
+        text = documented_fields.get(field.name, "")
         assert text.endswith(".") and text[0].isupper(), f"{name}.{field.name}: {text!r}"  # noqa: PT018
 
 
@@ -66,8 +66,8 @@ def documented(cls: type) -> dict[str, str]:
     found = {}
     for field, text in zip(tree.body, tree.body[1:]):
         match field, text:
-            case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(said))):
-                found[name] = said
+            case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(docstring))):
+                found[name] = docstring
     return found
 
 
@@ -82,8 +82,8 @@ def test_a_program_that_uses_the_api_is_typed(tmp_path: Path) -> None:
     (tmp_path / "program.py").write_text(PROGRAM)
     command = [sys.executable, "-m", "mypy", str(tmp_path / "program.py")]
     done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
-    told = [line.partition(": ")[2] for line in done.stdout.splitlines() if "program.py" in line]
-    assert told == ERRORS, done.stderr
+    messages = [line.partition(": ")[2] for line in done.stdout.splitlines() if "program.py" in line]
+    assert messages == ERRORS, done.stderr
 
 
 PROGRAM = """

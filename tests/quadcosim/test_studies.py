@@ -37,9 +37,11 @@ def test_a_sweep_becomes_a_table_with_units_of_axes_and_metrics(swept: Swept) ->
 
 
 def test_a_sweep_is_not_flown_twice_and_tells_its_progress(swept: Swept) -> None:
-    heard: list[tuple[int, int]] = []
-    again = quadcosim.sweep(STUDY, folder=swept.path.parent, progress=lambda done, total: heard.append((done, total)))
-    assert (again.total, again.flown, heard) == (2, 0, [(2, 2)])
+    reported: list[tuple[int, int]] = []
+    again = quadcosim.sweep(
+        STUDY, folder=swept.path.parent, progress=lambda done, total: reported.append((done, total))
+    )
+    assert (again.total, again.flown, reported) == (2, 0, [(2, 2)])
     assert repr(again) == f"<Swept: 2 runs, 0 flown now, in {again.path}>"
 
 
@@ -58,17 +60,17 @@ def test_functions_of_a_result_are_metrics_of_a_sweep_known_by_their_source(tmp_
     def coarse(result):
         return None if len(result.events) > 22 else len(result.events)
 
-    given = {"furthest": furthest, "nearest": nearest, "coarse": coarse}
-    found = quadcosim.sweep(STUDY, metrics=given, folder=tmp_path, progress=None)
+    metrics = {"furthest": furthest, "nearest": nearest, "coarse": coarse}
+    found = quadcosim.sweep(STUDY, metrics=metrics, folder=tmp_path, progress=None)
     table = found.to_pandas()
     assert (table["furthest"] >= table["nearest"]).all()
     alone = [quadcosim.run(native(stop_time=0.1, timing=Timing(period=period))) for period in (0.01, 0.02)]
     assert table["furthest"].tolist() == [furthest(result) for result in alone]
     assert table["coarse"].isna().tolist() == [True, False]
     assert list(found.plot("furthest")) == ["furthest"]
-    assert quadcosim.sweep(STUDY, metrics=given, folder=tmp_path, progress=None).flown == 0
+    assert quadcosim.sweep(STUDY, metrics=metrics, folder=tmp_path, progress=None).flown == 0
     with pytest.raises(UsageError, match=r"holds another study \(metrics.nearest was .*\); expected the same one"):
-        quadcosim.sweep(STUDY, metrics={**given, "nearest": furthest}, folder=tmp_path, progress=None)
+        quadcosim.sweep(STUDY, metrics={**metrics, "nearest": furthest}, folder=tmp_path, progress=None)
 
 
 def _uses_what_is_around(result):
@@ -87,7 +89,7 @@ def _scaled(scale):
 
 
 @pytest.mark.parametrize(
-    ("function", "said"),
+    ("function", "message"),
     [
         (_uses_what_is_around, "MARGIN is not in it: expected all that it uses in the function, but for modules"),
         (_of_two, "expected a function of one argument, a Result, defined by def"),
@@ -98,8 +100,8 @@ def _scaled(scale):
     ],
     ids=["global", "two", "builtin", "enclosed", "lambda", "number"],
 )
-def test_a_function_that_its_source_does_not_say_as_a_whole_is_refused(function: Any, said: str) -> None:
-    with pytest.raises(UsageError, match=f"^metrics.own: .*{said}"):
+def test_a_function_whose_source_is_not_self_contained_is_refused(function: Any, message: str) -> None:
+    with pytest.raises(UsageError, match=f"^metrics.own: .*{message}"):
         quadcosim.sweep(STUDY, metrics={"own": function})
 
 
@@ -112,9 +114,9 @@ def test_functions_and_lanes_do_not_go_together_and_an_error_in_one_is_that_of_i
     def broken(result):
         return result.signals["no.such"]
 
-    told: list[str] = []
-    quadcosim.sweep(STUDY, metrics={"broken": broken}, folder=tmp_path, progress=None, announce=told.append)
-    assert told[-1] == "run 1 (timing.period = 0.02) failed: metrics.broken: KeyError: 'no.such'"
+    lines: list[str] = []
+    quadcosim.sweep(STUDY, metrics={"broken": broken}, folder=tmp_path, progress=None, announce=lines.append)
+    assert lines[-1] == "run 1 (timing.period = 0.02) failed: metrics.broken: KeyError: 'no.such'"
 
 
 def test_a_notebook_shows_what_became_of_the_runs(swept: Swept) -> None:

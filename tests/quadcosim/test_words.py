@@ -7,7 +7,7 @@ from orchestration.basics.errors import in_python
 from quadcosim import Scenario, UsageError
 from tests.commands import Main
 
-SAID = {
+EXPECTED = {
     "--of peroid: did you mean period? expected one of a": "of = peroid: did you mean period? expected one of a",
     "--from 1 --to 0: expected finite numbers": "first = 1, last = 0: expected finite numbers",
     "--of x: expected --from and --to": "of = x: expected first and last",
@@ -20,9 +20,9 @@ SAID = {
 }
 
 
-@pytest.mark.parametrize("text", SAID)
-def test_flags_are_told_as_arguments(text: str) -> None:
-    assert in_python(text) == SAID[text]
+@pytest.mark.parametrize("text", EXPECTED)
+def test_flags_are_named_as_arguments(text: str) -> None:
+    assert in_python(text) == EXPECTED[text]
 
 
 def test_the_api_names_the_argument_and_the_command_its_flag(main: Main) -> None:

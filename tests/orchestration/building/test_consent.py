@@ -1,4 +1,4 @@
-"""Nothing of a foreign folder is run before somebody has agreed to it; once is enough."""
+"""Nothing of a foreign folder is run without consent, which is asked for once."""
 
 import io
 import sys

@@ -89,11 +89,11 @@ def test_a_path_is_taken_as_it_is(built: dict[str, Path]) -> None:
 
 def test_a_missing_fmu_is_built_and_announced_once(project: Path) -> None:
     folder = with_fmus_folder(project)
-    heard: list[str] = []
+    reported: list[str] = []
     for _ in range(2):
-        assert fmus.locate("UnifiedController", heard.append) == folder / "UnifiedController.fmu"
-    assert len(heard) == 1
-    assert heard[0] == f"building {folder / 'UnifiedController.fmu'}"
+        assert fmus.locate("UnifiedController", reported.append) == folder / "UnifiedController.fmu"
+    assert len(reported) == 1
+    assert reported[0] == f"building {folder / 'UnifiedController.fmu'}"
     assert [path.name for path in folder.iterdir()] == ["UnifiedController.fmu"]
 
 
@@ -164,20 +164,20 @@ def builds_by(code: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_build_that_fails_says_why_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    said = "Traceback …\ncontroller_fmu/sliding_mode/law.py:3: imports numpy\n"
-    builds_by(f"import sys; sys.stderr.reconfigure(encoding='utf-8'); sys.exit({said!r})", monkeypatch)
+    output = "Traceback …\ncontroller_fmu/sliding_mode/law.py:3: imports numpy\n"
+    builds_by(f"import sys; sys.stderr.reconfigure(encoding='utf-8'); sys.exit({output!r})", monkeypatch)
     with pytest.raises(QuadcosimError, match=r"failed: controller_fmu/sliding_mode/law.py:3: imports numpy$"):
         builder.build(["UnifiedController"], tmp_path)
 
 
 def test_a_build_says_how_far_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     builds_by("print('a.fmu'); print('b.fmu')", monkeypatch)
-    heard: list[float] = []
-    assert builder.build(["UnifiedController", "QuadrotorPlant"], tmp_path, progress=heard.append) == [
+    reported: list[float] = []
+    assert builder.build(["UnifiedController", "QuadrotorPlant"], tmp_path, progress=reported.append) == [
         Path("a.fmu"),
         Path("b.fmu"),
     ]
-    assert heard == [0.5, 1.0]
+    assert reported == [0.5, 1.0]
 
 
 # -- slaves of anybody ------------------------------------------------------------------------------------
@@ -211,13 +211,13 @@ def lamp(tmp_path: Path) -> Path:
 
 def test_a_missing_fmu_is_built_from_the_slave_beside_it_and_again_when_that_changes(lamp: Path) -> None:
     path = lamp / "Lamp.fmu"
-    heard: list[str] = []
+    reported: list[str] = []
     for _ in range(2):
-        assert fmus.locate(str(path), heard.append) == path
-    assert heard == [f"building {path}"]
+        assert fmus.locate(str(path), reported.append) == path
+    assert reported == [f"building {path}"]
     (lamp / "voltage.py").write_text("VOLTS = 24.0\n", encoding="utf-8")
-    fmus.locate(str(path), heard.append)
-    assert heard == [f"building {path}"] * 2
+    fmus.locate(str(path), reported.append)
+    assert reported == [f"building {path}"] * 2
     with Fmi2Instance(path, "lamp") as instance:
         instance.enter_initialization(0.0, 1.0)
         instance.exit_initialization()
@@ -231,10 +231,10 @@ def test_without_python_inside_it_is_built_into_a_folder_beside_the_slave(
     folder: str, version: str, lamp: Path
 ) -> None:
     path = lamp / folder / "Lamp.fmu"
-    heard: list[str] = []
+    reported: list[str] = []
     for _ in range(2):
-        assert fmus.locate(str(path), heard.append) == path
-    assert heard == [f"building {path}"]
+        assert fmus.locate(str(path), reported.append) == path
+    assert reported == [f"building {path}"]
     assert read_model(path).description.fmiVersion == version
     assert fmus.native_twin(str(path)) == str(path)
     assert fmus.native_twin(str(lamp / "Lamp.fmu")) == str(lamp / "native" / "Lamp.fmu")
@@ -257,14 +257,14 @@ def test_a_variant_is_built_again_with_its_values_when_its_sources_change(packin
     (slave,) = builder.slaves_of(lamp)
     folder = lamp / packing.folder
     (path,) = builder.build_slaves([builder.with_fixed(slave, "Dim", {"share": 0.5})], folder, packing=packing)
-    heard: list[str] = []
-    assert fmus.locate(str(path), heard.append) == path
-    assert heard == []
+    reported: list[str] = []
+    assert fmus.locate(str(path), reported.append) == path
+    assert reported == []
     before = read_source_hash(path)
     (lamp / "voltage.py").write_text("VOLTS = 24.0\n", encoding="utf-8")
     for _ in range(2):
-        assert fmus.locate(str(path), heard.append) == path
-    assert heard == [f"building {path}"]
+        assert fmus.locate(str(path), reported.append) == path
+    assert reported == [f"building {path}"]
     assert read_source_hash(path) != before
     assert (read_model(path).variables["share"].is_constant, read_model(path).variables["share"].start) == (True, "0.5")
 
@@ -285,14 +285,14 @@ def test_a_variant_of_this_projects_is_built_again_in_its_folder_and_elsewhere_o
     own, elsewhere = builder.build_slaves([target], with_fmus_folder(project)) + builder.build_slaves(
         [target], tmp_path
     )
-    built, heard = own.read_bytes(), list[str]()
-    fmus.locate(str(elsewhere), heard.append)
-    assert heard == []
+    built, reported = own.read_bytes(), list[str]()
+    fmus.locate(str(elsewhere), reported.append)
+    assert reported == []
     old = with_another_hash(elsewhere)
     own.write_bytes(old)
-    fmus.locate(str(own), heard.append)
-    fmus.locate(str(elsewhere), heard.append)
-    assert heard == [
+    fmus.locate(str(own), reported.append)
+    fmus.locate(str(elsewhere), reported.append)
+    assert reported == [
         f"building {own}",
         f"{elsewhere} was built of other sources than the current ones: expected quadcosim build --name Heavy again",
     ]

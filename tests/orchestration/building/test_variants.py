@@ -41,18 +41,18 @@ def fixed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     return path
 
 
-def flown(controller: str, **parameters: float | str) -> Result:
+def run_of(controller: str, **parameters: float | str) -> Result:
     """Half a second of a Crazyflie."""
     scenario = Scenario(vehicle=load_vehicle("crazyflie", Path()), stop_time=0.5).with_fmus(
         plant="native/QuadrotorPlant", controller=controller
     )
-    given = {f"controller.{name}": value for name, value in parameters.items()}
-    return run(scenario.with_changes(parameters=given, timing=TIMING))
+    values = {f"controller.{name}": value for name, value in parameters.items()}
+    return run(scenario.with_changes(parameters=values, timing=TIMING))
 
 
 def test_it_flies_as_the_general_one_with_these_values_to_the_bit(fixed: Path, request: pytest.FixtureRequest) -> None:
     folder = MAKINGS[request.node.callspec.params["fixed"]].folder
-    one, other = flown(str(fixed)), flown(str(Path(folder, "UnifiedController")), **REDESIGN)
+    one, other = run_of(str(fixed)), run_of(str(Path(folder, "UnifiedController")), **REDESIGN)
     assert one.columns == other.columns
     differing = [name for name in one.columns if one.signals[name].tobytes() != other.signals[name].tobytes()]
     assert differing == []
@@ -94,13 +94,13 @@ def test_no_rule_is_broken_and_other_software_reads_it(fixed: Path) -> None:
 
 
 def test_what_has_another_value_is_refused_and_what_has_its_own_is_not(fixed: Path) -> None:
-    assert flown(str(fixed), **{name: REDESIGN[name] for name in ("gain.eta", "discretisation")}).divergence is None
+    assert run_of(str(fixed), **{name: REDESIGN[name] for name in ("gain.eta", "discretisation")}).divergence is None
     with pytest.raises(UsageError, match=r"controller\.gain\.eta = 13: expected 12\.0, which is fixed in this FMU"):
-        flown(str(fixed), **{"gain.eta": 13})
+        run_of(str(fixed), **{"gain.eta": 13})
 
 
 MASTERS = {"native": ["libcosim", "libcosim, SSP", "ecos", "ecos, SSP"], "python": ["libcosim", "ecos"]}
-"""By SSP they are given the same parameters, whatever is inside of an FMU."""
+"""By SSP they set the same parameters, whatever is inside of an FMU."""
 
 
 @pytest.mark.parametrize("fixed", MASTERS, indirect=True)
@@ -115,7 +115,7 @@ def test_a_redesign_that_is_fixed_flies_in_masters_that_set_no_enumeration(
 
 
 @pytest.mark.parametrize(
-    ("flags", "said"),
+    ("flags", "message"),
     [
         (["--set", "mass=2"], "--set, --vehicle: expected --name NAME, what the FMU with these values is called"),
         (["--name", "2nd"], "--name 2nd: expected letters, digits and _, no digit first"),
@@ -133,8 +133,10 @@ def test_a_redesign_that_is_fixed_flies_in_masters_that_set_no_enumeration(
         ),
     ],
 )
-def test_what_cannot_be_fixed_is_refused_in_one_line(flags: list[str], said: str, main: Main, tmp_path: Path) -> None:
-    done = main("build", "--out", tmp_path, *flags, code=2 if said.startswith("--") else 1)
+def test_what_cannot_be_fixed_is_refused_in_one_line(
+    flags: list[str], message: str, main: Main, tmp_path: Path
+) -> None:
+    done = main("build", "--out", tmp_path, *flags, code=2 if message.startswith("--") else 1)
     (line,) = [line for line in done.stderr.splitlines() if "building: " not in line]
-    assert said in line
+    assert message in line
     assert not any(tmp_path.iterdir())

@@ -21,7 +21,7 @@ _VARIABLE = '<ScalarVariable name="{}" valueReference="{}" causality="{}" variab
 
 
 def moving(folder: Path, *, fixed_step: bool = False) -> Path:
-    """The FMU in `folder`, which can be computed in lanes too; it says if it is to take steps of one length only."""
+    """The FMU in `folder`, which has code for SIMD lanes too; it declares whether it takes steps of one length only."""
     folder.mkdir(exist_ok=True)
     library = folder / f"Moving{fmpy.sharedLibraryExtension}"
     source = Path(__file__).with_name("moving.c")

@@ -1,6 +1,6 @@
 """What hypothesis draws from: systems of any components and connections, with times that meet each other.
 
-Strategies are made once: making one takes longer than drawing from it.
+Strategies are created once: that takes longer than drawing from them.
 """
 
 import functools
@@ -90,7 +90,7 @@ def jitters(
 @functools.cache
 @st.composite
 def lost(draw: st.DrawFn) -> dict[str, Any]:
-    """What is lost, by a probability or by a trace."""
+    """Losses, by a probability or by a trace."""
     if draw(whole(0, 3)) == 0:
         return {"loss": draw(losses())}
     return {"loss": draw(some(0.3, 0.5)), "burst_length": draw(BURSTS)}
@@ -144,10 +144,10 @@ def connections(draw: st.DrawFn, index: int, names: Sequence[str]) -> Connection
 def systems(draw: st.DrawFn, most: int = 6) -> System:
     """Of two components and more."""
     names = [f"k{i}" for i in range(draw(whole(2, most)))]
-    made = {name: draw(components()) for name in names}
+    parts = {name: draw(components()) for name in names}
     wires = [draw(connections(i, names)) for i in range(draw(whole(1, 2 * len(names))))]
     stop_time = draw(ENDS)
-    return System(stop_time=stop_time, seed=draw(whole(0, 2**32)), components=made, connections=tuple(wires))
+    return System(stop_time=stop_time, seed=draw(whole(0, 2**32)), components=parts, connections=tuple(wires))
 
 
 @functools.cache

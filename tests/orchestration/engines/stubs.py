@@ -1,4 +1,4 @@
-"""Simulators made of a few lines, which note how they are called."""
+"""Small simulators that record how they are called."""
 
 import numpy as np
 

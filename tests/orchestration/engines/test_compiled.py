@@ -157,19 +157,19 @@ def test_components_of_one_step_run_the_same(
     }
     what = replace(what, components=parts)
     assert all(not read_model(Path(parts[name].fmu)).varies_step for name in names)
-    said: list[str | bytes] = []
+    messages: list[str | bytes] = []
     for engine in ("python", "compiled"):
         try:
             result = ran(what, engine, load=kept.load)
         except QuadcosimError as error:
-            said.append(str(error))
+            messages.append(str(error))
             continue
-        said.append(result.rows.tobytes())
+        messages.append(result.rows.tobytes())
         for name in names:
             grid = Grid(Fraction(0), exact_nanoseconds(parts[name].step or 0.0))
             arrived = [e.time for e in result.events if e.kind == "arrived" and receiver_of(what, e.what) == name]
             assert all(grid.from_(time) == time for time in arrived)
-    assert said[0] == said[1]
+    assert messages[0] == messages[1]
 
 
 def receiver_of(system: System, connection: str) -> str:
@@ -253,12 +253,12 @@ def test_warnings_and_values_that_are_not_finite_are_the_same(fmu: Path, kept: K
 
 
 def test_a_call_that_fails_is_told_in_the_same_words(fmu: Path) -> None:
-    said = []
+    messages = []
     for engine in ("python", "compiled"):
         with pytest.raises(SimulatorError) as caught:
             ran(of(LOOP, fmu, controller={"fails_at": 0.3}), engine)
-        said.append(str(caught.value))
-    assert said == ["controller (Moving): fmi2DoStep: there is no more"] * 2
+        messages.append(str(caught.value))
+    assert messages == ["controller (Moving): fmi2DoStep: there is no more"] * 2
 
 
 def test_a_number_that_an_input_does_not_hold_is_refused_in_the_same_words(tmp_path: Path) -> None:
@@ -266,12 +266,12 @@ def test_a_number_that_an_input_does_not_hold_is_refused_in_the_same_words(tmp_p
     parts = {name: Component(fmu=str(path), step=0.01) for name in ("first", "second")}
     # a count that is multiplied until no 32 bits hold it
     wire = Connection(name="0", start=("first.count",), end=("second.mode",), scale=1e9)
-    said = []
+    messages = []
     for engine in ("python", "compiled"):
         with pytest.raises(QuadcosimError) as caught:
             ran(System(stop_time=0.1, components=parts, connections=(wire,)), engine)
-        said.append(str(caught.value))
-    assert said == ["second.mode = 3e+09: expected a number that int32 holds"] * 2
+        messages.append(str(caught.value))
+    assert messages == ["second.mode = 3e+09: expected a number that int32 holds"] * 2
 
 
 @pytest.mark.parametrize(

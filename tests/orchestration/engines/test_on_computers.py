@@ -1,4 +1,4 @@
-"""Systems on computers and networks are flown to the same bits by all engines, in windows, and beyond a pause."""
+"""Systems on computers and networks have the same bits with all engines, in windows, and beyond a pause."""
 
 import re
 from collections.abc import Iterator
@@ -243,8 +243,8 @@ def crowds(draw: st.DrawFn) -> list[System]:
 @settings(max_examples=30, derandomize=True, deadline=None)
 @given(crowds())
 def test_and_in_lanes_beside_others(fmu: Path, kept: Kept, crowd: list[System]) -> None:
-    flown = [of(what, fmu) for what in crowd]
-    shape = shape_of(flown[0])
-    found = in_lanes(shape, flown)
-    for lane, what in enumerate(flown):
+    simulated = [of(what, fmu) for what in crowd]
+    shape = shape_of(simulated[0])
+    found = in_lanes(shape, simulated)
+    for lane, what in enumerate(simulated):
         assert_the_same_signals(shape, found, lane, ran(what, "compiled", load=kept.load))

@@ -94,7 +94,7 @@ def small(
     tolerance: float | None = None,
     mode_is_input: bool = False,
 ) -> Path:
-    """The FMU with these habits (macros of `small.c`) in `folder`, which says of itself what it is told to.
+    """The FMU with these habits (macros of `small.c`) in `folder`, with these flags in its description.
 
     `mode_is_input`: that of FMI 2.0 has `mode` as an Integer that others may feed, of any value.
     """
@@ -105,12 +105,12 @@ def small(
         if fmi == 3
         else ("canGetAndSetFMUstate", "canSerializeFMUstate")
     )
-    said = {
+    flags = {
         "canHandleVariableCommunicationStepSize": not fixed_step,
         "canBeInstantiatedOnlyOncePerProcess": once,
         **dict.fromkeys(state, saves),
     }
-    attributes = " ".join(f'{name}="{str(value).lower()}"' for name, value in said.items())
+    attributes = " ".join(f'{name}="{str(value).lower()}"' for name, value in flags.items())
     text = _FMI3 if fmi == 3 else _FMI2
     place = fmpy.platform_tuple if fmi == 3 else fmpy.platform
     path = folder / "small.fmu"
@@ -130,9 +130,9 @@ def _compiled(*macros: str) -> bytes:
     """The library, in which what is kept has a name that each FMU replaces by its own."""
     defined = [f"-D{macro}" for macro in (*macros, f'KEPT="{_KEPT.decode()}"')]
     with tempfile.TemporaryDirectory() as folder:
-        made = Path(folder) / "small"
+        library = Path(folder) / "small"
         options = ("-shared", "-fPIC", "-O1", "-w")
-        subprocess.run([str(COMPILER), *options, *defined, str(_SOURCE), "-o", str(made), "-lm"], check=True)
-        found = made.read_bytes()
-    assert _KEPT in found
-    return found
+        subprocess.run([str(COMPILER), *options, *defined, str(_SOURCE), "-o", str(library), "-lm"], check=True)
+        content = library.read_bytes()
+    assert _KEPT in content
+    return content

@@ -23,7 +23,7 @@ def refused() -> None:
 
 
 class PickyError(Exception):
-    """It cannot be made again from its text alone."""
+    """It cannot be rebuilt from its text alone."""
 
     def __init__(self, name: str, value: int) -> None:
         super().__init__(f"{name} = {value}")

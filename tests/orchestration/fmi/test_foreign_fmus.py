@@ -128,7 +128,7 @@ def test_a_fixed_step_is_kept_whatever_happens_between_its_points(tmp_path: Path
         sources={"one": Source(constant=1.0, to=("controller.u",))},
     )
     assert last(ran(system), "plant.count") == 10.0
-    varying = alone(small(tmp_path / "other", "FIXED_STEP"), stop=0.105)  # it says that it takes any step
+    varying = alone(small(tmp_path / "other", "FIXED_STEP"), stop=0.105)  # it declares that it takes any step
     with pytest.raises(SimulatorError, match=r"it \(Small\): fmi2DoStep"):
         ran(varying)
 
@@ -162,12 +162,12 @@ def test_a_tolerance_is_that_of_the_file_else_of_the_declared_experiment(fmi: in
     )
     output, array = ("it.y[1]" if fmi == 3 else "it.y"), fmi == 3
 
-    def told(path: Path, **keys: Any) -> float:
-        """What initialisation is told: -1 for none."""
+    def tolerance_of(path: Path, **keys: Any) -> float:
+        """The tolerance that initialisation receives: -1 for none."""
         return float(ran(alone(path, array=array, **keys), load=load).signals[output][0])
 
-    assert (told(of_none), told(of_one)) == (-1.0, 1e-3)
-    assert (told(of_none, tolerance=1e-7), told(of_one, tolerance=1e-7)) == (1e-7, 1e-7)
+    assert (tolerance_of(of_none), tolerance_of(of_one)) == (-1.0, 1e-3)
+    assert (tolerance_of(of_none, tolerance=1e-7), tolerance_of(of_one, tolerance=1e-7)) == (1e-7, 1e-7)
 
 
 def test_a_tolerance_is_of_one_run(tmp_path: Path) -> None:
@@ -334,12 +334,12 @@ def test_a_crash_of_an_isolated_fmu_is_an_error_in_words(tmp_path: Path) -> None
 
 def test_what_an_isolated_fmu_refuses_reads_as_if_it_were_not(tmp_path: Path) -> None:
     path = small(tmp_path, "REFUSES")
-    said = []
+    messages = []
     for load in (instances.open_here, IsolatedInstance):
         with pytest.raises(SimulatorError) as error:
             ran(alone(path), load=load)
-        said.append(str(error.value))
-    assert said[0] == said[1]
+        messages.append(str(error.value))
+    assert messages[0] == messages[1]
 
 
 def test_isolated_or_not_a_run_is_the_same_to_the_bit(tmp_path: Path) -> None:

@@ -26,14 +26,14 @@ def test_what_an_fmu_prints_like_c_is_formatted_and_told_apart_by_instance(tmp_p
 
 @needs_compiler
 @pytest.mark.parametrize(
-    ("fmi", "logged", "said"), [(2, "50 %%n, 7 %%s", "50 %n, 7 %s"), (3, "50 %n, 7 %s", "50 %n, 7 %s")]
+    ("fmi", "logged", "text"), [(2, "50 %%n, 7 %%s", "50 %n, 7 %s"), (3, "50 %n, 7 %s", "50 %n, 7 %s")]
 )
 def test_a_text_with_percent_signs_arrives_as_its_version_of_fmi_means_it(
-    fmi: int, logged: str, said: str, tmp_path: Path
+    fmi: int, logged: str, text: str, tmp_path: Path
 ) -> None:
     with open_instance(small(tmp_path, f'SAYS="{logged}"', fmi=fmi), "it") as one:
         one.enter_initialization(0.0, 1.0)
         one.exit_initialization()
         with pytest.raises(SimulatorError) as error:
             one.step(0.0, 0.01)
-    assert str(error.value) == f"it (Small): fmi{fmi}DoStep: {said}"
+    assert str(error.value) == f"it (Small): fmi{fmi}DoStep: {text}"

@@ -36,7 +36,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return nothing_known(tmp_path / "cache", monkeypatch)
 
 
-def made(habits: str, folder: Path, fmi: int = 2) -> Path:
+def build(habits: str, folder: Path, fmi: int = 2) -> Path:
     return small(folder, *habits.split(), fmi=fmi, once="ONCE" in habits)
 
 
@@ -45,24 +45,24 @@ REUSED = ("none", "STICKY_PARAMETER", "STATICS", "BROKEN_RESET STATICS")
 
 @pytest.mark.parametrize("habits", [habits for habits in HABITS if habits not in REUSED])
 def test_what_is_shown_of_an_fmu_is_what_it_does(habits: str, tmp_path: Path) -> None:
-    assert repeatability.of(made(habits, tmp_path)) == HABITS[habits]
+    assert repeatability.of(build(habits, tmp_path)) == HABITS[habits]
 
 
 def test_fmi_3_is_shown_likewise(tmp_path: Path) -> None:
-    assert repeatability.of(made("none", tmp_path / "a", fmi=3)) == HABITS["none"]
-    assert repeatability.of(made("BROKEN_RESET", tmp_path / "b", fmi=3)) == HABITS["BROKEN_RESET"]
+    assert repeatability.of(build("none", tmp_path / "a", fmi=3)) == HABITS["none"]
+    assert repeatability.of(build("BROKEN_RESET", tmp_path / "b", fmi=3)) == HABITS["BROKEN_RESET"]
 
 
 @pytest.fixture(scope="module")
 def fresh(tmp_path_factory: pytest.TempPathFactory) -> list[bytes]:
     """The rows of processes of their own, in which no habit shows."""
-    path = made("none", tmp_path_factory.mktemp("fresh"))
+    path = build("none", tmp_path_factory.mktemp("fresh"))
     return [ran(alone(path, parameters=setting), load=IsolatedInstance).rows.tobytes() for setting in SETTINGS]
 
 
 @pytest.mark.parametrize("habits", REUSED)
 def test_runs_one_after_another_are_those_of_fresh_processes(habits: str, fresh: list[bytes], tmp_path: Path) -> None:
-    path = made(habits, tmp_path)
+    path = build(habits, tmp_path)
     systems = [alone(path, parameters=setting) for setting in SETTINGS]
     instances = Instances()
     kinds, rows = [], []
@@ -81,7 +81,7 @@ def test_runs_one_after_another_are_those_of_fresh_processes(habits: str, fresh:
 
 def test_an_instance_is_kept_only_where_its_reset_is_one(tmp_path: Path) -> None:
     for habits, kept in (("none", True), ("BROKEN_RESET", False)):
-        path, instances = made(habits, tmp_path / habits), Instances()
+        path, instances = build(habits, tmp_path / habits), Instances()
         with instances.load(path, "it") as first:
             pass
         with instances.load(path, "it") as second:
@@ -91,7 +91,7 @@ def test_an_instance_is_kept_only_where_its_reset_is_one(tmp_path: Path) -> None
 
 
 def test_it_is_shown_once_on_a_machine(tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = made("BROKEN_RESET", tmp_path)
+    path = build("BROKEN_RESET", tmp_path)
     first = repeatability.of(path)
     monkeypatch.setattr(repeatability, "_known", {})
     monkeypatch.setattr(Child, "receive_all", lambda *_: pytest.fail("shown again"))
@@ -108,7 +108,7 @@ def test_what_could_not_be_tried_to_the_end_is_not_relied_on_nor_kept(
 ) -> None:
     stopped = Ending(code=None, reached="it takes longer than the limit of 60 s", out_of_time=True)
     monkeypatch.setattr(Child, "receive_all", lambda *_: stopped)
-    assert repeatability.of(made("none", tmp_path)) == Repeatability(reset=False, second_instance=False)
+    assert repeatability.of(build("none", tmp_path)) == Repeatability(reset=False, second_instance=False)
     assert not list(cache.rglob("*.json"))
 
 

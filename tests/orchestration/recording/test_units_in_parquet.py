@@ -20,7 +20,7 @@ def result() -> Result:
     return quadcosim.run(SHORT)
 
 
-def said(path: Path) -> dict[str, dict[bytes, bytes]]:
+def metadata_of(path: Path) -> dict[str, dict[bytes, bytes]]:
     """The metadata of each column that has any."""
     schema: Any = pq.read_schema(path)
     return {field.name: field.metadata for field in schema if field.metadata}
@@ -30,9 +30,9 @@ def test_a_run_that_is_saved_and_one_written_as_it_flies_say_the_units_of_their_
     result: Result, tmp_path: Path
 ) -> None:
     saved = save_run(result, tmp_path / "saved", figures=False)
-    keep_run(tmp_path / "flown", lambda to: quadcosim.run(SHORT, recorder=to), figures=False)
-    for folder in (saved, tmp_path / "flown"):
-        columns = said(folder / "signals.parquet")
+    keep_run(tmp_path / "recorded", lambda to: quadcosim.run(SHORT, recorder=to), figures=False)
+    for folder in (saved, tmp_path / "recorded"):
+        columns = metadata_of(folder / "signals.parquet")
         assert columns["time"][b"unit"] == b"s"
         assert columns["plant.torque.x"][b"unit"] == b"N.m"
         assert columns["reference.position.x"][b"unit"] == b"m"
@@ -40,4 +40,4 @@ def test_a_run_that_is_saved_and_one_written_as_it_flies_say_the_units_of_their_
         assert {name for name, one in result.described.items() if one.unit} == {
             name for name, one in columns.items() if b"unit" in one
         }
-        assert said(folder / "events.parquet") == {"time": {b"unit": b"s"}}
+        assert metadata_of(folder / "events.parquet") == {"time": {b"unit": b"s"}}

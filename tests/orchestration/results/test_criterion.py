@@ -1,4 +1,4 @@
-"""What of a criterion a run did not meet is said with its number against its bound."""
+"""The parts of a criterion that a run did not meet are reported with value and bound."""
 
 from dataclasses import replace
 from typing import Any
@@ -15,15 +15,15 @@ def with_good(good: str | None) -> System:
     return replace(system, criterion=replace(system.criterion, good=good))
 
 
-def metrics(found: dict[str, Any], good: bool | None = False, outcome: str = "bounded") -> dict[str, Any]:
-    return {"good": good, "outcome": outcome, **found}
+def metrics(values: dict[str, Any], good: bool | None = False, outcome: str = "bounded") -> dict[str, Any]:
+    return {"good": good, "outcome": outcome, **values}
 
 
 UNITS = {"ultimate_bound": "m", "settling_time": "s"}
 
 
 @pytest.mark.parametrize(
-    ("good", "found", "said"),
+    ("good", "values", "text"),
     [
         ("ultimate_bound < 0.05", {"ultimate_bound": 0.0623}, "ultimate_bound = 0.0623 m, expected < 0.05 m"),
         ("ultimate_bound < 0.05", {"ultimate_bound": None}, "ultimate_bound has no value, expected < 0.05 m"),
@@ -40,11 +40,11 @@ UNITS = {"ultimate_bound": "m", "settling_time": "s"}
         ("ultimate_bound + settling_time < 1", {}, "ultimate_bound + settling_time < 1 does not hold"),
     ],
 )
-def test_the_part_that_failed_is_said(good: str, found: dict[str, float | None], said: str) -> None:
-    assert unmet(with_good(good), metrics(found), UNITS) == said
+def test_the_part_that_failed_is_reported(good: str, values: dict[str, float | None], text: str) -> None:
+    assert unmet(with_good(good), metrics(values), UNITS) == text
 
 
-def test_of_a_run_that_is_good_or_diverged_nothing_is_said() -> None:
+def test_of_a_run_that_is_good_or_diverged_nothing_is_reported() -> None:
     system = with_good("ultimate_bound < 0.05")
     assert unmet(system, metrics({"ultimate_bound": 0.01}, good=True), UNITS) is None
     assert unmet(system, metrics({"ultimate_bound": None}, outcome="diverged"), UNITS) is None

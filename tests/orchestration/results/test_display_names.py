@@ -13,12 +13,12 @@ METRICS_PAGE = Path(__file__).parents[3] / "docs" / "metrics.md"
 
 
 def test_every_metric_of_a_flight_has_a_name_and_its_unit_and_is_on_the_page() -> None:
-    flown = quadcosim.run(Scenario(stop_time=0.05))
-    assert set(flown.metrics) <= set(labels.METRICS)
-    units = {name: labels.METRICS[name][1] for name in flown.units}
-    assert {name: unit for name, unit in units.items() if unit != flown.units[name]} == {}
+    result = quadcosim.run(Scenario(stop_time=0.05))
+    assert set(result.metrics) <= set(labels.METRICS)
+    units = {name: labels.METRICS[name][1] for name in result.units}
+    assert {name: unit for name, unit in units.items() if unit != result.units[name]} == {}
     page = METRICS_PAGE.read_text(encoding="utf-8")
-    assert [name for name in flown.metrics if f"`{name}`" not in page] == []
+    assert [name for name in result.metrics if f"`{name}`" not in page] == []
 
 
 @pytest.mark.parametrize(

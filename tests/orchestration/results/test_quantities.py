@@ -6,7 +6,7 @@ from orchestration.results.quantities import is_in_seconds, quantity, setting
 
 
 @pytest.mark.parametrize(
-    ("values", "unit", "said"),
+    ("values", "unit", "text"),
     [
         ([0.01, 0.999], "ms", "10 ms"),
         ([0.01, 1.0], "s", "0.01 s"),
@@ -17,10 +17,10 @@ from orchestration.results.quantities import is_in_seconds, quantity, setting
     ],
 )
 def test_times_are_in_milliseconds_where_all_of_them_are_below_a_second(
-    values: list[object], unit: str, said: str
+    values: list[object], unit: str, text: str
 ) -> None:
     found = quantity("period", "s", values)
-    assert (found.title, found.text_of(0.01)) == (f"period [{unit}]", said)
+    assert (found.title, found.text_of(0.01)) == (f"period [{unit}]", text)
     assert found.of([0.01, 0.5]).tolist() == ([10.0, 500.0] if unit == "ms" else [0.01, 0.5])
 
 

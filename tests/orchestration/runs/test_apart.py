@@ -1,4 +1,4 @@
-"""A run with an FMU of others is in a process of its own: however that ends, the run ends in words, with its rows."""
+"""A run with a third-party FMU has a separate process: however that ends, the run raises an error with its rows."""
 
 import os
 import signal
@@ -72,7 +72,7 @@ def lost(tmp_path: Path) -> Callable[..., RunLost]:
 
 
 @pytest.mark.parametrize(
-    ("does", "said"),
+    ("does", "text"),
     [
         ("exit(0)", "ended with exit code 0"),
         ("abort()", "ended by SIGABRT"),
@@ -81,10 +81,10 @@ def lost(tmp_path: Path) -> Callable[..., RunLost]:
     ],
 )
 def test_however_an_fmu_ends_the_process_the_run_says_so_and_keeps_every_row(
-    does: str, said: str, lost: Callable[..., RunLost], tmp_path: Path
+    does: str, text: str, lost: Callable[..., RunLost], tmp_path: Path
 ) -> None:
     error = lost(does)
-    assert str(error) == f"the process of the run {said}, in a call of it (Small), after t = 0.05 s of 0.1 s"
+    assert str(error) == f"the process of the run {text}, in a call of it (Small), after t = 0.05 s of 0.1 s"
     assert error.result is not None
     whole = run(alone(small(tmp_path / "sound")), in_process=True)
     assert error.result.columns == whole.columns
@@ -114,8 +114,8 @@ def test_the_command_says_it_in_one_line_and_keeps_the_rows_beside_what_is_there
     (tmp_path / "system.toml").write_text(SYSTEM)
     for name in ("out", "out.1"):
         done = main("run", tmp_path / "system.toml", "--out", tmp_path / "out", code=1)
-        said = "quadcosim: the process of the run ended with exit code 0, in a call of it (Small), after t = 0.05 s"
-        assert done.stderr == f"{said} of 0.1 s; what was recorded is in {tmp_path / name}\n"
+        text = "quadcosim: the process of the run ended with exit code 0, in a call of it (Small), after t = 0.05 s"
+        assert done.stderr == f"{text} of 0.1 s; what was recorded is in {tmp_path / name}\n"
         assert done.stdout == ""
         assert len(load_run(tmp_path / name).rows) == 6
 
@@ -193,8 +193,8 @@ def test_an_fmu_that_rounds_otherwise_is_named_and_moves_no_other(engine: Any, t
     expected = run(pairs([sound] * len(others), sound), in_process=True, engine=engine)
     for in_process in (False, True):
         result = run(pairs(others, sound), engine=engine, in_process=in_process)
-        said = "the FMU has changed how numbers are rounded of the whole process, which was put back"
-        assert result.warnings == tuple(f"a{i} (Small): {said}" for i in range(len(HABITS)))
+        text = "the FMU has changed how numbers are rounded of the whole process, which was put back"
+        assert result.warnings == tuple(f"a{i} (Small): {text}" for i in range(len(HABITS)))
         for i in range(len(HABITS)):
             assert result.signals[f"b{i}.y"].tobytes() == expected.signals[f"b{i}.y"].tobytes()
 
@@ -204,9 +204,9 @@ def test_an_fmu_that_changes_the_folder_is_named_and_the_folder_put_back(tmp_pat
     before = os.getcwd()
     result = run(alone(other), in_process=True)
     assert os.getcwd() == before
-    said = "the FMU has changed the current folder of the whole process, which was put back"
-    assert result.warnings == (f"it (Small): {said}",)
-    assert run(beside(sound, other)).warnings == (f"one of a (Small), b (Small): {said}",)
+    text = "the FMU has changed the current folder of the whole process, which was put back"
+    assert result.warnings == (f"it (Small): {text}",)
+    assert run(beside(sound, other)).warnings == (f"one of a (Small), b (Small): {text}",)
 
 
 def test_an_archive_that_is_made_to_fill_the_disk_is_not_unpacked(tmp_path: Path, main: Main) -> None:

@@ -27,9 +27,9 @@ def starts(random: np.random.Generator) -> dict[str, float]:
 
 @pytest.fixture
 def environment() -> Iterator[Any]:
-    made = gym.Environment(SHORT, reward, low=LOW, high=HIGH, starts=starts)
-    yield made
-    made.close()
+    environment = gym.Environment(SHORT, reward, low=LOW, high=HIGH, starts=starts)
+    yield environment
+    environment.close()
 
 
 @pytest.mark.filterwarnings("ignore:.*Box (observation|action) space", "ignore:.*not having a spec")

@@ -132,10 +132,10 @@ WRONG: list[tuple[dict[str, Any], dict[str, Any], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("values", "more", "said"), WRONG, ids=[said for *_, said in WRONG])
-def test_what_cannot_be_is_refused_in_a_line(values: dict[str, Any], more: dict[str, Any], said: str) -> None:
+@pytest.mark.parametrize(("values", "more", "message"), WRONG, ids=[message for *_, message in WRONG])
+def test_what_cannot_be_is_refused_in_a_line(values: dict[str, Any], more: dict[str, Any], message: str) -> None:
     still = {f"plant.initial.quaternion.{axis}": 0.0 for axis in "xyz"}
-    with pytest.raises(QuadcosimError, match=said) as error:
+    with pytest.raises(QuadcosimError, match=message) as error:
         quadcosim.fly(SHORT, values | (still if "quaternion" in str(values) else {}), **more)
     assert "\n" not in str(error.value)
 
@@ -145,5 +145,5 @@ def test_runs_share_what_they_do_not_have_of_their_own() -> None:
 
     system = located(Scenario(timing=Timing(period=0.01)).as_system())
     models = {name: quadcosim.read_model(component.fmu) for name, component in system.components.items()}
-    given = columns(Scenario(), system, models, {X: np.zeros(100), "timing.period": [0.01, 0.02] * 50})
-    assert len({id(one) for one in given.systems}) == 2
+    runs = columns(Scenario(), system, models, {X: np.zeros(100), "timing.period": [0.01, 0.02] * 50})
+    assert len({id(one) for one in runs.systems}) == 2

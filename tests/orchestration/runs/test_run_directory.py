@@ -152,12 +152,14 @@ def test_a_run_without_samples_can_be_drawn(tmp_path: Path) -> None:
 
 
 def test_no_energy_is_drawn_of_a_controller_that_has_none() -> None:
-    flown = quadcosim.run(native(stop_time=0.1))
-    place = flown.columns.index("controller.energy")
-    columns, without = (*flown.columns[:place], *flown.columns[place + 1 :]), InMemory()
+    simulated = quadcosim.run(native(stop_time=0.1))
+    place = simulated.columns.index("controller.energy")
+    columns, without = (*simulated.columns[:place], *simulated.columns[place + 1 :]), InMemory()
     without.begin(columns)
-    without.take(Chunk(columns=columns, rows=np.delete(flown.rows, place, axis=1), events=Events.of(flown.events)))
-    assert set(drawing.draw(dataclasses.replace(flown, recording=without))) == {*FLIGHT} - {"energy"}
+    without.take(
+        Chunk(columns=columns, rows=np.delete(simulated.rows, place, axis=1), events=Events.of(simulated.events))
+    )
+    assert set(drawing.draw(dataclasses.replace(simulated, recording=without))) == {*FLIGHT} - {"energy"}
 
 
 # -- replacing --------------------------------------------------------------------------------------------
@@ -332,7 +334,7 @@ def test_a_directory_follows_the_umask(mask: int, result: Result, folder: Path) 
 
 
 def never(_: Recorder) -> Result:
-    raise AssertionError("flown")
+    raise AssertionError("simulated")
 
 
 def test_a_directory_that_cannot_be_is_refused_before_the_flight(folder: Path) -> None:
@@ -346,14 +348,14 @@ def test_a_directory_that_cannot_be_is_refused_before_the_flight(folder: Path) -
 
 
 def test_a_flight_whose_place_is_taken_meanwhile_is_kept_beside(result: Result, folder: Path) -> None:
-    def fly(recorder: Recorder) -> Result:
+    def simulate(recorder: Recorder) -> Result:
         folder.mkdir()
         (folder / "thesis.tex").write_text("years of work")
         folder.with_name("run.1").mkdir()
         return quadcosim.run(result.request, recorder=recorder)
 
     with pytest.raises(QuadcosimError, match=r"expected a new .*; what was written is in .*run\.2$"):
-        keep_run(folder, fly, figures=False)
+        keep_run(folder, simulate, figures=False)
     assert contents(folder) == {"thesis.tex": b"years of work"}
     assert load_run(folder.with_name("run.2")).rows.tobytes() == result.rows.tobytes()
     assert {path.name for path in folder.parent.iterdir()} == {"run", "run.1", "run.2"}

@@ -131,11 +131,11 @@ COMMANDS: list[tuple[Any, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("command", "said"), COMMANDS)
-def test_a_command_that_is_none_is_refused_and_the_run_goes_on(command: Any, said: str) -> None:
+@pytest.mark.parametrize(("command", "message"), COMMANDS)
+def test_a_command_that_is_none_is_refused_and_the_run_goes_on(command: Any, message: str) -> None:
     with Simulation(SHORT) as simulation:
         simulation.reset()
-        with pytest.raises(UsageError, match=said):
+        with pytest.raises(UsageError, match=message):
             simulation.step(command)
         simulation.step([9.81, 0.0, 0.0, 0.0])
         assert simulation.time == 0.02

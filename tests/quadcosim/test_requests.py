@@ -1,4 +1,4 @@
-"""What runs can be asked for by: requests, paths of their files, dictionaries, lists; anything else is refused."""
+"""Requests can be objects, paths of their files, dictionaries, lists; anything else is refused."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -13,9 +13,9 @@ from tests.native import NATIVE, assert_the_same
 SHORT = NATIVE.with_changes(stop_time=0.1)
 ENTRIES: dict[str, Callable[[Any], object]] = {
     "run": quadcosim.run,
-    "limit": lambda asked: quadcosim.limit(asked, "period", workers=1),
-    "fly": lambda asked: quadcosim.fly(asked, {"seed": [0]}),
-    "fly_until": lambda asked: quadcosim.fly_until(asked, 0.1, "nowhere"),
+    "limit": lambda request: quadcosim.limit(request, "period", workers=1),
+    "fly": lambda request: quadcosim.fly(request, {"seed": [0]}),
+    "fly_until": lambda request: quadcosim.fly_until(request, 0.1, "nowhere"),
     "Simulation": quadcosim.Simulation,
 }
 
@@ -47,11 +47,11 @@ def test_a_list_gives_a_list(expected: Result) -> None:
 
 
 @pytest.mark.parametrize("entry", ENTRIES)
-@pytest.mark.parametrize("asked", [3, Scenario, object(), {3}], ids=["number", "class", "object", "set"])
-def test_anything_else_is_refused_with_what_is_expected(entry: str, asked: Any) -> None:
+@pytest.mark.parametrize("argument", [3, Scenario, object(), {3}], ids=["number", "class", "object", "set"])
+def test_anything_else_is_refused_with_what_is_expected(entry: str, argument: Any) -> None:
     expected = r": expected a Scenario, a System, the path of a file of one, or its tables as a dictionary$"
     with pytest.raises(UsageError, match=expected):
-        ENTRIES[entry](asked)
+        ENTRIES[entry](argument)
 
 
 def test_a_vehicle_is_known_by_its_name() -> None:
