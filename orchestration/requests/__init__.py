@@ -1,1 +1,1 @@
-"""What can be asked to run: a system, a scenario, an SSP."""
+"""Requests to run: a system, a scenario, an SSP."""

@@ -1,4 +1,4 @@
-"""Networks from a database of a CAN bus: a DBC file, or another one that cantools reads."""
+"""Networks from a CAN database: a DBC file, or another one that cantools reads."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,25 +10,25 @@ from orchestration.basics.extras import needs
 
 ENDINGS = (".dbc", ".arxml", ".kcd", ".sym")
 BIT_RATE, DATA_BIT_RATE = 500e3, 2e6
-"""[1/s], where no database says them"""
+"""[1/s], where the database has none"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Bus:
-    """What a database says of a bus."""
+    """A bus of a CAN database."""
 
     networks: dict[str, Any]
-    """the table of a system file"""
+    """the table `networks` of a system file"""
     guessed: tuple[str, ...]
     undecided: tuple[str, ...]
-    """messages that are not in it, and why"""
+    """messages that are left out, and why"""
 
 
 @needs("cantools")
 def bus_of(path: Path) -> Bus:
     """The table `networks` of a system file, with each message that has an identifier of 11 bits and a cycle time.
 
-    All are load: which connection goes over the bus no database says. Raises `UsageError` for a file that is none.
+    All are load, as a database has no connections. Raises `UsageError` for a file that is no CAN database.
     """
     import cantools
 
@@ -37,7 +37,7 @@ def bus_of(path: Path) -> Bus:
             database = cantools.database.load_file(path, strict=False)
         except OSError:
             raise
-        except Exception as error:  # of many kinds, those of its parsers among them
+        except Exception as error:  # of many types, including those of its parsers
             raise UsageError(f"{path}: expected a CAN database: {str(error) or type(error).__name__}") from error
     messages, undecided = {}, []
     for message in getattr(database, "messages", []):
@@ -62,13 +62,15 @@ def bus_of(path: Path) -> Bus:
 
 
 def _rates(path: Path, database: Any, is_fd: bool) -> tuple[dict[str, float], tuple[str, ...]]:
-    """The bit rates, and which of them the database does not say."""
+    """The bit rates, and messages on those that the database does not have."""
     buses = getattr(database, "buses", [])
-    told = {
+    declared = {
         "bit_rate": next((bus.baudrate for bus in buses if bus.baudrate), None),
         "data_bit_rate": next((bus.fd_baudrate for bus in buses if getattr(bus, "fd_baudrate", None)), None),
     }
-    usual = {"bit_rate": BIT_RATE, **({"data_bit_rate": DATA_BIT_RATE} if is_fd else {})}
-    rates = {key: float(told[key] or value) for key, value in usual.items()}
-    guessed = [f"{path.stem}.{key} is {rates[key]:g}, as {path.name} does not say it" for key in usual if not told[key]]
+    defaults = {"bit_rate": BIT_RATE, **({"data_bit_rate": DATA_BIT_RATE} if is_fd else {})}
+    rates = {key: float(declared[key] or value) for key, value in defaults.items()}
+    guessed = [
+        f"{path.stem}.{key} is {rates[key]:g}, as {path.name} does not have it" for key in defaults if not declared[key]
+    ]
     return rates, tuple(guessed)

@@ -1,4 +1,4 @@
-"""Where a limit is looked for: the quantities, and how each is scanned."""
+"""Search ranges of limits: the quantities, and the scan of each."""
 
 import math
 from collections.abc import Mapping
@@ -18,14 +18,14 @@ from orchestration.system.sampling import TaskSampling
 
 PERIOD = "period"
 QUANTITIES = (PERIOD, "delay", "jitter", "loss")
-"""Names by which a request may know quantities; any other is a path"""
+"""Names of quantities that a request may have; any other is a path"""
 STEPS, PARTS = 20, 50
-"""of a range that is given: values of the scan, and parts of its step to which the last bracket is brought together"""
+"""Of a given range: the number of steps of the scan, and of tolerances in a step"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Varied:
-    """A request in one quantity, all else as it is."""
+    """A request as a function of one quantity."""
 
     request: Request
     of: str
@@ -39,12 +39,12 @@ class Varied:
 
     @cached_property
     def system(self) -> System:
-        """As it is."""
+        """The unchanged system."""
         return system_of(self.request)
 
     @cached_property
     def paths(self) -> tuple[str, ...]:
-        """What is changed; raises `UsageError` for what is not there."""
+        """The paths of the quantity; raises `UsageError` for an unknown one."""
         known = [name for name in QUANTITIES if self.request.range_of(name) is not None]
         if self.of in known:
             return paths_in(self.request, f"timing.{self.of}")
@@ -56,7 +56,7 @@ class Varied:
         return paths_in(self.request, self.of)
 
     def at(self, value: float) -> System:
-        """With another value; raises `UsageError` for one that cannot be."""
+        """The system with another value; raises `UsageError` for an invalid one."""
         with errors_in_own_terms(self.request):
             return changed(self.system, dict.fromkeys(self.paths, value))
 
@@ -70,13 +70,13 @@ def search_range(
     tolerance: float | None,
     scan: float | None,
 ) -> Range:
-    """The range in which a quantity is looked for; raises `UsageError` for one that cannot be."""
+    """The range in which a limit is searched; raises `UsageError` for an invalid one."""
     for flag, value in (("tolerance", tolerance), ("scan", scan)):
         if value is not None and not (value > 0.0 and math.isfinite(value)):
             raise UsageError(f"--{flag} {value}: expected a positive number")
     known = varied.request.range_of(varied.of) or _range_of_period(varied)
     if known is None and (first is None or last is None):
-        raise UsageError(f"--of {varied.of}: expected --from and --to, between which it is looked for")
+        raise UsageError(f"--of {varied.of}: expected --from and --to, between which it is searched")
     low = first if first is not None else known.first if known is not None else 0.0
     high = last if last is not None else known.last if known is not None else 0.0
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
@@ -93,9 +93,9 @@ def search_range(
 
 
 def default_quantity(request: Request) -> str:
-    """What is looked for where nobody says what: the period, of a system that of its only sampled component.
+    """The default quantity: the period, or that of the only sampled component of a system.
 
-    Raises `UsageError` naming the periods of a system that has none or several.
+    Raises `UsageError` for a system that has none or several, naming the periods.
     """
     if request.range_of(PERIOD) is not None:
         return PERIOD
@@ -110,7 +110,7 @@ def default_quantity(request: Request) -> str:
 
 
 def _range_of_period(varied: Varied) -> Range | None:
-    """From half of the period of a sampled component to fifty times of it, as that of the quadrotor is scanned."""
+    """From half to fifty times the period of a sampled component, as for the quadrotor."""
     is_task = varied.of.startswith("computers.") and varied.of.endswith(f".{PERIOD}")
     if not (is_task or varied.of.endswith(f".sampling.{PERIOD}")):
         return None
@@ -119,7 +119,7 @@ def _range_of_period(varied: Varied) -> Range | None:
 
 
 def unit_at(path: str, models: Mapping[str, Model]) -> str | None:
-    """The unit of the value at a path of a system; None where it has none, or none is known."""
+    """The unit of the value at a path of a system; None if it has none or is unknown."""
     if is_in_seconds(path):
         return "s"
     for name, model in models.items():
@@ -131,7 +131,7 @@ def unit_at(path: str, models: Mapping[str, Model]) -> str | None:
 
 
 def paths_in(base: Request, target: str) -> tuple[str, ...]:
-    """The paths of a target in the system that `base` means; raises `UsageError` where there is no such."""
+    """The paths of a target in the system of `base`; raises `UsageError` for an unknown target."""
     paths = base.paths_of(target)
     for path in paths:
         value_at(system_of(base), path)

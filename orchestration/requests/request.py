@@ -1,4 +1,4 @@
-"""What can be asked to run: a system file or a scenario of the quadrotor, both TOML; an SSP and its timing."""
+"""Reads requests to run: a system file or a scenario of the quadrotor, both TOML; an SSP with its timing."""
 
 import copy
 import os
@@ -17,20 +17,20 @@ from orchestration.system.request import Request
 from orchestration.system.system_file import is_system, system_from_tables
 
 FILES = (translation.SYSTEM,)
-"""What requests are changes of, beside the code"""
+"""The files that requests are based on, beside the code"""
 SSP_ENDINGS = (".ssp", ".ssd")
 SSP = "ssp"
 """Key of a file with timing: the SSP that it is for"""
 
 
 RequestLike: TypeAlias = Request | str | os.PathLike[str] | Mapping[str, Any]
-"""A request, the path of its file, or what stands in that as a dictionary"""
+"""A request, the path of its file, or the content of the file as a dictionary"""
 
 
 def request_of(request: RequestLike) -> Request:
-    """The request of whatever form it has; relative paths of a dictionary start at the current folder.
+    """The request in any of these forms; relative paths of a dictionary start at the current folder.
 
-    Raises `UsageError` for what is none, and as `load_request`.
+    Raises `UsageError` for anything else, and as `load_request`.
     """
     if isinstance(request, (str, os.PathLike)):
         return load_request(Path(request))
@@ -43,30 +43,30 @@ def request_of(request: RequestLike) -> Request:
 
 
 def default_scenario() -> Scenario:
-    """What runs where nobody says what: the paper's flight."""
+    """The default: the paper's flight."""
     return Scenario()
 
 
 def load_request(path: str | Path, timing: str | Path | None = None) -> Scenario | System:
     """Read a system file, a scenario file, or an SSP with a file of its `timing`; paths are relative to their file.
 
-    A file with timing that names its SSP is as good as both; without one, an SSP has the timing of its annotation.
+    A file with timing may be given alone if it names its SSP; without one, an SSP has the timing of its annotation.
     Raises `UsageError` for a file that cannot be read, a key that does not exist (naming those that do) or a value of
-    the wrong kind.
+    the wrong type.
     """
     path = Path(path)
     if path.suffix.lower() in SSP_ENDINGS:
-        on_top = None if timing is None else read_toml(Path(timing), "file with timing")
+        overlay = None if timing is None else read_toml(Path(timing), "file with timing")
         if (
-            on_top is not None
-            and SSP in on_top
-            and (Path(timing or "").parent / str(on_top.pop(SSP))).resolve() != path.resolve()
+            overlay is not None
+            and SSP in overlay
+            and (Path(timing or "").parent / str(overlay.pop(SSP))).resolve() != path.resolve()
         ):
             raise UsageError(f"{timing}: ssp: names another file than {path}")
         with _errors_naming(path if timing is None else Path(timing)):
-            return _from_ssp(path, on_top, path.parent if timing is None else Path(timing).parent)
+            return _from_ssp(path, overlay, path.parent if timing is None else Path(timing).parent)
     if timing is not None:
-        raise UsageError(f"{timing}: expected no second file; only an SSP leaves its timing to one")
+        raise UsageError(f"{timing}: expected no second file; only an SSP has its timing in one")
     tables = read_toml(path, "system or scenario file")
     with _errors_naming(path):
         if isinstance(tables.get(SSP), str):
@@ -80,13 +80,14 @@ def request_from_tables(tables: dict[str, Any], folder: Path) -> Scenario | Syst
 
 
 def _from_ssp(path: Path, timing: dict[str, Any] | None, folder: Path) -> System:
-    from orchestration.requests.ssp.reading import tables_of  # with it comes XML, which no other file needs
+    from orchestration.requests.ssp.reading import tables_of  # which loads XML, needed for no other file
 
     return system_from_tables(tables_of(path, timing), folder)
 
 
 @contextmanager
 def _errors_naming(path: Path) -> Iterator[None]:
+    """Begin the message of each `UsageError` with the path."""
     try:
         yield
     except UsageError as error:

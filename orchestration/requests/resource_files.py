@@ -1,4 +1,4 @@
-"""Files of tasks and messages among others, and what they say."""
+"""Computers and networks from files of tasks and messages."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,8 +9,8 @@ from orchestration.requests import can_database, task_table
 from orchestration.system.proposal import Resources
 
 
-def resources_of(given: Sequence[str]) -> tuple[Resources, list[str]]:
-    """The computers and networks of the files that have them, and what is given besides.
+def resources_of(arguments: Sequence[str]) -> tuple[Resources, list[str]]:
+    """The computers and networks of the files that have them, and the other arguments.
 
     Raises `UsageError` for a file that cannot be read, and where two have the same computer or network.
     """
@@ -18,7 +18,7 @@ def resources_of(given: Sequence[str]) -> tuple[Resources, list[str]]:
     guessed: list[str] = []
     undecided: list[str] = []
     others = []
-    for text in given:
+    for text in arguments:
         path = Path(text)
         if path.suffix.lower() == ".csv":
             _add(tables, "computers", path, task_table.computers_of(path))

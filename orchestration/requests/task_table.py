@@ -1,4 +1,4 @@
-"""Computers from a table of tasks: a CSV file with a row for each task and columns named as the keys of one."""
+"""Computers from a table of tasks: a CSV file with a row for each task, and its keys as columns."""
 
 import csv
 import dataclasses
@@ -11,17 +11,17 @@ from orchestration.basics.errors import UsageError, expected_name
 from orchestration.system.computers import Task
 
 UNITS = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9}
-"""Of times, as a column says behind its name: `period [ms]`"""
+"""Units of times, after the name of a column: `period [ms]`"""
 TIMES = ("period", "offset", "jitter", "execution", "deadline")
 TEXTS = ("component", "on", "read", "write", "overrun")
 COLUMNS = ("name", "computer", "priority", *TIMES, *TEXTS)
 
 
 def computers_of(path: Path) -> dict[str, Any]:
-    """The table `computers` of a system file, for the tasks of a CSV file; without a column `computer` of one.
+    """The table `computers` of a system file from a CSV file; without a column `computer`, all tasks are on one.
 
-    Times are in seconds, or in the unit that a column says: `period [ms]`. A cell that is empty is not said. Raises
-    `UsageError`, naming the line, for what cannot be.
+    Times are in seconds, or in the unit of their column: `period [ms]`. An empty cell stands for the default. Raises
+    `UsageError`, naming the line, for an invalid value.
     """
     with readable(path, "CSV file"), path.open(newline="", encoding="utf-8-sig") as file:
         rows = csv.reader(file, strict=True)
@@ -56,13 +56,13 @@ def _column(path: Path, header: str) -> tuple[str, float]:
 def _add(computers: dict[str, Any], path: Path, place: str, columns: list[tuple[str, float]], row: list[str]) -> None:
     if len(row) != len(columns):
         raise UsageError(f"{place}: {len(row)} values, expected {len(columns)} as in the header")
-    said = {name: (cell.strip(), unit) for (name, unit), cell in zip(columns, row, strict=True) if cell.strip()}
-    keys = {name: _value(place, name, *cell) for name, cell in said.items() if name not in ("name", "computer")}
-    if "name" not in said:
+    given = {name: (cell.strip(), unit) for (name, unit), cell in zip(columns, row, strict=True) if cell.strip()}
+    keys = {name: _value(place, name, *cell) for name, cell in given.items() if name not in ("name", "computer")}
+    if "name" not in given:
         raise UsageError(f"{place}: name: expected one for each task")
-    name = said["name"][0]
+    name = given["name"][0]
     tasks: dict[str, Mapping[str, Any]] = computers.setdefault(
-        said.get("computer", (path.stem, 1.0))[0], {"tasks": {}}
+        given.get("computer", (path.stem, 1.0))[0], {"tasks": {}}
     )["tasks"]
     if name in tasks:
         raise UsageError(f"{place}: name = {name}: expected another one than those before it")

@@ -1,1 +1,1 @@
-"""Systems as SSP 1.0 files: written for other people's tools, and read with what SSP does not know on top."""
+"""Systems as SSP 1.0 files: written for third-party tools, and read with a file of timing, which SSP lacks."""

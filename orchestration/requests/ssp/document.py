@@ -1,4 +1,4 @@
-"""The XML of SSP: made, and read as valid by its schema."""
+"""The XML documents of SSP: written, and read with validation by their schemas."""
 
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ SCHEMAS = {
     "ssv": "SystemStructureParameterValues.xsd",
     "ssm": "SystemStructureParameterMapping.xsd",
 }
-"""That fmpy brings, by the prefix of the root"""
+"""The schemas in fmpy, by the prefix of the root"""
 LARGEST = 2**24
 """Bytes of a document"""
 
@@ -46,7 +46,7 @@ def add(parent: Element, tag: str, **attributes: str) -> Element:
 
 
 def document(root: Element) -> bytes:
-    """The text of a document, with the prefixes that libcosim and ecos insist on."""
+    """The text of a document, with the prefixes that libcosim and ecos require."""
     for prefix, uri in NAMESPACES.items():
         register_namespace(prefix, uri)
     indent(root)
@@ -67,7 +67,7 @@ def read(path: Path, kind: str) -> Read:
         raise UsageError(f"{path}: expected a readable {what}: {error.msg}") from error
     try:
         ssd.validate_tree(root, SCHEMAS[kind])
-    except Exception as error:  # which says all that is wrong, each on a line of its own
+    except Exception as error:  # which lists all errors, one per line
         first = str(error).splitlines()[1:2] or [str(error)]
         for uri in NAMESPACES.values():
             first[0] = first[0].replace(f"{{{uri}}}", "")

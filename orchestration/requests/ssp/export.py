@@ -1,4 +1,4 @@
-"""What of a system other masters can be given: FMUs with their parameters, wires, and one step for all."""
+"""The part of a system that an SSP carries: FMUs with their parameters, connections, and one step for all."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
@@ -30,10 +30,10 @@ class Part:
     fmu: Path
     model: Model
     parameters: dict[str, Parameter]
-    """all that have a start value, and inputs that are given one"""
+    """all parameters with a start value, and inputs that have a value"""
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    """what is connected"""
+    """the connected ones"""
 
     def variable(self, name: str) -> Variable:
         """The declaration of a variable."""
@@ -42,26 +42,26 @@ class Part:
 
 @dataclass(frozen=True, kw_only=True)
 class Export:
-    """A system for other masters."""
+    """A system for third-party masters."""
 
     system: System
     parts: tuple[Part, ...]
-    """sampled ones first, each kind as this project's master has them at one instant: so a tool that steps one
-    after the other exchanges what this master does"""
+    """sampled ones first, each kind in the order of this project's master at one instant: so a tool that steps them in
+    order exchanges the same values"""
     step: float
     """communication step of all [s]"""
     unsupported: tuple[str, ...]
-    """what other masters are not told, a line each that names its place"""
+    """a line for each feature that an SSP lacks, with its place"""
 
 
-def export_of(asked: Request, announce: Callable[[str], None] | None = None) -> Export:
-    """What other masters are given of a system, and what they cannot be told.
+def export_of(request: Request, announce: Callable[[str], None] | None = None) -> Export:
+    """The part of a system that an SSP carries, and the features that it lacks.
 
-    That is: anything late, lost or noisy, a source that is no constant, and components at steps of their own. A
-    sampled component needs the common step for its period, or an FMU with a clock of its own by `sample_period`.
+    Those are: faults and noise, sources that are no constant, and different steps. A sampled component needs the common
+    step as its period, or an FMU with its own clock by `sample_period`.
     """
-    with errors_in_own_terms(asked):
-        system = asked.as_system()
+    with errors_in_own_terms(request):
+        system = request.as_system()
         located = fmus.of_components(system.fmus, announce)
         models = {name: read_model(path) for name, path in located.items()}
         check(system, models)
@@ -73,12 +73,12 @@ def export_of(asked: Request, announce: Callable[[str], None] | None = None) -> 
             system=system,
             parts=tuple(_part(system, name, located[name], models[name]) for name in plan.sampled + plan.continuous),
             step=step,
-            unsupported=tuple(map(asked.in_own_terms, unsupported)),
+            unsupported=tuple(map(request.in_own_terms, unsupported)),
         )
 
 
 def _held(system: System) -> System:
-    """With a constant for each input that is fed a motion at rest, which is all that other masters can be told of."""
+    """The system with a constant for each input that is fed a motion at rest."""
     sources: dict[str, Source] = {}
     for name, source in system.sources.items():
         if source.signal != AT_REST or not source.to:
@@ -92,12 +92,12 @@ def _held(system: System) -> System:
     return replace(system, sources=sources)
 
 
-def complete_export(asked: Request, announce: Callable[[str], None] | None = None) -> Export:
-    """As `carried`; raises `UsageError` for the first that other masters cannot be told."""
-    given = export_of(asked, announce)
-    if given.unsupported:
-        raise UsageError(given.unsupported[0])
-    return given
+def complete_export(request: Request, announce: Callable[[str], None] | None = None) -> Export:
+    """As `export_of`; raises `UsageError` for the first feature that an SSP lacks."""
+    export = export_of(request, announce)
+    if export.unsupported:
+        raise UsageError(export.unsupported[0])
+    return export
 
 
 def _unsupported(system: System) -> Iterator[str]:
@@ -106,7 +106,7 @@ def _unsupported(system: System) -> Iterator[str]:
             yield from _not_plain(f"components.{name}.sampling", component.sampling, ("jitter", "clock_ratio"))
     for table in ("computers", "networks"):
         for name in getattr(system, table):
-            yield f"{table}.{name}: an SSP cannot say that; expected none"
+            yield f"{table}.{name}: an SSP cannot express that; expected none"
     for x in system.connections:
         yield from _not_plain(f"connections.{x.name}", x, FAULTS)
     for name, source in system.sources.items():
@@ -116,7 +116,7 @@ def _unsupported(system: System) -> Iterator[str]:
 
 
 FAULTS = ("delay", "delay_jitter", "loss", "hold", "noise", "quantisation")
-"""Of a connection, what no other master can say"""
+"""The fields of a connection that an SSP lacks"""
 
 
 def _not_plain(place: str, of: Sampling | Connection, keys: tuple[str, ...]) -> Iterator[str]:
@@ -125,16 +125,13 @@ def _not_plain(place: str, of: Sampling | Connection, keys: tuple[str, ...]) -> 
         value = getattr(of, key)
         if isinstance(value, Mapping):
             if any(value.values()):
-                yield f"{place}.{key}: an SSP cannot say that; expected none"
+                yield f"{place}.{key}: an SSP cannot express that; expected none"
         elif value != defaults[key]:
-            yield f"{place}.{key} = {value}: an SSP cannot say that; expected {defaults[key]}"
+            yield f"{place}.{key} = {value}: an SSP cannot express that; expected {defaults[key]}"
 
 
 def _common_step(system: System, models: Mapping[str, Model]) -> tuple[float, list[str]]:
-    """The step of all components in continuous time, or the period of all others where there are none.
-
-    The first of them, and what differs from it.
-    """
+    """The first step of the components in continuous time, or else the first period; and a line for each other."""
     steps = {f"components.{name}.step": c.step for name, c in system.components.items() if c.step is not None}
     by_master = {
         name: c.sampling
@@ -150,7 +147,7 @@ def _common_step(system: System, models: Mapping[str, Model]) -> tuple[float, li
         if step != first
     ]
     unsupported += [
-        f"components.{name}.sampling.offset = {sampling.offset}: an SSP cannot say that; expected 0"
+        f"components.{name}.sampling.offset = {sampling.offset}: an SSP cannot express that; expected 0"
         for name, sampling in by_master.items()
         if sampling.offset != 0.0
     ]
@@ -178,7 +175,7 @@ def _outputs(system: System, name: str, model: Model) -> tuple[str, ...]:
 
 
 def _constants(system: System, name: str) -> dict[str, Parameter]:
-    """Inputs that a source holds."""
+    """The values of inputs that constants feed."""
     return {
         variable_of(end): source.constant
         for source in system.sources.values()
@@ -188,7 +185,7 @@ def _constants(system: System, name: str) -> dict[str, Parameter]:
 
 
 def _values(component: Component, model: Model, constants: Mapping[str, Parameter]) -> dict[str, Parameter]:
-    """In the order of the FMU: every parameter that is a number, and what else is given."""
+    """The values of a component in the order of the FMU: all numeric parameters, and others that are given."""
     given = {**component.parameters, **constants}
     if component.sampling is not None and model.has_clock:
         given |= {SAMPLE_PERIOD: component.sampling.period, SAMPLE_OFFSET: component.sampling.offset}
@@ -198,7 +195,7 @@ def _values(component: Component, model: Model, constants: Mapping[str, Paramete
             continue
         if variable.name in given:
             value = _typed(given[variable.name], variable)
-            # A Boolean only if it is not what it is anyway: fmpy takes the text false for true.
+            # A Boolean only if it is not the start value: fmpy reads the text false as true.
             if variable.kind != "Boolean" or str(value).lower() != variable.start:
                 found[variable.name] = value
         elif variable.causality == "parameter" and variable.kind in ("Real", "Integer") and variable.start is not None:
@@ -210,5 +207,5 @@ def _typed(value: Parameter, variable: Variable) -> Parameter:
     if variable.kind == "Real":
         return float(value)
     if variable.kind in ("Integer", "Enumeration") and isinstance(value, float):
-        return round(value)  # of a source, or of the command line
+        return round(value)  # from a source, or from the command line
     return bool(value) if variable.kind == "Boolean" and not isinstance(value, str) else value

@@ -1,6 +1,6 @@
-"""Names within an SSP that other people's tools ask for."""
+"""Names within an SSP that third-party tools need."""
 
 PARAMETER_SET = "scenario"
 """Name of each parameter set."""
 SYSTEM_PARAMETERS = "resources/scenario.ssv"
-"""The set with the names of the components before those of the parameters."""
+"""The set with the parameters of all components, their names prefixed."""

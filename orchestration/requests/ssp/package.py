@@ -19,13 +19,13 @@ LARGEST = 2**32
 
 @dataclass(frozen=True, kw_only=True)
 class Package:
-    """Where the files of an SSP are."""
+    """The files of an SSP."""
 
     structure: Path
     """its .ssd"""
 
     def file(self, source: str, base: Path | None = None) -> Path:
-        """The file that a source in a document means, relative to the .ssd or to `base`; raises `UsageError`."""
+        """The file of a source in a document, relative to the .ssd or to `base`; raises `UsageError`."""
         parts = urlsplit(source)
         if parts.scheme not in ("", "file") or parts.netloc:
             raise UsageError(f"source {source}: expected a file of the SSP")
@@ -36,7 +36,7 @@ class Package:
 
 
 def opened(path: Path) -> Package:
-    """The SSP of an .ssp or .ssd file; raises `UsageError` for what is none."""
+    """The SSP of an .ssp or .ssd file; raises `UsageError` for anything else."""
     if path.suffix.lower() == ".ssd":
         return Package(structure=path)
     with readable(path, "SSP archive"), path.open("rb") as file:
@@ -60,7 +60,7 @@ def _cache() -> Path:
 
 
 def _unpack(path: Path, folder: Path) -> None:
-    """All files or none; names that lead out of the folder are cut by zipfile."""
+    """Unpack all files or none; zipfile cuts names that lead out of the folder."""
     if not zipfile.is_zipfile(path):
         raise UsageError(f"{path}: expected an SSP archive, which is a zip file")
     folder.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""The values that the parameter bindings of an element give, mapped, by their names there."""
+"""The values in the parameter bindings of an element, after their mappings."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from orchestration.system.conversion import Conversion
 
 @dataclass(frozen=True, kw_only=True)
 class Value:
-    """A value and the unit that it is in."""
+    """A value with its unit."""
 
     value: Parameter
     unit: str | None
@@ -24,7 +24,7 @@ class Value:
 
 
 def values_of(element: Read, package: Package, component: Path) -> Iterator[tuple[str, Value]]:
-    """What an element's bindings give; what is bound later is taken. Raises `UsageError`.
+    """The values of the bindings of an element; a later one overrides. Raises `UsageError`.
 
     `component` is the file that a source with `sourceBase` component is relative to.
     """
@@ -63,7 +63,7 @@ def _value(name: str, kind: str, text: str) -> Parameter:
 
 
 def _mapped(given: dict[str, Value], mapping: Read, package: Package, component: Path) -> Iterator[tuple[str, Value]]:
-    """By the entries of a mapping; what it does not name is not given."""
+    """The values by the entries of a mapping; others are dropped."""
     if mapping.get("source") is not None:
         base = component if mapping.get("sourceBase") == "component" else None
         roots = [read(package.file(mapping.get("source"), base), "ssm")]
@@ -85,7 +85,7 @@ def _mapped(given: dict[str, Value], mapping: Read, package: Package, component:
 
 
 def transformation(parent: Read) -> Conversion:
-    """The linear transformation of a connection or of an entry of a mapping; raises `UsageError` for another one."""
+    """The linear transformation of a connection or of an entry of a mapping; raises `UsageError` for other kinds."""
     for child in all_of(parent, "*"):
         name = child.tag.rpartition("}")[2]
         if name == "LinearTransformation":
@@ -96,7 +96,7 @@ def transformation(parent: Read) -> Conversion:
 
 
 def definitions_in(root: Read, path: str) -> dict[str, BaseUnits]:
-    """Units of a document by name."""
+    """The units of a document by name."""
     found = {}
     for unit in all_of(root, path):
         (base,) = all_of(unit, "ssc:BaseUnit")

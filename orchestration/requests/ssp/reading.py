@@ -1,4 +1,4 @@
-"""From an SSP, and a file with the timing that SSP has no words for, to the tables of a system file."""
+"""The tables of a system file from an SSP and a file with the timing that SSP lacks."""
 
 import re
 from collections.abc import Mapping, Sequence, Set
@@ -26,22 +26,22 @@ CLOCK = (SAMPLE_PERIOD, SAMPLE_OFFSET)
 
 @dataclass(frozen=True, kw_only=True)
 class Signal:
-    """A connection of two components."""
+    """A signal from one component to another."""
 
     start: str
     end: str
     """COMPONENT.VARIABLE"""
     conversion: Conversion
     stated: bool
-    """whether that is all there is to its units, by suppressUnitConversion somewhere on the way"""
+    """whether suppressUnitConversion is set somewhere on the way, so that the conversion includes that of units"""
 
 
 def tables_of(path: Path, timing: Mapping[str, Any] | None) -> dict[str, Any]:
-    """The tables of the system file that an SSP and the `timing` on top of it mean; None: that of its annotation.
+    """The tables of the system file for an SSP with a `timing`; None: that of its annotation.
 
-    A component is stepped as `timing` says, else in continuous time with the step that the SSP's annotations name.
-    Components that `timing` has come first, in its order, which decides ties. Raises `UsageError` for what is not
-    read, what does not exist, and a step or end that nobody says.
+    A component is stepped as in `timing`, else in continuous time with the step in the SSP's annotations. Components in
+    `timing` come first, in its order, which decides ties. Raises `UsageError` for unsupported elements, names that do
+    not exist, and a missing step or end.
     """
     package = opened(path)
     structure = structure_of(read(package.structure, "ssd"), package)
@@ -63,7 +63,7 @@ def tables_of(path: Path, timing: Mapping[str, Any] | None) -> dict[str, Any]:
 
 
 def _names(paths: Sequence[Path_] | Mapping[Path_, Any]) -> dict[Path_, str]:
-    """Components by their path, with _ between and for what no name can have."""
+    """The names of components: their paths joined by _, which also replaces invalid characters."""
     names = {path: re.sub(r"\W", "_", "_".join(path), flags=re.ASCII) for path in paths}
     for path, name in names.items():
         same = [".".join(other) for other, its in names.items() if its == name]
@@ -92,9 +92,9 @@ def _components(
     fed: Set[str],
     tasks: Set[str],
 ) -> dict[str, Any]:
-    """In the order of `timing`, then in that of the SSP; its values for inputs that sources feed are left out.
+    """The components in the order of `timing`, then in that of the SSP, without values for inputs in `fed`.
 
-    Those that are `tasks` of computers are stepped when these say.
+    Those in `tasks` are stepped by their computers.
     """
     for name in timing:
         if name not in names.values():
@@ -106,7 +106,7 @@ def _components(
         given = dict(timing.get(name, {}))
         parameters = _parameters(structure, place, models[place])
         parameters = {key: value for key, value in parameters.items() if f"{name}.{key}" not in fed}
-        if "sampling" in given or name in tasks:  # which goes before the clock that the SSP gave the component
+        if "sampling" in given or name in tasks:  # which overrides the clock of the SSP
             parameters = {key: value for key, value in parameters.items() if key not in CLOCK}
         parameters |= dict(given.pop("parameters", {}))
         table = {"fmu": str(structure.components[place]), "parameters": parameters, **given}
@@ -122,14 +122,14 @@ def _components(
 
 
 def _parameters(structure: Structure, place: Path_, model: Model) -> dict[str, Parameter]:
-    """Values for a component, in the units of its FMU; those for what is connected to a component are left out."""
+    """Values for a component, in the units of its FMU, without those for inputs connected to a component."""
     found = {}
     for node, value in structure.values.items():
-        if node[0] == place and _giver(structure, node) is None:
+        if node[0] == place and _source_of(structure, node) is None:
             found[node[1]] = _in_own_unit(structure, node, value, model)
     for node in [node for node in structure.wires if node[0] == place]:
         wires = list(structure.way_to(node))
-        for wire in reversed(wires):  # the value that is set furthest out
+        for wire in reversed(wires):  # the outermost value
             if wire.start in structure.values and wire.start[0] not in structure.components:
                 outer = _in_own_unit(structure, wire.start, structure.values[wire.start], None)
                 found[node[1]] = _passed(outer, wires[: wires.index(wire) + 1], structure, model)
@@ -137,8 +137,8 @@ def _parameters(structure: Structure, place: Path_, model: Model) -> dict[str, P
     return found
 
 
-def _giver(structure: Structure, node: Node) -> Node | None:
-    """The component's output at the other end of what is connected to a connector."""
+def _source_of(structure: Structure, node: Node) -> Node | None:
+    """The output of a component from which the wires lead to a connector; None if there is none."""
     wires = list(structure.way_to(node))
     return wires[-1].start if wires and wires[-1].start[0] in structure.components else None
 
@@ -164,20 +164,20 @@ def _in_own_unit(structure: Structure, node: Node, value: Value, model: Model | 
 
 
 def _signals(structure: Structure, names: Mapping[Path_, str], models: Mapping[Path_, Model]) -> list[Signal]:
-    """What goes from component to component, in the order of the document's components and their connectors."""
+    """The signals between components, in the order of the document's components and their connectors."""
     found = []
     for node in structure.kinds:
-        giver = _giver(structure, node) if node[0] in names else None
-        if giver is not None:
+        source = _source_of(structure, node) if node[0] in names else None
+        if source is not None:
             wires = list(structure.way_to(node))
             conversion, stated = _along(wires, structure, models), not all(wire.converts_units for wire in wires)
-            start, end = (f"{names[place]}.{variable}" for place, variable in (giver, node))
+            start, end = (f"{names[place]}.{variable}" for place, variable in (source, node))
             found.append(Signal(start=start, end=end, conversion=conversion, stated=stated))
     return found
 
 
 def _along(wires: Sequence[Wire], structure: Structure, models: Mapping[Path_, Model]) -> Conversion:
-    """What becomes of a value on its way, the last wire first: transformations, each followed by that of units."""
+    """The conversion along wires, given from the last: each transformation, followed by that of units."""
     result = Conversion()
     for wire in reversed(wires):
         result = result.then(wire.transformation)
@@ -210,7 +210,7 @@ def _conversion(one: BaseUnits | None, other: BaseUnits | None, place: str) -> C
 
 
 def _connections(signals: Sequence[Signal], timing: object) -> list[dict[str, Any]]:
-    """Those that the timing names by their ends, in its order, then the others: a message for each pair."""
+    """The connections that the timing names by their ends, in its order, then a message for each other pair."""
     left = list(signals)
     tables = []
     for index, table in enumerate(timing if isinstance(timing, list) else []):
@@ -237,13 +237,13 @@ def _connections(signals: Sequence[Signal], timing: object) -> list[dict[str, An
 
 def _table(members: Sequence[Signal]) -> dict[str, Any]:
     conversion, stated = members[0].conversion, members[0].stated
-    is_said = stated or not conversion.is_none
-    changed = {"scale": conversion.scale, "offset": conversion.offset} if is_said else {}
+    is_stated = stated or not conversion.is_none
+    changed = {"scale": conversion.scale, "offset": conversion.offset} if is_stated else {}
     return {"from": [signal.start for signal in members], "to": [signal.end for signal in members], **changed}
 
 
 def _named(place: str, table: Mapping[str, Any], signals: Sequence[Signal]) -> list[Signal]:
-    """The signals that a table of the timing means by its ends: each by name, or all between two components."""
+    """The signals of a table of the timing: each by the names of its ends, or all between two components."""
     starts, ends = ([end] if isinstance(end, str) else end for end in (table.get("from"), table.get("to")))
     if not (isinstance(starts, list) and isinstance(ends, list) and len(starts) == len(ends) > 0):
         raise UsageError(f"{place}: expected from and to: as many ends, or a component each")

@@ -1,4 +1,4 @@
-"""What an SSP can say and masters that were tried do not take (`docs/guides/ssp.md` has them)."""
+"""Contents of an SSP that tested masters reject (see `docs/guides/ssp.md`)."""
 
 from collections.abc import Iterator
 
@@ -8,16 +8,16 @@ from orchestration.system.component import Parameter
 from orchestration.system.variable_names import variable_of
 
 
-def rejections(given: Export) -> Iterator[str]:
-    """Values and connections, a line each that names the place, in the words of a system, and the masters."""
-    parts = {part.name: part for part in given.parts}
-    for part in given.parts:
+def rejections(export: Export) -> Iterator[str]:
+    """A line for each rejected value and connection, with its place in the system and the masters."""
+    parts = {part.name: part for part in export.parts}
+    for part in export.parts:
         for name, value in part.parameters.items():
             masters = _masters_without(part, name, value)
             if masters is not None:
                 kind, instead = part.variable(name).kind, _integer_instead(part, name, value)
                 yield f"components.{part.name}.parameters.{name} = {value}: of type {kind}; {masters}{instead}"
-    for x in given.system.connections:
+    for x in export.system.connections:
         for start, end in zip(x.start, x.end, strict=True):
             kinds = [
                 parts[name].variable(variable_of(port)).kind for name, port in ((x.sender, start), (x.receiver, end))
@@ -27,7 +27,7 @@ def rejections(given: Export) -> Iterator[str]:
 
 
 def _integer_instead(part: Part, name: str, value: Parameter) -> str:
-    """What to set that all masters take: the Integer that this project's FMUs have beside an Enumeration."""
+    """The alternative that all masters accept: the Integer that this project's FMUs have beside an Enumeration."""
     index, choices = f"{name}{INDEX}", part.variable(name).choices
     if index not in part.model.variables or not choices:
         return ""
@@ -35,7 +35,7 @@ def _integer_instead(part: Part, name: str, value: Parameter) -> str:
 
 
 def _masters_without(part: Part, name: str, value: Parameter) -> str | None:
-    """What the masters do that do not take a value; None if all do."""
+    """The behaviour of masters that reject a value; None if all accept it."""
     kind = part.variable(name).kind
     if kind == "Enumeration" and isinstance(value, str):
         return "libcosim crashes, ecos and fmpy refuse the SSP"

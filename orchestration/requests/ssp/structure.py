@@ -1,4 +1,4 @@
-"""What an SSD says, with nested systems taken apart: components by their path, and what feeds what through them."""
+"""The structure of an SSD without its nested systems: components by path, and the wires between them."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -13,14 +13,14 @@ from orchestration.requests.ssp.timing import ANNOTATION
 from orchestration.system.conversion import Conversion
 
 Path_ = tuple[str, ...]
-"""Names from the system at the top, which is (), to an element"""
+"""The names from the top system, which is (), to an element"""
 Node = tuple[Path_, str]
-"""A connector, of the element at a path"""
+"""A connector of the element at a path"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Wire:
-    """One connection of the document, as its values flow."""
+    """A connection of the document, in the direction of its values."""
 
     start: Node
     end: Node
@@ -29,19 +29,19 @@ class Wire:
 
     @property
     def label(self) -> str:
-        """For messages."""
+        """The wire as text, for messages."""
         return f"{dotted(self.start)} -> {dotted(self.end)}"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Structure:
-    """A document, taken apart."""
+    """The content of a document."""
 
     components: dict[Path_, Path] = field(default_factory=dict)
     """their FMUs"""
     kinds: dict[Node, str] = field(default_factory=dict)
     units: dict[Node, str] = field(default_factory=dict)
-    """where connectors name one"""
+    """of the connectors that name one"""
     wires: dict[Node, Wire] = field(default_factory=dict)
     """by their end"""
     values: dict[Node, Value] = field(default_factory=dict)
@@ -50,12 +50,12 @@ class Structure:
     """of units"""
     stop: float | None = None
     step: float | None = None
-    """[s], if they are in it"""
+    """[s], if the document has them"""
     timing: str | None = None
-    """what only this project's annotation says"""
+    """the text of this project's annotation"""
 
     def way_to(self, node: Node) -> Iterator[Wire]:
-        """The wires that lead to a connector, the last first, through the connectors of systems."""
+        """The wires that lead to a connector, from the last, through the connectors of systems."""
         seen = set()
         while (wire := self.wires.get(node)) is not None and node not in seen:
             seen.add(node)
@@ -64,12 +64,12 @@ class Structure:
 
 
 def dotted(node: Node) -> str:
-    """A connector by its path."""
+    """The dotted path of a connector."""
     return ".".join((*node[0], node[1]))
 
 
 def structure_of(root: Read, package: Package) -> Structure:
-    """Take a document apart; raises `UsageError` for what is not read."""
+    """Read the structure of a document; raises `UsageError` for unsupported elements."""
     (system,) = all_of(root, "ssd:System")
     result = Structure(stop=_stop(root), step=_step(root), timing=_timing(root))
     result.definitions.update(definitions_in(root, "ssd:Units/ssc:Unit"))
@@ -92,7 +92,7 @@ def _walk(system: Read, path: Path_, package: Package, into: Structure) -> None:
             raise UsageError(f"{dotted((path, name))}: is a {kind}; only components and systems are read")
     for connection in all_of(system, "ssd:Connections/ssd:Connection"):
         _wire(connection, path, into)
-    # After those of its elements: what is bound further out is taken.
+    # After those of its elements: outer bindings override.
     for name, value in values_of(system, package, package.structure):
         into.values[_node_named(name, path, elements)] = value
 
@@ -120,7 +120,7 @@ def _connectors(element: Read, path: Path_, into: Structure) -> None:
 
 
 def _wire(connection: Read, path: Path_, into: Structure) -> None:
-    """Which end gives is a matter of the connectors' kinds, not of which is called the start."""
+    """Add a wire; its direction follows from the kinds of the connectors, not from which is called the start."""
     ends: list[Node] = []
     for which in ("start", "end"):
         element = connection.get(f"{which}Element")
@@ -128,11 +128,11 @@ def _wire(connection: Read, path: Path_, into: Structure) -> None:
         if node not in into.kinds:
             raise UsageError(f"connection to {dotted(node)}: there is no such connector")
         ends.append(node)
-    gives = [into.kinds[node] in (("input", "parameter") if node[0] == path else ("output",)) for node in ends]
-    if gives[0] == gives[1]:
+    is_output = [into.kinds[node] in (("input", "parameter") if node[0] == path else ("output",)) for node in ends]
+    if is_output[0] == is_output[1]:
         kinds = " and ".join(f"{dotted(node)} ({into.kinds[node]})" for node in ends)
         raise UsageError(f"connection of {kinds}: expected an output and an input")
-    start, end = (ends[0], ends[1]) if gives[0] else (ends[1], ends[0])
+    start, end = (ends[0], ends[1]) if is_output[0] else (ends[1], ends[0])
     if end in into.wires:
         raise UsageError(f"connection to {dotted(end)}: is connected already; expected one connection")
     into.wires[end] = Wire(
@@ -144,7 +144,7 @@ def _wire(connection: Read, path: Path_, into: Structure) -> None:
 
 
 def _node_named(name: str, path: Path_, elements: dict[str, Read]) -> Node:
-    """What a name in a parameter set of a system means: of an element, if it begins with that one's name."""
+    """The connector of a name in a parameter set of a system: of an element, if it begins with the name of that one."""
     owners = [owner for owner in elements if name.startswith(f"{owner}.")]
     if not owners:
         return path, name
@@ -174,7 +174,7 @@ def _timing(root: Read) -> str | None:
 
 
 def _step(root: Read) -> float | None:
-    """From the annotations of other tools; the standard has no place for it."""
+    """The step in the annotations of other tools; the standard has none."""
     names = {
         "FixedStepAlgorithm": "baseStepSize",
         "FixedStepMaster": "stepSize",

@@ -1,4 +1,4 @@
-"""The file beside an SSP: what a system says that SSP has no words for."""
+"""The file beside an SSP with the timing of a system, which SSP lacks."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,41 +11,41 @@ from orchestration.system.written import tables_of
 
 ENDING = ".timing.toml"
 ANNOTATION = "quadcosim.timing"
-"""Type of the annotation of an SSP that says the same"""
+"""The type of the annotation of an SSP with the same content"""
 
 
 def write(system: System, ssp: Path) -> Path:
-    """Write the file that makes `system` of its SSP again, beside it; its path."""
+    """Write the file beside an SSP with which it loads as `system`; return its path."""
     path = ssp.with_suffix(ENDING)
     path.write_text(as_text(system, ssp=ssp.name), encoding="utf-8")
     return path
 
 
 def as_text(system: System, **before: str) -> str:
-    """What such a file says, behind other keys."""
+    """The text of such a file, with other keys first."""
     import tomli_w
 
     return tomli_w.dumps({**before, **_timing_tables(system)})
 
 
 def from_text(text: str) -> dict[str, Any]:
-    """What the annotation of an SSP says; raises `UsageError` if it is no TOML."""
+    """The tables of the annotation of an SSP; raises `UsageError` if it is no TOML."""
     return toml_of(text, f"annotation {ANNOTATION}")
 
 
 def _timing_tables(system: System) -> dict[str, Any]:
-    """The tables of a system without its FMUs, their parameters and the conversions of connections."""
+    """The tables of a system without what an SSP has: FMUs, their parameters, and conversions of connections."""
     tables = tables_of(system)
-    carried = {"components": ("fmu", "parameters"), "connections": ("scale", "offset")}
+    in_ssp = {"components": ("fmu", "parameters"), "connections": ("scale", "offset")}
     for name, members in (("components", tables["components"].values()), ("connections", tables["connections"])):
         for table in members:
-            for key in carried[name]:
+            for key in in_ssp[name]:
                 table.pop(key, None)
     return {key: value for key, value in tables.items() if value not in ({}, [])}
 
 
 def expect_tables(timing: Mapping[str, Any]) -> None:
-    """Raise `UsageError` for a document in which what is to be laid over an SSP has another shape."""
+    """Raise `UsageError` for a document whose tables have the wrong shape."""
     for kind in ("components", "sources", "computers"):
         for name, table in _expect(dict, kind, timing.get(kind, {})).items():
             _expect(dict, f"{kind}.{name}", table)

@@ -1,4 +1,4 @@
-"""A system as one SSP 1.0 file, for other people's tools: FMUs, their connections, their parameters.
+"""Writes a system as an SSP 1.0 file for third-party tools: FMUs, their connections, their parameters.
 
 The tools differ in what they read of an SSP. libcosim and ecos take parameter sets that are bound to a
 component and want the prefixes ssd, ssc, ssv and osp; libcosim has its step from an annotation; fmpy takes
@@ -27,47 +27,47 @@ from orchestration.system.request import Request
 from orchestration.system.variable_names import variable_of
 
 TYPED: tuple[Kind, ...] = ("Real", "Integer", "Boolean", "String")
-"""Types of connectors that need no list of items"""
+"""Types of connectors without a list of items"""
 
 
 def write(
-    asked: Request,
+    request: Request,
     path: Path,
     announce: Callable[[str], None] | None = None,
     warn: Callable[[str], None] | None = None,
 ) -> Path:
     """Write a system as an SSP; the same system and FMUs give the same bytes.
 
-    `announce` hears of FMUs that are built for it. `warn` hears, a line each, of what the SSP has no words for: it is
-    another system without its file with timing; and of what it says and some masters do not take. Raises `UsageError`
-    for different FMUs of one file name.
+    `announce` receives the FMUs that are built for it. `warn` receives a line for each feature that the SSP lacks,
+    without which it is another system unless its file with timing is used, and for each that some masters reject.
+    Raises `UsageError` for different FMUs of one file name.
     """
-    given = export_of(asked, announce)
+    export = export_of(request, announce)
     if warn is not None:
-        for line in given.unsupported:
+        for line in export.unsupported:
             warn(f"{line.partition('; expected')[0]}; only its file with timing does")
-        for line in rejections(given):
-            warn(asked.in_own_terms(line))
-    files = {source: fmu.read_bytes() for source, fmu in _sources(given.parts).items()}
-    for part in given.parts:
+        for line in rejections(export):
+            warn(request.in_own_terms(line))
+    files = {source: fmu.read_bytes() for source, fmu in _sources(export.parts).items()}
+    for part in export.parts:
         files[_parameter_file(part)] = document(_parameter_set({"": part}))
-    files[SYSTEM_PARAMETERS] = document(_parameter_set({f"{part.name}.": part for part in given.parts}))
-    about = {"description": asked.description} if asked.description else {}
-    files["SystemStructure.ssd"] = document(_structure(given, asked.title or path.stem, about))
+    files[SYSTEM_PARAMETERS] = document(_parameter_set({f"{part.name}.": part for part in export.parts}))
+    about = {"description": request.description} if request.description else {}
+    files["SystemStructure.ssd"] = document(_structure(export, request.title or path.stem, about))
     path.parent.mkdir(parents=True, exist_ok=True)
     write_archive(path, files, first="SystemStructure.ssd")
     return path
 
 
 def write_with_timing(
-    asked: Request,
+    request: Request,
     path: Path,
     announce: Callable[[str], None] | None = None,
     warn: Callable[[str], None] | None = None,
 ) -> tuple[Path, Path]:
-    """As `write`, and beside it the file that makes the system of it again."""
-    write(asked, path, announce, warn)
-    return path, timing.write(asked.as_system(), path)
+    """As `write`, with the file beside it with which it loads as the same system."""
+    write(request, path, announce, warn)
+    return path, timing.write(request.as_system(), path)
 
 
 def _sources(parts: Iterable[Part]) -> dict[str, Path]:
@@ -91,7 +91,7 @@ def _parameter_file(part: Part) -> str:
 # -- the documents ----------------------------------------------------------------------------------------
 
 
-def _structure(given: Export, name: str, about: Mapping[str, str]) -> Element:
+def _structure(export: Export, name: str, about: Mapping[str, str]) -> Element:
     root = element(
         "ssd:SystemStructureDescription",
         name=name,
@@ -102,24 +102,24 @@ def _structure(given: Export, name: str, about: Mapping[str, str]) -> Element:
     system = add(root, "ssd:System", name=name, **about)
     _bind(system, SYSTEM_PARAMETERS)
     elements = add(system, "ssd:Elements")
-    for part in given.parts:
+    for part in export.parts:
         _add_component(elements, part)
-    if given.system.connections:
-        _add_connections(add(system, "ssd:Connections"), given.system)
-    step = repr(float(given.step))
+    if export.system.connections:
+        _add_connections(add(system, "ssd:Connections"), export.system)
+    step = repr(float(export.step))
     _annotate_for_omsimulator(system, step)
-    _add_units(root, "ssd:Units", given.parts)
-    experiment = add(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(float(given.system.stop_time)))
+    _add_units(root, "ssd:Units", export.parts)
+    experiment = add(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(float(export.system.stop_time)))
     annotation = add(add(experiment, "ssd:Annotations"), "ssc:Annotation", type="com.opensimulationplatform")
     algorithm = add(annotation, "osp:Algorithm")
     add(algorithm, "osp:FixedStepAlgorithm", baseStepSize=step)
     own = add(add(root, "ssd:Annotations"), "ssc:Annotation", type=timing.ANNOTATION)
-    add(own, "quadcosim:Timing").text = timing.as_text(given.system)
+    add(own, "quadcosim:Timing").text = timing.as_text(export.system)
     return root
 
 
 def _add_connections(connections: Element, system: System) -> None:
-    """With the conversion that the system states, and no other."""
+    """Add the connections with the conversions that the system states, and no other."""
     for x in system.connections:
         is_plain = not (x.stated or x.converts)
         for start, end in zip(x.start, x.end, strict=True):
@@ -137,7 +137,7 @@ def _add_connections(connections: Element, system: System) -> None:
 
 
 def _annotate_for_omsimulator(system: Element, step: str) -> None:
-    """The attributes are what its version 3 reads, the child is what version 2 does not start without."""
+    """Version 3 reads the attributes; version 2 does not start without the child."""
     annotation = add(add(system, "ssd:Annotations"), "ssc:Annotation", type="org.openmodelica")
     master = add(
         add(annotation, "oms:Annotations"),
@@ -178,7 +178,7 @@ def _bind(parent: Element, source: str) -> None:
 
 
 def _parameter_set(parts: Mapping[str, Part]) -> Element:
-    """The parameters of components, each with its prefix."""
+    """A set with the parameters of components, each with its prefix."""
     root = element("ssv:ParameterSet", version="1.0", name=PARAMETER_SET)
     parameters = add(root, "ssv:Parameters")
     for prefix, part in parts.items():
@@ -192,12 +192,12 @@ def _parameter_set(parts: Mapping[str, Part]) -> Element:
 
 
 def _unit(variable: Variable) -> dict[str, str]:
-    """The attribute `unit`, if the variable has one; a Real only can."""
+    """The attribute `unit` of a variable, if it has one; only a Real can."""
     return {} if variable.unit is None or variable.kind != "Real" else {"unit": variable.unit}
 
 
 def _add_units(root: Element, tag: str, parts: Iterable[Part]) -> None:
-    """The unit definitions of the FMUs that say what the unit is, each once."""
+    """Add the unit definitions of the FMUs that have base units, each once."""
     definitions = (unit for part in parts for unit in part.model.description.unitDefinitions)
     bases = {unit.name: unit.baseUnit for unit in definitions if unit.baseUnit is not None}
     if not bases:
@@ -210,4 +210,4 @@ def _add_units(root: Element, tag: str, parts: Iterable[Part]) -> None:
 
 
 _BASE = {**dict.fromkeys(BASE, 0), "factor": 1.0, "offset": 0.0}
-"""What a base unit is by the standard where nothing is said."""
+"""The defaults of a base unit in the standard."""

@@ -158,7 +158,7 @@ def test_the_versions_of_what_flew_are_told(one: One) -> None:
             {"timing": {"plant_interval": 1e-3 / 3.0}},
             f"timing.plant_interval = {1e-3 / 3.0}: expected a whole number of nanoseconds",
         ),
-        ({"timing": {"jitter": 0.001}}, "timing.jitter = 0.001: an SSP cannot say that; expected"),
+        ({"timing": {"jitter": 0.001}}, "timing.jitter = 0.001: an SSP cannot express that; expected"),
     ],
 )
 def test_times_that_other_masters_do_not_step_on_are_refused(

@@ -121,8 +121,8 @@ def test_a_tool_that_there_is_none_of_is_wrong_usage_and_the_names_are_listed(ma
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("--delay", "0.01"), "timing.delay = 0.01: an SSP cannot say that"),
-        (("--jitter", "0.001"), "timing.jitter = 0.001: an SSP cannot say that"),
+        (("--delay", "0.01"), "timing.delay = 0.01: an SSP cannot express that"),
+        (("--jitter", "0.001"), "timing.jitter = 0.001: an SSP cannot express that"),
         (("--period", "0.0105"), "timing.period = 0.0105: expected a multiple of the common step of 0.001 s"),
         (("--set", "plant.mass=true"), "plant.mass = True: expected a number"),
         (("--set", "controller.use_reference_inputs=true"), "controller.use_reference_inputs: expected [reference]"),

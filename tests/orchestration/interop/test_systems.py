@@ -136,10 +136,10 @@ SAMPLING = "components.controller.sampling"
 @pytest.mark.parametrize(
     ("name", "changes", "said"),
     [
-        ("water_tank", {}, "connections.valve.delay = 0.25: an SSP cannot say that; expected 0.0"),
+        ("water_tank", {}, "connections.valve.delay = 0.25: an SSP cannot express that; expected 0.0"),
         ("water_tank", CARRIED["water_tank"], "tool = libcosim: no conversion of types, as of controller.valve"),
         ("double_integrator", {f"{SAMPLING}.period": 0.1}, f"{SAMPLING}.period = 0.1: an SSP has one step for all"),
-        ("double_integrator", {f"{SAMPLING}.jitter": 0.01}, f"{SAMPLING}.jitter = 0.01: an SSP cannot say that"),
+        ("double_integrator", {f"{SAMPLING}.jitter": 0.01}, f"{SAMPLING}.jitter = 0.01: an SSP cannot express that"),
         ("double_integrator", {"stop_time": 0.33}, "stop_time = 0.33: expected a multiple of the common step of 0.05"),
         ("double_integrator", {"connections.command.scale": 2.0}, "connections.command: has scale or offset"),
         ("four_components", UPHILL, "sources.slope.file: an SSP cannot feed one; expected a constant"),

@@ -95,7 +95,7 @@ def test_messages_of_a_database_are_load_and_what_it_does_not_say_is_said(tmp_pa
             },
         }
     }
-    assert found.guessed == ("bus.bit_rate is 500000, as bus.dbc does not say it",)
+    assert found.guessed == ("bus.bit_rate is 500000, as bus.dbc does not have it",)
     assert found.undecided == (
         "bus.event: no cycle time; expected how often it is sent",
         "bus.long: identifier of 29 bits; expected one of 11",

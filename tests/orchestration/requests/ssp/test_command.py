@@ -50,7 +50,7 @@ def test_flags_and_out_are_those_of_a_flight(here: Path, main: Main) -> None:
 
 
 def test_what_an_ssp_cannot_say_is_warned_of_even_quietly(here: Path, main: Main) -> None:
-    said = "timing.delay = 0.005: an SSP cannot say that; only its file with timing does"
+    said = "timing.delay = 0.005: an SSP cannot express that; only its file with timing does"
     assert main("ssp", "-q", "--delay", "0.005", "--out", "loop.ssp").stderr == f"warning: {said}\n"
 
 
@@ -125,7 +125,7 @@ def test_a_timing_that_an_ssp_cannot_say_is_said_to_be_in_its_file_only(
     value = UNSAYABLE[key]
     given = "" if isinstance(value, dict) else f" = {value}"
     assert heard(short.with_changes(timing={key: value}), tmp_path) == [
-        f"timing.{key}{given}: an SSP cannot say that; only its file with timing does"
+        f"timing.{key}{given}: an SSP cannot express that; only its file with timing does"
     ]
 
 
