@@ -1,1 +1,1 @@
-"""The words in which objectives and criteria are written: parsed once, and written for each that evaluates them."""
+"""The language of objectives and criteria: its parser, and its evaluation over runs and at instants."""

@@ -1,4 +1,4 @@
-"""Conditions that are looked at while a run goes on: an expression made into a function of the current values."""
+"""Conditions during a run: an expression compiled to a function of the current values."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
@@ -9,30 +9,30 @@ from orchestration.expressions.scalars import scalars
 from orchestration.expressions.syntax import Call, Name, Node, Number, Operation, Sampled, children, is_over_run
 
 Current: TypeAlias = Callable[[Sequence[float]], float]
-"""A number from the values of the signals that an expression names"""
+"""A number from the values of the signals in an expression"""
 
 
 def compiled(node: Node, places: Mapping[str, int]) -> Current:
-    """A function of a sequence of values, of which `places` says which signal stands where.
+    """A function of a sequence of values, with the index of each signal in `places`.
 
-    Raises `UsageError` for a name that is not there, a vector outside `norm`, or a function over a whole run.
+    Raises `UsageError` for an unknown name, a vector outside `norm`, or a function over a whole run.
     """
     vectors: dict[str, Sequence[str]] = {}
-    _look_through(node, places, vectors)
+    _check(node, places, vectors)
     found = scalars(node, vectors)
     if len(found) != 1:
         raise UsageError("it is a vector; expected a number, such as norm(…)")
     written = _Lines(places)
     result = written.value(found[0])
-    made: dict[str, Any] = dict(PYTHON)
-    # The text is of numbers, places and the words of operators alone, whatever was written in the expression.
-    exec("\n    ".join(["def current(values):", *written.lines, f"return {result}"]), made)
-    current: Current = made["current"]
+    scope: dict[str, Any] = dict(PYTHON)
+    # The text has only numbers, indices and operators, whatever the expression is.
+    exec("\n    ".join(["def current(values):", *written.lines, f"return {result}"]), scope)
+    current: Current = scope["current"]
     return current
 
 
-def _look_through(node: Node, places: Mapping[str, int], vectors: dict[str, Sequence[str]]) -> None:
-    """Refuse what has no value at an instant, and note what vectors stand for."""
+def _check(node: Node, places: Mapping[str, int], vectors: dict[str, Sequence[str]]) -> None:
+    """Raise `UsageError` for what has no value at an instant, and add the signals of vectors to `vectors`."""
     if isinstance(node, Sampled):
         raise UsageError("sampled is of a whole run; expected functions of values at one instant")
     if isinstance(node, Call) and is_over_run(node):
@@ -42,7 +42,7 @@ def _look_through(node: Node, places: Mapping[str, int], vectors: dict[str, Sequ
         if not vectors[node.text]:
             raise UsageError(f"there is no {node.text}; expected a recorded signal or time")
     for child in children(node):
-        _look_through(child, places, vectors)
+        _check(child, places, vectors)
     if isinstance(node, Call) and not OPERATORS[node.function].joins:
         sizes = [len(scalars(argument, vectors)) for argument in node.arguments]
         if max(sizes) > 1:
@@ -50,7 +50,7 @@ def _look_through(node: Node, places: Mapping[str, int], vectors: dict[str, Sequ
 
 
 class _Lines:
-    """Lines of Python, each of which gives a name to what one operator makes of names."""
+    """Lines of Python, each of which names the result of one operator."""
 
     def __init__(self, places: Mapping[str, int]) -> None:
         self.lines: list[str] = []
@@ -68,12 +68,12 @@ class _Lines:
         return self._named(node, lambda: f"1.0 if {self._truth(node)} else 0.0")
 
     def _truth(self, node: Node) -> str:
-        """The name of what is true or false."""
+        """The name of a truth value."""
         if not isinstance(node, Operation) or not OPERATORS[node.sign].gives_truth:
             return self.value(node)
-        made, operands = OPERATORS[node.sign], node.operands
-        write = self._truth if made.takes_truths else self.value
-        return self._named((node, "truth"), lambda: made.python(*map(write, operands)))
+        operator, operands = OPERATORS[node.sign], node.operands
+        write = self._truth if operator.takes_truths else self.value
+        return self._named((node, "truth"), lambda: operator.python(*map(write, operands)))
 
     def _named(self, key: object, text: Callable[[], str]) -> str:
         if key not in self._found:

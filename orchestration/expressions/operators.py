@@ -1,7 +1,7 @@
-"""The operators of the language and its functions of values at one instant: each is defined here, for all targets.
+"""The operators of the language and its functions of values at one instant, defined for all targets.
 
-They are numpy's over a span of a run (`over_span.py`), text of Python at an instant (`at_instant.py`), text of C in
-lanes, and text of C with a bound on its error in the condition of the compiled loop (`engines`). A truth is 0 or 1.
+The targets are numpy over a span of a run (`over_span.py`), Python at an instant (`at_instant.py`), C in SIMD lanes,
+and C with a bound on its error in the condition of the compiled loop (`engines`). A truth value is 0 or 1.
 """
 
 import ast
@@ -17,7 +17,7 @@ from orchestration.expressions import unit_rules
 from orchestration.expressions.unit_rules import Rule
 
 Printer: TypeAlias = Callable[..., str]
-"""From the texts of the operands to that of what is made of them"""
+"""From the texts of the operands to that of the result"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,23 +25,23 @@ class Operator:
     """One operator, or function of values at one instant."""
 
     tree: type[ast.AST] | None = None
-    """of Python's grammar; None: it is called by its name"""
+    """its node in Python's grammar; None: it is called by its name"""
     arguments: tuple[int, int] = (1, 1)
     """the fewest and most of a function"""
     joins: bool = False
-    """whether vectors among the operands are taken together; they are else gone through component by component"""
+    """whether it combines the components of vectors; others apply component by component"""
     unit: Rule
     gives_truth: bool = False
-    """whether what the targets have is true or false, not yet 0 or 1"""
+    """whether the result in the targets is true or false, not 0 or 1"""
     takes_truths: bool = False
-    """whether its operands are true or false, which a number is unless it is 0"""
+    """whether its operands are truth values; a number is true unless it is 0"""
     python: Printer
-    """of names and numbers; it calls what is in `PYTHON`"""
+    """on names and numbers; it calls functions of `PYTHON`"""
     numpy: Callable[..., Any]
     lanes: Printer
-    """of names and calls; it calls what is in lanes.h, mathematics.h and batch.c"""
+    """on names and calls; it calls functions of lanes.h, mathematics.h and batch.c"""
     bounded: str | None = None
-    """of `n` operands `a`, each a `Known` of condition.h; None: Python is asked"""
+    """on `n` operands `a`, each a `Known` of condition.h; None: Python evaluates it"""
 
 
 def _infix(sign: str) -> Printer:
@@ -96,7 +96,7 @@ def _mathematical(name: str, unit: Rule, numpy: Callable[..., Any], count: int =
     return Operator(arguments=(count, count), unit=unit, python=_called(name), numpy=numpy, lanes=_called(f"q_{name}"))
 
 
-# The root of the sum of the squares, one after another: to the bit the same everywhere.
+# The root of the sum of the squares, in order: the same bits on all targets.
 _NORM = Operator(
     arguments=(1, 99), joins=True, unit=unit_rules.agreed,
     python=_root_of_squares("root"), numpy=_norm, lanes=_root_of_squares("q_sqrt"), bounded="norm(a, n)",
@@ -179,15 +179,15 @@ PYTHON: Mapping[str, Any] = {
     **{name: _or_nan(getattr(math, name))
        for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan2", "tanh")},
 }  # fmt: skip
-"""What the texts of Python call"""
+"""The functions that the Python texts call"""
 
 
 def applied(word: str, *values: Any) -> Any:
-    """What an operator makes of numbers or arrays of them."""
-    made = OPERATORS[word]
-    if not made.gives_truth:
-        return made.numpy(*values)
-    if made.takes_truths:
+    """The result of an operator on numbers or arrays."""
+    definition = OPERATORS[word]
+    if not definition.gives_truth:
+        return definition.numpy(*values)
+    if definition.takes_truths:
         values = tuple(np.asarray(value) != 0.0 for value in values)
-    found = np.asarray(made.numpy(*values))
+    found = np.asarray(definition.numpy(*values))
     return found.astype(float) if found.ndim else float(found)

@@ -1,4 +1,4 @@
-"""Values of expressions over a whole run."""
+"""Evaluates expressions over a whole run."""
 
 import difflib
 import math
@@ -15,10 +15,10 @@ from orchestration.expressions.syntax import Call, Name, Node, Operation, Sample
 
 
 def evaluate(nodes: Mapping[str, Node], spans: Spans) -> dict[str, float | None]:
-    """The numbers that expressions come to, by name; one may name another that stands before it.
+    """The values of expressions, by name; an expression may use the name of one before it.
 
-    None for what has no value, such as a settling time that is never reached. Raises `UsageError`, naming the
-    expression, if it names what is not there or has a value for each row instead of one for the run.
+    None for no value, as of a settling time that is never reached. Raises `UsageError`, naming the expression, for an
+    unknown name and for an expression with a value for each row instead of one for the run.
     """
     whole: dict[str, Node] = {}
     for name, node in nodes.items():
@@ -33,7 +33,7 @@ def evaluate(nodes: Mapping[str, Node], spans: Spans) -> dict[str, float | None]
                 context, values = span, SpanValues(span, known)
                 for call, fold in folds.items():
                     with _naming(nodes, whole, call):
-                        values.into(fold)
+                        values.add_to(fold)
             known |= {call: _finite(fold.value()) for call, fold in folds.items()}
         context = context or next(spans())
         found = {}
@@ -45,7 +45,7 @@ def evaluate(nodes: Mapping[str, Node], spans: Spans) -> dict[str, float | None]
 
 @contextmanager
 def _naming(nodes: Mapping[str, Node], whole: Mapping[str, Node], part: Node) -> Iterator[None]:
-    """An error says in which of the expressions it is."""
+    """Begin an error with the expression that contains `part`."""
     try:
         yield
     except UsageError as error:
@@ -60,7 +60,7 @@ def _all(node: Node) -> Iterator[Node]:
 
 
 def inlined(node: Node, known: Mapping[str, Node]) -> Node:
-    """The expression with those that it names in place of their names."""
+    """The expression with the known ones in place of their names."""
     match node:
         case Name(name):
             return known.get(name, node)
@@ -77,12 +77,12 @@ def inlined(node: Node, known: Mapping[str, Node]) -> Node:
 
 
 def reductions(node: Node) -> Iterator[Call]:
-    """The functions over a run in an expression, also those inside others."""
+    """The functions over a run in an expression, including nested ones."""
     return (part for part in _all(node) if isinstance(part, Call) and is_over_run(part))
 
 
 def _depth(node: Node) -> int:
-    """How many reductions are inside one another."""
+    """The depth of nested functions over a run."""
     return max(map(_depth, children(node)), default=0) + (isinstance(node, Call) and is_over_run(node))
 
 

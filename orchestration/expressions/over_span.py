@@ -1,4 +1,4 @@
-"""Expressions over one span of a run: at its rows, just before the next ones, and half-way between."""
+"""Evaluates expressions over one span of a run: at its rows, just before the next ones, and half-way between."""
 
 import math
 from collections.abc import Mapping
@@ -15,13 +15,13 @@ from orchestration.expressions.syntax import Call, Name, Node, Number, Operation
 
 
 class SpanValues:
-    """Expressions over one span: at its rows, just before the next ones, and half-way between; each found once."""
+    """The values of expressions over one span, each computed once."""
 
     def __init__(self, recorded: Recorded, known: Mapping[Node, float | None]) -> None:
         self._recorded, self._known = recorded, known
         self._found: dict[tuple[Node, str], Any] = {}
 
-    def into(self, fold: Fold) -> None:
+    def add_to(self, fold: Fold) -> None:
         """Add this span to a number of the whole run."""
         argument, *rest = fold.call.arguments
         fold.add(self._course(argument, fold.call.function), *(self.number(other) for other in rest))

@@ -1,7 +1,6 @@
-"""What expressions see of a run: its rows, what signals become between them, and where messages arrived.
+"""The recording of a run for expressions: its rows, signals between them, and arrivals of messages.
 
-A run is gone through span by span, so that it need not fit into memory; each span begins with the last row of the
-one before.
+A run is read span by span, so that it need not fit into memory; each span begins with the last row of the one before.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -21,10 +20,10 @@ class Recorded:
     time: Floats
     signals: Mapping[str, Floats]
     ends: Mapping[str, Floats] = field(default_factory=dict)
-    """of signals that are held: what each has become just before the next row, shape (n - 1,), along a line; all
-    others are in continuous time, known at the rows and taken as linear between them"""
+    """of held signals: the value just before the next row, shape (n - 1,), reached along a line; all others are in
+    continuous time, known at the rows and linear between them"""
     numbers: Mapping[str, float] = field(default_factory=dict)
-    """what has one value in the run, such as parameters, by name"""
+    """constants of the run, such as parameters, by name"""
     arrivals: Mapping[str, Booleans] = field(default_factory=dict)
     """by connection, the rows at which a message arrived, shape (n,)"""
     stop_time: float
@@ -34,16 +33,16 @@ class Recorded:
 
     @cached_property
     def vectors(self) -> dict[str, tuple[str, ...]]:
-        """Names that stand for several signals: `plant.position` for its .x, .y, .z (and .w)."""
+        """The names of vectors: `plant.position` for its .x, .y, .z (and .w)."""
         return vectors(self.signals)
 
 
 Spans: TypeAlias = Callable[[], Iterator[Recorded]]
-"""The spans of a run, in order; to be gone through as often as need be"""
+"""The spans of a run, in order; can be iterated repeatedly"""
 
 
 def vectors(signals: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
-    """Names that stand for several of `signals`, by what they stand for."""
+    """The names of vectors among `signals`, with their components."""
     found: dict[str, list[str]] = {}
     for axis in "xyzw":
         for name in signals:

@@ -1,4 +1,4 @@
-"""The functions over a run, such as max, integral and settling_time: each a number that is made span by span.
+"""The functions over a run, such as max, integral and settling_time, computed span by span.
 
 Integrals are exact for signals that are held.
 """
@@ -24,14 +24,14 @@ class Course:
     ends: Floats
     """just before the row after each, shape (n - 1,)"""
     middles: Floats | None
-    """half-way, for what is made of held signals alone; None: linear between rows"""
+    """half-way, for expressions of held signals only; None: linear between rows"""
     sampled: bool
-    """whether the values stand for themselves, with nothing between them"""
+    """whether the values are samples, with nothing between them"""
     first: int
-    """the first row that the span before did not have"""
+    """the first row that is not in the span before"""
 
     def integral(self) -> float:
-        """By Simpson's rule over held signals, which is exact up to third powers of them; else by the trapezoid."""
+        """By Simpson's rule over held signals, exact up to their third powers; else by the trapezoidal rule."""
         starts, ends = self.values[:-1], self.ends
         mean = 0.5 * (starts + ends) if self.middles is None else (starts + 4.0 * self.middles + ends) / 6.0
         return float((mean * np.diff(self.time)).sum())
@@ -43,14 +43,14 @@ class Course:
 
 
 class Fold(ABC):
-    """A number of a whole run, made span by span."""
+    """A number of a whole run, computed span by span."""
 
     def __init__(self, call: Call) -> None:
         self.call = call
 
     @abstractmethod
     def add(self, x: Course, *numbers: float | None) -> None:
-        """The next span, and the function's further arguments."""
+        """Add the next span; `numbers` are the further arguments of the function."""
 
     @abstractmethod
     def value(self) -> float | None:
@@ -121,7 +121,7 @@ class _Edge(Fold):
 
 
 class _PeakTime(Fold):
-    """peak_time: when the largest value is there first."""
+    """peak_time: when the largest value occurs first."""
 
     def __init__(self, call: Call) -> None:
         super().__init__(call)
@@ -139,7 +139,7 @@ class _PeakTime(Fold):
 
 
 class _SettlingTime(Fold):
-    """settling_time: from when on |x| stays within the band."""
+    """settling_time: the time from which |x| stays within the band."""
 
     def __init__(self, call: Call) -> None:
         super().__init__(call)
@@ -159,7 +159,7 @@ class _SettlingTime(Fold):
 
 
 class _TotalVariation(Fold):
-    """total_variation: how far x moves in all, along its course and where it jumps."""
+    """total_variation: the sum of all changes of x, including jumps."""
 
     def __init__(self, call: Call) -> None:
         super().__init__(call)

@@ -1,4 +1,4 @@
-"""Expressions of vectors as expressions of the signals that they are made of."""
+"""Expressions of vectors as expressions of their components."""
 
 from collections.abc import Mapping, Sequence
 
@@ -8,9 +8,9 @@ from orchestration.expressions.syntax import Call, Name, Node, Operation, Sample
 
 
 def scalars(node: Node, vectors: Mapping[str, Sequence[str]]) -> list[Node]:
-    """An expression whose names are signals alone: one, or several for a vector.
+    """The expression in terms of signals only: one, or several for a vector.
 
-    `vectors` are names that stand for several signals. Raises `UsageError` for vectors that do not go together.
+    `vectors` has the components of vectors by name. Raises `UsageError` for vectors of different sizes.
     """
     match node:
         case Name(name):

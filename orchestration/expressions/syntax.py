@@ -13,7 +13,7 @@ from orchestration.basics.errors import UsageError
 from orchestration.expressions.operators import OPERATORS
 
 LONGEST, DEEPEST = 10_000, 60
-"""Characters and nesting of an expression"""
+"""The most characters, and the deepest nesting, of an expression"""
 
 OVER_RUN = {
     "min": (1, 99), "max": (1, 99), "mean": (1, 1), "rms": (1, 1), "last": (1, 1), "first": (1, 1),
@@ -28,7 +28,7 @@ SAMPLED = "sampled"
 
 
 JOB_MEASURES = ("response", "missed")
-"""`response(TASK)`, `missed(TASK)`: of the jobs of a task, as `control` or COMPUTER.TASK"""
+"""`response(TASK)`, `missed(TASK)`: measures of the jobs of a task, as `control` or COMPUTER.TASK"""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Name:
 
 
 class _Deep:
-    """An expression with others in it, the key of many tables: its hash is found once."""
+    """An expression with nested ones, used as a key: its hash is computed once."""
 
     @functools.cached_property
     def _hash(self) -> int:
@@ -55,7 +55,7 @@ class _Deep:
     def __hash__(self) -> int:
         return self._hash
 
-    def __getstate__(self) -> dict[str, Any]:  # the hash of a text is another one in another process
+    def __getstate__(self) -> dict[str, Any]:  # hashes of text differ between processes
         return {name: value for name, value in vars(self).items() if name != "_hash"}
 
 
@@ -91,7 +91,7 @@ class Sampled(_Deep):
 
 @dataclass(frozen=True)
 class JobMeasure:
-    """What there is of each job of a task: its response [s], or whether it missed its deadline."""
+    """A measure of each job of a task: its response [s], or whether it missed its deadline."""
 
     what: str
     task: str
@@ -104,14 +104,14 @@ Node: TypeAlias = Number | Name | Operation | Call | Sampled | JobMeasure
 def parse(text: str) -> Node:
     """The tree of an expression; raises `UsageError` naming what is not part of the language.
 
-    What it says of jobs, which no signal decides, is one number of the run: it is there by its text, as a name.
+    A function over a measure of jobs is one number of the run, which no signal determines: a name with its text.
     """
-    return _with_numbers(parse_job_measures(text))
+    return _with_job_numbers(parse_job_measures(text))
 
 
 @functools.lru_cache(maxsize=1024)
 def parse_job_measures(text: str) -> Node:
-    """The same, with what it says of jobs as it is written."""
+    """As `parse`, with measures of jobs as nodes."""
     if not isinstance(text, str) or len(text) > LONGEST:
         raise UsageError(f"expected an expression of at most {LONGEST} characters")
     try:
@@ -123,39 +123,39 @@ def parse_job_measures(text: str) -> Node:
 
 
 def names_job_measure(name: str) -> bool:
-    """Whether a name is the text of what is said of jobs."""
+    """Whether a name is the text of a function over a measure of jobs."""
     return name.endswith(")")
 
 
 def has_job_measure(node: Node) -> bool:
-    """Whether something in an expression is said of jobs."""
+    """Whether an expression contains a measure of jobs."""
     return isinstance(node, JobMeasure) or any(map(has_job_measure, children(node)))
 
 
-def _with_numbers(node: Node) -> Node:
+def _with_job_numbers(node: Node) -> Node:
     match node:
         case JobMeasure():
             raise UsageError(f"{text(node)}: has a value for each job; expected it inside max, mean, share or the like")
         case Call() if is_over_run(node) and has_job_measure(node):
             return Name(text(node))
         case Operation(sign, operands):
-            return Operation(sign, tuple(map(_with_numbers, operands)))
+            return Operation(sign, tuple(map(_with_job_numbers, operands)))
         case Call(function, arguments):
-            return Call(function, tuple(map(_with_numbers, arguments)))
+            return Call(function, tuple(map(_with_job_numbers, arguments)))
         case Sampled(connection, argument):
-            return Sampled(connection, _with_numbers(argument))
+            return Sampled(connection, _with_job_numbers(argument))
     return node
 
 
 @functools.lru_cache(maxsize=4096)
 def names(node: Node) -> tuple[str, ...]:
-    """Every name in an expression, as often as it is there."""
+    """Every name in an expression, once for each use."""
     own = (node.text,) if isinstance(node, Name) else ()
     return own + tuple(name for child in children(node) for name in names(child))
 
 
 def text(node: Node) -> str:
-    """An expression as it could have been written."""
+    """The text of an expression."""
     match node:
         case Number(value):
             return f"{value:g}"
@@ -178,12 +178,12 @@ def _bracketed(node: Node) -> str:
 
 
 def is_over_run(node: Call) -> bool:
-    """Whether a call makes one number of a whole run."""
+    """Whether a call is a function over a whole run."""
     return node.function in OVER_RUN and not (node.function in ("min", "max") and len(node.arguments) > 1)
 
 
 def is_number(node: Node) -> bool:
-    """Whether an expression is a number by the way it is written, so that it can be no condition."""
+    """Whether an expression is a number by its form, and so no condition."""
     match node:
         case Operation(sign):
             return not OPERATORS[sign].gives_truth
@@ -193,12 +193,12 @@ def is_number(node: Node) -> bool:
 
 
 def is_truth(node: Node) -> bool:
-    """Whether an expression is true or false by the way it is written, so that it can be no number."""
+    """Whether an expression is a truth value by its form, and so no number."""
     return isinstance(node, Operation) and OPERATORS[node.sign].gives_truth
 
 
 def parts(node: Node) -> Iterator[Node]:
-    """What a condition joins by and, or and not; itself if it joins nothing."""
+    """The operands of and, or and not in a condition; itself if it has none."""
     if isinstance(node, Operation) and node.sign in ("and", "or", "not"):
         for operand in node.operands:
             yield from parts(operand)
@@ -207,7 +207,7 @@ def parts(node: Node) -> Iterator[Node]:
 
 
 def children(node: Node) -> tuple[Node, ...]:
-    """What an expression is made of."""
+    """The direct subexpressions."""
     if isinstance(node, Operation):
         return node.operands
     if isinstance(node, Sampled):
@@ -252,7 +252,7 @@ def _node(tree: ast.expr, text: str, depth: int) -> Node:
         case ast.Call(func=ast.Name(id="response" | "missed" as what), args=[task], keywords=[]):
             return JobMeasure(what, _dotted(task, text))
         case ast.Call(func=ast.Name(id=function), keywords=[]):
-            return Call(_known(function, len(tree.args), text), tuple(map(build, tree.args)))
+            return Call(_checked_name(function, len(tree.args), text), tuple(map(build, tree.args)))
     raise UsageError(
         f"{_short(text)}: {_short(ast.unparse(tree))} is not part of the language; expected numbers, names, "
         "+ - * / **, comparisons, and, or, not, and functions"
@@ -275,7 +275,7 @@ def _dotted(tree: ast.expr, text: str) -> str:
     raise UsageError(f"{_short(text)}: {_short(ast.unparse(tree))}: expected the name of a signal")
 
 
-def _known(function: str, count: int, text: str) -> str:
+def _checked_name(function: str, count: int, text: str) -> str:
     at_instant = {word: operator.arguments for word, operator in OPERATORS.items() if operator.tree is None}
     functions = {**at_instant, **OVER_RUN, SAMPLED: (2, 2), **dict.fromkeys(JOB_MEASURES, (1, 1))}
     if function not in functions:

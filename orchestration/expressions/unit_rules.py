@@ -1,4 +1,4 @@
-"""What units the operators make of those of their operands; what does not go together is refused."""
+"""The units of operators from those of their operands, with errors for incompatible units."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,21 +11,21 @@ from orchestration.basics.units import ONE, RADIAN, Unit, common
 
 @dataclass(frozen=True, kw_only=True)
 class Operand:
-    """What a rule knows of an operand, or of the argument of a function."""
+    """An operand of an operator, or an argument of a function."""
 
     text: str
     unit: Unit | None
-    """None: it has none, or none that is known"""
+    """None: it has none, or an unknown one"""
     number: Fraction | None = None
-    """its value, if it is of numbers alone, as 1 / 2"""
+    """its value, if it consists of numbers only, as 1 / 2"""
 
 
 Rule: TypeAlias = Callable[[str, Sequence[Operand]], Unit | None]
-"""From a word and its operands to the unit of what it comes to; raises `UsageError` for what does not go together"""
+"""From a word and its operands to the unit of the result; raises `UsageError` for incompatible units"""
 
 
 def agreed(word: str, operands: Sequence[Operand]) -> Unit | None:
-    """The unit that all have; raises `UsageError` if two of them differ."""
+    """The common unit; raises `UsageError` if two of them differ."""
     known = [(operand.text, operand.unit) for operand in operands if operand.unit is not None]
     for i, (text, unit) in enumerate(known):
         for other, another in known[:i]:
@@ -37,41 +37,41 @@ def agreed(word: str, operands: Sequence[Operand]) -> Unit | None:
 
 
 def first(word: str, operands: Sequence[Operand]) -> Unit | None:
-    """The unit of the first one."""
+    """The unit of the first operand."""
     return operands[0].unit
 
 
 def none(word: str, operands: Sequence[Operand]) -> Unit | None:
-    """A truth, of whatever."""
+    """The unit of a truth value, with any operands."""
     return ONE
 
 
 def compared(word: str, operands: Sequence[Operand]) -> Unit | None:
-    """A truth, of what has one unit."""
+    """The unit of a truth value, with operands of one unit."""
     agreed(word, operands)
     return ONE
 
 
 def direction(word: str, operands: Sequence[Operand]) -> Unit | None:
-    """An angle, of what has one unit."""
+    """The unit of an angle, with operands of one unit."""
     agreed(word, operands)
     return RADIAN
 
 
 def product(word: str, operands: Sequence[Operand]) -> Unit | None:
-    """Of both units."""
+    """The product of both units."""
     left, right = (operand.unit for operand in operands)
     return None if left is None or right is None else left.times(right)
 
 
 def quotient(word: str, operands: Sequence[Operand]) -> Unit | None:
-    """Of the first unit by the second."""
+    """The first unit divided by the second."""
     left, right = (operand.unit for operand in operands)
     return None if left is None or right is None else left.times(right.power(Fraction(-1)))
 
 
 def power(word: str, operands: Sequence[Operand]) -> Unit | None:
-    """Of the first unit; the exponent has none."""
+    """The power of the first unit; the exponent has none."""
     base, exponent = operands
     if base.unit is None:
         return None
@@ -89,7 +89,7 @@ def root(word: str, operands: Sequence[Operand]) -> Unit | None:
 
 
 def ratio(word: str, operands: Sequence[Operand]) -> Unit | None:
-    """1, of 1 or rad alone."""
+    """The unit 1, with an operand in 1 or rad."""
     unit = operands[0].unit
     if unit is not None and unit.is_ratio is False and not unit.has_number:
         raise UsageError(f"{word} of {operands[0].text}, which is in {unit}; expected 1 or rad, or a factor")
@@ -97,6 +97,6 @@ def ratio(word: str, operands: Sequence[Operand]) -> Unit | None:
 
 
 def angle(word: str, operands: Sequence[Operand]) -> Unit | None:
-    """An angle, of 1 or rad alone."""
+    """The unit of an angle, with an operand in 1 or rad."""
     ratio(word, operands)
     return RADIAN

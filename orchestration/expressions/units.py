@@ -1,4 +1,4 @@
-"""The unit of an expression, from the units of what it names; what does not go together is refused."""
+"""The unit of an expression from the units of its names, with errors for incompatible units."""
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
@@ -23,14 +23,14 @@ from orchestration.expressions.syntax import (
 from orchestration.expressions.unit_rules import Operand, agreed
 
 Units: TypeAlias = Mapping[str, Unit | None]
-"""By name; None: it has none, or none that is known"""
+"""By name; None: it has none, or an unknown one"""
 
 
 def unit_of(node: Node, units: Units) -> Unit | None:
-    """The unit of an expression over what `units` names; None where something in it has none.
+    """The unit of an expression of names in `units`; None where one of these has none.
 
-    Raises `UsageError` for values in different units that are added or compared, and for a function of a ratio that
-    is given something else. A number is without unit, and so goes with anything: also `x + 2 * v`.
+    Raises `UsageError` for values in different units that are added or compared, and for functions of a ratio with
+    other arguments. A number has no unit and fits any other: also `x + 2 * v`.
     """
     match node:
         case Number():
@@ -63,7 +63,7 @@ def _named(name: str, units: Units) -> Unit | None:
 
 
 def _constant(node: Node) -> Fraction | None:
-    """The value of an expression of numbers alone, as 1 / 2."""
+    """The value of an expression that consists of numbers only, as 1 / 2."""
     match node:
         case Number(value):
             return Fraction(value).limit_denominator(1000)

@@ -1,6 +1,6 @@
-"""Functions of time as a value with its first four derivatives: what a motion is made of.
+"""Functions of time with their first four derivatives, of which motions consist.
 
-On the operations of `ScalarOps`, so that times are floats, arrays of them or symbols.
+They use `ScalarOps`, so that times are floats, arrays of them or symbols.
 """
 
 from typing import NamedTuple
@@ -21,7 +21,7 @@ class Derivatives(NamedTuple):
 
 
 def constant(value: float, t: Scalar) -> Derivatives:
-    """The same at all times `t`."""
+    """A constant, at all times `t`."""
     zero = 0.0 * t
     return Derivatives(value + zero, zero, zero, zero, zero)
 
@@ -43,7 +43,7 @@ def wave(amplitude: float, rate: float, t: Scalar, ops: ScalarOps) -> Derivative
 def rise(t: Scalar, start: float, duration: float, ops: ScalarOps) -> Derivatives:
     """From 0 at `start` to 1 `duration` later, all [s]: S(τ) = 126 τ⁵ - 420 τ⁶ + 540 τ⁷ - 315 τ⁸ + 70 τ⁹.
 
-    The polynomial of lowest degree whose first four derivatives vanish at both ends; before and after it rests.
+    The polynomial of lowest degree whose first four derivatives vanish at both ends; constant before and after.
     """
     share = _share(t, start, duration, ops)
     q, p = share * (1.0 - share), 1.0 - 2.0 * share  # S' = 630 q⁴, and q' = p
@@ -59,9 +59,9 @@ def rise(t: Scalar, start: float, duration: float, ops: ScalarOps) -> Derivative
 
 
 def eased(t: Scalar, ramp: float, ops: ScalarOps) -> Derivatives:
-    """Time σ(t) that stands still at 0 and runs as `t` does from `ramp` [s] on: dσ/dt = S(t/ramp).
+    """Time σ(t) that is at rest at 0 and runs as `t` does from `ramp` [s] on: dσ/dt = S(t/ramp).
 
-    From then on it is ramp/2 late. With a ramp of 0 it is `t`.
+    From then on it lags by ramp/2. With a ramp of 0 it is `t`.
     """
     if ramp == 0.0:
         return line(0.0, 1.0, t)
@@ -71,7 +71,7 @@ def eased(t: Scalar, ramp: float, ops: ScalarOps) -> Derivatives:
 
 
 def after(path: Derivatives, time: Derivatives) -> Derivatives:
-    """`path`, whose derivatives are by σ, as a function of t; `time` is σ(t): the chain rule up to the fourth."""
+    """`path`, a function of σ, as a function of t, where `time` is σ(t): the chain rule up to the fourth derivative."""
     s1, s2, s3, s4 = time[1:]
     p0, p1, p2, p3, p4 = path
     return Derivatives(
@@ -84,12 +84,12 @@ def after(path: Derivatives, time: Derivatives) -> Derivatives:
 
 
 def moved(by: float, one: Derivatives) -> Derivatives:
-    """`one` and a constant."""
+    """`one` plus a constant."""
     return Derivatives(by + one.value, *one[1:])
 
 
 def times(factor: float, one: Derivatives) -> Derivatives:
-    """`one` by a factor."""
+    """`one` times a factor."""
     return Derivatives(*(factor * each for each in one))
 
 
@@ -100,14 +100,14 @@ def reference(x: Derivatives, y: Derivatives, z: Derivatives) -> Reference:
 
 
 def _share(t: Scalar, start: float, duration: float, ops: ScalarOps) -> Scalar:
-    """How much of the time from `start` has passed, in [0, 1]."""
+    """The share of `duration` that has passed since `start`, in [0, 1]."""
     share = (t - start) / duration
     share = ops.where(share > 0.0, share, 0.0 * t)
     return ops.where(share < 1.0, share, 1.0 + 0.0 * t)
 
 
 def _horner(coefficients: tuple[float, ...], x: Scalar) -> Scalar:
-    """The polynomial with these coefficients, that of x⁰ first."""
+    """The polynomial with these coefficients, from that of x⁰."""
     result = coefficients[-1] + 0.0 * x
     for each in reversed(coefficients[:-1]):
         result = result * x + each

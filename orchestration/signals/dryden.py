@@ -1,4 +1,4 @@
-"""Dryden gusts near the ground: velocities of the air about its mean, as coloured noise of stated spectra.
+"""Dryden gusts near the ground: velocities of the air about its mean, as coloured noise of given spectra.
 
 MIL-F-8785C (1980), section 3.7: the Dryden form and its low-altitude model (10 to 1000 feet). With Ω = ω/V the
 spectra are, one-sided and per rad/m,
@@ -18,27 +18,27 @@ from orchestration.basics.errors import UsageError
 FOOT = 0.3048
 """[m]"""
 LOWEST, HIGHEST = 10.0 * FOOT, 1000.0 * FOOT
-"""[m], between which the low-altitude model is said to hold"""
+"""[m], the range of the low-altitude model"""
 DRAWS = 5
-"""normal variates for each step: one for u, two for v, two for w"""
+"""Normal variates of each step: one for u, two for v, two for w"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Dryden:
-    """Gusts at one height, as something sees them that moves through the air at `airspeed`."""
+    """Gusts at one height, for a vehicle that moves through the air at `airspeed`."""
 
     wind_speed: float = 5.0
-    """W₂₀, the mean wind 20 feet (6 m) above the ground [m/s], by which the gusts grow"""
+    """W₂₀, the mean wind 20 feet (6 m) above the ground [m/s], to which gusts are proportional"""
     height: float = 10.0
     """h, above the ground [m]"""
     airspeed: float = 5.0
-    """V, between the vehicle and the air [m/s]; hovering, that of the mean wind"""
+    """V, between the vehicle and the air [m/s]; at hover, that of the mean wind"""
     direction: float = 0.0
-    """to which the mean wind blows [rad], from north towards east"""
+    """the direction to which the mean wind blows [rad], from north towards east"""
     steady: float = 0.0
-    """mean wind that is added to the gusts [m/s]"""
+    """the mean wind added to the gusts [m/s]"""
     step: float = 0.01
-    """at which the gusts are drawn [s]; linear in between"""
+    """the step at which gusts are drawn [s]; they are linear in between"""
 
     def __post_init__(self) -> None:
         for name in ("airspeed", "step"):
@@ -59,10 +59,10 @@ class Dryden:
         return level, level, self.height
 
     def velocities(self, normal: Iterable[Sequence[float]]) -> list[tuple[float, float, float]]:
-        """Wind [m/s], inertial, at the steps 0, 1, …, from as many standard normal variates, `DRAWS` a step.
+        """Wind [m/s], inertial, at the steps 0, 1, …, from standard normal variates, `DRAWS` per step.
 
-        The first values have the spectra already, and each step is exact: its values have the joint distribution that
-        the continuous process has at these times.
+        The first values are from the stationary distribution, and each step is exact: the values have the joint
+        distribution of the continuous process at these times.
         """
         along, across, down = (
             _Filter(intensity, self.airspeed * self.step / length)
@@ -77,11 +77,11 @@ class Dryden:
 
 
 class _Filter:
-    """White noise made to one of the spectra, step by step, from the stationary distribution.
+    """A filter from white noise to one of the spectra, step by step, from the stationary distribution.
 
     In the time θ = tV/L the second order is d(x₁, x₂) = (x₂, -x₁ - 2x₂) dθ + (0, 2) dw, whose stationary covariance is
-    the unit matrix, and y = σ/2 (x₁ + √3 x₂). Over a step e^{Aθ} = e^{-θ} [[1 + θ, θ], [-θ, 1 - θ]], and what is added
-    has the covariance ∫ e^{As} B Bᵀ e^{Aᵀs} ds, of which the triangular root is taken.
+    the unit matrix, and y = σ/2 (x₁ + √3 x₂). Over a step e^{Aθ} = e^{-θ} [[1 + θ, θ], [-θ, 1 - θ]], and the noise has
+    the covariance ∫ e^{As} B Bᵀ e^{Aᵀs} ds, whose triangular root is used.
     """
 
     def __init__(self, intensity: float, theta: float) -> None:

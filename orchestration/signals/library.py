@@ -1,4 +1,4 @@
-"""Signals that go by a name, and what they are told."""
+"""Signals by name, with their parameters."""
 
 import dataclasses
 import math
@@ -16,10 +16,9 @@ WAY_POINTS = "way-points"
 
 
 def make_signal(name: str, parameters: Mapping[str, Any], among: Mapping[str, type] = SIGNALS) -> Any:
-    """The signal of a name with these parameters; the others are what its class says.
+    """The signal of a name with these parameters, and its defaults for the others.
 
-    Raises `UsageError` for a name or a parameter that there is none of, naming those there are, or a value that
-    cannot be.
+    Raises `UsageError` for an unknown name or parameter, naming the known ones, or an invalid value.
     """
     if name not in among:
         raise UsageError(f"signal = {shown(name)}: {expected_name(str(name), list(among))}")
@@ -27,7 +26,7 @@ def make_signal(name: str, parameters: Mapping[str, Any], among: Mapping[str, ty
 
 
 def limits(parameters: Mapping[str, Any]) -> Limits:
-    """How fast a curve through way-points may be; raises `UsageError` as `make_signal` does."""
+    """The limits of a curve through way-points; raises `UsageError` as `make_signal` does."""
     found: Limits = _with_parameters(WAY_POINTS, Limits, parameters)
     return found
 

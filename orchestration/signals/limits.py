@@ -1,4 +1,4 @@
-"""How fast a curve through way-points may be: of which its times follow."""
+"""Limits of a curve through way-points, from which its times follow."""
 
 from dataclasses import dataclass
 
@@ -10,10 +10,10 @@ AXES = ("x", "y", "z")
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
-    """How fast a curve through way-points without times may be."""
+    """The limits of a curve through way-points without times."""
 
     speed: float = 1.0
-    """[m/s], where the file does not say it of a point"""
+    """[m/s], for points without one in the file"""
     acceleration: float = 1.0
     """[m/s²]"""
 

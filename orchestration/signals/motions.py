@@ -1,7 +1,7 @@
-"""Motions by name: where a reference is at any time, with its derivatives up to snap.
+"""Motions by name: positions over time, with their derivatives up to snap.
 
-Inertial frame north-east-down (z points down), SI units. Each begins at (x, y, z); those that go around begin towards
-north, and ease in from rest over `ramp` seconds, with four continuous derivatives.
+Inertial frame north-east-down (z points down), SI units. Each begins at (x, y, z); periodic ones begin towards north,
+and accelerate from rest over `ramp` seconds, with four continuous derivatives.
 """
 
 import math
@@ -27,11 +27,11 @@ from orchestration.signals.derivatives import (
 
 _PAPER = Trajectory()
 PERIOD = 10.0
-"""[s] of what goes around and is told neither a period nor a speed"""
+"""[s], the default of periodic motions"""
 
 
 class Motion(Protocol):
-    """Where to be, and how to move there."""
+    """A position over time, with derivatives."""
 
     def at(self, t: Scalar, ops: ScalarOps = FLOAT) -> Reference:
         """P_d and its first four derivatives at `t` [s], each a `Vec3` of scalars shaped as `t`."""
@@ -60,20 +60,20 @@ class Step:
     y: float = 0.0
     z: float = 0.0
     dx: float = 1.0
-    """by how far [m], as dy and dz"""
+    """the distance [m], as dy and dz"""
     dy: float = 0.0
     dz: float = 0.0
     start: float = 1.0
     """when it begins [s]"""
     duration: float = 2.0
-    """how long it takes [s]"""
+    """the time that it takes [s]"""
 
     def __post_init__(self) -> None:
         _require(self.start >= 0.0, "start", self.start, "zero or a positive number")
         _require(self.duration > 0.0, "duration", self.duration, "a positive number")
 
     def at(self, t: Scalar, ops: ScalarOps = FLOAT) -> Reference:
-        """On the way between two points."""
+        """The motion between the two points."""
         share = rise(t, self.start, self.duration, ops)
         ways = ((self.x, self.dx), (self.y, self.dy), (self.z, self.dz))
         return reference(*(moved(begin, times(by, share)) for begin, by in ways))
@@ -81,7 +81,7 @@ class Step:
 
 @dataclass(frozen=True, kw_only=True)
 class _Around:
-    """What goes around at an angular rate ω."""
+    """A periodic motion at an angular rate ω."""
 
     x: float = 0.0
     """where it begins [m], as y and z"""
@@ -90,11 +90,11 @@ class _Around:
     radius: float = 2.0
     """[m]"""
     period: float | None = None
-    """of one turn [s]; 10 unless a period or a speed is given"""
+    """of one turn [s]; default: 10, if no speed is given"""
     speed: float | None = None
     """[m/s], in place of a period"""
     ramp: float = 3.0
-    """how long it takes from rest to full speed [s]; 0: at full speed from the beginning"""
+    """the time from rest to full speed [s]; 0: at full speed from the beginning"""
 
     def __post_init__(self) -> None:
         _require(self.radius > 0.0, "radius", self.radius, "a positive number")
@@ -116,19 +116,19 @@ class Circle(_Around):
     """P + r [sin θ, 1 - cos θ, 0]: level, to the right; θ = ωσ(t), and `speed` is that along the circle."""
 
     def at(self, t: Scalar, ops: ScalarOps = FLOAT) -> Reference:
-        """On the circle."""
+        """The motion on the circle."""
         return reference(*_circle(self, eased(t, self.ramp, ops), ops), constant(self.z, t))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Helix(_Around):
-    """As the circle, and z + rate_z σ(t): it climbs or descends as it goes around; `speed` is the level part."""
+    """As the circle, and z + rate_z σ(t): it climbs or descends at the same time; `speed` is the level part."""
 
     rate_z: float = -0.2
     """[m/s]; z points down, so that a negative one climbs"""
 
     def at(self, t: Scalar, ops: ScalarOps = FLOAT) -> Reference:
-        """On the helix."""
+        """The motion on the helix."""
         time = eased(t, self.ramp, ops)
         return reference(*_circle(self, time, ops), after(line(self.z, self.rate_z, time.value), time))
 
@@ -141,7 +141,7 @@ class Lemniscate(_Around):
     """
 
     def at(self, t: Scalar, ops: ScalarOps = FLOAT) -> Reference:
-        """On the figure of eight."""
+        """The motion on the figure of eight."""
         time, rate = eased(t, self.ramp, ops), self.rate(math.sqrt(2.0) * self.radius)
         along = moved(self.x, after(wave(self.radius, rate, time.value, ops), time))
         across = moved(self.y, after(wave(0.5 * self.radius, 2.0 * rate, time.value, ops), time))
@@ -150,9 +150,9 @@ class Lemniscate(_Around):
 
 @dataclass(frozen=True, kw_only=True)
 class Paper:
-    """The paper's (section V): [a_x sin ωσ cos ωσ, a_y sin ωσ, start_z + rate_z σ], as controllers have it built in.
+    """The paper's motion (section V), built into controllers: [a_x sin ωσ cos ωσ, a_y sin ωσ, start_z + rate_z σ].
 
-    The paper has no ramp: its reference is at full speed from the beginning, and so is this one unless told.
+    The paper has no ramp: its reference is at full speed from the beginning, and so is this one by default.
     """
 
     amplitude_x: float = _PAPER.amplitude_x
@@ -166,13 +166,13 @@ class Paper:
     rate_z: float = _PAPER.rate_z
     """[m/s]"""
     ramp: float = 0.0
-    """how long it takes from rest to full speed [s]"""
+    """the time from rest to full speed [s]"""
 
     def __post_init__(self) -> None:
         _require(self.ramp >= 0.0, "ramp", self.ramp, "zero or a positive number")
 
     def at(self, t: Scalar, ops: ScalarOps = FLOAT) -> Reference:
-        """On the paper's path."""
+        """The motion on the paper's path."""
         path = Trajectory(
             amplitude_x=self.amplitude_x,
             amplitude_y=self.amplitude_y,

@@ -2,8 +2,8 @@
 
 Of all curves through the points that are at rest at both ends, up to the fourth derivative, the one with the least
 ∫ |d⁵P/dt⁵|² dt. Its first four derivatives are continuous by construction (neighbours share them), and so are the
-fifth to the eighth, since that is where the integral is least. What minimum snap is to curves with three derivatives
-(Mellinger and Kumar 2011), this is to curves with four.
+fifth to the eighth, as the integral is least. It is the analogue for four derivatives of minimum snap, which is for
+three (Mellinger and Kumar 2011).
 """
 
 import functools
@@ -15,15 +15,15 @@ import numpy as np
 from orchestration.basics.simulator import Floats
 
 ORDERS = 5
-"""the value and four derivatives"""
+"""The value and four derivatives"""
 DEGREE = 2 * ORDERS - 1
 
 
 @dataclass(frozen=True, kw_only=True)
 class Spline:
-    """Polynomials between knots (n + 1,) [s]; before the first and after the last it rests.
+    """Polynomials between knots (n + 1,) [s]; at rest before the first and after the last.
 
-    `coefficients` (n, 10, 3) are by powers of the share of the time between two knots that has passed.
+    `coefficients` (n, 10, 3) are by powers of the elapsed share of the time between two knots.
     """
 
     knots: Floats
@@ -59,12 +59,12 @@ def through(times: Floats, points: Floats) -> Spline:
 
 
 def _coefficients(spans: Floats, derivatives: Floats) -> Floats:
-    """Of the pieces between knots that have these derivatives, shape (n + 1, 5, 3)."""
+    """The coefficients of the pieces between knots with these derivatives, shape (n + 1, 5, 3)."""
     scaled = derivatives[:-1] * spans[:, None, None] ** np.arange(ORDERS)[:, None]
     ends = derivatives[1:] * spans[:, None, None] ** np.arange(ORDERS)[:, None]
     begin = scaled[:, 0].copy()
     for each in (scaled, ends):
-        each[:, 0] -= begin  # from where the piece begins, which costs no digits far from the origin
+        each[:, 0] -= begin  # relative to its begin, which loses no digits far from the origin
     result: Floats = np.einsum("ij,njk->nik", _exact_matrices()[0], np.concatenate([scaled, ends], axis=1))
     result[:, 0] += begin
     return result
@@ -73,8 +73,8 @@ def _coefficients(spans: Floats, derivatives: Floats) -> Floats:
 def _derivatives(spans: Floats, points: Floats) -> Floats:
     """Position and derivatives at the knots, shape (n, 5, 3), by elimination from knot to knot.
 
-    At each inner knot the integral is least where its derivative by the four unknowns is zero: four equations in
-    them and in those of both neighbours.
+    At each inner knot the integral is least where its derivatives by the four unknowns vanish: four equations in
+    these and in those of both neighbours.
     """
     count = len(points)
     found = np.zeros((count, ORDERS, 3))
@@ -133,7 +133,7 @@ def _product(a: list[list[Fraction]], b: list[list[Fraction]]) -> list[list[Frac
 
 
 def _inverse(rows: list[list[Fraction]]) -> list[list[Fraction]]:
-    """By elimination, in fractions."""
+    """The inverse of a matrix by elimination, in fractions."""
     size = len(rows)
     work = [list(row) + [Fraction(int(i == j)) for j in range(size)] for i, row in enumerate(rows)]
     for i in range(size):

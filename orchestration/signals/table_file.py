@@ -16,20 +16,20 @@ from orchestration.basics.errors import UsageError, shown
 from orchestration.basics.simulator import Floats
 
 LONGEST_LINE = 2**17
-"""Characters of a line, so that a file without line ends is not read whole."""
+"""The most characters of a line, so that a file without line ends is not read whole"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Rows:
-    """The numbers of a CSV file by column, each with the line that it is in."""
+    """The numbers of a CSV file by column, with the line of each row."""
 
     path: Path
     columns: Mapping[str, Floats]
     """(n,) by name, in the order of the file"""
     lines: Sequence[int]
 
-    def refused(self, row: int, column: str, expected: str) -> UsageError:
-        """That a value is none that is expected."""
+    def error(self, row: int, column: str, expected: str) -> UsageError:
+        """The error for an invalid value."""
         value = shown(float(self.columns[column][row]))
         return UsageError(f"{self.path}: line {self.lines[row]}: {column} = {value}: expected {expected}")
 
@@ -38,7 +38,7 @@ class Rows:
         steps = np.diff(self.columns[TIME])
         if not (steps > 0.0).all():
             row = 1 + int((steps <= 0.0).argmax())
-            raise self.refused(row, TIME, "times that increase")
+            raise self.error(row, TIME, "times that increase")
 
 
 TIME = "time"
@@ -61,7 +61,7 @@ def read_table(path: Path, columns: Sequence[str], stop_time: float) -> tuple[Fl
 def read_rows(path: Path, columns: Sequence[str]) -> Rows:
     """A CSV file that has at least these columns.
 
-    Raises `UsageError`, naming line and column, for one that has not, or a value that is no finite number.
+    Raises `UsageError` for a missing column and, naming line and column, for a value that is no finite number.
     """
     with _opened(path) as lines:
         return _read_rows(path, lines, columns)
@@ -127,7 +127,7 @@ def _expect_columns(path: Path, header: Sequence[str], columns: Sequence[str]) -
 
 
 def _wrong(header: Sequence[str], row: Sequence[str]) -> str:
-    """The first value of a row that is no finite number, by its column."""
+    """The first value of a row that is no finite number, with its column."""
     return next(f"{name} = {shown(text)}" for name, text in zip(header, row) if not _is_finite(text))
 
 

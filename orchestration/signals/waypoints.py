@@ -1,4 +1,4 @@
-"""Curves through the points of a CSV file: `time, x, y, z`, or `x, y, z` with limits of which the times follow."""
+"""Curves through the points of a CSV file: `time, x, y, z`, or `x, y, z` with limits that determine the times."""
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -14,13 +14,13 @@ from orchestration.signals.table_file import TIME, Rows, read_rows
 
 HOLD, SPEED = "hold", "speed"
 _SAMPLES, _FINER = 32, 3
-"""of a piece, and how often the neighbourhood of the largest is looked at as finely again"""
+"""Samples of a piece, and of the neighbourhood of the largest in each refinement; the number of refinements"""
 
 
 def read_waypoints(path: Path, limits: Mapping[str, float]) -> Spline:
     """The curve through the points [m] of a CSV file; `limits` are fields of `Limits`, for a file without times.
 
-    Raises `UsageError`, naming line and column, for what is no such file.
+    Raises `UsageError`, naming line and column, for any other file.
     """
     rows = read_rows(path, AXES)
     known = (TIME, *AXES) if TIME in rows.columns else (*AXES, HOLD, SPEED)
@@ -37,22 +37,22 @@ def read_waypoints(path: Path, limits: Mapping[str, float]) -> Spline:
 
 
 def _timed(rows: Rows, points: Floats, limits: Limits) -> Spline:
-    """One curve after the other, from hold to hold, each as fast as the limits let it."""
+    """Curves from hold to hold, each as fast as the limits allow."""
     count = len(points)
     holds = rows.columns.get(HOLD, np.zeros(count))
     speeds = rows.columns.get(SPEED, np.full(count, limits.speed))
     for row in range(count):
         if holds[row] < 0.0:
-            raise rows.refused(row, HOLD, "zero or a positive number of seconds")
+            raise rows.error(row, HOLD, "zero or a positive number of seconds")
         if speeds[row] <= 0.0 and row:
-            raise rows.refused(row, SPEED, "a positive number, the largest on the way to this point")
+            raise rows.error(row, SPEED, "a positive number, the largest on the way to this point")
         if row and (points[row] == points[row - 1]).all():
-            raise rows.refused(row, "x", "another point than the one before; to stay there, give that a hold")
+            raise rows.error(row, "x", "another point than the one before; to stay there, give that a hold")
     stops = [0, *(i for i in range(1, count - 1) if holds[i] > 0.0), count - 1]
     now, curves = 0.0, []
     for first, last in pairwise(stops):
         if holds[first] > 0.0:
-            curves.append(_resting(now, now + float(holds[first]), points[first]))
+            curves.append(_at_rest(now, now + float(holds[first]), points[first]))
             now += float(holds[first])
         curve = _within(points[first : last + 1], speeds[first + 1 : last + 1], limits.acceleration)
         curves.append(Spline(knots=now + curve.knots, coefficients=curve.coefficients))
@@ -61,8 +61,8 @@ def _timed(rows: Rows, points: Floats, limits: Limits) -> Spline:
 
 
 def _within(points: Floats, speeds: Floats, acceleration: float) -> Spline:
-    """From rest to rest. Each way gets time by its length and speed, and that at either end as much again to speed up
-    or slow down; then all times are stretched by the one factor at which speed or acceleration touches a limit.
+    """The curve from rest to rest. The time of each piece is its length by its speed, twice that for the first and the
+    last, which accelerate and slow down; then all times are scaled so that speed or acceleration just reaches a limit.
     """
     spans = np.linalg.norm(np.diff(points, axis=0), axis=1) / speeds
     spans[0] += spans[0]
@@ -73,7 +73,7 @@ def _within(points: Floats, speeds: Floats, acceleration: float) -> Spline:
 
 
 def _peak(curve: Spline, order: int, limits: Floats) -> float:
-    """The largest share of the limit of its piece that a derivative of the curve reaches."""
+    """The largest ratio of a derivative of the curve to the limit of its piece."""
     begins, ends = curve.knots[:-1], curve.knots[1:]
     shares = np.linspace(0.0, 1.0, _SAMPLES + 1)
     for _ in range(_FINER):
@@ -85,7 +85,7 @@ def _peak(curve: Spline, order: int, limits: Floats) -> float:
     return float((size.max(axis=1) / limits).max())
 
 
-def _resting(begin: float, end: float, point: Floats) -> Spline:
+def _at_rest(begin: float, end: float, point: Floats) -> Spline:
     coefficients = np.zeros((1, DEGREE + 1, len(AXES)))
     coefficients[0, 0] = point
     return Spline(knots=np.array([begin, end]), coefficients=coefficients)

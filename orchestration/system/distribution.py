@@ -269,5 +269,5 @@ def _column(path: Path, column: str, state: tuple[int, int] | None) -> "Floats":
     rows = read_rows(path, (column,))
     values = rows.columns[column]
     if (values < 0.0).any():
-        raise rows.refused(int((values < 0.0).argmax()), column, "zero or positive numbers")
+        raise rows.error(int((values < 0.0).argmax()), column, "zero or positive numbers")
     return values
