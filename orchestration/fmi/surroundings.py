@@ -5,7 +5,7 @@ import os
 from collections.abc import Sequence
 from contextlib import suppress
 
-ROUNDING, FOLDER = "how numbers are rounded", "the current folder"
+ROUNDING, FOLDER = "the floating-point mode", "the current folder"
 _ONE, _LITTLE, _SMALLEST, _HALF, _TINY = 1.0, 2.0**-60, 2.0**-1022, 0.5, 2.0**-1074
 _ENVIRONMENT = 512
 """[byte] an upper bound on the size of the floating-point environment"""
@@ -47,8 +47,8 @@ def current_folder() -> str | None:
 
 def sentence(names: Sequence[str], what: str) -> str:
     """The warning for what one of some FMUs has changed."""
-    who = names[0] if len(names) == 1 else f"one of {', '.join(names)}"
-    return f"{who}: the FMU has changed {what} of the whole process, which was put back"
+    fmu = names[0] if len(names) == 1 else f"one of {', '.join(names)}"
+    return f"{fmu}: the FMU has changed {what} of the whole process, which was restored"
 
 
 def _mode() -> tuple[bool, ...]:

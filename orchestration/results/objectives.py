@@ -141,7 +141,7 @@ def with_available_objectives(system: System, signals: set[str], numbers: set[st
         if name in (*FIXED, *PRINTED):
             raise UsageError(f"objectives.{name}: every run has a result of that name, expected another")
         if name in valid:
-            raise UsageError(f"objectives.{name}: expressions know something else by that name, expected another")
+            raise UsageError(f"objectives.{name}: that name has another meaning in expressions, expected another")
         if name in system.optional and not valid.issuperset(names(parse(text))):
             continue
         expect_names(parse(text), valid, f"objectives.{name}")

@@ -177,4 +177,4 @@ def _hash(path: Path) -> str:
 def _expect_same(paused: dict[str, str], simulation: PreparedRun, folder: Path) -> None:
     for what, digest in _hashes(simulation).items():
         if digest != paused.get(what):
-            raise UsageError(f"{folder}: {what} is not as when the run was paused; expected it unchanged")
+            raise UsageError(f"{folder}: {what} has changed since the run was paused; expected it unchanged")

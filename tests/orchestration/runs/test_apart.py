@@ -193,7 +193,7 @@ def test_an_fmu_that_rounds_otherwise_is_named_and_moves_no_other(engine: Any, t
     expected = run(pairs([sound] * len(others), sound), in_process=True, engine=engine)
     for in_process in (False, True):
         result = run(pairs(others, sound), engine=engine, in_process=in_process)
-        text = "the FMU has changed how numbers are rounded of the whole process, which was put back"
+        text = "the FMU has changed the floating-point mode of the whole process, which was restored"
         assert result.warnings == tuple(f"a{i} (Small): {text}" for i in range(len(HABITS)))
         for i in range(len(HABITS)):
             assert result.signals[f"b{i}.y"].tobytes() == expected.signals[f"b{i}.y"].tobytes()
@@ -204,7 +204,7 @@ def test_an_fmu_that_changes_the_folder_is_named_and_the_folder_put_back(tmp_pat
     before = os.getcwd()
     result = run(alone(other), in_process=True)
     assert os.getcwd() == before
-    text = "the FMU has changed the current folder of the whole process, which was put back"
+    text = "the FMU has changed the current folder of the whole process, which was restored"
     assert result.warnings == (f"it (Small): {text}",)
     assert run(beside(sound, other)).warnings == (f"one of a (Small), b (Small): {text}",)
 

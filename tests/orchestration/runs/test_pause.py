@@ -81,7 +81,7 @@ def test_other_fmus_than_those_of_the_pause_are_refused(tmp_path: Path) -> None:
     run_until(native(stop_time=0.1).with_fmus(**own(tmp_path)), 0.05, tmp_path / "paused")
     with zipfile.ZipFile(tmp_path / "UnifiedController.fmu", "a") as fmu:
         fmu.writestr("resources/more.txt", "more")  # its GUID stays
-    with pytest.raises(UsageError, match=r"the FMU of controller is not as when the run was paused"):
+    with pytest.raises(UsageError, match=r"the FMU of controller has changed since the run was paused"):
         resume(tmp_path / "paused")
 
 
@@ -91,7 +91,7 @@ def test_another_scenario_than_that_of_the_pause_is_refused(edit: tuple[str, str
     file = tmp_path / "paused" / "scenario.toml"
     assert edit[0] in file.read_text()
     file.write_text(file.read_text().replace(*edit))
-    with pytest.raises(UsageError, match=r"scenario.toml is not as when the run was paused"):
+    with pytest.raises(UsageError, match=r"scenario.toml has changed since the run was paused"):
         resume(tmp_path / "paused", tmp_path / "done")
     assert [path.name for path in tmp_path.iterdir()] == ["paused"]
 
@@ -102,7 +102,7 @@ def test_another_reference_than_that_of_the_pause_is_refused(tmp_path: Path) -> 
     scenario = native(stop_time=0.1, reference=ReferenceChoice(file=table))
     run_until(scenario, 0.05, tmp_path / "paused")
     table.write_text(table.read_text() + "\n2" + ",0" * 15)
-    with pytest.raises(UsageError, match="the file of reference is not as when the run was paused"):
+    with pytest.raises(UsageError, match="the file of reference has changed since the run was paused"):
         resume(tmp_path / "paused")
 
 

@@ -118,7 +118,7 @@ def system_of(folder: Path, text: str) -> System:
         ('["tank.inflow"]', '["tank.inflw"]', "sources.rain.to: Tank has no input inflw; ", "inflow"),
         ('["tank.inflow"]', '["tank.level"]', "sources.rain.to: tank.level is an output; ", "an input: valve, inflow"),
         ("peak =", "outcome =", "objectives.outcome: every run has a result of that name", "expected another"),
-        ("peak =", "stop_time =", "objectives.stop_time: expressions know something else by that", "expected another"),
+        ("peak =", "stop_time =", "objectives.stop_time: that name has another meaning in", "expected another"),
         ("tank.level > 5", "tank.level", "criterion.diverged: tank.level is a Real; ", "as in tank.level > 1"),
         ("max(tank.level)", "max(tank.levl)", "objectives.peak: there is no tank.levl; ", "did you mean tank.level"),
     ],
