@@ -158,7 +158,7 @@ class NativeInstance(Instance):
         return content
 
     def restore(self, state: bytes) -> None:
-        """Put back what `save` gave."""
+        """Restore a state that `save` returned."""
         self._expect_state()
         _, _, free, deserialise, put = self.state_calls
         handle = self._call(deserialise, state)
@@ -225,7 +225,7 @@ class NativeInstance(Instance):
         self._put(variable, converted)
 
     def set_tolerance(self, tolerance: float) -> None:
-        """Give its solver a relative tolerance, before initialisation, instead of that of its declared experiment."""
+        """Set the relative tolerance of its solver, before initialisation; default: that of its declared experiment."""
         self._tolerance = tolerance
 
     def get(self, name: str) -> Value:
