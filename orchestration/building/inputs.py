@@ -47,7 +47,7 @@ class Files:
         return {name: read_model(path) for name, path in self.fmus.items()}
 
     @cached_property
-    def starts(self) -> dict[str, dict[str, float]]:
+    def start_values(self) -> dict[str, dict[str, float]]:
         """The start values of all Real variables, by FMU and name."""
         return {
             name: {v.name: float(v.start) for v in model.variables.values() if v.kind == "Real" and v.start is not None}
@@ -58,7 +58,7 @@ class Files:
         """The models of the components of a system."""
         return {name: self.models[component.fmu] for name, component in system.components.items()}
 
-    def starts_of(self, system: System) -> dict[str, float]:
+    def start_values_of(self, system: System) -> dict[str, float]:
         """The start values of all Real parameters, as COMPONENT.NAME."""
         return {
             f"{name}.{variable.name}": float(variable.start)

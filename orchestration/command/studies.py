@@ -79,7 +79,7 @@ def _say_if_endless(study: "Study") -> None:
     if LOOPS.of(study.base.kind) is None:
         files = study.files()
         first = range(min(len(study.points), FIRST))
-        exact.say_if_endless(study.base, [study.system(i, files.starts_of(study.origin)) for i in first], files)
+        exact.say_if_endless(study.base, [study.system(i, files.start_values_of(study.origin)) for i in first], files)
 
 
 def status(study: StudyFile, out: Out = None) -> Answer:

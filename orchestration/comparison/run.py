@@ -130,7 +130,7 @@ def rerun_cells(
     runs = [comparison.runs_of(comparison.cell(index)) for index in indices]
     comparison, files, how = _prepared(comparison, [of_cell[0] for of_cell in runs], engine)
     study = comparison.study
-    starts = files.starts_of(study.origin)
+    starts = files.start_values_of(study.origin)
     systems = [study.system(i, starts) for i in chain(*runs)]
     with RunEvaluator(files, workers, how.engine) as pool:
         flights = pool.run_all(systems, in_lanes=how.in_lanes, on_gpu=how.on_gpu)
@@ -160,7 +160,7 @@ def flight(comparison: Comparison, index: int, start: int, out: Path, *, engine:
     if not 0 <= start < len(runs):
         raise UsageError(f"--start {start}: expected a number from 0 to {len(runs) - 1}")
     comparison, files, how = _prepared(comparison, [runs[start]], engine)
-    request = comparison.request(runs[start], files.starts_of(comparison.study.origin))
+    request = comparison.request(runs[start], files.start_values_of(comparison.study.origin))
     keep_run(out, lambda to: fly(request, recorder=to, engine=how.engine))
 
 
@@ -176,7 +176,7 @@ def _prepared(
         study = replace(comparison, native=native).study
         files = study.files()
         with errors_in_own_terms(comparison.base):
-            systems = [study.system(index, files.starts_of(study.origin)) for index in indices]
+            systems = [study.system(index, files.start_values_of(study.origin)) for index in indices]
             for system in systems:
                 check_against_fmus(system, files.models_of(system))
         return systems[0], files

@@ -66,7 +66,7 @@ def at_edge(scenario: Scenario) -> Scenario | None:
     """
     scenario = scenario.resolved()
     system = scenario.as_system()
-    known = files_of(system).starts_of(system)
+    known = files_of(system).start_values_of(system)
     own = {f"controller.{name}": value for name, value in scenario.controller.parameters.items()}
     names = [f"controller.{name}" for name in (wiring.SURFACE_GAIN, wiring.SURFACE_EXPONENT, wiring.BOUNDARY_LAYER)]
     if any(name not in known for name in names):

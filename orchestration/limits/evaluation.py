@@ -8,7 +8,7 @@ from typing import Any
 from orchestration.basics.bisection import Range
 from orchestration.basics.statistics import refutes, wilson
 from orchestration.requests.ranges import Varied
-from orchestration.results.criterion import judged, unmet
+from orchestration.results.criterion import judged_objective, unmet
 from orchestration.workers.executors import RunEvaluator
 
 RELIABILITY = 0.9
@@ -86,7 +86,7 @@ class Evaluator:
         self._done += 1
         down = next((one for one in metrics if not is_good(one)), None)
         flew = sum(map(is_good, metrics))
-        measured = metrics[0 if down is None else metrics.index(down)].get(judged(system) or "")
+        measured = metrics[0 if down is None else metrics.index(down)].get(judged_objective(system) or "")
         known = self._confidence is not None and len(metrics) == self._seeds
         found = self.tried[value] = Evaluation(
             value=value,

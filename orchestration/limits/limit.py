@@ -20,7 +20,7 @@ from orchestration.limits.found import Continuous, Found
 from orchestration.requests.ranges import Varied, default_quantity, search_range
 from orchestration.requests.request import RequestLike, request_of
 from orchestration.results import html
-from orchestration.results.criterion import edge, judged
+from orchestration.results.criterion import bound_of, judged_objective
 from orchestration.stability.known_loops import LocalLimit
 from orchestration.stability.local_limit import local_limits
 from orchestration.system.chance import has_random_timing, is_random
@@ -121,7 +121,7 @@ def find(
     span = search_range(varied, models, first=first, last=last, tolerance=tolerance, scan=scan)
     with errors_in_own_terms(request):
         fitting = [check_against_fmus(varied.at(value), models) for value in span.values()]
-    units, metric = fitting[0].units, judged(varied.system)
+    units, metric = fitting[0].units, judged_objective(varied.system)
     random = is_random(varied.at(span.last))
     seeds = math.ceil(math.log(1.0 - confidence) / math.log(RELIABILITY)) if random else 1
     local = _local(varied, span, files)
@@ -148,7 +148,7 @@ def find(
     tried = tuple(trials.tried[value] for value in sorted(trials.tried))
     return Limit(
         of=of, unit=span.unit.strip() or None, judged=metric, judged_unit=units.get(metric or ""),
-        judged_bound=None if metric is None else edge(varied.system, metric),
+        judged_bound=None if metric is None else bound_of(varied.system, metric),
         local_limit=local.limit, local_limit_outside=local.outside, local_method=local.method,
         local_accuracy=local.accuracy, mean_square_limit=mean_square.limit,
         large_signal_limit=None if bracket is None else bracket.good,

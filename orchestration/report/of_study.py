@@ -20,7 +20,7 @@ from orchestration.report.tables import ColumnAxis, Row, is_good, share_of, shar
 from orchestration.report.tracks import Tracks
 from orchestration.results import display_names as labels
 from orchestration.results.column_info import column_infos
-from orchestration.results.criterion import judged
+from orchestration.results.criterion import judged_objective
 from orchestration.results.quantities import quantity
 from orchestration.studies.axis_labels import quantity_of
 from orchestration.studies.shown_first import shown_first
@@ -149,7 +149,7 @@ def metric_of(stored: Stored, study: Study | None) -> str:
     def values(name: str) -> Floats:
         return np.array([float(row[name]) for row in stored.rows if is_good(row) and row[name] is not None])
 
-    preferred = None if study is None else judged(study.origin)
+    preferred = None if study is None else judged_objective(study.origin)
     return shown_first((name for name in stored.metrics if name not in FIXED), values, preferred)
 
 

@@ -44,7 +44,7 @@ def fastest(study: Study) -> tuple[Study, Files, bool]:
     def first(native: bool) -> tuple[System, Files]:
         variant = replace(study, native=native)
         files = variant.files()
-        return variant.system(0, files.starts_of(variant.origin)), files
+        return variant.system(0, files.start_values_of(variant.origin)), files
 
     how = choose_execution("auto", study.native, first)
     variant = replace(study, native=how.native)
@@ -55,7 +55,7 @@ def rerun(
     study: Study, files: Files, indices: Sequence[int], *, lanes: bool, progress: Progress | None = None
 ) -> Iterator[Rerun]:
     """Simulate runs of a study again by their indices; a run that fails is omitted."""
-    starts, paths = files.starts_of(study.origin), {**files.fmus, **files.tables}
+    starts, paths = files.start_values_of(study.origin), {**files.fmus, **files.tables}
     batches = Batches() if lanes else None
     for first in range(0, len(indices), BATCH if lanes else 1):
         some = indices[first : first + (BATCH if lanes else 1)]

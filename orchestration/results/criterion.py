@@ -10,13 +10,13 @@ from orchestration.system.model import System
 _HOLDS = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
 
 
-def judged(system: System) -> str | None:
+def judged_objective(system: System) -> str | None:
     """The objective that the criterion judges, or else the first one; None if there is none."""
     named = names(parse(system.criterion.good)) if system.criterion.good is not None else ()
     return next((name for name in named if name in system.objectives), next(iter(system.objectives), None))
 
 
-def edge(system: System, metric: str) -> float | None:
+def bound_of(system: System, metric: str) -> float | None:
     """The bound of a criterion that is only `metric < number`, or another comparison; None for any other."""
     if system.criterion.good is None:
         return None

@@ -25,7 +25,7 @@ def expect_flyable(study: Study, files: Files) -> tuple[str, ...]:
     """
     expect_columns(study.judged)
     first, wrong = "", 0
-    starts, longest, alike = files.starts_of(study.origin), study.origin, _Alike(files)
+    starts, longest, alike = files.start_values_of(study.origin), study.origin, _Alike(files)
     for index in range(len(study.points)):
         try:
             with errors_in_own_terms(study.base):

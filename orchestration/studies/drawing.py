@@ -11,7 +11,7 @@ from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
 from orchestration.basics.terminal import Share
 from orchestration.figures.style import SCREEN, Style, save
-from orchestration.results.criterion import edge, judged
+from orchestration.results.criterion import bound_of, judged_objective
 from orchestration.studies import figures, sensitivity
 from orchestration.studies.axes import Axis, unit_points
 from orchestration.studies.maps import heat_map
@@ -76,7 +76,7 @@ def _over_axes(
     words = system.criterion.outcomes
     if len(axes) > 2:
         return {metric: figures.scatter(table, axes, metric, words, units=units, style=style)}
-    made = {metric: figures.lines(table, axes, metric, words, edge(system, metric), units=units, style=style)}
+    made = {metric: figures.lines(table, axes, metric, words, bound_of(system, metric), units=units, style=style)}
     if len(axes) == 2 and all(axis.values is not None for axis in axes):
         made[f"{metric}_map"] = heat_map(table, axes, metric, words, units=units, style=style)
     return made
@@ -104,7 +104,9 @@ def numbers(table: "pd.DataFrame", metric: str) -> Floats:
 def _shown_first(study: Study, table: "pd.DataFrame") -> str:
     good = figures.flew(table)
     return shown_first(
-        study.judged, lambda name: table[name].where(good).to_numpy(float, na_value=np.nan), judged(study.origin)
+        study.judged,
+        lambda name: table[name].where(good).to_numpy(float, na_value=np.nan),
+        judged_objective(study.origin),
     )
 
 

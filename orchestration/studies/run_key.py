@@ -32,7 +32,7 @@ def run_key(system: System, files: Files, metrics: Sequence[OwnMetric] = ()) -> 
         ),
         **{key: json.dumps(getattr(system, key)) for key in ("stop_time", "seed")},
         "components": _listed(
-            _text_of_component(name, component, files.hashes, files.starts[component.fmu])
+            _text_of_component(name, component, files.hashes, files.start_values[component.fmu])
             for name, component in system.components.items()
         ),
     }  # fmt: skip

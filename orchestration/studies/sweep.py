@@ -94,7 +94,7 @@ def sweep(
             if announce is not None and engine == "auto":
                 announce(str(how))
             flown_with = with_python_twins(files) if how.in_lanes else files
-            task_of = partial(_task, study, files.starts_of(study.origin), time_limit)
+            task_of = partial(_task, study, files.start_values_of(study.origin), time_limit)
             tasks = (task_of(index, key, how.engine) for index, key in missing.items())
             lanes: dict[str, Row] = {}
             try:
@@ -129,7 +129,7 @@ def ready(study: Study, engine: EngineChoice) -> tuple[Study, Files, Execution, 
         asked = replace(study, native=native)
         files = asked.files()
         found[native] = asked, files, expect_flyable(asked, files)
-        return asked.system(0, files.starts_of(asked.origin)), files
+        return asked.system(0, files.start_values_of(asked.origin)), files
 
     apart = "metrics that are functions need whole runs, one at a time" if study.metrics else None
     how = choose_execution(engine, study.native, first, no_lanes=apart)
@@ -273,7 +273,7 @@ def _describe(opened: store.Store, study: Study, files: Files) -> None:
 
 def _units(study: Study, files: Files) -> dict[str, str]:
     """Of the axes, and of what its runs come to, as the first of them has them."""
-    first = study.system(0, files.starts_of(study.origin))
+    first = study.system(0, files.start_values_of(study.origin))
     models = files.models_of(first)
     of_axes = {
         axis.name: unit_at(paths_in(study.base, axis.targets[0])[0], models)
@@ -284,7 +284,7 @@ def _units(study: Study, files: Files) -> dict[str, str]:
 
 
 def _places(study: Study, files: Files) -> Iterator[store.DesignPoint]:
-    starts = files.starts_of(study.origin)
+    starts = files.start_values_of(study.origin)
     for index in range(len(study.points)):
         settings, system = study.settings_and_system(index, starts)
         yield store.DesignPoint(index=index, key=run_key(system, files, study.metrics), settings=settings)

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from orchestration.quadrotor.translation import quadrotor
-from orchestration.results.criterion import edge, unmet
+from orchestration.results.criterion import bound_of, unmet
 from orchestration.system.model import System
 
 
@@ -52,5 +52,5 @@ def test_of_a_run_that_is_good_or_diverged_nothing_is_reported() -> None:
 
 
 def test_an_edge_is_the_bound_of_one_comparison_and_of_no_other_expression() -> None:
-    assert edge(with_good("ultimate_bound < 0.05"), "ultimate_bound") == 0.05
-    assert edge(with_good("ultimate_bound < 0.05 and settling_time < 5"), "ultimate_bound") is None
+    assert bound_of(with_good("ultimate_bound < 0.05"), "ultimate_bound") == 0.05
+    assert bound_of(with_good("ultimate_bound < 0.05 and settling_time < 5"), "ultimate_bound") is None

@@ -106,7 +106,7 @@ def swept(chosen: Study, folder: Path, **options: Any) -> Path:
 
 
 def starts() -> dict[str, float]:
-    return files_in().starts_of(short().as_system())
+    return files_in().start_values_of(short().as_system())
 
 
 def files_in(scenario: Scenario | None = None) -> Files:

@@ -101,7 +101,7 @@ def test_a_study_file_names_a_system_file_and_may_multiply_what_an_fmu_has(syste
     file = tmp_path / "study.toml"
     file.write_text(f'scenario = "{FILE}"\n[[axes]]\nname = "gain"\nmultiplies = ["{K_D}"]\nvalues = [1.0, 3]\n')
     chosen = load_study(file)
-    starts = chosen.files().starts_of(chosen.origin)
+    starts = chosen.files().start_values_of(chosen.origin)
     assert [chosen.system(i, starts).components["controller"].parameters for i in range(2)] == [
         {"k_d": 1.0}, {"k_d": 3.0},
     ]  # fmt: skip
