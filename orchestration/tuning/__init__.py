@@ -1,1 +1,1 @@
-"""Searches for the parameters of a controller that cost least."""
+"""Tuning: searches for the parameters of a controller with the lowest cost."""

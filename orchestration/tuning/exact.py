@@ -1,4 +1,4 @@
-"""Tuning without a run: the parameters of which the exact expectation of a cost is least."""
+"""Tuning without runs: the parameters that minimise the exact expectation of a cost."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -14,49 +14,51 @@ from orchestration.fmi.foreign import isolated_call
 from orchestration.stability.known_loops import rested
 from orchestration.system.model import System
 from orchestration.system.request import errors_in_own_terms
-from orchestration.tuning.sought import COST, Outcome, Sought, lowest
+from orchestration.tuning.tuning_problem import COST, SearchResult, TuningProblem, minimise
 
 UNSTABLE = 1e100
-"""times the mean-square radius, in place of an infinite cost: a search sees which way it becomes finite"""
+"""Factor on the mean-square radius in place of an infinite cost, so that a search can find where it becomes finite"""
 
 
 @record()
-class ExactTuning(Sought):
-    """What is tuned for the exact expectation of its cost; raises `UsageError` for what cannot be."""
+class ExactTuning(TuningProblem):
+    """A tuning for the exact expectation of its cost; raises `UsageError` for invalid values."""
 
     @cached_property
     def origin(self) -> System:
-        """The system that the base means, where it is at rest."""
+        """The system that the base describes, at its operating point."""
         with errors_in_own_terms(self.base):
             return rested(self.base)
 
-    def described(self) -> list[str]:
-        """What the cost of a search is, for the file of its outcome."""
+    def describe_cost(self) -> list[str]:
+        """The definition of the cost, for the file of tuned parameters."""
         return [f"the exact expectation of ({self.cost})."]
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExactFound(Outcome):
-    """The outcome of one search by expectations; its cost is infinite where it saw no finite one."""
+class ExactTuningResult(SearchResult):
+    """The result of one search by expectations; its cost is infinite if no evaluated point has a finite one."""
 
     mean_square_radius: float
-    """by how much second moments grow in a common period"""
+    """growth factor of second moments in a common period"""
     accuracy: float
-    """of the cost, relative"""
+    """relative, of the cost"""
 
     @property
     def judgement(self) -> str:
-        """How far it is from having no finite cost, in words."""
+        """The margin to an infinite cost, in words."""
         return f"the mean-square radius is {self.mean_square_radius:.6g}"
 
     @property
     def figures(self) -> dict[str, float | None]:
-        """Likewise in numbers, by name."""
+        """The same in numbers, by name."""
         return {"mean-square radius": self.mean_square_radius}
 
 
-def search_exactly(tuning: ExactTuning, period: float, seed: int, progress: Callable[[float], None]) -> ExactFound:
-    """The best of one search."""
+def search_exactly(
+    tuning: ExactTuning, period: float, seed: int, progress: Callable[[float], None]
+) -> ExactTuningResult:
+    """The result of one search."""
     files = tuning.files()
     loops = Loops(files.models)
 
@@ -68,27 +70,27 @@ def search_exactly(tuning: ExactTuning, period: float, seed: int, progress: Call
     def costs(points: Sequence[Floats]) -> list[float]:
         return [_cost(each) for each in expected([point.tolist() for point in points])]
 
-    best = lowest(tuning, seed, costs, progress)
-    (found,) = expected([best.shares.tolist()])
-    cost = found.objectives[COST]
-    return ExactFound(
+    best = minimise(tuning, seed, costs, progress)
+    (expectation,) = expected([best.shares.tolist()])
+    cost = expectation.objectives[COST]
+    return ExactTuningResult(
         period=period,
         seed=seed,
         values=tuning.values(best.shares.tolist()),
         cost=math.inf if cost is None else cost,
         evaluations=best.evaluations,
-        mean_square_radius=found.mean_square_radius,
-        accuracy=found.accuracy,
+        mean_square_radius=expectation.mean_square_radius,
+        accuracy=expectation.accuracy,
     )
 
 
 def _expected(systems: Sequence[System], loops: Loops) -> list[Expected]:
-    """Of each, in their order; raises `UsageError` where a cost has no expectation at all."""
-    found = [expected_of(system, loops) for system in systems]
-    for one in found:
+    """The expectations of each system, in order; raises `UsageError` if a cost has no expectation at all."""
+    results = [expected_of(system, loops) for system in systems]
+    for one in results:
         if one.objectives[COST] is None and one.mean_square_radius < 1.0:
             raise UsageError(one.reasons[COST])
-    return found
+    return results
 
 
 def _cost(one: Expected) -> float:

@@ -1,4 +1,4 @@
-"""Searches for every period and seed of a tuning, and nothing twice."""
+"""Runs the searches of a tuning for every period and seed, without repeating finished ones."""
 
 import dataclasses
 import functools
@@ -16,10 +16,10 @@ from orchestration.basics.terminal import inform
 from orchestration.building.inputs import Files
 from orchestration.results import html
 from orchestration.system.references import describe_references
-from orchestration.tuning.exact import ExactFound, ExactTuning, search_exactly
-from orchestration.tuning.sought import Outcome, Sought, best_by_period
-from orchestration.tuning.tuning import Found, Tuning, search
+from orchestration.tuning.exact import ExactTuning, ExactTuningResult, search_exactly
+from orchestration.tuning.tuning import Tuning, TuningResult, search
 from orchestration.tuning.tuning_file import gains_text
+from orchestration.tuning.tuning_problem import SearchResult, TuningProblem, best_by_period
 from orchestration.workers.choice import EngineChoice, choose_execution, single_run_execution
 from orchestration.workers.executors import RunEvaluator
 from orchestration.workers.provenance import versions
@@ -27,39 +27,39 @@ from orchestration.workers.provenance import versions
 if TYPE_CHECKING:
     import pandas as pd
 
-One = TypeVar("One", bound=Outcome)
+Result = TypeVar("Result", bound=SearchResult)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Tuned:
-    """What a tuning has found."""
+    """The result of a tuning."""
 
-    searches: tuple[Outcome, ...]
-    """Every search, one for each period and seed."""
+    searches: tuple[SearchResult, ...]
+    """The results of all searches, one for each period and seed."""
     written: tuple[Path, ...]
     """The files of tuned parameters, one for each period, that scenario files and comparisons read."""
 
     @property
-    def best(self) -> dict[float, Outcome]:
-        """By period [s] the search whose parameters cost least where they were tuned."""
+    def best(self) -> dict[float, SearchResult]:
+        """By period [s], the search with the lowest cost."""
         return {one.period: one for one in best_by_period(self.searches)}
 
     def __repr__(self) -> str:
-        best = "; ".join(f"{period:g} s: {found.judgement}" for period, found in self.best.items())
+        best = "; ".join(f"{period:g} s: {result.judgement}" for period, result in self.best.items())
         return f"<Tuned: {len(self.searches)} searches; {best}>"
 
     def _repr_html_(self) -> str:
-        """As notebooks show it: the best of each period."""
+        """The form that notebooks show: the best search for each period."""
         rows = [
             (f"{name} at {period:g} s", html.number(value), "")
-            for period, found in self.best.items()
-            for name, value in {**found.values, "cost": found.cost, **found.figures}.items()
+            for period, result in self.best.items()
+            for name, value in {**result.values, "cost": result.cost, **result.figures}.items()
         ]
         return html.card("A tuning", None, None, f"{len(self.searches)} searches", rows)
 
     @explains_missing
     def to_pandas(self) -> "pd.DataFrame":
-        """A row for each search: period [s], seed, tuned values, cost, and what else is known of its outcome."""
+        """A row for each search: period [s], seed, tuned values, cost and the other fields of its result."""
         import pandas as pd
 
         table = pd.DataFrame(
@@ -86,67 +86,71 @@ def tune(
 ) -> Tuned:
     """Tune the parameters of a controller, by runs or by exact expectations.
 
-    A `Tuning` flies an ensemble of starts and is judged on others: by `workers` processes and an engine as in `sweep`.
-    An `ExactTuning` flies nothing; it measures native FMUs where they can be had.
+    A `Tuning` runs an ensemble of initial conditions and is judged on others, by `workers` processes and an engine as
+    in `sweep`. An `ExactTuning` needs no runs; it linearises native FMUs if available.
 
-    For each period of the tuning a file of parameters is written into `out`; it says that it was made by `command`.
-    What each search has found is kept in `folder`, default `results/NAME`, so that no search is done twice. `progress`
-    hears the share that is done, `announce` a line for each search; None for silence.
+    Writes a file of parameters into `out` for each period; it names `command` as its origin. The result of each search
+    is kept in `folder`, default `results/NAME`, so that no search is repeated. `progress` is called with the share
+    done, `announce` with a line for each search; None for silence.
 
-    Raises `UsageError` for what cannot be, `QuadcosimError` if a run fails, `KeyboardInterrupt` after Ctrl-C.
+    Raises `UsageError` for an invalid tuning, `QuadcosimError` if a run fails, `KeyboardInterrupt` after Ctrl-C.
     """
     folder, announce = Path(folder or Path("results") / tuning.name), announce or (lambda line: None)
-    done: Sequence[Outcome]
+    done: Sequence[SearchResult]
     if isinstance(tuning, Tuning):
-        done = _flown(tuning, folder, workers, engine, progress, announce)
+        done = _search_by_runs(tuning, folder, workers, engine, progress, announce)
     elif workers != 1 or engine != "auto":
-        raise UsageError("--workers and --engine: expected none; a tuning by expect flies nothing")
+        raise UsageError("--workers and --engine: expected none; a tuning by expect makes no runs")
     else:
         exact = dataclasses.replace(tuning, base=single_run_execution(tuning.base, "auto")[0])
-        with share_reporter(progress, "searching") as hear:
+        with share_reporter(progress, "searching") as report:
             find = functools.partial(search_exactly, exact)
-            done = searched(exact, exact.files(), folder, find, ExactFound, progress=hear, announce=announce)
+            done = run_searches(
+                exact, exact.files(), folder, find, ExactTuningResult, progress=report, announce=announce
+            )
     return Tuned(searches=tuple(done), written=tuple(write(tuning, done, Path(out), command)))
 
 
-def _flown(
+def _search_by_runs(
     tuning: Tuning,
     folder: Path,
     workers: int,
     engine: EngineChoice,
     progress: ShareProgress,
     announce: Callable[[str], None],
-) -> list[Found]:
-    """What the searches of a tuning by runs find."""
-    how = choose_execution(engine, tuning.native, lambda native: dataclasses.replace(tuning, native=native).first())
-    asked = dataclasses.replace(tuning, native=how.native)
-    files = asked.files()
+) -> list[TuningResult]:
+    """The results of the searches of a tuning by runs."""
+    execution = choose_execution(
+        engine, tuning.native, lambda native: dataclasses.replace(tuning, native=native).first_run()
+    )
+    tuning = dataclasses.replace(tuning, native=execution.native)
+    files = tuning.files()
     if engine == "auto":
-        announce(str(how))
-    if follows := describe_references(asked.origin, files.models_of(asked.origin)):
+        announce(str(execution))
+    if follows := describe_references(tuning.origin, files.models_of(tuning.origin)):
         announce(f"follows {follows}")
-    with share_reporter(progress, "searching") as hear, RunEvaluator(files, workers, how.engine) as pool:
-        fly = functools.partial(pool.run_all, in_lanes=how.in_lanes, on_gpu=how.on_gpu)
+    with share_reporter(progress, "searching") as report, RunEvaluator(files, workers, execution.engine) as pool:
+        run = functools.partial(pool.run_all, in_lanes=execution.in_lanes, on_gpu=execution.on_gpu)
 
-        def find(period: float, seed: int, heard: Callable[[float], None]) -> Found:
-            return search(asked, period, seed, fly, pool.run_all, heard)
+        def find(period: float, seed: int, report: Callable[[float], None]) -> TuningResult:
+            return search(tuning, period, seed, run, pool.run_all, report)
 
-        return searched(asked, files, folder, find, Found, progress=hear, announce=announce)
+        return run_searches(tuning, files, folder, find, TuningResult, progress=report, announce=announce)
 
 
-def searched(
-    tuning: Sought,
+def run_searches(
+    tuning: TuningProblem,
     files: Files,
     folder: Path,
-    find: Callable[[float, int, Callable[[float], None]], One],
-    kind: type[One],
+    find: Callable[[float, int, Callable[[float], None]], Result],
+    kind: type[Result],
     *,
     progress: Callable[[float], None],
     announce: Callable[[str], None],
-) -> list[One]:
-    """What each search finds, of a kind, by its period, seed and who hears its share; that is kept in `folder`.
+) -> list[Result]:
+    """The results of all searches; `find` makes one of class `kind` from period, seed and progress function.
 
-    A search that is done, of the same tuning with the same software, is not done again.
+    They are kept in `folder`: a finished search of the same tuning with the same software is not repeated.
     """
     record = folder / f"{_key(tuning, files, kind)[:16]}.json"
     done = [kind(**each) for each in json.loads(record.read_text())] if record.is_file() else []
@@ -162,7 +166,7 @@ def searched(
     return done
 
 
-def write(tuning: Sought, done: Sequence[Outcome], out: Path, command: str) -> Iterator[Path]:
+def write(tuning: TuningProblem, done: Sequence[SearchResult], out: Path, command: str) -> Iterator[Path]:
     """Write the files of tuned parameters, one for each period; their paths."""
     out.mkdir(parents=True, exist_ok=True)
     for best in best_by_period(done):
@@ -176,9 +180,15 @@ def _part(progress: Callable[[float], None], index: int, count: int) -> Callable
     return lambda share: progress((index + share) / count)
 
 
-def _key(tuning: Sought, files: Files, kind: type[Outcome]) -> str:
-    """Of all that a search depends on."""
-    asked = json.dumps(dataclasses.asdict(tuning), default=str)
-    told = [each.name for each in dataclasses.fields(kind)]
-    content = [type(tuning).__name__, asked, sorted(files.hashes.items()), sorted(versions().items()), told]
+def _key(tuning: TuningProblem, files: Files, kind: type[SearchResult]) -> str:
+    """A hash of everything that a search depends on."""
+    content_of_tuning = json.dumps(dataclasses.asdict(tuning), default=str)
+    fields = [each.name for each in dataclasses.fields(kind)]
+    content = [
+        type(tuning).__name__,
+        content_of_tuning,
+        sorted(files.hashes.items()),
+        sorted(versions().items()),
+        fields,
+    ]
     return hashlib.sha256(json.dumps(content).encode()).hexdigest()

@@ -1,4 +1,4 @@
-"""Tuning: the parameters of a controller that cost least on an ensemble of starts, judged on other starts."""
+"""Tuning by runs: parameters of lowest mean cost over an ensemble of initial conditions, judged on others."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,26 +15,26 @@ from orchestration.limits.evaluation import is_good
 from orchestration.system.model import System
 from orchestration.system.paths import changed
 from orchestration.system.request import ControlLoop, Ensemble, errors_in_own_terms, system_of
-from orchestration.tuning.sought import COST, Outcome, Sought, lowest
+from orchestration.tuning.tuning_problem import COST, SearchResult, TuningProblem, minimise
 
-Fly = Callable[[Sequence[System]], Sequence[dict[str, Any]]]
+RunSystems = Callable[[Sequence[System]], Sequence[dict[str, Any]]]
 """The metrics of runs, in their order"""
 
 
 @record()
-class Tuning(Sought):
-    """What is tuned, on what, and with how much effort; raises `UsageError` for what cannot be."""
+class Tuning(TuningProblem):
+    """A tuning by runs; raises `UsageError` for invalid values."""
 
     base: ControlLoop
     """The scenario whose controller is tuned."""
     bad: float
     """The cost of a run that diverges, or whose cost has no value; no run costs more."""
     starts: Ensemble
-    """The starts that it is tuned on; those that it is judged on come after them."""
+    """The initial conditions that it is tuned on; those that it is judged on follow them."""
     judged: int
-    """How many starts it is judged on."""
+    """The number of initial conditions that it is judged on."""
     native: bool = False
-    """Whether native FMUs fly."""
+    """Whether native FMUs are used."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -43,17 +43,17 @@ class Tuning(Sought):
 
     @cached_property
     def origin(self) -> System:
-        """The system that the base means, by native FMUs if these are to fly."""
+        """The system that the base describes, with native FMUs if requested."""
         system = system_of(self.base)
         return native_twins(system) if self.native else system
 
-    def first(self) -> tuple[System, Files]:
-        """One of the flights, and the files of all."""
+    def first_run(self) -> tuple[System, Files]:
+        """The system of one of the runs, and the files of all."""
         middle = self.values([0.5] * len(self.parameters))
         return self.systems(self.periods[0], middle, self.starts.some(self.starts.first, 1))[0], self.files()
 
     def systems(self, period: float, values: Mapping[str, float], starts: Ensemble) -> list[System]:
-        """The flights from an ensemble of starts; raises `UsageError` for a value that cannot be."""
+        """The systems from an ensemble of initial conditions; raises `UsageError` for an invalid value."""
         system = self.system(period, values)
         with errors_in_own_terms(self.base):
             return [
@@ -61,21 +61,21 @@ class Tuning(Sought):
                 for start in starts.initial_conditions(self.base)
             ]
 
-    def judging(self) -> Ensemble:
-        """The starts that the outcome is judged on."""
+    def judging_ensemble(self) -> Ensemble:
+        """The initial conditions that the result is judged on."""
         return self.starts.some(self.starts.first + self.starts.count, self.judged)
 
     def mean_cost(self, runs: Sequence[dict[str, Any]]) -> float:
-        """Of runs by their metrics, `bad` for each that diverges: what a search makes small."""
+        """The mean cost of runs by their metrics, `bad` for each that diverges: what a search minimises."""
         return sum(self._cost(metrics) for metrics in runs) / len(runs)
 
     def survivors_cost(self, runs: Sequence[dict[str, Any]]) -> float | None:
-        """The mean cost of those that survive; None if none does."""
+        """The mean cost of the surviving runs; None if none survives."""
         surviving = [metrics for metrics in runs if survives(metrics)]
         return self.mean_cost(surviving) if surviving else None
 
-    def described(self) -> list[str]:
-        """What the cost of a search is, for the file of its outcome."""
+    def describe_cost(self) -> list[str]:
+        """The definition of the cost, for the file of tuned parameters."""
         return [
             f"the mean of ({self.cost}), {self.bad:g} where it diverges,",
             f"over {self.starts.count} starts and {self.origin.stop_time:g} s.",
@@ -87,26 +87,26 @@ class Tuning(Sought):
 
 
 def survives(metrics: Mapping[str, Any]) -> bool:
-    """Whether a run does not diverge by its horizon."""
+    """Whether a run does not diverge before its stop time."""
     return not metrics["diverged"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Found(Outcome):
-    """The outcome of one search by runs; its cost is the mean on the starts that it was tuned on, `bad` ones too."""
+class TuningResult(SearchResult):
+    """The result of one search by runs; its cost is the mean over its initial conditions, diverging runs included."""
 
     judged: int
-    """how many other starts it is judged on"""
+    """number of other initial conditions that it is judged on"""
     survives: int
-    """how many of these do not diverge by the horizon"""
+    """how many of these do not diverge before the stop time"""
     good: int
     """how many of these meet the criterion of the base"""
     survivors_cost: float | None
-    """the mean of those that survive; None: none does"""
+    """mean cost of the surviving ones; None: none survives"""
 
     @property
     def judgement(self) -> str:
-        """How it does on the other starts, in words."""
+        """The results on the other initial conditions, in words."""
         low, high = wilson(self.survives, self.judged)
         cost = "" if self.survivors_cost is None else f" at a mean cost of {self.survivors_cost:.5g}"
         return (
@@ -116,16 +116,18 @@ class Found(Outcome):
 
     @property
     def figures(self) -> dict[str, float | None]:
-        """Likewise in numbers, by name."""
+        """The same in numbers, by name."""
         return {f"survive, of {self.judged}": self.survives, "cost of those": self.survivors_cost}
 
 
-def search(tuning: Tuning, period: float, seed: int, fly: Fly, judge: Fly, progress: Callable[[float], None]) -> Found:
-    """The best of one search; `fly` flies what is searched through, `judge` what the best is judged by."""
-    best = lowest(tuning, seed, lambda shares: _costs(tuning, period, shares, fly), progress)
+def search(
+    tuning: Tuning, period: float, seed: int, run: RunSystems, judge: RunSystems, progress: Callable[[float], None]
+) -> TuningResult:
+    """The result of one search; `run` simulates the candidates, `judge` the runs that the best one is judged on."""
+    best = minimise(tuning, seed, lambda shares: _costs(tuning, period, shares, run), progress)
     values = tuning.values(list(best.shares))
-    judged = judge(tuning.systems(period, values, tuning.judging()))
-    return Found(
+    judged = judge(tuning.systems(period, values, tuning.judging_ensemble()))
+    return TuningResult(
         period=period,
         seed=seed,
         values=values,
@@ -138,12 +140,12 @@ def search(tuning: Tuning, period: float, seed: int, fly: Fly, judge: Fly, progr
     )
 
 
-def _costs(tuning: Tuning, period: float, candidates: Sequence[Floats], fly: Fly) -> list[float]:
-    """The mean cost of each candidate; all their flights are flown together."""
+def _costs(tuning: Tuning, period: float, candidates: Sequence[Floats], run: RunSystems) -> list[float]:
+    """The mean cost of each candidate; all runs of all candidates are submitted together."""
     systems = [
         system
         for candidate in candidates
         for system in tuning.systems(period, tuning.values(list(candidate)), tuning.starts)
     ]
-    flights, size = fly(systems), tuning.starts.count
-    return [tuning.mean_cost(flights[i : i + size]) for i in range(0, len(flights), size)]
+    metrics, size = run(systems), tuning.starts.count
+    return [tuning.mean_cost(metrics[i : i + size]) for i in range(0, len(metrics), size)]

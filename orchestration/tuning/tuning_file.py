@@ -1,4 +1,4 @@
-"""Reads files that say what is tuned, and writes what was found."""
+"""Reads tuning files, and writes files of tuned parameters."""
 
 from collections.abc import Sequence
 from dataclasses import field
@@ -11,56 +11,54 @@ from orchestration.basics.typed_tables import table_of
 from orchestration.studies.study_file import AxisTable, axis_of, base_of, load, loop_of
 from orchestration.system.model import System
 from orchestration.tuning.exact import ExactTuning
-from orchestration.tuning.sought import Outcome, Sought
 from orchestration.tuning.tuning import Tuning
+from orchestration.tuning.tuning_problem import SearchResult, TuningProblem
 
 By = Literal["runs", "expect"]
 
 
-class CostTable(table_of(Sought, only=["cost"], called={"cost": "of"})):  # type: ignore[misc]
-    """`[cost]`: by runs, of one that survives and of one that diverges; or its exact expectation, without a run."""
+class CostTable(table_of(TuningProblem, only=["cost"], called={"cost": "of"})):  # type: ignore[misc]
+    """`[cost]`: the cost of a run, and of one that diverges; or its exact expectation, without runs."""
 
     by: By = "runs"
-    """Whether runs are made, or the cost is what `quadcosim expect` gives."""
+    """`runs`: the cost is evaluated by runs; `expect`: it is the exact expectation, as of `quadcosim expect`."""
     bad: float | None = None
     """The cost of a run that diverges, or whose cost has no value; no run costs more."""
 
 
 JUDGED = "judged"
-"""Key of `[starts]`: how many more starts, after those that are tuned on, the result is judged on"""
-USUALLY_JUDGED = 200
-"""of them, unless told"""
+"""Key of `[starts]`: the number of further initial conditions that the result is judged on"""
+DEFAULT_JUDGED = 200
 
 
-class SearchTable(table_of(Sought, only=["periods", "evaluations", "seeds"])):  # type: ignore[misc]
+class SearchTable(table_of(TuningProblem, only=["periods", "evaluations", "seeds"])):  # type: ignore[misc]
     """`[search]`: the effort."""
 
 
 @record()
 class TuningFile:
-    """The file: a scenario, or the path of one, and what of it is tuned."""
+    """The tuning file: a scenario, or the path of one, and its parameters to tune."""
 
     cost: CostTable
-    """What is made small."""
+    """The cost to minimise."""
     search: SearchTable
-    """How long is searched."""
+    """The effort of the search."""
     parameters: list[AxisTable]
-    """What is tuned, each in a range: two at least."""
+    """The parameters to tune, each in a range: at least two."""
     starts: dict[str, Any] = field(default_factory=dict)
-    """The initial states that are flown from; and `judged`: on how many more, after these, it is judged (200)."""
+    """The initial conditions; and `judged`: the number of further ones that the result is judged on (200)."""
     name: str | None = None
-    """What the files of the result are called by; without it, the name of the file."""
+    """The beginning of the names of the written files; default: the name of this file."""
     scenario: str | None = None
-    """The path of the scenario file, or by `expect` of the system file, whose parameters are tuned."""
+    """The path of the scenario file, or with `expect` of the system file, whose parameters are tuned."""
     base: dict[str, Any] = field(default_factory=dict)
-    """The same here instead of in a file of its own: its tables."""
+    """The same given here instead of in a separate file: its tables."""
 
 
 def load_tuning(path: str | Path) -> Tuning | ExactTuning:
-    """Read such a file; paths in it are relative to its folder.
+    """Read a tuning file; paths in it are relative to its folder.
 
-    Raises `UsageError` for a file that cannot be read, a key that does not exist (naming those that do) or a value
-    that cannot be.
+    Raises `UsageError` for an unreadable file, an unknown key (naming the known ones) or an invalid value.
     """
     return load(Path(path), "tuning file", TuningFile, _tuning)
 
@@ -74,26 +72,26 @@ def _tuning(file: TuningFile, path: Path) -> Tuning | ExactTuning:
         "name": file.name or path.stem, "parameters": parameters, "cost": file.cost.cost, **file.search.model_dump()
     }  # fmt: skip
     if file.cost.by == "expect":
-        for key, given in (("cost.bad", file.cost.bad is not None), ("starts", bool(file.starts))):
-            if given:
+        for key, present in (("cost.bad", file.cost.bad is not None), ("starts", bool(file.starts))):
+            if present:
                 raise UsageError(f'{key}: expected none with cost.by = "expect", which makes no runs')
         return ExactTuning(base=base_of(file, path.parent), **common)
     if file.cost.bad is None:
         raise UsageError("cost.bad: expected a value")
     base, starts = loop_of(file, path.parent), dict(file.starts)
-    judged = starts.pop(JUDGED, USUALLY_JUDGED)
+    judged = starts.pop(JUDGED, DEFAULT_JUDGED)
     if isinstance(judged, bool) or not isinstance(judged, int):
         raise UsageError(f"starts.{JUDGED} = {judged!r}: expected a valid integer")
     ensemble = base.ensemble(starts, beside=(JUDGED,))
     return Tuning(base=base, **common, bad=file.cost.bad, starts=ensemble, judged=judged)
 
 
-def gains_text(tuning: Sought, best: Outcome, all_found: Sequence[Outcome], command: str) -> str:
-    """The file of tuned gains: parameters by their tables, and where they come from in comments."""
+def gains_text(tuning: TuningProblem, best: SearchResult, all_results: Sequence[SearchResult], command: str) -> str:
+    """The content of a file of tuned parameters by their tables, with their origin in comments."""
     import tomli_w
 
-    others = [one for one in all_found if one.period == best.period]
-    of, *more = tuning.described()
+    others = [one for one in all_results if one.period == best.period]
+    of, *more = tuning.describe_cost()
     lines = [
         f"Tuned for a period of {best.period:g} s by: {command}",
         f"{best.evaluations} evaluations of {of}",

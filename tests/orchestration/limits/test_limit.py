@@ -26,8 +26,8 @@ from orchestration.flight.local_limit import local_limit
 from orchestration.fmi.reuse import Instances
 from orchestration.limits import limit as limits
 from orchestration.limits.evaluation import is_good
-from orchestration.limits.found import Continuous
 from orchestration.limits.limit import find
+from orchestration.limits.limit_result import ContinuousRun
 from orchestration.quadrotor.fmu_choice import FmuChoice, Record
 from orchestration.quadrotor.wiring import COMMAND
 from orchestration.requests.ranges import Varied
@@ -65,7 +65,7 @@ def fly(scenario: Scenario, fleet: Instances) -> Result:
 
 
 @given(edge=st.floats(0.0, 10.0), tolerance=st.floats(1e-6, 1.0))
-def test_the_edge_of_what_does_not_fail_lies_in_the_bracket(edge: float, tolerance: float) -> None:
+def test_the_edge_of_failure_lies_in_the_bracket(edge: float, tolerance: float) -> None:
     found = first_failure(lambda value: value > edge, [0.0, 1.0, 2.0, 3.0, 5.0, 8.0, 11.0], tolerance)
     assert found is not None
     good, bad = found
@@ -110,7 +110,7 @@ def test_an_island_of_failure_within_the_bracket_is_seen_by_the_finer_steps() ->
     tolerance=st.sampled_from([1.1e-6, 0.011, 0.13, 0.21, 0.31, 0.97, 4.1]),
     parts=st.integers(1, 6),
 )
-def test_how_many_values_are_left_is_a_bound_that_comes_down(edge: float, tolerance: float, parts: int) -> None:
+def test_the_number_of_remaining_values_is_a_decreasing_bound(edge: float, tolerance: float, parts: int) -> None:
     bounds: list[int] = []
     values = [0.0, 1.0, 2.0, 3.0, 5.0, 8.0, 11.0]
     first_failure(lambda value: value > edge, values, tolerance, parts=parts, remaining=bounds.append)
@@ -135,13 +135,13 @@ def test_nothing_above_the_first_value_that_fails_is_tried() -> None:
 
     def fails(value: float) -> bool:
         tried.append(value)
-        return 2.5 < value < 3.5  # what flies again above is not looked at
+        return 2.5 < value < 3.5  # good values above are not evaluated
 
     assert first_failure(fails, [1.0, 2.0, 3.0, 4.0], 0.5) == (2.5, 3.0)
     assert tried == [1.0, 2.0, 3.0, 2.5]
 
 
-def test_the_search_says_when_nothing_fails_and_when_the_first_does() -> None:
+def test_the_search_reports_that_nothing_fails_or_that_the_first_value_does() -> None:
     assert first_failure(lambda value: False, [1.0, 2.0], 0.1) is None
     assert first_failure(lambda value: True, [1.0, 2.0], 0.1) == (None, 1.0)
 
@@ -169,7 +169,7 @@ def theory(coupling: float = 1.0, **timing: Any) -> float:
 
 
 def disturbed(scenario: Scenario, size: float, *coordinates: str) -> Scenario:
-    """Hover but for small initial values of some coordinates."""
+    """Hover except for small initial values of some coordinates."""
     hover = hover_of(scenario)
     return hover.with_changes(parameters={f"plant.initial.{name}": size for name in coordinates})
 
@@ -290,7 +290,7 @@ def with_motors(down: float) -> Scenario:
     )
 
 
-def test_motors_are_in_the_loop_as_lags_of_their_own() -> None:
+def test_motors_are_in_the_loop_as_separate_lags() -> None:
     lagging = scenario_of(period=0.04, delay=0.01).with_changes(parameters={"plant.actuator_time_constant": 0.05})
     by_motors, by_box = (HoverLoop.of(scenario).matrix(0.04, 0.01) for scenario in (with_motors(0.05), lagging))
     assert by_motors == pytest.approx(by_box, rel=1e-6, abs=1e-6)
@@ -302,7 +302,7 @@ def range_of(scenario: Scenario) -> Range:
     return found
 
 
-def test_motors_that_rise_otherwise_than_they_fall_have_no_local_limit() -> None:
+def test_motors_that_rise_and_fall_differently_have_no_local_limit() -> None:
     scenario = with_motors(0.1)
     found = local_limits(Varied(request=scenario, of="period"), range_of(scenario))
     assert (found.limit, found.method) == (None, None)
@@ -311,7 +311,7 @@ def test_motors_that_rise_otherwise_than_they_fall_have_no_local_limit() -> None
     )
 
 
-def test_the_lag_that_an_fmu_has_by_itself_is_in_the_loop(tmp_path: Path) -> None:
+def test_the_default_lag_of_an_fmu_is_in_the_loop(tmp_path: Path) -> None:
     sources = source_tree.copy_sources(tmp_path)
     source_tree.replace(
         sources / "plant_fmu" / "actuators.py", "time_constant: float = 0.0", "time_constant: float = 0.05"
@@ -385,12 +385,12 @@ def test_a_controller_with_another_mass_has_no_hover_to_linearise_about() -> Non
 
 
 class StubPool:
-    """In place of flights: what flies is decided by a rule, and what was asked for is kept."""
+    """Replaces the runs: a rule decides whether a run is good, and the requested systems are kept."""
 
-    flown: list[System]
+    systems: list[System]
 
     def __init__(self, *arguments: Any) -> None:
-        StubPool.flown = []
+        StubPool.systems = []
 
     def __enter__(self) -> "StubPool":
         return self
@@ -401,7 +401,7 @@ class StubPool:
     def run_until(self, systems: Sequence[System], stop: Any, report: Any = lambda done: None) -> list[dict[str, Any]]:
         found: list[dict[str, Any]] = []
         for system in systems:
-            self.flown.append(system)
+            self.systems.append(system)
             bound = self.bound(system)
             outcome = "settled" if bound < 0.05 else "bounded" if bound < math.inf else "diverged"
             divergence_time = 3.25 if outcome == "diverged" else None
@@ -437,7 +437,7 @@ _KNOWN: dict[str, LocalLimit] = {}
 
 
 def known_local_limits(varied: Varied, span: Range) -> LocalLimit:
-    """Those of linear theory, once for the many tests with the same scenario."""
+    """The local limits of linear theory, computed once for the tests with the same scenario."""
     key = f"{varied.of} {varied.request}"
     if key not in _KNOWN:
         _KNOWN[key] = local_limits(varied, span)
@@ -450,35 +450,37 @@ def unseeded(system: System) -> System:
 
 @pytest.mark.usefixtures("stubbed")
 @pytest.mark.parametrize("tolerance", [None, 0.004, 1e-5])
-def test_the_large_signal_limit_is_the_last_that_flies_to_the_tolerance(tolerance: float | None) -> None:
+def test_the_large_signal_limit_is_the_last_good_value_to_the_tolerance(tolerance: float | None) -> None:
     found = find(scenario_of(), "period", tolerance=tolerance)
     assert found.tolerance == (tolerance or 0.0005)
     assert found.large_signal_limit is not None
     assert 0.0317 - found.tolerance <= found.large_signal_limit < 0.0317
 
 
-def test_what_varies_is_the_quantity_alone(stubbed: type[StubPool]) -> None:
+def test_only_the_quantity_varies(stubbed: type[StubPool]) -> None:
     base = scenario_of(period=0.02)
     found = find(base, "delay")
     assert found.large_signal_limit == pytest.approx(0.0123, abs=0.0005)
     assert all(
-        flown == base.with_changes(timing={"delay": at(flown, "timing.delay")}).as_system() for flown in stubbed.flown
+        flown == base.with_changes(timing={"delay": at(flown, "timing.delay")}).as_system() for flown in stubbed.systems
     )
 
 
 @pytest.mark.usefixtures("stubbed")
-def test_a_gap_of_more_than_a_tenth_of_the_local_limit_is_said() -> None:
+def test_a_gap_of_more_than_a_tenth_of_the_local_limit_is_noted() -> None:
     found = find(scenario_of(), "period")
     assert found.local_limit == pytest.approx(0.080, abs=0.0005)
     assert "more than a tenth from the local limit" in found.note
 
 
-def test_within_a_tenth_of_the_local_limit_is_said(stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_limit_within_a_tenth_of_the_local_limit_is_noted(
+    stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(stubbed, "bound", lambda self, system: 0.01 if at(system, "timing.period") < 0.078 else 1.0)
     assert "within a tenth of the local limit" in find(scenario_of(), "period").note
 
 
-def test_nothing_that_fails_and_nothing_that_flies_are_said(
+def test_a_range_without_failures_or_without_good_values_is_noted(
     stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(stubbed, "bound", lambda self, system: 0.01)
@@ -486,9 +488,9 @@ def test_nothing_that_fails_and_nothing_that_flies_are_said(
     assert nothing_fails.large_signal_limit is None
     assert "good throughout the range" in nothing_fails.note
     monkeypatch.setattr(stubbed, "bound", lambda self, system: 1.0)
-    nothing_flies = find(scenario_of(), "delay")
-    assert nothing_flies.large_signal_limit is None
-    assert "not good at 0 s, the first value of the range" in nothing_flies.note
+    nothing_good = find(scenario_of(), "delay")
+    assert nothing_good.large_signal_limit is None
+    assert "not good at 0 s, the first value of the range" in nothing_good.note
 
 
 @pytest.mark.parametrize(
@@ -497,19 +499,19 @@ def test_nothing_that_fails_and_nothing_that_flies_are_said(
      ("period", {"command_loss": 0.1})],
 )  # fmt: skip
 @pytest.mark.parametrize(("confidence", "seeds"), [(0.95, 29), (0.5, 7), (0.99, 44)])
-def test_of_random_quantities_so_many_seeds_fly_that_nine_in_ten_do_at_the_confidence(
+def test_random_quantities_take_enough_seeds_for_nine_in_ten_at_the_confidence(
     stubbed: type[StubPool], of: str, timing: dict[str, Any], confidence: float, seeds: int
 ) -> None:
     base = dataclasses.replace(scenario_of(**timing), seed=5)
     found = find(base, of, confidence=confidence)
     assert (found.seeds, found.confidence) == (seeds, confidence)
     assert 0.9**seeds <= 1.0 - confidence < 0.9 ** (seeds - 1)  # the success run
-    flown = [[one.seed for one in group] for _, group in itertools.groupby(stubbed.flown, key=unseeded)]
+    flown = [[one.seed for one in group] for _, group in itertools.groupby(stubbed.systems, key=unseeded)]
     assert flown[0] == list(range(5, 5 + seeds))
     assert {seed for group in flown for seed in group} == set(flown[0])
 
 
-def test_one_seed_that_does_not_fly_is_enough_to_fail(stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_seed_that_is_not_good_is_enough_to_fail(stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch) -> None:
     def bound(self: StubPool, system: System) -> float:
         return 1.0 if system.seed == 28 and at(system, "timing.loss") > 0.222 else 0.01
 
@@ -520,7 +522,7 @@ def test_one_seed_that_does_not_fly_is_enough_to_fail(stubbed: type[StubPool], m
     assert "linear theory has no local limit of loss" in found.note
 
 
-def test_what_flies_again_above_the_limit_is_told(stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_good_values_above_the_limit_are_reported(stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch) -> None:
     def bound(self: StubPool, system: System) -> float:
         return 1.0 if 0.0317 < at(system, "timing.period") < 0.042 else 0.01
 
@@ -536,28 +538,28 @@ def test_what_flies_again_above_the_limit_is_told(stubbed: type[StubPool], monke
 
 
 @pytest.mark.parametrize(
-    ("bound", "said"),
+    ("bound", "expected"),
     [(1.0, "(fails, bounded: ultimate_bound = 1 m, expected < 0.05 m)"), (math.inf, "(fails, diverged at 3.25 s)")],
 )
-def test_what_the_value_that_fails_did_is_told(
-    stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch, bound: float, said: str
+def test_the_outcome_of_the_failing_value_is_noted(
+    stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch, bound: float, expected: str
 ) -> None:
     monkeypatch.setattr(stubbed, "bound", lambda self, system: 0.01 if at(system, "timing.period") < 0.03 else bound)
     found = find(scenario_of(), "period")
-    assert said in found.note
+    assert expected in found.note
     assert found.horizon == 30.0
 
 
-def test_of_a_random_quantity_the_value_at_which_nine_in_ten_is_refuted_is_told_with_its_interval(
+def test_the_value_at_which_nine_in_ten_is_refuted_is_noted_with_its_interval(
     stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def bound(self: StubPool, system: System) -> float:  # the more is lost, the fewer of the 29 seeds fly
+    def bound(self: StubPool, system: System) -> float:  # the more is lost, the fewer of the 29 seeds are good
         return 1.0 if system.seed % 29 < 100.0 * (at(system, "timing.loss") - 0.26) else 0.01
 
     monkeypatch.setattr(stubbed, "bound", bound)
     found = find(scenario_of(), "loss")
     assert found.large_signal_limit == pytest.approx(0.26, abs=0.01)
-    assert found.refuted_limit == pytest.approx(0.32, abs=0.011)  # 6 of 29 down is not enough, 7 are
+    assert found.refuted_limit == pytest.approx(0.32, abs=0.011)  # 6 failures of 29 are not enough, 7 are
     by_value = {one.value: one for one in found.tried}[found.refuted_limit or 0.0]
     assert (by_value.flew, by_value.runs) == (22, 29)
     assert by_value.share == wilson(22, 29)
@@ -566,7 +568,7 @@ def test_of_a_random_quantity_the_value_at_which_nine_in_ten_is_refuted_is_told_
     assert (passed.flew, passed.share) == (29, wilson(29, 29))
 
 
-def test_a_value_that_only_some_seeds_are_good_at_does_not_fly_above_the_limit(
+def test_a_value_at_which_only_some_seeds_are_good_is_not_reported_as_good_above_the_limit(
     stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def bound(self: StubPool, system: System) -> float:  # of the seeds one fails from .2 to .42, and all from .5 on
@@ -583,7 +585,7 @@ def test_a_value_that_only_some_seeds_are_good_at_does_not_fly_above_the_limit(
     assert found.flies_above
 
 
-def test_the_interval_of_a_share_is_at_the_confidence_that_was_asked_for(
+def test_the_interval_of_a_share_is_at_the_requested_confidence(
     stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(stubbed, "bound", lambda self, system: 1.0 if at(system, "timing.loss") > 0.3 else 0.01)
@@ -593,7 +595,7 @@ def test_the_interval_of_a_share_is_at_the_confidence_that_was_asked_for(
     assert wilson(found.seeds, found.seeds, 0.5) != wilson(found.seeds, found.seeds)
 
 
-def test_where_the_first_value_fails_for_some_seeds_it_may_still_fly_for_nine_in_ten(
+def test_a_first_value_that_fails_for_some_seeds_may_still_be_good_for_nine_in_ten(
     stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(stubbed, "bound", lambda self, system: 1.0 if system.seed == 3 else 0.01)
@@ -602,18 +604,18 @@ def test_where_the_first_value_fails_for_some_seeds_it_may_still_fly_for_nine_in
     assert found.tried[0].share == wilson(28, 29)
 
 
-def test_near_continuous_time_nothing_digital_is_left(stubbed: type[StubPool]) -> None:
+def test_near_continuous_time_no_digital_effects_remain(stubbed: type[StubPool]) -> None:
     base = scenario_of(
         period=0.02, delay=0.005, command_loss=0.1, hold="first", order="jacobi", noise={"position": 0.1}
     )
     base = base.with_changes(parameters={"plant.mass": 1.0, "plant.actuator_time_constant": 0.02})
     found = find(base, "delay", continuous=True)
-    (ideal,) = [flown for flown in stubbed.flown if at(flown, "timing.period") == 1e-4]
+    (ideal,) = [flown for flown in stubbed.systems if at(flown, "timing.period") == 1e-4]
     clear = dataclasses.replace(
         base, timing=Timing(period=1e-4, plant_interval=0.02), record=Record(plant=(), controller=())
     )
     assert ideal == clear.as_system()
-    assert found.continuous == Continuous(period=1e-4, outcome="settled", settling_time=1.5)
+    assert found.continuous == ContinuousRun(period=1e-4, outcome="settled", settling_time=1.5)
     assert find(base, "delay").continuous is None
 
 
@@ -631,17 +633,17 @@ def test_where_nothing_is_random_one_run_decides_and_there_is_no_confidence() ->
 
 @pytest.mark.usefixtures("stubbed")
 def test_each_value_is_announced() -> None:
-    said: list[str] = []
-    find(scenario_of(), "period", announce=said.append)
-    assert said[0] == "engine compiled: native FMUs, one run at a time"
-    assert said[1] == "period 0.001 s: settled"
-    assert "period 0.03 s: settled" in said
-    assert "period 0.035 s: fails, bounded: ultimate_bound = 1 m, expected < 0.05 m" in said
+    lines: list[str] = []
+    find(scenario_of(), "period", announce=lines.append)
+    assert lines[0] == "engine compiled: native FMUs, one run at a time"
+    assert lines[1] == "period 0.001 s: settled"
+    assert "period 0.03 s: settled" in lines
+    assert "period 0.035 s: fails, bounded: ultimate_bound = 1 m, expected < 0.05 m" in lines
 
 
 @pytest.mark.usefixtures("stubbed")
 @pytest.mark.parametrize("of", ["period", "jitter"])
-def test_the_share_that_is_done_is_of_the_longest_search_and_comes_to_all(of: str) -> None:
+def test_progress_is_a_share_of_the_longest_search_and_reaches_one(of: str) -> None:
     shares: list[float] = []
     found = find(scenario_of(), of, progress=shares.append)
     assert len(shares) > len(found.tried)
@@ -651,7 +653,7 @@ def test_the_share_that_is_done_is_of_the_longest_search_and_comes_to_all(of: st
 
 
 @pytest.mark.usefixtures("stubbed")
-def test_a_mass_mismatch_has_no_local_limit_and_says_why() -> None:
+def test_a_mass_mismatch_has_no_local_limit_with_the_reason_noted() -> None:
     found = find(scenario_of().with_changes(parameters={"controller.mass": 1.1}), "period")
     assert found.local_limit is None
     assert found.large_signal_limit is not None
@@ -659,7 +661,7 @@ def test_a_mass_mismatch_has_no_local_limit_and_says_why() -> None:
     assert len(found.note.splitlines()) == 1
 
 
-def test_find_flies_the_scenario_and_its_result_is_json() -> None:
+def test_find_runs_the_scenario_and_its_result_is_json() -> None:
     base = dataclasses.replace(hover_of(short(stop_time=2.0, plant_interval=0.01)), stop_time=2.0)
     base = base.with_changes(parameters={"plant.initial.position.x": 0.005})
     found = find(base, "period", tolerance=0.02)
@@ -692,7 +694,7 @@ def test_find_of_a_random_quantity_is_the_same_with_any_number_of_workers(worker
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "expected"),
     [
         ({"of": "mass"}, "of = mass: expected one of period, delay, jitter, loss, or a path"),
         ({"tolerance": 0.0}, "tolerance = 0.0: expected a positive number"),
@@ -705,10 +707,10 @@ def test_find_of_a_random_quantity_is_the_same_with_any_number_of_workers(worker
         ({"confidence": math.nan}, "confidence = nan: expected a number between 0 and 1"),
     ],
 )
-def test_what_cannot_be_asked_for_is_refused_before_anything_flies(
-    stubbed: type[StubPool], options: dict[str, Any], said: str
+def test_invalid_requests_are_refused_before_any_run(
+    stubbed: type[StubPool], options: dict[str, Any], expected: str
 ) -> None:
-    stubbed.flown = []
-    with pytest.raises(UsageError, match=said):
+    stubbed.systems = []
+    with pytest.raises(UsageError, match=expected):
         find(scenario_of(), **{"of": "period", **options})
-    assert stubbed.flown == []
+    assert stubbed.systems == []

@@ -323,7 +323,7 @@ def test_where_no_loop_is_known_no_process_is_started_for_its_radius(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(limit_figure, "LOOPS", Registry[Any]())
-    monkeypatch.setattr(limit_figure, "computed", lambda *_: pytest.fail("it computes"))
+    monkeypatch.setattr(limit_figure, "isolated_call", lambda *_: pytest.fail("it computes"))
     assert draw_limit(short(), limit("period"), tmp_path, PNG) == [tmp_path / "limit_period.png"]
 
 
@@ -333,7 +333,7 @@ def test_a_limit_whose_fmus_lose_their_process_is_drawn_without_the_radius(
     def lost(*_: Any) -> None:
         raise LostError("the process of the FMUs ended")
 
-    monkeypatch.setattr(limit_figure, "computed", lost)
+    monkeypatch.setattr(limit_figure, "isolated_call", lost)
     assert draw_limit(short(), limit("period"), tmp_path, PNG) == [tmp_path / "limit_period.png"]
 
 
@@ -346,7 +346,7 @@ def ys(line: Line2D) -> list[float]:
 
 
 def test_a_limit_shows_each_value_that_was_tried_where_it_was_measured() -> None:
-    figure = limit_figure.measured(limit("components.pilot.sampling.period", judged_bound=0.06))
+    figure = limit_figure.limit_figure(limit("components.pilot.sampling.period", judged_bound=0.06))
     (axes,) = figure.axes
     marks = {line.get_label(): line for line in axes.get_lines()}
     assert xs(marks["good"]) == pytest.approx([20.0, 40.0, 50.0])
@@ -364,7 +364,7 @@ def test_a_limit_of_many_seeds_shows_their_share_and_how_well_it_is_known() -> N
         Evaluation(value=v, outcome="settled", divergence_time=None, flew=n, runs=29, share=wilson(n, 29, 0.95))
         for v, n in ((0.1, 29), (0.2, 20))
     )
-    figure = limit_figure.measured(limit("loss", unit=None, confidence=0.95, seeds=29, tried=tried))
+    figure = limit_figure.limit_figure(limit("loss", unit=None, confidence=0.95, seeds=29, tried=tried))
     (axes,) = figure.axes
     marks = {line.get_label(): line for line in axes.get_lines()}
     assert ys(marks["good"]) == [1.0]
@@ -375,7 +375,7 @@ def test_a_limit_of_many_seeds_shows_their_share_and_how_well_it_is_known() -> N
 @pytest.mark.parametrize(("longest", "title"), [(0.9, "period [ms]"), (1.5, "period [s]")])
 def test_a_limit_over_times_is_in_milliseconds_where_all_are_below_a_second(longest: float, title: str) -> None:
     tried = tuple(dataclasses.replace(one, value=longest * one.value / 0.1) for one in limit("period").tried)
-    figure = limit_figure.measured(limit("period", tried=tried))
+    figure = limit_figure.limit_figure(limit("period", tried=tried))
     assert figure.axes[0].get_xlabel() == title
     assert xs(figure.axes[0].get_lines()[1])[-1] == pytest.approx(longest * 0.8 * (1e3 if "ms" in title else 1.0))
 
@@ -400,7 +400,7 @@ def test_the_axes_of_a_study_have_the_units_of_its_store(tmp_path: Path) -> None
 
 def test_a_limit_that_nothing_in_the_range_has_says_so() -> None:
     good = tuple(one for one in limit("delay").tried if one.flew)
-    figure = limit_figure.measured(limit("delay", tried=good, large_signal_limit=None))
+    figure = limit_figure.limit_figure(limit("delay", tried=good, large_signal_limit=None))
     assert figure.axes[0].get_title(loc="left") == "delay: good throughout, in runs of 30 s"
 
 

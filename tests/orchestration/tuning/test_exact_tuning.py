@@ -1,4 +1,4 @@
-"""Tuning by exact expectations: against a search of its own through matrices typed in by hand, and what is refused."""
+"""Tuning by exact expectations: against a separate search with matrices written by hand, and refusals."""
 
 import math
 from dataclasses import replace
@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 from orchestration.basics.documents import read_toml
 from orchestration.basics.errors import UsageError
 from orchestration.studies.axes import Axis
-from orchestration.tuning.exact import ExactFound, ExactTuning, search_exactly
+from orchestration.tuning.exact import ExactTuning, ExactTuningResult, search_exactly
 from orchestration.tuning.tune import Tuned, tune
 from orchestration.tuning.tuning_file import load_tuning
 from tests.examples.common import EXAMPLES
@@ -26,8 +26,8 @@ def tuning(**changes: object) -> ExactTuning:
     return replace(loaded, **changes)  # type: ignore[arg-type]
 
 
-def tuned(asked: ExactTuning, folder: Path) -> Tuned:
-    return tune(asked, out=folder / "gains", folder=folder / "kept", progress=None, announce=None)
+def tuned(problem: ExactTuning, folder: Path) -> Tuned:
+    return tune(problem, out=folder / "gains", folder=folder / "kept", progress=None, announce=None)
 
 
 def cost(K: float, Td: float) -> float:
@@ -35,7 +35,7 @@ def cost(K: float, Td: float) -> float:
     return float(loop.costs()[0]) / 0.006 if loop.radius < 1.0 else math.inf
 
 
-def test_the_gains_that_are_found_cost_what_is_least_by_matrices_and_another_search(tmp_path: Path) -> None:
+def test_the_tuned_gains_have_the_lowest_cost_by_matrices_and_another_search(tmp_path: Path) -> None:
     found = tuned(tuning(evaluations=40), tmp_path)
     (one,) = found.searches
     K, Td = (one.values[f"{GAINS}.{name}"] for name in ("K", "Td"))
@@ -50,13 +50,13 @@ def test_the_gains_that_are_found_cost_what_is_least_by_matrices_and_another_sea
     assert tuned(tuning(evaluations=40), tmp_path).searches == found.searches
 
 
-def test_a_search_that_begins_where_nothing_is_finite_goes_where_the_radius_is_smaller() -> None:
+def test_a_search_that_starts_where_no_cost_is_finite_reduces_the_radius() -> None:
     wide = (
         Axis(name="K", targets=(f"{GAINS}.K",), low=2.0, high=40.0),
         Axis(name="Td", targets=(f"{GAINS}.Td",), low=0.02, high=0.3),
     )
     short, longer = (search_exactly(tuning(parameters=wide, evaluations=n), 0.006, 1, lambda _: None) for n in (1, 15))
-    assert isinstance(short, ExactFound)
+    assert isinstance(short, ExactTuningResult)
     assert short.cost == math.inf
     assert longer.mean_square_radius < short.mean_square_radius
 
@@ -76,7 +76,7 @@ def test_a_cost_without_an_expectation_is_refused_by_its_reason() -> None:
         ("parameters.K", "parameter.K", "components.controller.parameter.K: "),
     ],
 )
-def test_what_is_wrong_with_a_file_is_said(before: str, after: str, named: str, tmp_path: Path) -> None:
+def test_errors_in_a_file_are_reported(before: str, after: str, named: str, tmp_path: Path) -> None:
     path = tmp_path / "servo.toml"
     system = (FILE.parent / "system.toml").as_posix()
     path.write_text(FILE.read_text().replace('system.toml"', f'{system}"').replace(before, after))
@@ -85,8 +85,8 @@ def test_what_is_wrong_with_a_file_is_said(before: str, after: str, named: str, 
     assert str(error.value).startswith(f"{path}: {named}")
 
 
-def test_no_engine_and_no_workers_are_asked_for_where_nothing_is_flown(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="expected none; a tuning by expect flies nothing"):
+def test_engine_and_workers_are_refused_where_there_are_no_runs(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="expected none; a tuning by expect makes no runs"):
         tune(tuning(), out=tmp_path, engine="batch")
 
 

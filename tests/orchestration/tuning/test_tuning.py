@@ -9,10 +9,10 @@ from orchestration.basics.documents import read_toml
 from orchestration.basics.errors import UsageError
 from orchestration.quadrotor.initial_conditions import Starts
 from orchestration.system.paths import value_at
-from orchestration.tuning.sought import best_by_period
-from orchestration.tuning.tune import searched, write
-from orchestration.tuning.tuning import Found, Tuning, search
+from orchestration.tuning.tune import run_searches, write
+from orchestration.tuning.tuning import Tuning, TuningResult, search
 from orchestration.tuning.tuning_file import load_tuning
+from orchestration.tuning.tuning_problem import best_by_period
 
 FILE = """
 [base]
@@ -63,12 +63,12 @@ def tuning(tmp_path) -> Tuning:
 
 def bowl(systems):
     """Metrics as of flights whose cost is lowest at an attitude gain of 10 and a surface gain of 5."""
-    found = []
+    metrics = []
     for system in systems:
         attitude, surface = (value_at(system, f"{GAINS}.{name}") for name in ("attitude", "surface"))
         cost = 1.0 + math.log(attitude / 10.0) ** 2 + (surface - 5.0) ** 2
-        found.append({"cost": cost, "good": cost < 50.0, "diverged": cost > 60.0})
-    return found
+        metrics.append({"cost": cost, "good": cost < 50.0, "diverged": cost > 60.0})
+    return metrics
 
 
 def test_a_search_finds_the_bottom_of_a_bowl(tuning):
@@ -80,7 +80,7 @@ def test_a_search_finds_the_bottom_of_a_bowl(tuning):
     assert found.evaluations <= tuning.budget + 10
 
 
-def test_the_same_seed_searches_the_same_way_and_another_another(tuning):
+def test_searches_are_reproducible_and_depend_on_the_seed(tuning):
     one, again, other = (search(tuning, 0.01, seed, bowl, bowl, lambda share: None) for seed in (1, 1, 2))
     assert one == again
     assert one.values != other.values
@@ -90,7 +90,7 @@ def run(cost, *, good=True, diverged=False):
     return {"cost": cost, "good": good, "diverged": diverged}
 
 
-def test_a_run_that_diverges_costs_what_is_said_and_one_that_survives_what_it_costs_and_no_more(tuning):
+def test_a_run_that_diverges_has_the_stated_cost_which_also_bounds_that_of_others(tuning):
     assert tuning.mean_cost([run(1.0), run(2.0, good=False)]) == pytest.approx(1.5)
     assert tuning.mean_cost([run(1.0), run(1.0, good=False, diverged=True)]) == pytest.approx(5.5)
     assert tuning.mean_cost([run(1.0), run(None), run(99.0)]) == pytest.approx(7.0)
@@ -113,65 +113,65 @@ def test_where_none_survives_there_is_no_cost(tuning):
     assert "mean cost" not in found.judgement
 
 
-def test_no_start_is_both_tuned_on_and_judged_on(tuning):
+def test_no_initial_condition_is_both_tuned_on_and_judged_on(tuning):
     seen = []
 
-    def fly(systems):
+    def run(systems):
         seen.append(
             [tuple(value_at(s, f"components.plant.parameters.initial.velocity.{a}") for a in "xyz") for s in systems]
         )
         return bowl(systems)
 
-    search(tuning, 0.01, 1, fly, fly, lambda share: None)
+    search(tuning, 0.01, 1, run, run, lambda share: None)
     trained, judged = set(itertools.chain(*seen[:-1])), set(seen[-1])
     assert len(trained) == 3
     assert len(judged) == 4
     assert not trained & judged
 
 
-def test_flights_have_the_period_that_is_tuned_for(tuning):
+def test_runs_have_the_period_that_is_tuned_for(tuning):
     systems = tuning.systems(0.02, tuning.values([0.5, 0.5]), tuning.starts)
     assert {system.components["controller"].sampling.period for system in systems} == {0.02}
 
 
-def test_the_best_is_the_one_that_costs_least_where_it_was_tuned(tuning):
+def test_the_best_search_is_the_one_of_lowest_cost(tuning):
     one = search(tuning, 0.01, 1, bowl, bowl, lambda share: None)
     worse = replace(one, seed=2, cost=one.cost + 1.0, survivors_cost=0.0)
     assert list(best_by_period([worse, one])) == [one]
 
 
-def test_a_tuning_goes_on_where_it_was_stopped(tuning, tmp_path):
+def test_an_interrupted_tuning_continues(tuning, tmp_path):
     files, count = tuning.files(), 0
-    told: list[str] = []
+    lines: list[str] = []
 
-    def fly(systems):
+    def run(systems):
         nonlocal count
         count += len(systems)
         if count > 2000:
             raise KeyboardInterrupt
         return bowl(systems)
 
-    def searched_by(fly):
-        def find(period, seed, hear):
-            return search(tuning, period, seed, fly, fly, hear)
+    def results_of(run):
+        def find(period, seed, report):
+            return search(tuning, period, seed, run, run, report)
 
-        return searched(
-            tuning, files, tmp_path / "kept", find, Found, progress=lambda share: None, announce=told.append
+        return run_searches(
+            tuning, files, tmp_path / "kept", find, TuningResult, progress=lambda share: None, announce=lines.append
         )
 
     with pytest.raises(KeyboardInterrupt):
-        searched_by(fly)
-    before = list(told)
+        results_of(run)
+    before = list(lines)
     assert 0 < len(before) < 4
-    done = searched_by(bowl)
+    done = results_of(bowl)
     written = list(write(tuning, done, tmp_path / "gains", "quadcosim tune"))
-    assert len(told) == 4
+    assert len(lines) == 4
     assert [path.name for path in written] == ["bowl_10ms.toml", "bowl_20ms.toml"]
 
     def fail(systems):
-        pytest.fail("flown again")
+        pytest.fail("run again")
 
-    assert searched_by(fail) == done
+    assert results_of(fail) == done
     gains = read_toml(written[0], "gains")["controller"]
     assert set(gains) == {"gain.attitude", "gain.theta", "gain.surface"}
     comments = written[0].read_text()
@@ -191,7 +191,7 @@ def test_a_tuning_goes_on_where_it_was_stopped(tuning, tmp_path):
         ("count = 3", "count = 0", "starts.count = 0: expected a whole number from 1"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_with_a_file_is_said(tmp_path, before, after, named):
+def test_errors_in_a_file_are_reported(tmp_path, before, after, named):
     path = tmp_path / "bowl.toml"
     path.write_text(FILE.replace(before, after))
     with pytest.raises(UsageError) as error:
@@ -199,7 +199,7 @@ def test_what_is_wrong_with_a_file_is_said(tmp_path, before, after, named):
     assert str(error.value).startswith(f"{path}: {named}")
 
 
-def test_one_parameter_is_no_tuning(tuning):
+def test_a_single_parameter_is_refused(tuning):
     with pytest.raises(UsageError, match="expected at least two"):
         replace(tuning, parameters=tuning.parameters[:1])
 
@@ -215,17 +215,17 @@ LOW = '"trajectory.start_z" = -10.0'
     ],
     ids=["its own", "that of its vehicle"],
 )
-def test_starts_lie_around_the_trajectory_of_the_base(text, tmp_path):
+def test_initial_conditions_lie_around_the_trajectory_of_the_base(text, tmp_path):
     (tmp_path / "low_flier.toml").write_text(f"[controller]\n{LOW}\n")
     (tmp_path / "low.toml").write_text(text)
     low = loaded(tmp_path / "low.toml")
-    for starts in (low.starts, low.judging()):
+    for starts in (low.starts, low.judging_ensemble()):
         systems = low.systems(0.01, low.values([0.5, 0.5]), starts)
         heights = [value_at(system, "components.plant.parameters.initial.position.z") for system in systems]
         assert len(heights) == starts.count
         assert all(abs(height + 10.0) <= 1.0 for height in heights)
 
 
-def test_starts_that_are_judged_on_come_after_the_others(tuning):
-    assert tuning.judging() == replace(tuning.starts, first=3, count=4)
+def test_initial_conditions_that_are_judged_on_follow_the_others(tuning):
+    assert tuning.judging_ensemble() == replace(tuning.starts, first=3, count=4)
     assert isinstance(tuning.starts, Starts)

@@ -1,4 +1,4 @@
-"""What every tuning says: parameters in their ranges, a cost, and how long is searched."""
+"""The tuning problem: parameters with their ranges, a cost, the search effort; and its minimisation by CMA-ES."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,29 +17,29 @@ from orchestration.system.paths import changed
 from orchestration.system.request import Request, errors_in_own_terms, system_of
 
 COST = "cost"
-"""The objective that a tuning adds"""
+"""Name of the objective that a tuning adds"""
 _WIDTH = 0.25
-"""of the first generation, as a share of each range"""
+"""Standard deviation of the first generation, as a share of each range"""
 
 
 @record()
-class Sought:
-    """Parameters that are looked for; raises `UsageError` for what cannot be."""
+class TuningProblem:
+    """Parameters to tune for a cost; raises `UsageError` for invalid values."""
 
     name: str
-    """The name of the tuning, with which its files begin."""
+    """The name of the tuning, with which the names of its files begin."""
     base: Request
     """The scenario or the system whose parameters are tuned."""
     parameters: tuple[Axis, ...]
-    """What is tuned, each between its `low` and its `high`."""
+    """The parameters to tune, each between its `low` and its `high`."""
     cost: str
-    """What is made small: an expression over the objectives of the base."""
+    """The cost to minimise: an expression over the objectives of the base."""
     periods: tuple[float, ...]
-    """The sampling periods [s]; it is tuned for each by itself."""
+    """The sampling periods [s], for each of which it is tuned separately."""
     evaluations: int
-    """How often the cost is evaluated in a search, for each parameter."""
+    """The number of evaluations of the cost in a search, per parameter."""
     seeds: tuple[int, ...]
-    """The seeds of the optimiser, each a search of its own; the best by its cost is taken."""
+    """The seeds of the optimiser, each for a separate search; the search with the lowest cost is taken."""
 
     def __post_init__(self) -> None:
         if len(self.parameters) < 2:
@@ -52,11 +52,11 @@ class Sought:
         if COST in self.origin.objectives:
             raise UsageError(f"objectives.{COST}: expected another name, which a tuning adds")
         assert self._paths
-        assert self._of_period
+        assert self._period_paths
 
     @cached_property
     def origin(self) -> System:
-        """The system that the base means."""
+        """The system that the base describes."""
         return system_of(self.base)
 
     @cached_property
@@ -64,14 +64,14 @@ class Sought:
         return {target: paths_in(self.base, target) for axis in self.parameters for target in axis.targets}
 
     @cached_property
-    def _of_period(self) -> tuple[str, ...]:
+    def _period_paths(self) -> tuple[str, ...]:
         try:
             return Varied(request=self.base, of=default_quantity(self.base)).paths
         except UsageError:
             raise UsageError("search.periods: expected a base with one period, of its only sampled component") from None
 
-    def described(self) -> list[str]:
-        """What the cost of a search is, line by line, for the file of its outcome."""
+    def describe_cost(self) -> list[str]:
+        """The definition of the cost, line by line, for the file of tuned parameters."""
         raise NotImplementedError
 
     @property
@@ -80,26 +80,26 @@ class Sought:
         return self.evaluations * len(self.parameters)
 
     def files(self) -> Files:
-        """All files that are needed, FMUs built if need be."""
+        """All files of the runs; missing FMUs are built."""
         return files_of(self.origin)
 
     def values(self, shares: Sequence[float]) -> dict[str, float]:
-        """What each target is set to, at a share in [0, 1] of the range of each parameter."""
+        """The value of each target, at a share in [0, 1] of the range of each parameter."""
         return {
             target: axis.at(float(share)) for axis, share in zip(self.parameters, shares) for target in axis.targets
         }
 
     def system(self, period: float, values: Mapping[str, float]) -> System:
-        """With a period and values of the targets; raises `UsageError` for one that cannot be."""
-        given = {path: value for target, value in values.items() for path in self._paths[target]}
+        """The system with a period and values of the targets; raises `UsageError` for an invalid value."""
+        changes = {path: value for target, value in values.items() for path in self._paths[target]}
         with errors_in_own_terms(self.base):
-            system = changed(self.origin, {**given, **dict.fromkeys(self._of_period, period)})
+            system = changed(self.origin, {**changes, **dict.fromkeys(self._period_paths, period)})
             return replace(system, objectives={**system.objectives, COST: self.cost})
 
 
 @dataclass(frozen=True, kw_only=True)
-class Outcome:
-    """The outcome of one search."""
+class SearchResult:
+    """The result of one search."""
 
     period: float
     """[s]"""
@@ -107,55 +107,58 @@ class Outcome:
     values: dict[str, float]
     """of each target"""
     cost: float
-    """of these, as it was searched by"""
+    """of these values, as minimised"""
     evaluations: int
 
     @property
     def judgement(self) -> str:
-        """What is known of it beside its cost, in words."""
+        """An assessment besides the cost, in words."""
         raise NotImplementedError
 
     @property
     def figures(self) -> dict[str, float | None]:
-        """Likewise in numbers, by name."""
+        """The same assessment in numbers, by name."""
         raise NotImplementedError
 
 
 @dataclass(frozen=True, kw_only=True)
-class Lowest:
-    """The cheapest of all points that a search has seen."""
+class Minimum:
+    """The point of lowest cost that a search has evaluated."""
 
     shares: Floats
     cost: float
     evaluations: int
 
 
-def lowest(
-    tuning: Sought, seed: int, costs: Callable[[Sequence[Floats]], Sequence[float]], progress: Callable[[float], None]
-) -> Lowest:
-    """The best of one search by CMA-ES (Hansen, arXiv:1604.00772), begun at a point that the seed draws.
+def minimise(
+    tuning: TuningProblem,
+    seed: int,
+    costs: Callable[[Sequence[Floats]], Sequence[float]],
+    progress: Callable[[float], None],
+) -> Minimum:
+    """The best point of one search by CMA-ES (Hansen, arXiv:1604.00772), which starts at a point drawn by the seed.
 
-    `costs` are those of points of the unit cube, a generation at a time.
+    `costs` gives the costs of points of the unit cube, a generation at a time.
     """
-    import cma  # with it comes matplotlib
+    import cma  # deferred: it imports matplotlib
 
     first = np.random.default_rng(seed).uniform(0.25, 0.75, len(tuning.parameters))
     options = {"bounds": [0.0, 1.0], "seed": seed + 1, "verbose": -9}
     strategy = cma.CMAEvolutionStrategy(first, _WIDTH, options)
     best, least, count = first, np.inf, 0
-    while count < tuning.budget:  # whatever the optimiser thinks of it: every controller gets the same effort
+    while count < tuning.budget:  # no other stopping rule: every controller gets the same effort
         candidates = [np.asarray(candidate) for candidate in strategy.ask()]
-        found = costs(candidates)
-        strategy.tell(candidates, found)
+        values = costs(candidates)
+        strategy.tell(candidates, values)
         count += len(candidates)
-        place = int(np.argmin(found))
-        if found[place] < least:
-            best, least = candidates[place], found[place]
+        place = int(np.argmin(values))
+        if values[place] < least:
+            best, least = candidates[place], values[place]
         progress(min(1.0, count / tuning.budget))
-    return Lowest(shares=best, cost=float(least), evaluations=count)
+    return Minimum(shares=best, cost=float(least), evaluations=count)
 
 
-def best_by_period(found: Sequence[Outcome]) -> Iterator[Outcome]:
-    """Of the searches for each period the one whose cost is lowest."""
-    for period in dict.fromkeys(one.period for one in found):
-        yield min((one for one in found if one.period == period), key=lambda one: one.cost)
+def best_by_period(results: Sequence[SearchResult]) -> Iterator[SearchResult]:
+    """The search with the lowest cost for each period."""
+    for period in dict.fromkeys(one.period for one in results):
+        yield min((one for one in results if one.period == period), key=lambda one: one.cost)
