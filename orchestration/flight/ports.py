@@ -13,20 +13,20 @@ def _ports(causality: str, names: Iterable[str]) -> Iterator[Port]:
 
 
 CONTROLLER = Role(
-    told_by=wiring.COMMAND,
+    identified_by=wiring.COMMAND,
     ports=(
         *_ports("output", wiring.COMMAND),
         *_ports("input", wiring.MEASUREMENT),
     ),
-    further=(
+    optional=(
         *_ports("input", wiring.REFERENCE),
         *_ports("parameter", (SAMPLE_PERIOD, SAMPLE_OFFSET, *TRAJECTORY)),
         Port(USE_REFERENCE_INPUTS, "parameter", None, "Boolean"),
     ),
-    whole_by=(*TRAJECTORY,),
+    complete_by=(*TRAJECTORY,),
 )
 PLANT = Role(
-    told_by=wiring.MEASUREMENT,
+    identified_by=wiring.MEASUREMENT,
     ports=(
         *_ports("output", wiring.MEASUREMENT),
         *_ports("input", (*wiring.COMMAND, *wiring.EXTERNAL_FORCE)),

@@ -11,9 +11,9 @@ import pytest
 from orchestration.building import fmus
 from orchestration.building.models import MODELS
 from orchestration.checks.validation import rules
-from orchestration.checks.validation.confined_process import PLATFORM, READABLE, look
+from orchestration.checks.validation.confined_process import PLATFORM, READABLE, check_description
 from orchestration.checks.validation.finding import Finding, name_of
-from orchestration.checks.validation.progress import Report, Told
+from orchestration.checks.validation.progress import ReceivedReport, Reporter
 from orchestration.checks.validation.validator import PROCESS, validate
 from orchestration.command import cli
 from orchestration.processes.limits import Limits
@@ -69,9 +69,9 @@ def runs(mutant: Mutant) -> bool:
 
 def looked_at(path: Path) -> list[Finding]:
     """What is found wrong with an FMU before it runs."""
-    told = Told()
-    look(path, Limits().size, Report(told.hear))
-    return told.findings
+    received = ReceivedReport()
+    check_description(path, Limits().size, Reporter(received.receive))
+    return received.findings
 
 
 @pytest.fixture(scope="module")

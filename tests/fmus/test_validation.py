@@ -18,7 +18,7 @@ from orchestration.checks.validation.finding import Finding, check
 from orchestration.checks.validation.fmu import Fmu
 from orchestration.checks.validation.own_description import differences, elements
 from orchestration.checks.validation.probe import Probe
-from orchestration.checks.validation.progress import Frame, Report, Told
+from orchestration.checks.validation.progress import Frame, ReceivedReport, Reporter
 from orchestration.checks.validation.reading import read_co_simulation, read_fmu
 from orchestration.checks.validation.structure import initial_unknowns, known_dependencies, outputs
 from orchestration.checks.validation.units import dimensions, unit_meaning
@@ -240,7 +240,7 @@ def test_an_error_of_the_validation_itself_is_no_finding(
         return Ending(code=1, last_line="no such module")
 
     monkeypatch.setattr(Child, "receive_all", fail)
-    with pytest.raises(QuadcosimError, match=f"LowPass.fmu: it is the validation that failed: {words}"):
+    with pytest.raises(QuadcosimError, match=f"LowPass.fmu: the validation failed: {words}"):
         validate(low_pass)
 
 
@@ -267,10 +267,10 @@ def test_the_child_reports_an_error_in_a_rule(low_pass: Path, monkeypatch: pytes
 
     monkeypatch.setattr(run_rules, "FIRST", (odd,))
     monkeypatch.setattr(confined_process, "restrict", lambda size: None)  # which would hold for the process of the test
-    told = Told()
+    received = ReceivedReport()
     with pytest.raises(KeyError):
-        confined_process.check(low_pass, tmp_path, Limits(), Report(told.hear))
-    assert (told.rule, told.error, told.ended) == ("odd", "KeyError: 3", False)
+        confined_process.check(low_pass, tmp_path, Limits(), Reporter(received.receive))
+    assert (received.rule, received.error, received.ended) == ("odd", "KeyError: 3", False)
 
 
 # -- units ----------------------------------------------------------------------------------------------

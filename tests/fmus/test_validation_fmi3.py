@@ -108,7 +108,7 @@ def test_what_ticks_with_a_clock_is_said_not_to_be_looked_at(tmp_path: Path) -> 
     path = foreign(tmp_path, old="  </ModelVariables>", new=f"{CLOCK}</ModelVariables>")
     assert validate(path) == [
         Finding("capabilities", "hasEventMode = false: expected true, for the clocks tick"),
-        Finding("runs", "tick: not looked at, for it runs without event mode, in which clocks tick", note=True),
+        Finding("runs", "tick: not checked, as clocks tick in event mode only, in which it does not run", note=True),
     ]
 
 

@@ -1,1 +1,1 @@
-"""What an FMU needs to load, read from its file, and what of it this machine has."""
+"""The requirements of an FMU for loading, read from its file, compared with this machine."""

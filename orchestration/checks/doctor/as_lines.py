@@ -1,4 +1,4 @@
-"""The doctor's findings in lines to read."""
+"""The doctor's report as lines of text."""
 
 from collections.abc import Iterable, Iterator
 
@@ -7,23 +7,23 @@ from orchestration.checks.doctor.dependencies import PYTHON_DLL, missing_version
 from orchestration.checks.doctor.fmu import PLATFORMS, Fmu, PlatformBinary
 from orchestration.checks.doctor.machine import Library, Machine
 from orchestration.checks.doctor.report import Report
-from orchestration.checks.doctor.verdict import Host, Unjudged, Verdict
+from orchestration.checks.doctor.verdict import Host, UnexaminedFmu, Verdict
 
 _WIDTH = 12
 
 Row = tuple[str, str, bool]
-"""What it is about, what there is to say, whether that is a problem."""
+"""Label, text, and whether it is a problem."""
 
 
 def as_text(report: Report) -> str:
-    """A block of lines for the machine and one for each FMU; what is wrong is marked with an exclamation mark."""
+    """A block of lines for the machine and one for each FMU; problems are marked with an exclamation mark."""
     blocks = [_block("this machine", _machine_rows(report.machine))]
     blocks += [_verdict_block(verdict, report.machine) for verdict in report.verdicts]
     return "\n\n".join(blocks)
 
 
-def _verdict_block(verdict: Verdict | Unjudged, machine: Machine) -> str:
-    if isinstance(verdict, Unjudged):
+def _verdict_block(verdict: Verdict | UnexaminedFmu, machine: Machine) -> str:
+    if isinstance(verdict, UnexaminedFmu):
         return _block(str(verdict.path), [("file", verdict.failure, True)])
     return _block(str(verdict.fmu.path), _fmu_rows(verdict, machine))
 
@@ -50,7 +50,7 @@ def _fmu_rows(verdict: Verdict, machine: Machine) -> Iterator[Row]:
         yield from _platform_rows(part, machine, fmu.version, part is here)
     yield from _python_rows(fmu, machine)
     if fmu.needs_tool is not None:
-        yield "tool", f"{fmu.needs_tool}, says the FMU (needsExecutionTool)", False
+        yield "tool", f"{fmu.needs_tool}, declared by the FMU (needsExecutionTool)", False
     for problem in verdict.problems:
         yield "file", problem, True
     for problem in verdict.elsewhere:
@@ -76,26 +76,26 @@ def _platform_rows(part: PlatformBinary, machine: Machine, version: int, here: b
     if here:
         yield from (_dependency_row(dependency, machine) for dependency in needed(part))
     elif part.binary.dependencies:
-        yield "", f"needs {', '.join(_named(dependency) for dependency in needed(part))}", False
+        yield "", f"needs {', '.join(_with_versions(dependency) for dependency in needed(part))}", False
     if part.binary.python_symbols:
         count = len(part.binary.python_symbols)
         needs = "finds a libpython itself" if part.finds_python else "needs a libpython that its host has loaded"
         yield "", f"{needs}, globally visible ({count} symbols)", False
 
 
-def _named(dependency: Dependency) -> str:
+def _with_versions(dependency: Dependency) -> str:
     return " ".join((dependency.name, *newest(dependency.versions)))
 
 
 def _dependency_row(dependency: Dependency, machine: Machine) -> Row:
     libraries = [found.get(dependency.name) for found in (machine.found, machine.found_by_python)]
-    program, python = (_found(dependency, library) for library in libraries)
+    program, python = (_found_text(dependency, library) for library in libraries)
     bad = any(library is None or missing_versions(dependency, library) for library in libraries)
     here = program if program == python else f"{program}, in Python {python}"
-    return "", f"needs {_named(dependency)}; here {here}", bad and not PYTHON_DLL.fullmatch(dependency.name)
+    return "", f"needs {_with_versions(dependency)}; here {here}", bad and not PYTHON_DLL.fullmatch(dependency.name)
 
 
-def _found(dependency: Dependency, library: Library | None) -> str:
+def _found_text(dependency: Dependency, library: Library | None) -> str:
     return "none" if library is None else offered(dependency, library) or str(library.path)
 
 

@@ -1,4 +1,4 @@
-"""What a shared library says of itself: its machine, and what it needs of others. ELF, PE and Mach-O.
+"""The headers of shared libraries in ELF, PE and Mach-O: their machine and dependencies.
 
 Headers and tables only, so that a library for any machine can be read on any other.
 """
@@ -23,14 +23,14 @@ _FAT_MACH_O = {b"\xca\xfe\xba\xbe": 20, b"\xca\xfe\xba\xbf": 32}
 """Magic number -> size of the entry of one architecture."""
 
 _WEAK_VERSION = 2
-"""VER_FLG_WEAK: the loader only warns if such a version is not there."""
+"""VER_FLG_WEAK: the loader only warns if such a version is missing."""
 
 _PYTHON_SYMBOL = re.compile(r"_?Py[A-Z_]")
 _NUMBERED = re.compile(r"(.+)_(\d+(?:\.\d+)*)")
 
 
 class UnreadableError(Exception):
-    """What was read is no shared library of a known format, or a damaged one."""
+    """A file is no shared library of a known format, or damaged."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,22 +51,22 @@ class Binary:
     dependencies: tuple[Dependency, ...] | None = None
     """None: unknown; the tables of Mach-O are not read, and an ELF file can be stripped of them."""
     python_symbols: tuple[str, ...] = ()
-    """Symbols of Python that it leaves to whoever loads it (ELF)."""
+    """Undefined symbols of Python, to be provided by its host (ELF)."""
     defined_versions: tuple[str, ...] = ()
-    """Versions of symbols that it offers (ELF)."""
+    """Versions of symbols that it defines (ELF)."""
     run_path: tuple[str, ...] = ()
-    """Folders in which it asks the loader to look for its own dependencies (ELF)."""
+    """Folders in which the loader searches its dependencies (ELF)."""
     inherited_run_path: tuple[str, ...] = ()
-    """Those of them that hold for the dependencies of what it loads, too: DT_RPATH without DT_RUNPATH."""
+    """Those that apply to the dependencies of its dependencies, too: DT_RPATH without DT_RUNPATH."""
 
     @property
     def dependency_names(self) -> tuple[str, ...]:
-        """The names alone; none if unknown."""
+        """The names alone; empty if unknown."""
         return tuple(dependency.name for dependency in self.dependencies or ())
 
     @property
     def target(self) -> str:
-        """The machines that it is for, in words."""
+        """The machines that it is for, as text."""
         return f"{self.system}, {' and '.join(self.architectures)}"
 
     def fits(self, system: str, architecture: str) -> bool:
@@ -74,8 +74,8 @@ class Binary:
         return self.system == system and architecture in self.architectures
 
 
-def joined(first: Binary, second: Binary) -> Binary:
-    """What `first` needs to load and then to load `second`, both for the same machine."""
+def combined(first: Binary, second: Binary) -> Binary:
+    """The needs of `first` and of `second`, which it loads, both for the same machine."""
     versions: dict[str, set[str]] = {}
     for dependency in (*(first.dependencies or ()), *(second.dependencies or ())):
         versions.setdefault(dependency.name, set()).update(dependency.versions)
@@ -86,7 +86,7 @@ def joined(first: Binary, second: Binary) -> Binary:
 def read(stream: BinaryIO, *, symbols: bool = True) -> Binary:
     """Read a shared library or program; raises `UnreadableError` with the reason.
 
-    `symbols`: whether the symbols of Python are looked for, which takes long in a library that has many.
+    `symbols`: whether symbols of Python are searched, which takes long in a library with many.
     """
     magic = stream.read(4)
     stream.seek(0)
@@ -97,18 +97,18 @@ def read(stream: BinaryIO, *, symbols: bool = True) -> Binary:
             return _read_pe(stream)
         if magic in _MACH_O or magic in _FAT_MACH_O:
             return Binary(system=MACOS, architectures=_mach_architectures(stream.read(4096)))
-    except Exception as error:  # the parsers trip over damage in their own ways
+    except Exception as error:  # the parsers fail on damage in various ways
         raise UnreadableError(f"damaged: {error}") from error
     raise UnreadableError(f"begins with {magic!r}, expected an ELF, PE or Mach-O file")
 
 
 def origin_in(folder: str, origin: str) -> str:
-    """A folder of a run path with the place of the binary that asks for it put in."""
+    """A folder of a run path with the folder of its binary for $ORIGIN."""
     return folder.replace("${ORIGIN}", origin).replace("$ORIGIN", origin)
 
 
 def newest(versions: Iterable[str], *, unnumbered: bool = False) -> tuple[str, ...]:
-    """The highest version of each kind, e.g. of all GLIBCXX_*, and those without a number if they are wanted."""
+    """The highest version of each kind, e.g. of all GLIBCXX_*, and if `unnumbered` those without a number."""
     highest: dict[str, tuple[tuple[int, ...], str]] = {}
     for version in versions:
         match = _NUMBERED.fullmatch(version)

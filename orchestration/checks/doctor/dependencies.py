@@ -1,4 +1,4 @@
-"""What the binary of an FMU needs of the libraries of a machine, and what of it is not there."""
+"""The dependencies of the binary of an FMU, and those missing on a machine."""
 
 import re
 from collections.abc import Iterator
@@ -10,13 +10,13 @@ from orchestration.checks.doctor.machine import Libraries, Library, Machine
 PYTHON_DLL = re.compile(r"python3\d*\.dll", re.IGNORECASE)
 _RUNTIME_DLL = re.compile(r"(msvcp|vcruntime|concrt)\d+", re.IGNORECASE)
 _API_SETS = ("api-ms-", "ext-ms-")
-"""Names that Windows resolves itself; there are no such files."""
+"""Names that Windows resolves itself; no such files exist."""
 
 _REDISTRIBUTABLE = "the Microsoft Visual C++ Redistributable"
 
 
 def part_for(fmu: Fmu, machine: Machine) -> PlatformBinary | None:
-    """The FMU's binary that loads on this machine, if any."""
+    """The FMU's binary for this machine, if any."""
     parts = {part.platform: part for part in fmu.platforms}
     for part in map(parts.get, machine.platforms(fmu.version)):
         if part is not None and part.binary is not None:
@@ -24,7 +24,9 @@ def part_for(fmu: Fmu, machine: Machine) -> PlatformBinary | None:
     return None
 
 
-def lacking(part: PlatformBinary, libraries: Libraries, without: re.Pattern[str] | None = None) -> list[str]:
+def missing_dependencies(
+    part: PlatformBinary, libraries: Libraries, without: re.Pattern[str] | None = None
+) -> list[str]:
     """Dependencies of a binary that are not found, or too old."""
     lacks = []
     for dependency in needed(part):
@@ -41,22 +43,22 @@ def lacking(part: PlatformBinary, libraries: Libraries, without: re.Pattern[str]
 
 
 def needed(part: PlatformBinary) -> Iterator[Dependency]:
-    """Dependencies that must be on the machine."""
+    """Dependencies that must be installed on the machine."""
     for dependency in (part.binary and part.binary.dependencies) or ():
         if dependency.name not in part.bundled and not dependency.name.lower().startswith(_API_SETS):
             yield dependency
 
 
 def missing_versions(dependency: Dependency, library: Library) -> tuple[str, ...]:
-    """The versions of symbols that a library should define and does not, of each kind the newest.
+    """The required versions of symbols that a library does not define, of each kind the newest.
 
-    A library without any versions is taken as it is, as the loader does.
+    A library without any versions is accepted, as by the loader.
     """
     missing = [version for version in dependency.versions if version not in library.versions]
     return newest(missing, unnumbered=True) if library.versions else ()
 
 
 def offered(dependency: Dependency, library: Library) -> str:
-    """The newest versions that a library defines, of the kinds that are asked for."""
+    """The newest versions that a library defines, of the required kinds."""
     kinds = {version.rpartition("_")[0] for version in dependency.versions}
     return " ".join(newest(version for version in library.versions if version.rpartition("_")[0] in kinds))

@@ -1,4 +1,4 @@
-"""What an .fmu file says of what it needs: its description, its binaries, the Python sources in it."""
+"""The requirements of an .fmu file: from its description, its binaries, and the Python sources in it."""
 
 import io
 import math
@@ -10,12 +10,21 @@ from xml.etree.ElementTree import Element
 
 from fmu_kit import loader
 from orchestration.checks.doctor import sources
-from orchestration.checks.doctor.binaries import LINUX, MACOS, WINDOWS, Binary, UnreadableError, joined, origin_in, read
+from orchestration.checks.doctor.binaries import (
+    LINUX,
+    MACOS,
+    WINDOWS,
+    Binary,
+    UnreadableError,
+    combined,
+    origin_in,
+    read,
+)
 from orchestration.fmi.archive import DESCRIPTION, UnreadableFmuError, read_archive, read_root, version_of
 
 CO_SIMULATION = "CoSimulation"
 KINDS = {CO_SIMULATION: "co-simulation", "ModelExchange": "model exchange", "ScheduledExecution": "scheduled execution"}
-"""By the elements that declare them"""
+"""by the elements that declare them"""
 
 ARCHITECTURES = {
     "x86": "x86",
@@ -27,9 +36,9 @@ ARCHITECTURES = {
     "ppc32": "ppc32",
     "ppc64": "ppc64",
 }
-"""By the names of the doctor, what FMI 3.0 calls them"""
+"""names in FMI 3.0 by the names of the doctor"""
 SYSTEMS = {LINUX: "linux", WINDOWS: "windows", MACOS: "darwin"}
-"""By the names of the doctor, what FMI 3.0 calls them"""
+"""names in FMI 3.0 by the names of the doctor"""
 _TUPLES = {
     f"{architecture}-{folder}": (system, (name,))
     for name, architecture in ARCHITECTURES.items()
@@ -47,9 +56,9 @@ PLATFORMS: Mapping[int, Mapping[str, tuple[str, tuple[str, ...]]]] = {
     },
     3: _TUPLES,
 }
-"""The folders that a version of FMI names, and the machines they stand for.
+"""The folders that a version of FMI defines, and their machines.
 
-For other processors than x86, FMI 2.0 takes the names of FMI 3.0 (FMI 2.0.4, section 2.3).
+For processors other than x86, FMI 2.0 uses the names of FMI 3.0 (FMI 2.0.4, section 2.3).
 """
 
 _SUFFIXES = {"linux": ".so", "win": ".dll", "darwin": ".dylib"}
@@ -62,17 +71,17 @@ class PlatformBinary:
     platform: str
     """The folder in `binaries/`."""
     binary: Binary | None = None
-    """None if there is none to be read; `problem` says why."""
+    """None: it cannot be read, for the reason in `problem`."""
     finds_python: bool = False
-    """Whether it is a loader of this project, which opens a libpython and then pythonfmu's library beside it."""
+    """Whether it is a loader of this project, which opens a libpython and then pythonfmu's library."""
     bundled: frozenset[str] = frozenset()
-    """Dependencies that the FMU brings along, where the loader looks."""
+    """Dependencies inside the FMU, in folders that the loader searches."""
     problem: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fmu:
-    """What an FMU needs."""
+    """The requirements of an FMU."""
 
     path: Path
     version: int
@@ -84,7 +93,7 @@ class Fmu:
     start_time: float
     """[s]; of the default experiment, 0 if it has none"""
     needs_tool: str | None
-    """The tool that must be installed because the FMU says so (needsExecutionTool)."""
+    """The tool that must be installed, as the FMU declares (needsExecutionTool)."""
     platforms: tuple[PlatformBinary, ...]
     requires_python: str | None
     """The version specifier that the description declares, if any."""
@@ -93,7 +102,7 @@ class Fmu:
 
 
 def read_fmu(path: Path, size_limit: float = math.inf) -> Fmu:
-    """What a file says; raises `UnreadableFmuError` if it is no FMU, or unpacks to over `size_limit` MB."""
+    """The requirements of a file; raises `UnreadableFmuError` if it is no FMU, or unpacks to over `size_limit` MB."""
     archive = read_archive(path, size_limit)
     description = read_root(archive)
     version = version_of(description)
@@ -121,7 +130,7 @@ def _start_time(description: Element) -> float:
     experiment = description.find("DefaultExperiment")
     try:
         return float("0" if experiment is None else experiment.get("startTime", "0"))
-    except ValueError:  # which is for `validate` to say
+    except ValueError:  # reported by `validate`
         return 0.0
 
 
@@ -132,13 +141,13 @@ def _platforms(files: Mapping[str, bytes], version: int, identifier: str) -> tup
 
 
 def _is_static(version: int, folder: str) -> bool:
-    """Whether FMI 3.0 has libraries for linking there: a compiler's name comes after that of the system."""
+    """Whether a folder of FMI 3.0 has static libraries: a compiler's name follows that of the system."""
     return version == 3 and folder.count("-") > 1
 
 
 def _platform(files: Mapping[str, bytes], version: int, folder: str, identifier: str) -> PlatformBinary:
-    called = folder if version == 2 else folder.rpartition("-")[2]
-    suffixes = [suffix for system, suffix in _SUFFIXES.items() if called.startswith(system)] or _SUFFIXES.values()
+    system_name = folder if version == 2 else folder.rpartition("-")[2]
+    suffixes = [suffix for system, suffix in _SUFFIXES.items() if system_name.startswith(system)] or _SUFFIXES.values()
     expected = [f"binaries/{folder}/{identifier}{suffix}" for suffix in suffixes]
     found = next((name for name in expected if name in files), None)
     if found is None:
@@ -147,11 +156,11 @@ def _platform(files: Mapping[str, bytes], version: int, folder: str, identifier:
         binary = read(io.BytesIO(files[found]))
         finds_python = folder == posixpath.basename(loader.PLATFORM) and loader.BESIDE in files
         if finds_python:
-            binary = joined(binary, read(io.BytesIO(files[loader.BESIDE])))
+            binary = combined(binary, read(io.BytesIO(files[loader.BESIDE])))
     except UnreadableError as error:
         return PlatformBinary(platform=folder, problem=f"{found}: {error}")
-    looked_at = {f"binaries/{folder}"} if binary.system == WINDOWS else set(_inside(binary, folder))
-    bundled = {name for name in binary.dependency_names for place in looked_at if f"{place}/{name}" in files}
+    searched = {f"binaries/{folder}"} if binary.system == WINDOWS else set(_inside(binary, folder))
+    bundled = {name for name in binary.dependency_names for place in searched if f"{place}/{name}" in files}
     problem = _mismatch(version, folder, binary)
     return PlatformBinary(
         platform=folder, binary=binary, finds_python=finds_python, bundled=frozenset(bundled), problem=problem
@@ -159,13 +168,13 @@ def _platform(files: Mapping[str, bytes], version: int, folder: str, identifier:
 
 
 def _inside(binary: Binary, folder: str) -> list[str]:
-    """Folders of the archive in which an ELF library asks the loader to look."""
+    """Folders of the archive in which the loader searches for an ELF library."""
     own = f"binaries/{folder}"
     return [posixpath.normpath(origin_in(entry, own)) for entry in binary.run_path]
 
 
 def _mismatch(version: int, folder: str, binary: Binary) -> str | None:
-    """What is wrong if the header of a binary speaks of another machine than its folder."""
+    """The problem of a binary whose header is for another machine than its folder; None: there is none."""
     if folder not in PLATFORMS[version]:
         return None
     system, architectures = PLATFORMS[version][folder]

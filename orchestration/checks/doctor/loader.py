@@ -1,6 +1,6 @@
-"""Where the dynamic loader of a host looks for libraries.
+"""The search path for libraries of the dynamic loader of a host.
 
-A Python host looks where its executable says first. A host that is not Python looks where any program does.
+A Python host first searches the run path of its executable. A host that is not Python searches as any program.
 """
 
 import os
@@ -21,7 +21,7 @@ _CACHED = re.compile(r"\s+(\S+) \(.*\) => (.+)")
 
 @dataclass(frozen=True, kw_only=True)
 class Loader:
-    """A dynamic loader: folders, then what the binary itself asks for, then the cache, then more folders."""
+    """A dynamic loader: it searches folders, the run path of the binary, the cache, and more folders, in this order."""
 
     system: str
     architecture: str
@@ -30,7 +30,7 @@ class Loader:
     last: tuple[Path, ...] = ()
 
     def find(self, name: str, run_path: Iterable[str] = ()) -> Path | None:
-        """The file that it would take for `name`, passing over those for other machines as it does."""
+        """The file that it would load for `name`, skipping those for other machines."""
         before = (*self.first, *map(Path, run_path))
         candidates = [folder / name for folder in before]
         candidates += self.cache.get(name, ())
@@ -44,7 +44,7 @@ class Loader:
 
 
 def read_file(path: Path) -> Binary | None:
-    """What a file of this machine says of itself but for its symbols; None if it is not there or no library."""
+    """The headers of a file of this machine without its symbols; None if it is missing or no library."""
     try:
         with path.open("rb") as stream:
             return read(stream, symbols=False)
@@ -53,7 +53,7 @@ def read_file(path: Path) -> Binary | None:
 
 
 def loader_of_programs(system: str, architecture: str) -> Loader:
-    """That of a program started here that is not Python."""
+    """The loader of a program started here that is not Python."""
     if system == WINDOWS:
         root = os.environ.get("SYSTEMROOT", r"C:\Windows")
         return Loader(
@@ -71,7 +71,7 @@ def loader_of_programs(system: str, architecture: str) -> Loader:
 
 
 def loader_of_this_python(programs: Loader) -> Loader:
-    """That of this process: it looks where its executable says first."""
+    """The loader of this process, which first searches the run path of its executable."""
     if programs.system == WINDOWS:
         return replace(programs, first=(Path(sys.base_prefix), *programs.first))
     executable = Path(sys.executable).resolve()
@@ -87,13 +87,13 @@ def _folders(variable: str) -> tuple[Path, ...]:
 
 
 def _default_folders() -> tuple[Path, ...]:
-    """Where glibc and musl look without a cache."""
+    """The folders that glibc and musl search without a cache."""
     triplet = sysconfig.get_config_var("MULTIARCH") or f"{platform.machine()}-linux-gnu"
     return tuple(map(Path, (f"/lib/{triplet}", f"/usr/lib/{triplet}", "/lib64", "/usr/lib64", "/lib", "/usr/lib")))
 
 
 def _ldconfig() -> dict[str, tuple[Path, ...]]:
-    """The loader's cache, by name; empty where there is no ldconfig that can print it."""
+    """The loader's cache, by name; empty without an ldconfig that prints it."""
     program = shutil.which("ldconfig", path=os.pathsep.join((os.environ.get("PATH", ""), "/sbin", "/usr/sbin")))
     if program is None:
         return {}

@@ -1,7 +1,7 @@
-"""Reading an FMU and loading it for real, in a confined process: one that cannot be loaded may well take its host down.
+"""Reads and loads an FMU in a confined process, as one that cannot be loaded may crash its host.
 
-`python -m orchestration.checks.doctor.loading FMU FOLDER MB` does what the process does: it unpacks the FMU in the
-folder, an empty one, and says what comes of it: an `error`, or the `fmu` and whether it `loads`, or the `failure`.
+`python -m orchestration.checks.doctor.loading FMU FOLDER MB` is that process: it unpacks the FMU in the folder, an
+empty one, and sends an `error`, or the `fmu` and whether it `loads`, or the `failure`.
 """
 
 import importlib
@@ -23,60 +23,60 @@ from orchestration.processes.limits import Limits, restrict
 
 @dataclass(frozen=True, kw_only=True)
 class Trial:
-    """What came of an FMU in a process of its own."""
+    """The result of trying an FMU in a separate process."""
 
     fmu: Fmu
     failure: str | None
-    """Why it did not load; None if it did"""
+    """why it did not load; None if it did"""
 
 
-def attempt(path: Path, limits: Limits) -> Trial:
+def try_loading(path: Path, limits: Limits) -> Trial:
     """Read, load and initialise an FMU in this Python.
 
     Raises `UsageError` if it is none, `OtherVersionError` if it is of another version than FMI 2.0 and 3.0.
 
-    Where variables of the environment may mislead Python, it is tried without them first.
+    If environment variables may mislead Python, it is tried without them first.
     """
-    trial = _attempt(path, limits, subprocesses.undisturbed_environment())
+    trial = _try_loading(path, limits, subprocesses.undisturbed_environment())
     misleading = subprocesses.misleading_variables()
     if trial.failure is not None or not misleading:
         return trial
     try:
-        failure = _attempt(path, limits, subprocesses.environment()).failure
-    except UsageError as error:  # it can be read, as was seen before
+        failure = _try_loading(path, limits, subprocesses.environment()).failure
+    except UsageError as error:  # it was readable before
         failure = str(error).removeprefix(f"{path}: ")
     if failure is None:
         return trial
-    given = " ".join(f"{name}={value}" for name, value in misleading.items())
-    return Trial(fmu=trial.fmu, failure=f"loads without {given}, not with it: {failure}")
+    settings = " ".join(f"{name}={value}" for name, value in misleading.items())
+    return Trial(fmu=trial.fmu, failure=f"loads without {settings}, not with it: {failure}")
 
 
-def _attempt(path: Path, limits: Limits, environment: Mapping[str, str]) -> Trial:
+def _try_loading(path: Path, limits: Limits, environment: Mapping[str, str]) -> Trial:
     with tempfile.TemporaryDirectory(prefix="quadcosim-", ignore_cleanup_errors=True) as folder:
         module = subprocesses.Module.of("orchestration.checks.doctor.loading", path.resolve(), folder, limits.size)
-        found: dict[str, Any] = {}
+        received: dict[str, Any] = {}
         with Child(module, environment=environment, limits=limits) as child:
-            ending = child.receive_all(found.update)
-    if isinstance(found.get("error"), OtherVersionError):
-        raise found["error"]
-    if "error" in found:
-        raise UsageError(f"{path}: {found['error']}")
-    if "fmu" not in found:
+            ending = child.receive_all(received.update)
+    if isinstance(received.get("error"), OtherVersionError):
+        raise received["error"]
+    if "error" in received:
+        raise UsageError(f"{path}: {received['error']}")
+    if "fmu" not in received:
         words = f": {ending.last_line}" if ending.last_line else ""
         raise UsageError(f"{path}: could not be read, the process {ending.description}{words}")
-    fmu: Fmu = found["fmu"]
+    fmu: Fmu = received["fmu"]
     if CO_SIMULATION not in fmu.kinds:
         return Trial(fmu=fmu, failure=f"not tried: it is for {' and '.join(KINDS[kind] for kind in fmu.kinds)} only")
-    return Trial(fmu=fmu, failure=_failure(found, ending))
+    return Trial(fmu=fmu, failure=_failure(received, ending))
 
 
-def _failure(found: dict[str, Any], ending: Ending) -> str | None:
-    """Why the FMU did not load; None if it did, and its process lived to its end."""
-    if "failure" in found:
-        return str(found["failure"])
+def _failure(received: dict[str, Any], ending: Ending) -> str | None:
+    """Why the FMU did not load; None if it did, and its process reached its end."""
+    if "failure" in received:
+        return str(received["failure"])
     if ending.code is None:
         return f"its process {ending.description}"
-    return None if "loads" in found and ending.code == 0 else f"took its process down: it {ending.description}"
+    return None if "loads" in received and ending.code == 0 else f"took its process down: it {ending.description}"
 
 
 def main(path: str, folder: str, size: str) -> None:
@@ -86,7 +86,7 @@ def main(path: str, folder: str, size: str) -> None:
 
 def _try(path: Path, folder: Path, size_limit: float, send: Callable[[object], None]) -> None:
     restrict(size_limit)
-    importlib.import_module("pydantic")  # as every command that runs an FMU does: it may be that of another Python
+    importlib.import_module("pydantic")  # as every command that runs an FMU: it may be that of another Python
     try:
         fmu = read_fmu(path, size_limit)
     except UnreadableFmuError as error:
@@ -103,7 +103,7 @@ def _try(path: Path, folder: Path, size_limit: float, send: Callable[[object], N
 
 
 def _load(fmu: Fmu, folder: Path) -> None:
-    """With what its description must say and no more: it may be odd in what loading does not need."""
+    """Load with the required parts of the description only: others may be invalid."""
     import fmpy
 
     from orchestration.fmi.messages import Message, failure_text

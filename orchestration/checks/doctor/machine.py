@@ -1,4 +1,4 @@
-"""What this machine has of what FMUs need, as plain facts; nothing is judged here."""
+"""The parts of this machine that FMUs may need, as plain facts without a verdict."""
 
 import importlib.util
 import os
@@ -33,12 +33,12 @@ class Library:
 
 
 Libraries = Mapping[str, Library | None]
-"""By the name that a binary gives; None: not found."""
+"""By the name in a binary; None: not found."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Machine:
-    """A machine, the Python that looks at it, and what was found of the libraries and modules asked for."""
+    """A machine, the Python that examines it, and the required libraries and modules that were found."""
 
     system: str
     architecture: str
@@ -51,18 +51,18 @@ class Machine:
     temp_folder: Path
     """Where FMUs are unpacked."""
     python_libraries: tuple[PythonLibrary, ...] = ()
-    """What a host that is not Python could load, best first."""
+    """Those that a host that is not Python could load, best first."""
     found: Libraries = field(default_factory=dict)
-    """What the loader of a program that is not Python finds."""
+    """Libraries that the loader of a program that is not Python finds."""
     found_by_python: Libraries = field(default_factory=dict)
-    """What the loader of this Python finds."""
+    """Libraries that the loader of this Python finds."""
     modules: Mapping[str, bool] = field(default_factory=dict)
     """Whether this Python can import a module."""
 
     def platforms(self, version: int) -> tuple[str, ...]:
-        """The folders in `binaries/` that are for it in a version of FMI, the first that there is being taken.
+        """The folders in `binaries/` for this machine in a version of FMI; the first existing one is used.
 
-        For other processors than x86, FMI 2.0 takes the names of FMI 3.0 (FMI 2.0.4, section 2.3), tools as for x86.
+        For processors other than x86, FMI 2.0 uses the names of FMI 3.0 (FMI 2.0.4, section 2.3), tools those of x86.
         """
         name = f"{ARCHITECTURES.get(self.architecture, self.architecture)}-{SYSTEMS.get(self.system, self.system)}"
         if version == 3:
@@ -72,12 +72,12 @@ class Machine:
 
 
 def this_machine(fmus: Iterable[Fmu]) -> Machine:
-    """This machine, looked at for what `fmus` ask for."""
+    """This machine, examined for the requirements of `fmus`."""
     fmus = tuple(fmus)
     system, architecture = _SYSTEMS.get(platform.system(), platform.system()), _architecture()
     programs = loader.loader_of_programs(system, architecture)
     own = loader.loader_of_this_python(programs)
-    wanted = {
+    required = {
         name: part.binary.run_path
         for fmu in fmus
         for part in fmu.platforms
@@ -93,14 +93,14 @@ def this_machine(fmus: Iterable[Fmu]) -> Machine:
         shared=_shared(system),
         temp_folder=Path(tempfile.gettempdir()),
         python_libraries=python_libraries(programs),
-        found={name: _library(programs, name, run_path) for name, run_path in wanted.items()},
-        found_by_python={name: _library(own, name, run_path) for name, run_path in wanted.items()},
+        found={name: _library(programs, name, run_path) for name, run_path in required.items()},
+        found_by_python={name: _library(own, name, run_path) for name, run_path in required.items()},
         modules={name: _importable(name) for fmu in fmus if fmu.python is not None for name in fmu.python.imports},
     )
 
 
 def _architecture() -> str:
-    """That of this process, which may be of 32 bits on a machine of 64."""
+    """The architecture of this process, which may have 32 bits on a machine of 64."""
     name = sysconfig.get_platform().rpartition("-")[2] if os.name == "nt" else platform.machine()
     wide = struct.calcsize("P") == 8
     if name.lower() in (*_X86, "win32"):

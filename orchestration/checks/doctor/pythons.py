@@ -1,4 +1,4 @@
-"""Which Python a host that is not Python can load: an FMU of pythonfmu runs in it."""
+"""The Pythons that a host that is not Python can load, to run an FMU of pythonfmu."""
 
 import os
 import re
@@ -14,7 +14,7 @@ from orchestration.checks.doctor.loader import Loader
 THIS_PYTHON, PRELOADED, ON_PATH, BY_LOADER = "this Python", "LD_PRELOAD", "PATH", "the loader"
 
 _LIBPYTHON = re.compile(r"libpython(3\.\d+)[dm]*\.so")
-"""Without that of free-threaded Python, whose binary interface is another."""
+"""without that of free-threaded Python, whose binary interface differs"""
 
 _PYTHON_DLL = re.compile(r"python3(\d+)\.dll", re.IGNORECASE)
 
@@ -27,16 +27,16 @@ class PythonLibrary:
     version: str
     """Major and minor."""
     found_by: str
-    """The loader's means, or `THIS_PYTHON`."""
+    """`PRELOADED`, `ON_PATH`, `BY_LOADER` or `THIS_PYTHON`."""
     home: Path | None = None
-    """What PYTHONHOME must be for it to find its standard library; None if it knows."""
+    """The PYTHONHOME with which it finds its standard library; None if it needs none."""
 
 
 def python_libraries(loader: Loader) -> tuple[PythonLibrary, ...]:
     """Pythons that a host that is not Python could load, best first.
 
-    What is loaded or on PATH already comes first since it wins anyway; then the version of the Python that
-    runs this, then newer before older.
+    A library that is already loaded or on PATH comes first, as it takes precedence; then the version of this Python,
+    then newer before older.
     """
     if loader.system == WINDOWS:
         return tuple(_python_dlls(loader))
@@ -72,7 +72,7 @@ def _loadable(loader: Loader) -> Iterator[PythonLibrary]:
 
 
 def _in_folders(folders: Iterable[Path]) -> Iterator[Path]:
-    """libpythons, the name that is installed without the development files before its shorter alias."""
+    """libpythons, the name installed without development files before its shorter alias."""
     for folder in folders:
         yield from sorted(folder.glob("libpython3.*.so*"), reverse=True)
 
@@ -89,7 +89,7 @@ def _own() -> Iterator[PythonLibrary]:
 
 
 def _python_dlls(loader: Loader) -> Iterator[PythonLibrary]:
-    """The python3.dll that wins on PATH, and that of this Python."""
+    """The python3.dll that is first on PATH, and that of this Python."""
     on_path = loader.find("python3.dll")
     own = Path(sys.base_prefix, "python3.dll")
     for path, found_by in ((on_path, ON_PATH), (own, THIS_PYTHON)):

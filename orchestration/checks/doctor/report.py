@@ -1,4 +1,4 @@
-"""Looking at FMUs and this machine, and what came of it."""
+"""The report on FMUs and this machine."""
 
 import dataclasses
 from collections.abc import Iterable
@@ -8,19 +8,19 @@ from typing import Any
 
 from orchestration.checks.doctor.binaries import newest
 from orchestration.checks.doctor.dependencies import part_for
-from orchestration.checks.doctor.loading import Trial, attempt
+from orchestration.checks.doctor.loading import Trial, try_loading
 from orchestration.checks.doctor.machine import Library, Machine, this_machine
-from orchestration.checks.doctor.verdict import Unjudged, Verdict, judge
+from orchestration.checks.doctor.verdict import UnexaminedFmu, Verdict, judge
 from orchestration.fmi.archive import OtherVersionError
 from orchestration.processes.limits import Limits
 
 
 @dataclass(frozen=True, kw_only=True)
 class Report:
-    """A machine, and what came of each FMU on it."""
+    """A machine, and the verdict on each FMU."""
 
     machine: Machine
-    verdicts: tuple[Verdict | Unjudged, ...]
+    verdicts: tuple[Verdict | UnexaminedFmu, ...]
 
     @property
     def good(self) -> bool:
@@ -29,21 +29,21 @@ class Report:
 
 
 def examine(paths: Iterable[Path], limits: Limits) -> Report:
-    """Read the FMUs and try them within `limits`, look at this machine; `UsageError` for what is no FMU."""
-    trials = [_trial(path, limits) for path in paths]
+    """Examine this machine, read the FMUs and try them within `limits`; `UsageError` for a file that is no FMU."""
+    trials = [_trial_of(path, limits) for path in paths]
     machine = this_machine([trial.fmu for trial in trials if isinstance(trial, Trial)])
-    return Report(machine=machine, verdicts=tuple(_verdict(trial, machine) for trial in trials))
+    return Report(machine=machine, verdicts=tuple(_verdict_on(trial, machine) for trial in trials))
 
 
-def _trial(path: Path, limits: Limits) -> Trial | Unjudged:
+def _trial_of(path: Path, limits: Limits) -> Trial | UnexaminedFmu:
     try:
-        return attempt(path, limits)
+        return try_loading(path, limits)
     except OtherVersionError as error:
-        return Unjudged(path=path, failure=str(error))
+        return UnexaminedFmu(path=path, failure=str(error))
 
 
-def _verdict(trial: Trial | Unjudged, machine: Machine) -> Verdict | Unjudged:
-    return trial if isinstance(trial, Unjudged) else judge(trial.fmu, machine, trial.failure)
+def _verdict_on(trial: Trial | UnexaminedFmu, machine: Machine) -> Verdict | UnexaminedFmu:
+    return trial if isinstance(trial, UnexaminedFmu) else judge(trial.fmu, machine, trial.failure)
 
 
 def as_tables(report: Report) -> dict[str, Any]:
@@ -55,8 +55,8 @@ def as_tables(report: Report) -> dict[str, Any]:
     }
 
 
-def _verdict_table(verdict: Verdict | Unjudged, machine: Machine) -> dict[str, Any]:
-    if isinstance(verdict, Unjudged):
+def _verdict_table(verdict: Verdict | UnexaminedFmu, machine: Machine) -> dict[str, Any]:
+    if isinstance(verdict, UnexaminedFmu):
         return {**_plain(verdict), "loads": False, "good": False}
     part = part_for(verdict.fmu, machine)
     hosts = {"python": verdict.python_host, "other": verdict.other_host}
@@ -73,7 +73,7 @@ def _verdict_table(verdict: Verdict | Unjudged, machine: Machine) -> dict[str, A
 
 
 def _plain(value: Any) -> Any:
-    """Dataclasses as tables, paths as text, sets as sorted lists; of a library's versions the newest."""
+    """Dataclasses as tables, paths as text, sets as sorted lists; only the newest versions of a library."""
     if isinstance(value, Library):
         return {"path": str(value.path), "versions": list(newest(value.versions))}
     if dataclasses.is_dataclass(value) and not isinstance(value, type):

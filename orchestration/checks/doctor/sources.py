@@ -1,4 +1,4 @@
-"""The Python sources that pythonfmu has packed into an FMU, and what they import; nothing is imported here."""
+"""The Python sources that pythonfmu has packed into an FMU, and their imports, found without importing."""
 
 import ast
 import sys
@@ -9,12 +9,12 @@ from fmu_kit.syntax_trees import parse_module
 
 ENTRY = "resources/slavemodule.txt"
 _MODULES = (".py", ".so", ".pyd")
-_FORGIVING = {"ImportError", "ModuleNotFoundError"}
+_IMPORT_ERRORS = {"ImportError", "ModuleNotFoundError"}
 
 
 @dataclass(frozen=True, kw_only=True)
 class PythonSources:
-    """What the sources in an FMU of pythonfmu need."""
+    """The requirements of the sources in an FMU of pythonfmu."""
 
     imports: tuple[str, ...]
     """Top-level packages that are neither bundled nor in the standard library of this Python."""
@@ -22,7 +22,7 @@ class PythonSources:
 
 
 def read(files: Mapping[str, bytes]) -> PythonSources | None:
-    """Look through the sources in `resources`, of files by name; None for an FMU that pythonfmu did not make."""
+    """Read the sources in `resources`, of files by name; None for an FMU that pythonfmu did not make."""
     if ENTRY not in files:
         return None
     bundled = set(filter(None, map(_bundled, files)))
@@ -50,13 +50,13 @@ def _bundled(name: str) -> str | None:
 
 
 def _needed(node: ast.AST) -> Iterator[str]:
-    """Top-level packages imported in a tree, without those that it does without if they are not there."""
+    """Top-level packages imported in a tree, without optional ones."""
     if isinstance(node, ast.Import):
         yield from (alias.name.partition(".")[0] for alias in node.names)
     elif isinstance(node, ast.ImportFrom):
         if node.level == 0 and node.module is not None:
             yield node.module.partition(".")[0]
-    elif isinstance(node, ast.Try) and any(map(_forgives, node.handlers)):
+    elif isinstance(node, ast.Try) and any(map(_catches_import_error, node.handlers)):
         for statement in (*node.orelse, *node.finalbody):
             yield from _needed(statement)
     elif isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
@@ -67,6 +67,6 @@ def _needed(node: ast.AST) -> Iterator[str]:
             yield from _needed(child)
 
 
-def _forgives(handler: ast.ExceptHandler) -> bool:
+def _catches_import_error(handler: ast.ExceptHandler) -> bool:
     caught = handler.type.elts if isinstance(handler.type, ast.Tuple) else [handler.type]
-    return any(isinstance(error, ast.Name) and error.id in _FORGIVING for error in caught)
+    return any(isinstance(error, ast.Name) and error.id in _IMPORT_ERRORS for error in caught)

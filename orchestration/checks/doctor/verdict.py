@@ -1,4 +1,4 @@
-"""What an FMU needs against what a machine has: pure functions of the two."""
+"""The requirements of an FMU compared with a machine: pure functions of the two."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,14 +6,14 @@ from pathlib import Path
 from packaging.specifiers import InvalidSpecifier, SpecifierSet
 
 from orchestration.checks.doctor.binaries import LINUX, WINDOWS
-from orchestration.checks.doctor.dependencies import PYTHON_DLL, lacking, part_for
+from orchestration.checks.doctor.dependencies import PYTHON_DLL, missing_dependencies, part_for
 from orchestration.checks.doctor.fmu import Fmu, PlatformBinary
 from orchestration.checks.doctor.machine import Machine
 from orchestration.checks.doctor.pythons import BY_LOADER, ON_PATH, PRELOADED, PythonLibrary
 from orchestration.fmi.pythonfmu import uri_is_read
 
-TOLD = "QUADCOSIM_LIBPYTHON"
-"""The variable by which the loader in an FMU is told of a libpython."""
+LIBPYTHON_VARIABLE = "QUADCOSIM_LIBPYTHON"
+"""environment variable with the path of a libpython for the loader in an FMU"""
 
 INSTALL_LIBPYTHON = "apt install libpython3-dev (Debian, Ubuntu), dnf install python3-libs (Fedora)"
 
@@ -25,9 +25,9 @@ class Host:
     needs: tuple[str, ...] = ()
     """What is missing."""
     start: str | None = None
-    """The command that starts the host, if that takes more than its name."""
+    """The command that starts the host, if more than its name is needed."""
     note: str | None = None
-    """What cannot be told from here."""
+    """What cannot be determined here."""
 
     @property
     def ready(self) -> bool:
@@ -45,11 +45,11 @@ class Verdict:
     python_host: Host
     other_host: Host
     failure: str | None
-    """Why it did not load when it was tried; None if it did."""
+    """Why it did not load in the trial; None if it did."""
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """What is wrong with the file itself, as far as it concerns this machine."""
+        """The problems of the file itself that concern this machine."""
         parts = self._of_parts(here=True)
         if self.fmu.python is not None:
             parts += self.fmu.python.problems
@@ -60,7 +60,7 @@ class Verdict:
 
     @property
     def elsewhere(self) -> tuple[str, ...]:
-        """What is wrong with the file for other machines."""
+        """The problems of the file for other machines."""
         return tuple(self._of_parts(here=False))
 
     @property
@@ -74,21 +74,21 @@ class Verdict:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Unjudged:
-    """An FMU that is not looked at."""
+class UnexaminedFmu:
+    """An FMU that was not examined."""
 
     path: Path
     failure: str
-    """Why"""
+    """the reason"""
 
     @property
     def good(self) -> bool:
-        """It is not known to load."""
+        """False, as it is not known to load."""
         return False
 
 
 def judge(fmu: Fmu, machine: Machine, failure: str | None) -> Verdict:
-    """Compare; `failure` is what trying to load it here gave."""
+    """The verdict; `failure` is the reason why the FMU did not load here, if it did not."""
     hosts = python_host(fmu, machine), other_host(fmu, machine)
     return Verdict(
         fmu=fmu, platforms=machine.platforms(fmu.version), python_host=hosts[0], other_host=hosts[1], failure=failure
@@ -96,11 +96,11 @@ def judge(fmu: Fmu, machine: Machine, failure: str | None) -> Verdict:
 
 
 def python_host(fmu: Fmu, machine: Machine) -> Host:
-    """A host in the Python that runs this, such as fmpy."""
+    """A host in this Python, such as fmpy."""
     part = part_for(fmu, machine)
     needs = _general_needs(fmu, machine, part)
     if part is not None:
-        needs += lacking(part, machine.found_by_python)
+        needs += missing_dependencies(part, machine.found_by_python)
     if satisfies(machine.python, fmu.requires_python) is False:
         needs.append(f"Python {fmu.requires_python}; this is {machine.python}")
     missing = [name for name in _imports(fmu) if not machine.modules.get(name, False)]
@@ -115,10 +115,10 @@ def other_host(fmu: Fmu, machine: Machine) -> Host:
     needs = _general_needs(fmu, machine, part)
     if part is None:
         return Host(needs=tuple(needs))
-    needs += lacking(part, machine.found, without=PYTHON_DLL)
+    needs += missing_dependencies(part, machine.found, without=PYTHON_DLL)
     if part.binary is None or part.binary.dependencies is None:
-        return Host(needs=tuple(needs), note="what its binary needs is unknown")
-    if not wants_python(part):
+        return Host(needs=tuple(needs), note="the dependencies of its binary are unknown")
+    if not needs_python(part):
         return Host(needs=tuple(needs))
     library = python_library(fmu, machine)
     if library is None:
@@ -134,8 +134,8 @@ def python_library(fmu: Fmu, machine: Machine) -> PythonLibrary | None:
     return next(fitting, None)
 
 
-def wants_python(part: PlatformBinary) -> bool:
-    """Whether the binary needs Python from its host or from the machine, and does not name a library of one version."""
+def needs_python(part: PlatformBinary) -> bool:
+    """Whether the binary needs a Python of any version from its host or the machine."""
     if part.binary is None:
         return False
     names = part.binary.dependency_names
@@ -145,7 +145,7 @@ def wants_python(part: PlatformBinary) -> bool:
 
 
 def satisfies(version: str, requires: str | None) -> bool | None:
-    """Whether a version of Python is one that is asked for; None if none is, or not in a way to be understood."""
+    """Whether a version of Python satisfies a requirement; None if there is none, or an invalid one."""
     if requires is None or not is_specifier(requires):
         return None
     return SpecifierSet(requires).contains(version, prereleases=True)
@@ -178,10 +178,10 @@ def _imports(fmu: Fmu) -> tuple[str, ...]:
 
 
 def _python_to_install(fmu: Fmu, machine: Machine) -> str:
-    wanted = f"Python {fmu.requires_python or '3'}"
+    required = f"Python {fmu.requires_python or '3'}"
     if machine.system == LINUX:
-        return f"a shared libpython of {wanted}: {INSTALL_LIBPYTHON}"
-    return f"python3.dll of {wanted} on PATH"
+        return f"a shared libpython of {required}: {INSTALL_LIBPYTHON}"
+    return f"python3.dll of {required} on PATH"
 
 
 def _start(library: PythonLibrary, part: PlatformBinary) -> str | None:
@@ -190,4 +190,4 @@ def _start(library: PythonLibrary, part: PlatformBinary) -> str | None:
     if library.path.suffix == ".dll":
         return f'set "PATH={library.path.parent};%PATH%" && TOOL'
     home = "" if library.home is None else f"PYTHONHOME={library.home} "
-    return f"{home}{TOLD if part.finds_python else 'LD_PRELOAD'}={library.path} TOOL"
+    return f"{home}{LIBPYTHON_VARIABLE if part.finds_python else 'LD_PRELOAD'}={library.path} TOOL"

@@ -1,4 +1,4 @@
-"""What must be true of an archive before anything in it is unpacked."""
+"""Rules on an archive, before anything in it is unpacked."""
 
 import zipfile
 from collections import Counter
@@ -12,7 +12,7 @@ _SYMBOLIC_LINK = 0o12
 
 
 def can_be_unpacked(archive: Archive) -> bool:
-    """Whether every file lands in the folder that the archive is unpacked to."""
+    """Whether every file is unpacked inside the folder of the archive."""
     return not any(True for _ in paths(archive))
 
 
@@ -25,7 +25,7 @@ def paths(archive: Archive) -> Iterator[str]:
 
 
 def entries(archive: Archive) -> Iterator[str]:
-    """One entry for each name, and nothing that common tools cannot unpack (FMI 2.0.4, section 2.3)."""
+    """One entry for each name, and none that common tools cannot unpack (FMI 2.0.4, section 2.3)."""
     for name, count in Counter(entry.filename for entry in archive.entries).items():
         if count > 1:
             yield f"{name}: there are {count} entries of this name, expected one"

@@ -16,16 +16,16 @@ class Variable:
     """A variable with its defaults filled in, numbers still as they are written; or an element of an array."""
 
     place: int
-    """In the list, from 1"""
+    """in the list, from 1"""
     handle: int
-    """By which the model structure names it: its place in FMI 2.0, its value reference in FMI 3.0"""
+    """by which the model structure refers to it: its place in FMI 2.0, its value reference in FMI 3.0"""
     name: str
     further_names: tuple[str, ...] = ()
-    """Of aliases in FMI 3.0, which are no variables of their own"""
+    """of aliases in FMI 3.0, which are no separate variables"""
     reference: int
     type: str
     kind: str
-    """Real, Integer …: its type as FMI 2.0 has it"""
+    """Real, Integer …: the corresponding type of FMI 2.0"""
     causality: str
     variability: str
     initial: str | None
@@ -36,21 +36,21 @@ class Variable:
     maximum: str | None
     nominal: str | None
     items: tuple[int, ...]
-    """Values that an Enumeration may take"""
+    """values of an Enumeration"""
     derivative_of: int | None
-    """Handle of the state that it is the derivative of"""
+    """handle of the state whose derivative it is"""
     others: Mapping[str, tuple[int, ...]]
-    """Further variables that it names by their handles: its clocks, its previous value, what its dimensions are"""
+    """further variables that it refers to by handles: its clocks, its previous value, its dimensions"""
     shape: tuple[int, ...] | None = None
-    """Of an array, as far as it is known what it starts with; None for a scalar, and for an element"""
+    """of an array, by start values; None for a scalar, and for an element"""
     whole: str
-    """The array that it is an element of; its own name if it is none"""
+    """name of the array that it is an element of; its own name if it is none"""
     element: int = 0
-    """Its place in the array"""
+    """index in the array"""
 
     @property
     def start(self) -> str | None:
-        """As it is written; None if there is none."""
+        """The start as it is written; None if there is none."""
         return " ".join(self.starts) if self.starts else None
 
     @property
@@ -67,18 +67,18 @@ class Variable:
 
     @property
     def keeps_start(self) -> bool:
-        """Whether it is at its start after initialisation, unless it is set: no event of the model can change it."""
-        given = self.causality in ("input", "parameter", "structuralParameter") or self.variability == "constant"
-        return given and bool(self.starts)
+        """Whether it has its start value after initialisation unless set: the model cannot change it."""
+        is_external = self.causality in ("input", "parameter", "structuralParameter") or self.variability == "constant"
+        return is_external and bool(self.starts)
 
     @property
     def is_clocked(self) -> bool:
-        """Whether it is a clock, or has a value only when one ticks."""
+        """Whether it is a clock, or has a value only at ticks of one."""
         return self.kind == "Clock" or bool(self.others.get("clocks"))
 
     @property
     def elements(self) -> "tuple[Variable, ...]":
-        """Itself, or the elements of an array, of which the last index moves first; each has one start at most."""
+        """Itself, or the elements of an array in row-major order; each has one start at most."""
         if self.shape is None:
             return (self if len(self.starts) < 2 else replace(self, starts=self.starts[:1]),)
         indices = itertools.product(*(range(1, n + 1) for n in self.shape))
@@ -101,4 +101,4 @@ class Unknown:
 
     handle: int
     dependencies: tuple[int, ...] | None
-    """Handles; None: it may depend on all there is"""
+    """handles; None: it may depend on everything"""

@@ -1,4 +1,4 @@
-"""Rules on what is declared of outputs and inputs: each input is moved, and what moves with it is looked at."""
+"""Rules on declared dependencies: each input is moved, and the outputs that move with it are compared."""
 
 import contextlib
 import math
@@ -7,38 +7,39 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 from orchestration.checks.validation.declared import Unknown, Variable
+from orchestration.checks.validation.excitation import Plan
 from orchestration.checks.validation.fmu import Fmu
 from orchestration.checks.validation.instance import Instance, RefusedError, Row, Value, Values, same
-from orchestration.checks.validation.probe import Plan, Probe
+from orchestration.checks.validation.probe import Probe
 
 MOST_SWITCHES = 16
-"""Boolean parameters that are tried the other way round, each with all inputs"""
+"""Boolean parameters that are inverted, each with all inputs moved"""
 MOST_PARAMETERS = 200
-"""Parameters that are moved, of an FMU that has many more"""
+"""parameters that are moved, of an FMU with more"""
 MOST_REFUSED = 10
-"""Moves that may be refused before the others are left: each takes an instance with it"""
+"""moves that may be refused before the others are left out: each costs an instance"""
 _POINTS = (0, 3)
-"""Communication points, in steps, at which the inputs are moved"""
+"""communication points, in steps, at which the inputs are moved"""
 
 _FAR = tuple(sign * 10.0**k for k in range(5) for sign in (1.0, -1.0))
-"""By how much an input is moved that moves nothing when it is moved a little"""
+"""moves of an input without effect when it is moved a little"""
 
 Moved = dict[str, set[str]]
-"""Outputs that move, by the input that they move with; arrays are one"""
+"""outputs that move, by the input that they move with; arrays count as one"""
 
 
 @dataclass(frozen=True)
 class Mode:
-    """What is declared of the outputs in a mode, and what was seen."""
+    """Declared and observed dependencies of the outputs in a mode."""
 
     where: str
     declared: dict[str, set[str] | None]
-    """Inputs by output; None: all"""
+    """inputs by output; None: all"""
     moved: Moved = field(default_factory=lambda: defaultdict(set))
 
 
 def undeclared_dependency(probe: Probe) -> Iterator[str]:
-    """No output moves with an input, nor at initialisation with a parameter, that it is declared not to depend on."""
+    """No output moves with an input, nor at initialisation with a parameter, without a declared dependency."""
     for mode in _modes(probe):
         for name, outputs in mode.moved.items():
             for output in sorted(outputs):
@@ -48,7 +49,7 @@ def undeclared_dependency(probe: Probe) -> Iterator[str]:
 
 
 def idle_dependency(probe: Probe) -> Iterator[str]:
-    """Rule of this project: an input that outputs are declared to depend on moves one of them in some way or other."""
+    """Rule of this project: an input with declared dependencies moves one of these outputs."""
     if not probe.fmu.is_ours:
         return
     for mode in _modes(probe):
@@ -60,15 +61,15 @@ def idle_dependency(probe: Probe) -> Iterator[str]:
 
 
 def _modes(probe: Probe) -> Iterator[Mode]:
-    """What is seen in initialisation mode and, of our FMUs, at communication points, in every configuration.
+    """The observations in initialisation mode and, of our FMUs, at communication points, in every configuration.
 
-    At a communication point FMI allows no value to be asked for between setting an input and the next step;
-    the FMUs of this project answer nevertheless, with what they declare.
+    At a communication point FMI allows no reading between setting an input and the next step; FMUs of this project
+    support it nevertheless, as they declare.
     """
     initial = Mode("in initialisation mode", _declared(probe.fmu, probe.fmu.initial_unknowns))
     later = Mode("at a communication point", _declared(probe.fmu, probe.fmu.outputs))
     for values in _configurations(probe):
-        with contextlib.suppress(RefusedError):  # a configuration that is refused shows nothing
+        with contextlib.suppress(RefusedError):  # a refused configuration shows nothing
             _move(probe, probe.inputs, values, None, initial.moved)
             parameters = [v for v in _parameters(probe) if v.name not in values]
             _move(probe, parameters, values, None, initial.moved, most_refused=MOST_REFUSED)
@@ -80,17 +81,17 @@ def _modes(probe: Probe) -> Iterator[Mode]:
 
 
 def _configurations(probe: Probe) -> Iterator[dict[str, Value]]:
-    """Inputs a little away from their starts; and with them each Boolean parameter the other way round."""
+    """Inputs a little away from their starts; and with these each Boolean parameter inverted."""
     inputs = probe.inputs_at(0)
     yield inputs
-    switches = [v for v in probe.of("parameter") if v.kind == "Boolean"]
+    switches = [v for v in probe.elements_of("parameter") if v.kind == "Boolean"]
     for v in switches[:MOST_SWITCHES]:
         yield {**inputs, v.name: not v.start_value}
 
 
 def _parameters(probe: Probe) -> list[Variable]:
-    """Those that may be set in initialisation mode and moved a little; a text may be a path, which has no beside."""
-    found = [v for v in probe.of("parameter") if v.initial == "exact" and v.kind not in ("String", "Binary")]
+    """Parameters that may be set in initialisation mode and moved a little; a text may be a path, which cannot."""
+    found = [v for v in probe.elements_of("parameter") if v.initial == "exact" and v.kind not in ("String", "Binary")]
     return found[:MOST_PARAMETERS]
 
 
@@ -119,12 +120,12 @@ def _move(
 
 
 def _moving(probe: Probe, instance: Instance, v: Variable, before: Row) -> set[str]:
-    """The outputs that move with a variable, which is put back."""
+    """The outputs that move with a variable, which is then reset."""
     value, *near = probe.around(v)
     outputs = set()
     for other in near:
         instance.set({v.name: other})
-        outputs |= _other(probe, before, instance.get(probe.outputs))
+        outputs |= _changed(probe, before, instance.get(probe.outputs))
     instance.set({v.name: value})
     return outputs
 
@@ -138,12 +139,12 @@ def _moving_far(probe: Probe, v: Variable) -> set[str]:
             instance.begin(values, probe.start)
             before = instance.get(probe.outputs)
             instance.set({v.name: float(values[v.name]) + move})
-            outputs |= _other(probe, before, instance.get(probe.outputs))
+            outputs |= _changed(probe, before, instance.get(probe.outputs))
     return outputs
 
 
-def _other(probe: Probe, before: Row, after: Row) -> set[str]:
-    """The outputs that are not what they were, an array if any of its elements is not."""
+def _changed(probe: Probe, before: Row, after: Row) -> set[str]:
+    """The outputs that have changed; an array has if any of its elements has."""
     return {v.whole for v in probe.outputs if not same(before[v.name], after[v.name])}
 
 

@@ -9,11 +9,11 @@ from orchestration.checks.validation.fmu import LIBRARIES, Fmu
 from orchestration.fmi.archive import Archive
 
 SLAVE_MODULE = "resources/slavemodule.txt"
-"""Where pythonfmu looks for the name of the script that it runs."""
+"""contains the name of the script that pythonfmu runs"""
 
 
 def standard(archive: Archive) -> list[str]:
-    """All that fmpy finds: the schema, names twice, required starts, combinations of attributes, units, structure."""
+    """The checks of fmpy: schema, duplicate names, required starts, combinations of attributes, units, structure."""
     from fmpy import read_model_description
     from fmpy.model_description import ValidationError
 
@@ -22,25 +22,25 @@ def standard(archive: Archive) -> list[str]:
         read_model_description(str(archive.path), validate_model_structure=True)  # names: by `variables.names`
     except ValidationError as error:
         problems = error.problems
-    except Exception as error:  # it reads attributes strictly, and trips over damage in its own ways
+    except Exception as error:  # it reads attributes strictly, and fails on damage in various ways
         problems = [f"fmpy does not read it: {type(error).__name__}: {error}"]
     return [" ".join(str(problem).split()) for problem in problems]
 
 
 def guid(fmu: Fmu) -> Iterator[str]:
-    """An empty one passes the schema, but no library could tell by it whose description it was given."""
+    """It is not empty: the schema allows that, but a library identifies its description by it."""
     if not fmu.guid.strip():
         yield f"{fmu.standard.token} = {fmu.guid!r}: expected a text that is not empty"
 
 
 def model_identifier(fmu: Fmu) -> Iterator[str]:
-    """It is the name of a file, and can be the prefix of C functions (FMI 2.0.4, section 2.1.1; FMI 3.0, 2.4.2)."""
+    """It is a valid C name, as that of a file and of functions (FMI 2.0.4, section 2.1.1; FMI 3.0, 2.4.2)."""
     if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", fmu.model_identifier):
         yield f"modelIdentifier = {fmu.model_identifier!r}: expected a name by C syntax"
 
 
 def capabilities(fmu: Fmu) -> Iterator[str]:
-    """What cannot be saved cannot be serialised; in FMI 3.0 clocks want event mode, an early return wants updates."""
+    """Serialising a state requires saving it; in FMI 3.0 clocks require event mode, early return updates."""
     if fmu.serialises and not fmu.saves:
         yield f"{fmu.standard.saves} = false: expected true, since {fmu.standard.serialises} is"
     early, updates = "canReturnEarlyAfterIntermediateUpdate", "providesIntermediateUpdate"
@@ -52,7 +52,7 @@ def capabilities(fmu: Fmu) -> Iterator[str]:
 
 
 def default_experiment(fmu: Fmu) -> Iterator[str]:
-    """It can be run as it is written."""
+    """Its times, step size and tolerance are valid."""
     experiment = fmu.experiment
     for key, value in experiment.items():
         if not math.isfinite(value):
@@ -66,7 +66,7 @@ def default_experiment(fmu: Fmu) -> Iterator[str]:
 
 
 def binaries(fmu: Fmu) -> Iterator[str]:
-    """A library for at least one platform goes by the model identifier, or the FMU comes as sources."""
+    """A library for at least one platform is named after the model identifier, or the FMU has sources."""
     files = fmu.archive.files
     libraries = [name for name in files if name.startswith("binaries/") and name.endswith(LIBRARIES)]
     if any(name.rpartition("/")[2].rpartition(".")[0] == fmu.model_identifier for name in libraries):
@@ -77,21 +77,21 @@ def binaries(fmu: Fmu) -> Iterator[str]:
 
 
 def source_files(fmu: Fmu) -> Iterator[str]:
-    """Every file that is said to be compiled is in sources/, by the names that the FMU gives."""
+    """Every declared source file is in sources/."""
     for name in fmu.source_files:
         if f"sources/{name}" not in fmu.archive.files:
             yield f"expected sources/{name}, which is to be compiled, found none"
 
 
 def _comes_as_sources(fmu: Fmu) -> bool:
-    """In FMI 3.0 there are to be files for a library of that name."""
+    """Whether there are sources to compile; in FMI 3.0 these are declared for a library of that name."""
     return bool(fmu.source_files) or (
         fmu.version == 2 and any(name.startswith("sources/") for name in fmu.archive.files)
     )
 
 
 def slave_module(fmu: Fmu) -> Iterator[str]:
-    """The script that pythonfmu is told to run is there, unless the FMU has no Python inside."""
+    """The script that pythonfmu runs exists, unless the FMU has no Python inside."""
     files = fmu.archive.files
     if SLAVE_MODULE not in files:
         if fmu.is_ours and NATIVE_TABLES not in files:

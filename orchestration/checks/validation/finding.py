@@ -1,4 +1,4 @@
-"""What is found wrong with an FMU, and rules as functions that find it."""
+"""Findings about an FMU, and rules as functions that yield them."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -6,25 +6,25 @@ from typing import TypeVar
 
 Subject = TypeVar("Subject")
 Rule = Callable[[Subject], Iterable[str]]
-"""Texts of what it finds wrong with a subject; the rule goes by the name of the function."""
+"""Yields texts of problems of a subject; the rule has the name of the function"""
 
 
 class Note(str):
-    """The text of a finding that breaks no rule of the standard, but that one should know."""
+    """The text of a finding that violates no rule of the standard, but is worth knowing."""
 
     __slots__ = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that is wrong with an FMU, or worth a note."""
+    """A problem of an FMU, or a note."""
 
     rule: str
-    """The rule that is broken, as `start-values`"""
+    """the violated rule, as `start-values`"""
     text: str
-    """The variable or file, what was found and what was expected"""
+    """the variable or file, what was found and what was expected"""
     note: bool = False
-    """Whether it is no problem: what the standard allows, or what could not be looked at"""
+    """whether it is no problem: the standard allows it, or it could not be checked"""
 
     def __str__(self) -> str:
         return f"{'note: ' if self.note else ''}{self.rule}: {self.text}"
@@ -36,5 +36,5 @@ def name_of(rule: Callable[..., object]) -> str:
 
 
 def check(rules: Iterable[Rule[Subject]], subject: Subject) -> list[Finding]:
-    """Everything that the rules find."""
+    """All findings of the rules."""
     return [Finding(name_of(rule), str(text), note=isinstance(text, Note)) for rule in rules for text in rule(subject)]

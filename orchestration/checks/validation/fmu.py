@@ -1,4 +1,4 @@
-"""The one view of an FMU that the rules look at, of either version of FMI: what it says of itself, not yet judged."""
+"""The view of an FMU that rules check, for either version of FMI: its archive and description."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from orchestration.fmi.archive import Archive
 
 OUR_TOOL = "quadcosim"
 LIBRARIES = (".so", ".dll", ".dylib")
-"""How the names of libraries end"""
+"""suffixes of libraries"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,64 +23,64 @@ class Fmu:
     archive: Archive
     root: Element
     variables: tuple[Variable, ...]
-    """As they are declared: an array is one"""
+    """as declared: an array is one"""
     outputs: tuple[Unknown, ...]
     derivatives: tuple[Unknown, ...]
     initial_unknowns: tuple[Unknown, ...]
     further_lists: Mapping[str, tuple[Unknown, ...]]
     build: Element | None = None
-    """How it is compiled, where FMI 3.0 has that in a file of its own"""
+    """how it is compiled, which FMI 3.0 has in a separate file"""
 
     @property
     def version(self) -> int:
-        """2 or 3, of FMI."""
+        """Of FMI: 2 or 3."""
         return self.standard.version
 
     @property
     def is_ours(self) -> bool:
-        """Whether quadcosim built it, so that the rules of this project are meant for it too."""
+        """Whether quadcosim built it, so that the rules of this project apply, too."""
         tool, _, _ = self.root.get("generationTool", "").partition(" ")
         return tool == OUR_TOOL or SOURCE_HASH_FILE in self.archive.files
 
     @property
     def guid(self) -> str:
-        """As it is written; in FMI 3.0 it is the instantiation token."""
+        """The GUID; in FMI 3.0 the instantiation token."""
         return self.root.get(self.standard.token, "")
 
     @property
     def model_identifier(self) -> str:
-        """Of the co-simulation part."""
+        """The model identifier for co-simulation."""
         return self._co_simulation.get("modelIdentifier", "")
 
     @property
     def experiment(self) -> dict[str, float]:
-        """What the default experiment says."""
+        """The attributes of the default experiment."""
         element = self.root.find("DefaultExperiment")
         return {} if element is None else {name: float(value) for name, value in element.items()}
 
     @property
     def fixed_step(self) -> float | None:
-        """[s] that it takes inside, if it says so (FMI 3.0)."""
+        """Its fixed internal step size [s], if declared (FMI 3.0)."""
         text = self._co_simulation.get("fixedInternalStepSize")
         return None if text is None else float(text)
 
     def can(self, capability: str) -> bool:
-        """A capability flag of the co-simulation part."""
+        """A capability flag for co-simulation."""
         return self._co_simulation.get(capability) in ("true", "1")
 
     @property
     def saves(self) -> bool:
-        """Whether its state can be saved, and set."""
+        """Whether its state can be saved and restored."""
         return self.can(self.standard.saves)
 
     @property
     def serialises(self) -> bool:
-        """Whether bytes can be made of its state."""
+        """Whether its state can be serialised."""
         return self.can(self.standard.serialises)
 
     @property
     def source_files(self) -> list[str]:
-        """What is to be compiled, as it is called in `sources/`."""
+        """The files to be compiled, relative to `sources/`."""
         if self.version == 2:
             return [e.get("name", "") for e in self._co_simulation.iterfind("SourceFiles/File")]
         return [
@@ -99,7 +99,7 @@ class Fmu:
 
     @property
     def lists(self) -> Iterator[tuple[str, tuple[Unknown, ...]]]:
-        """Those of the model structure, by what they are called."""
+        """The lists of the model structure, by their names."""
         called = self.standard.lists
         yield called.outputs[0], self.outputs
         yield called.derivatives[0], self.derivatives
@@ -111,22 +111,22 @@ class Fmu:
         return tuple(v for v in self.variables if v.causality in causalities)
 
     def variable(self, handle: int) -> Variable | None:
-        """By its handle; None if there is none."""
+        """The variable of a handle; None if there is none."""
         return self._by_handle.get(handle)
 
     @cached_property
     def elements(self) -> tuple[Variable, ...]:
-        """All that has a value of its own at any time: scalars and the elements of arrays, without what is clocked."""
+        """All that has a value at any time: scalars and the elements of arrays, without clocked ones."""
         return tuple(element for v in self.variables if not v.is_clocked for element in v.elements)
 
     @cached_property
     def elements_by_name(self) -> dict[str, Variable]:
-        """The same, by their names."""
+        """`elements` by their names."""
         return {v.name: v for v in self.elements}
 
     @cached_property
     def lengths(self) -> dict[str, int]:
-        """How many values a variable has, by its name."""
+        """The number of values of each variable, by its name."""
         return {v.name: len(v.elements) for v in self.variables}
 
     @cached_property

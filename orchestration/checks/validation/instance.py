@@ -1,4 +1,4 @@
-"""An instance of an FMU under validation, by plain FMI calls; any variable type, any order of calls."""
+"""An instance of an FMU under validation, by plain FMI calls, for any variable type and any order of calls."""
 
 import math
 import struct
@@ -28,16 +28,16 @@ _CONVERT: dict[str, Callable[[Any], Value]] = {
 
 
 class RefusedError(QuadcosimError):
-    """The FMU did not carry out a call; the text names the call and has the FMU's own words."""
+    """The FMU did not carry out a call; the text names the call and has the FMU's message."""
 
 
 class Instance:
-    """One instance; after a call that failed it is never called again, not even to free it."""
+    """One instance; after a failed call it is never called again, not even to free it."""
 
     def __init__(self, fmu: Fmu, folder: Path, name: str, beat: Callable[[], None]) -> None:
         self.fmu = fmu
         self.messages: list[Message] = []
-        self._arrays: dict[str, list[Any]] = {}  # as they were set: a call sets a whole one
+        self._arrays: dict[str, list[Any]] = {}  # as last set: a call sets a whole one
         self._failed = True
         self._beat = beat
         beat()
@@ -67,12 +67,12 @@ class Instance:
         self.set(inputs)
 
     def initialise(self, values: Values, start: float, stop: float | None = None) -> None:
-        """Through initialisation."""
+        """Initialise the instance."""
         self.begin(values, start, stop)
         self._call("exitInitializationMode")
 
     def step(self, t: float, h: float) -> bool:
-        """From `t` to `t + h` seconds; whether the run goes on, for an FMU may say that it ends it here."""
+        """Step from `t` to `t + h` seconds; False if the FMU ends the run."""
         raise NotImplementedError
 
     def terminate(self) -> None:
@@ -80,7 +80,7 @@ class Instance:
         self._call("terminate")
 
     def reset(self) -> None:
-        """Back to the state after instantiation."""
+        """Return to the state after instantiation."""
         self._call("reset")
         self._arrays.clear()
 
@@ -97,17 +97,17 @@ class Instance:
             self._call(f"set{self.fmu.standard.access[v.type]}", [v.reference], content)
 
     def get(self, variables: Iterable[Variable]) -> Row:
-        """The values of scalars and of elements of arrays, asked for by type."""
+        """The values of scalars and of elements of arrays, read by type."""
         by_type: dict[str, list[Variable]] = {}
         for v in variables:
             by_type.setdefault(v.type, []).append(v)
         row: Row = {}
         for type, group in by_type.items():
-            row.update(self._got(type, group))
+            row.update(self._values_of_type(type, group))
         return row
 
-    def _got(self, type: str, group: Sequence[Variable]) -> Iterator[tuple[str, Value]]:
-        """The values of variables of one type by their names, of which an array is asked for once."""
+    def _values_of_type(self, type: str, group: Sequence[Variable]) -> Iterator[tuple[str, Value]]:
+        """The values of variables of one type by their names; an array is read once."""
         access, convert = self.fmu.standard.access[type], _CONVERT[self.fmu.standard.types[type]]
         references = {v.whole: v.reference for v in group}
         lengths = [self.fmu.lengths[name] for name in references]
@@ -118,7 +118,7 @@ class Instance:
             yield v.name, convert(values[first[v.whole] + v.element])
 
     def _content(self, v: Variable) -> list[Any]:
-        """What the variable that `v` is of was last set to, or else starts with, to be changed."""
+        """The values last set of the variable that `v` belongs to, or else its starts, to be changed."""
         if self.fmu.lengths[v.whole] == 1:
             return [v.start_value]
         if v.whole not in self._arrays:
@@ -128,14 +128,14 @@ class Instance:
     # -- state ----------------------------------------------------------------------------------------------
 
     _states: ClassVar[tuple[str, str, str, str, str]]
-    """fmpy's names of the calls that get, serialise, free, deserialise and set a state"""
+    """names in fmpy of the calls that get, serialise, free, deserialise and set a state"""
 
     def state(self) -> Any:
-        """A copy of the state, to be given back to `put_back` or `serialised` of this instance."""
+        """A copy of the state, for `restore` of this instance."""
         return self._call(self._states[0])
 
-    def put_back(self, state: Any) -> None:
-        """Go on from a state, and free it."""
+    def restore(self, state: Any) -> None:
+        """Restore a state, and free it."""
         _, _, free, _, put = self._states
         self._call(put, state)
         self._call(free, state)
@@ -148,14 +148,14 @@ class Instance:
         self._call(free, state)
         return content
 
-    def put_back_bytes(self, content: bytes) -> None:
-        """Go on from what `serialised` of any instance of the FMU gave."""
-        self.put_back(self._call(self._states[3], content))
+    def restore_bytes(self, content: bytes) -> None:
+        """Restore a state that `serialised` of any instance of the FMU returned."""
+        self.restore(self._call(self._states[3], content))
 
     # -- inside ---------------------------------------------------------------------------------------------
 
     def _enter(self, start: float, stop: float | None) -> None:
-        """Into initialisation mode."""
+        """Enter initialisation mode."""
         raise NotImplementedError
 
     def _call(self, method: str, *args: Any, **kwargs: Any) -> Any:
@@ -175,7 +175,7 @@ class Instance:
 
 
 class Instance2(Instance):
-    """Of FMI 2.0."""
+    """An instance of FMI 2.0."""
 
     _states = ("getFMUstate", "serializeFMUstate", "freeFMUstate", "deSerializeFMUstate", "setFMUstate")
 
@@ -184,7 +184,7 @@ class Instance2(Instance):
         self._call("enterInitializationMode")
 
     def step(self, t: float, h: float) -> bool:
-        """As any."""
+        """As `Instance`."""
         if self._failed:
             raise RefusedError("fmi2DoStep: the instance has failed and is not called again")
         self._beat()
@@ -199,7 +199,7 @@ class Instance2(Instance):
 
 
 class Instance3(Instance):
-    """Of FMI 3.0, without event mode and early return, which an importer need not have."""
+    """An instance of FMI 3.0, without event mode and early return, which an importer need not support."""
 
     _states = ("getFMUState", "serializeFMUState", "freeFMUState", "deserializeFMUState", "setFMUState")
 
@@ -207,14 +207,14 @@ class Instance3(Instance):
         self._call("enterInitializationMode", startTime=start, stopTime=stop)
 
     def step(self, t: float, h: float) -> bool:
-        """As any; what was not offered to the FMU it must not ask for."""
+        """As `Instance`; the FMU must not request what was not offered."""
         event, ends, early, reached = self._call("doStep", t, h)
         if ends:
             return False
         if event or early:
-            asked = "eventHandlingNeeded" if event else "earlyReturn"
+            request = "eventHandlingNeeded" if event else "earlyReturn"
             self._failed = True
-            raise RefusedError(f"fmi3DoStep: {asked} = true from {t} to {t + h}: expected false, it was not offered")
+            raise RefusedError(f"fmi3DoStep: {request} = true from {t} to {t + h}: expected false, it was not offered")
         if not math.isfinite(reached):
             self._failed = True
             raise RefusedError(f"fmi3DoStep: lastSuccessfulTime = {reached} from {t} to {t + h}: expected a time")

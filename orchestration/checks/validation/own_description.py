@@ -1,7 +1,7 @@
-"""Rule of this project: the description is the one that the bundled slave itself gives.
+"""Rule of this project: the description is the one that the bundled slave itself generates.
 
-It is the slave that runs, so what its own `to_xml()` says is what the FMU is: a description that differs,
-be it by two value references that are swapped, describes another one.
+The slave is what runs, so its own `to_xml()` describes the FMU: a description that differs, if only by two swapped
+value references, describes another one.
 """
 
 import subprocess
@@ -15,7 +15,7 @@ from orchestration.checks.validation.description import SLAVE_MODULE
 from orchestration.checks.validation.probe import Probe
 
 _DIFFERS = {"guid", "generationDateAndTime", "generationTool", "version"}
-"""Attributes that packaging and the calendar decide."""
+"""attributes that depend on packaging and date"""
 
 Elements = dict[tuple[str, ...], dict[str, str]]
 
@@ -30,14 +30,14 @@ module = importlib.import_module(name)
 text = tostring(slave(instance_name="description", resources=resources).to_xml(), encoding="unicode")
 sys.stdout.buffer.write(text.encode("utf-8"))
 """
-"""Runs with nothing but the standard library and the resources of the FMU, so no other package can answer."""
+"""runs with only the standard library and the resources of the FMU, so that no other package is imported"""
 
 
 def own_description(probe: Probe) -> Iterator[str]:
-    """The description is the one that the bundled slave gives of itself."""
+    """The description is the one that the bundled slave generates."""
     fmu = probe.fmu
     if SLAVE_MODULE not in fmu.archive.files:
-        return  # for which there is a rule
+        return  # checked by another rule
     name = fmu.archive.files[SLAVE_MODULE].decode("utf-8", "replace").strip()
     command = [sys.executable, "-I", "-c", _PROGRAM, str(probe.folder / "resources"), name]
     done = subprocess.run(command, capture_output=True, stdin=subprocess.DEVNULL, check=False)
@@ -48,17 +48,17 @@ def own_description(probe: Probe) -> Iterator[str]:
     try:
         expected = ElementTree.fromstring(done.stdout)
     except ElementTree.ParseError as error:
-        yield f"the bundled slave describes itself by what is no XML: {error}"
+        yield f"the description by the bundled slave is no XML: {error}"
         return
     yield from differences(elements(fmu.root), elements(expected))
 
 
 def differences(found: Elements, expected: Elements) -> Iterator[str]:
-    """Elements that only one description has, attributes that differ, and whether the order does."""
+    """Elements of only one description, and differences of attributes and of the order."""
     for label in {**expected, **found}:
         where = ", ".join(label) or "fmiModelDescription"
         if label not in found:
-            if label[:-1] in found:  # else the element around it has been named
+            if label[:-1] in found:  # else its parent element has been reported
                 yield f"{where}: expected it as in the bundled slave, found none"
         elif label not in expected:
             if label[:-1] in expected:
@@ -74,7 +74,7 @@ def differences(found: Elements, expected: Elements) -> Iterator[str]:
 
 
 def elements(root: Element) -> Elements:
-    """The attributes of every element by the names that lead to it, in order; a variable's with those of its type."""
+    """The attributes of every element by its path of names, in order; those of a variable with those of its type."""
     found: Elements = {(): {key: value for key, value in root.items() if key not in _DIFFERS}}
     _add_children(root, (), found)
     return found

@@ -1,4 +1,4 @@
-"""Rules of this project: what an FMU that quadcosim built must be beyond the standard."""
+"""Rules of this project, beyond the standard, for FMUs that quadcosim built."""
 
 import datetime
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ _DATE = "%Y-%m-%dT%H:%M:%SZ"
 
 
 def guid_of_content(fmu: Fmu) -> Iterator[str]:
-    """The GUID says which files, to the byte, the FMU was built with."""
+    """The GUID is a hash of the content of all files."""
     expected = content_guid(dict(fmu.archive.files))
     if fmu.guid != expected:
         yield f"{fmu.standard.token} = {fmu.guid}: expected {expected}, that of the content"
@@ -29,7 +29,7 @@ def guid_of_content(fmu: Fmu) -> Iterator[str]:
 
 
 def date(fmu: Fmu) -> Iterator[str]:
-    """FMI asks for Zulu time in words, the schema for any time."""
+    """The date is in UTC, as the text of FMI requires; the schema allows any time."""
     text = fmu.root.get("generationDateAndTime", "none")
     try:
         sound = datetime.datetime.strptime(text, _DATE).strftime(_DATE) == text
@@ -40,20 +40,20 @@ def date(fmu: Fmu) -> Iterator[str]:
 
 
 def execution_tool(fmu: Fmu) -> Iterator[str]:
-    """Some masters refuse an FMU that says it needs a tool."""
+    """No tool is required: some masters refuse such an FMU."""
     if fmu.can("needsExecutionTool"):
         yield "needsExecutionTool = true: expected false"
 
 
 def value_references(fmu: Fmu) -> Iterator[str]:
-    """A value reference is the place in the list: none twice, and the same for every build of the same sources."""
+    """A value reference is the place in the list: unique, and the same for every build of the same sources."""
     for v in fmu.variables:
         if v.reference != v.place - 1:
             yield f"{v.name}: valueReference = {v.reference}, expected {v.place - 1}, its place in the list"
 
 
 def start_text(fmu: Fmu) -> Iterator[str]:
-    """A start is the shortest text that gives its bits, so that two builds cannot differ in it."""
+    """A start is the shortest text for its bits, so that two builds cannot differ in it."""
     for v in fmu.variables:
         for start in v.starts if v.kind == "Real" else ():
             if start != repr(float(start)):
@@ -61,7 +61,7 @@ def start_text(fmu: Fmu) -> Iterator[str]:
 
 
 def units(fmu: Fmu) -> Iterator[str]:
-    """Every Real has a unit, and every unit a definition by SI base units under a name that says the same."""
+    """Every Real has a unit, and every unit a definition by SI base units and a corresponding name."""
     used = {v.unit for v in fmu.variables if v.unit is not None}
     for v in fmu.variables:
         if v.kind == "Real" and v.unit is None and v.causality != "independent":  # which is in seconds without one
@@ -76,7 +76,7 @@ def units(fmu: Fmu) -> Iterator[str]:
 
 
 def documentation(fmu: Fmu) -> Iterator[str]:
-    """The FMU explains itself to whoever has nothing else, and the models of this project have their icon."""
+    """The FMU has a documentation page, and a model of this project its icon."""
     files = fmu.archive.files
     if not files.get(PAGE, b"").strip():
         yield f"{PAGE}: expected a page, found {'an empty file' if PAGE in files else 'none'}"
@@ -86,16 +86,16 @@ def documentation(fmu: Fmu) -> Iterator[str]:
 
 
 def ports(fmu: Fmu) -> Iterator[str]:
-    """A controller, and a plant, has all that is wired to it, under the names and with the units of the wiring."""
+    """A controller or plant has all variables to be connected, with the names and units of the wiring."""
     outputs, by_name = {v.name for v in fmu.of_causality("output")}, {v.name: v for v in fmu.variables}
-    role = next((role for role in ROLES if outputs.intersection(role.told_by)), None)
+    role = next((role for role in ROLES if outputs.intersection(role.identified_by)), None)
     if role is None:
         return
-    is_whole = not by_name.keys().isdisjoint(role.whole_by)
-    for port in (*role.ports, *role.further):
+    is_complete = not by_name.keys().isdisjoint(role.complete_by)
+    for port in (*role.ports, *role.optional):
         expected = _described(port.kind, port.causality, port.unit)
         if port.name not in by_name:
-            if port in role.further and not is_whole:
+            if port in role.optional and not is_complete:
                 continue
             yield f"{port.name}: expected {expected}, found none"
         elif (found := _as_port(by_name[port.name])) != expected:

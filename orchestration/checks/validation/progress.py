@@ -1,4 +1,4 @@
-"""What the confined process tells the one that waits for it: findings as they come, and that calls return."""
+"""The report of the confined process to the one that waits for it: findings as they come, and returning calls."""
 
 import time
 from collections.abc import Callable, Iterable
@@ -15,79 +15,79 @@ LONGEST = 1000
 _BEAT = 0.02
 """[s] between two beats, at least"""
 Frame = tuple[Any, ...]
-"""The name of a method of `Told`, and its arguments"""
+"""The name of a method of `ReceivedReport` without its underscore, and its arguments"""
 
 
-class Report:
-    """Says what begins, what is found and that it ends, as it happens: of use however far the process gets."""
+class Reporter:
+    """Sends the beginning of each rule, findings and the end as they occur: of use however far the process gets."""
 
-    def __init__(self, say: Callable[[Frame], None]) -> None:
-        self._say = say
+    def __init__(self, send: Callable[[Frame], None]) -> None:
+        self._send = send
         self._next = 0.0
 
-    def rule(self, name: str) -> None:
+    def begin(self, rule: str) -> None:
         """A rule begins."""
-        self._say(("begin", name))
+        self._send(("begin", rule))
 
     def beat(self) -> None:
         """A call of the FMU begins or has returned."""
         now = time.monotonic()
         if now >= self._next:
             self._next = now + _BEAT
-            self._say(("beat",))
+            self._send(("beat",))
 
-    def found(self, text: str) -> None:
-        """The rule finds something."""
+    def finding(self, text: str) -> None:
+        """The rule has a finding."""
         whole = text if len(text) <= LONGEST else f"{text[:LONGEST]} ..."
-        self._say(("found", whole, isinstance(text, Note)))
+        self._send(("finding", whole, isinstance(text, Note)))
 
     def failed(self, error: Exception) -> None:
         """The validation itself fails."""
-        self._say(("failed", f"{type(error).__name__}: {error}"))
+        self._send(("failed", f"{type(error).__name__}: {error}"))
 
     def end(self) -> None:
-        """All there is to try has been tried."""
-        self._say(("end",))
+        """All rules have been tried."""
+        self._send(("end",))
 
-    def tried(self, chosen: Iterable[Rule[Subject]], subject: Subject, refusal: type[QuadcosimError]) -> int:
-        """How many problems the rules find; a `refusal` that one runs into is one, too."""
+    def try_rules(self, chosen: Iterable[Rule[Subject]], subject: Subject, refusal: type[QuadcosimError]) -> int:
+        """Try rules; the number of problems that they find. A `refusal` raised by one counts, too."""
         count = 0
         for rule in chosen:
-            self.rule(name_of(rule))
-            count += self._of(rule, subject, refusal)
+            self.begin(name_of(rule))
+            count += self._try(rule, subject, refusal)
         return count
 
-    def _of(self, rule: Callable[[Subject], Iterable[str]], subject: Subject, refusal: type[QuadcosimError]) -> int:
+    def _try(self, rule: Callable[[Subject], Iterable[str]], subject: Subject, refusal: type[QuadcosimError]) -> int:
         count = 0
         try:
             texts = iter(rule(subject))
             for text in islice(texts, MOST):
-                self.found(text)
+                self.finding(text)
                 count += not isinstance(text, Note)
             if next(texts, None) is not None:
-                self.found(Note(f"there are more; {MOST} are listed"))
+                self.finding(Note(f"there are more; {MOST} are listed"))
         except refusal as error:
-            self.found(str(error))
+            self.finding(str(error))
             count += 1
         return count
 
 
-class Told:
-    """What a report says."""
+class ReceivedReport:
+    """The content of a report, as received."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         """`clock`: seconds of the process's own time."""
         self.findings: list[Finding] = []
         self.rule: str | None = None
-        """The rule that was begun last"""
+        """the one begun last"""
         self.ended = False
         self.error: str | None = None
-        self.beaten: float | None = None
-        """When a call of the FMU began or returned last, by the clock; None if there was none"""
+        self.last_beat: float | None = None
+        """when a call of the FMU last began or returned, by the clock; None if there was none"""
         self._clock = clock
 
-    def hear(self, frame: Frame) -> None:
-        """What comes next."""
+    def receive(self, frame: Frame) -> None:
+        """The next frame."""
         name, *content = frame
         getattr(self, f"_{name}")(*content)
 
@@ -95,9 +95,9 @@ class Told:
         self.rule = rule
 
     def _beat(self) -> None:
-        self.beaten = self._clock()
+        self.last_beat = self._clock()
 
-    def _found(self, text: str, note: bool) -> None:
+    def _finding(self, text: str, note: bool) -> None:
         self.findings.append(Finding(str(self.rule), text, note=note))
 
     def _failed(self, error: str) -> None:

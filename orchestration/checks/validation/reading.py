@@ -1,4 +1,4 @@
-"""From the archive and the XML of an FMU to the view that the rules have of it."""
+"""Reads the archive and the XML of an FMU into the view that rules check."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -19,7 +19,7 @@ _INITIAL = {
     "independent": None,
     "input": None,
 }
-"""What `initial` is when it is not written; constants aside, outputs and locals are calculated."""
+"""default of `initial`; constants aside, outputs and locals are calculated"""
 _PARAMETERS = ("parameter", "structuralParameter", "calculatedParameter")
 
 
@@ -32,7 +32,7 @@ def read_co_simulation(archive: Archive) -> Element:
 
 
 def read_fmu(archive: Archive, root: Element) -> Fmu:
-    """The view of an archive and its description; raises `UnreadableFmuError` for a number that is none."""
+    """The view of an archive and its description; raises `UnreadableFmuError` for an invalid number."""
     standard = STANDARDS[version_of(root)]
     read_variables = _variables_2 if standard.version == 2 else _variables_3
     lists = standard.lists
@@ -64,7 +64,7 @@ def _build(archive: Archive) -> Element | None:
 
 
 def _variables_2(root: Element) -> Iterable[Variable]:
-    """Of FMI 2.0: an element for the variable, and in it one for its type."""
+    """The variables of FMI 2.0: an element for the variable, and in it one for its type."""
     types = {element.get("name"): element[0] for element in root.iterfind("TypeDefinitions/SimpleType") if len(element)}
     for place, element in enumerate(root.iterfind("ModelVariables/ScalarVariable"), start=1):
         name = element.get("name", f"variable {place}")
@@ -76,7 +76,7 @@ def _variables_2(root: Element) -> Iterable[Variable]:
 
 
 def _variables_3(root: Element) -> Iterable[Variable]:
-    """Of FMI 3.0: the element is called by the type."""
+    """The variables of FMI 3.0: the element is named after the type."""
     types = {element.get("name"): element for element in root.iterfind("TypeDefinitions/*")}
     listed = [element for element in root.iterfind("ModelVariables/*") if element.tag in STANDARDS[3].types]
     sizes = {element.get("valueReference"): element.get("start") for element in listed}
@@ -95,7 +95,7 @@ def _variable(
     kind = standard.types[typed.tag]
     causality = element.get("causality", "local")
     variability = element.get("variability", _variability(standard, causality, kind))
-    reference = _whole(element.get("valueReference"), f"{name}: valueReference")
+    reference = _whole_number(element.get("valueReference"), f"{name}: valueReference")
     derivative = typed.get("derivative")
     return Variable(
         place=place,
@@ -114,10 +114,10 @@ def _variable(
         maximum=attribute("max"),
         nominal=attribute("nominal"),
         items=tuple(
-            _whole(e.get("value"), f"{name}: Item") for e in (() if declared is None else declared.iter("Item"))
+            _whole_number(e.get("value"), f"{name}: Item") for e in (() if declared is None else declared.iter("Item"))
         ),
-        derivative_of=None if derivative is None else _whole(derivative, f"{name}: derivative"),
-        others={key: _all(element.get(key, ""), f"{name}: {key}") for key in ("clocks", "previous")},
+        derivative_of=None if derivative is None else _whole_number(derivative, f"{name}: derivative"),
+        others={key: _whole_numbers(element.get(key, ""), f"{name}: {key}") for key in ("clocks", "previous")},
         whole=name,
     )
 
@@ -135,7 +135,7 @@ def _initial(causality: str, variability: str) -> str | None:
 
 
 def _starts(typed: Element, kind: str) -> tuple[str, ...]:
-    """A text or bytes are elements of their own in FMI 3.0; of numbers an array has several in one text."""
+    """A text or bytes are separate elements in FMI 3.0; an array of numbers has several in one text."""
     own = tuple(each.get("value", "") for each in typed.iterfind("Start"))
     text = typed.get("start")
     if text is None or own:
@@ -144,20 +144,20 @@ def _starts(typed: Element, kind: str) -> tuple[str, ...]:
 
 
 def _with_shape(found: Variable, element: Element, sizes: dict[str | None, str | None]) -> Variable:
-    """An array, each dimension a number or what another variable starts with."""
+    """An array, each dimension a number or the start value of another variable."""
     what = f"{found.name}: Dimension"
     dimensions = list(element.iterfind("Dimension"))
     named = [each.get("valueReference") for each in dimensions]
     shape = [
-        _whole(each.get("start"), what) if each.get("valueReference") is None else _size(sizes, each)
+        _whole_number(each.get("start"), what) if each.get("valueReference") is None else _size(sizes, each)
         for each in dimensions
     ]
-    others = {**found.others, "dimension": tuple(_whole(each, what) for each in named if each is not None)}
+    others = {**found.others, "dimension": tuple(_whole_number(each, what) for each in named if each is not None)}
     return replace(found, shape=tuple(shape), others=others)
 
 
 def _size(sizes: dict[str | None, str | None], dimension: Element) -> int:
-    """What the variable starts with that is named; that it is a whole number is for a rule to say."""
+    """The start value of the named variable; a rule checks that it is a whole number."""
     try:
         return int(float(sizes.get(dimension.get("valueReference")) or 0))
     except ValueError:
@@ -172,17 +172,17 @@ def _unknowns(root: Element, standard: Standard, called: tuple[str, str]) -> tup
 
 
 def _unknown(element: Element, key: str) -> Unknown:
-    handle = _whole(element.get(key), f"ModelStructure: {key}")
+    handle = _whole_number(element.get(key), f"ModelStructure: {key}")
     listed = element.get("dependencies")
     what = f"Unknown {handle}: dependencies"
-    return Unknown(handle=handle, dependencies=None if listed is None else _all(listed, what))
+    return Unknown(handle=handle, dependencies=None if listed is None else _whole_numbers(listed, what))
 
 
 # -- numbers ------------------------------------------------------------------------------------------------
 
 
 def _require_numbers(fmu: Fmu) -> None:
-    """What the rules take for numbers are some."""
+    """Raise `UnreadableFmuError` for an attribute that rules take for a number and that is none."""
     numbers = [
         ("DefaultExperiment", key, text) for e in fmu.root.iterfind("DefaultExperiment") for key, text in e.items()
     ]
@@ -212,11 +212,11 @@ def _number(read: Callable[[str], object], text: str, refusal: str) -> None:
         _refuse(refusal)
 
 
-def _all(text: str, what: str) -> tuple[int, ...]:
-    return tuple(_whole(each, what) for each in text.split())
+def _whole_numbers(text: str, what: str) -> tuple[int, ...]:
+    return tuple(_whole_number(each, what) for each in text.split())
 
 
-def _whole(text: str | None, what: str) -> int:
+def _whole_number(text: str | None, what: str) -> int:
     try:
         return int(text or "")
     except ValueError:

@@ -1,4 +1,4 @@
-"""Roles that FMUs of this project can have in a loop, and the variables that each needs for it."""
+"""Roles of FMUs of this project in a loop, with the variables that each needs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,15 +16,15 @@ class Port(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Role:
-    """What can be wired to an FMU."""
+    """The variables of an FMU that can be connected."""
 
-    told_by: Sequence[str]
-    """outputs of which any says that it has this role, unless it has one before"""
+    identified_by: Sequence[str]
+    """outputs any of which identifies this role; the first such role counts"""
     ports: Sequence[Port]
-    further: Sequence[Port] = ()
-    """what may be missing, unless it has any of `whole_by`; what there is of it is as it is here"""
-    whole_by: Sequence[str] = ()
+    optional: Sequence[Port] = ()
+    """may be missing, unless the FMU has any of `complete_by`; those present must be as declared here"""
+    complete_by: Sequence[str] = ()
 
 
 ROLES: list[Role] = []
-"""Rooms above enter theirs"""
+"""filled by the rooms above"""

@@ -1,4 +1,4 @@
-"""Every rule, by what it looks at and whose FMUs it is for."""
+"""All rules, by their subject and the FMUs that they apply to."""
 
 from orchestration.checks.validation import (
     archive_rules,
@@ -16,11 +16,11 @@ from orchestration.checks.validation.own_description import own_description
 OF_ARCHIVES = archive_rules.RULES
 OF_DESCRIPTIONS = (*description.RULES, *variables.RULES, *units.RULES, *structure.RULES)
 OF_RUNS = run_rules.RULES
-"""After `run_rules.FIRST`, without which they cannot be tried."""
+"""After `run_rules.FIRST`, on which they rely."""
 OF_EQUAL_RUNS = (*run_rules.COMPARED, *dependencies.RULES)
 """For FMUs whose runs can be repeated."""
 LAST_OF_RUNS = run_rules.LAST
-"""When nothing but rules of this project comes after."""
+"""Only rules of this project come after."""
 
 OUR_DESCRIPTIONS = own_rules.RULES
 OUR_RUNS = refusals.RULES

@@ -1,4 +1,4 @@
-"""Rules that run the FMU: it runs, and every run is the same run, whatever happened before or beside it."""
+"""Rules that run the FMU: it runs, and equal runs have equal results, whatever happened before or beside them."""
 
 import contextlib
 import math
@@ -6,23 +6,24 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from orchestration.checks.validation.declared import Variable
+from orchestration.checks.validation.excitation import PLAIN, Plan
 from orchestration.checks.validation.finding import Note
 from orchestration.checks.validation.instance import RefusedError, Row, Value, same
-from orchestration.checks.validation.probe import FEWEST, PLAIN, Plan, Probe
+from orchestration.checks.validation.probe import FEWEST, Probe
 from orchestration.fmi.messages import WARNING
 
 _DIGITS = 5e-15
-"""Relative; what a text of 15 digits may be away from the number that it was made of"""
+"""relative error of a number in a text of 15 digits"""
 
 
 def runs(probe: Probe) -> Iterator[str]:
-    """From instantiation to its end at start values, by the default experiment, without an error in its log."""
+    """A run of the default experiment at start values completes without an error in the log."""
     first = probe.first
-    if not first.whole:
-        yield Note(f"slow: {first.steps} steps take {first.seconds:.2g} s; all runs are of as many steps at most")
+    if not first.is_complete:
+        yield Note(f"slow: {first.steps} steps take {first.seconds:.2g} s; no run has more steps")
     clocked = [v.name for v in probe.fmu.variables if v.is_clocked]
     if clocked:
-        yield Note(f"{', '.join(clocked)}: not looked at, for it runs without event mode, in which clocks tick")
+        yield Note(f"{', '.join(clocked)}: not checked, as clocks tick in event mode only, in which it does not run")
     for status, message in dict.fromkeys((status, message) for status, _, message in first.messages):
         if status > WARNING:
             text = message.decode("utf-8", "replace").partition("\n")[0]
@@ -30,7 +31,7 @@ def runs(probe: Probe) -> Iterator[str]:
 
 
 def getters(probe: Probe) -> Iterator[str]:
-    """Every variable answers to the call for its type."""
+    """Every variable can be read by the function for its type."""
     try:
         with probe.instance() as instance:
             probe.begin(instance, PLAIN)
@@ -46,14 +47,14 @@ def getters(probe: Probe) -> Iterator[str]:
 
 
 def start_values(probe: Probe) -> Iterator[str]:
-    """What is declared to start at a value has it to 15 digits; in FMUs of this project to the last bit.
+    """Variables have their declared start values to 15 digits; in FMUs of this project to the last bit.
 
-    FMI 2.0 lets nobody ask before initialisation, and the FMUs of this project answer nevertheless.
+    FMI 2.0 allows no reading before initialisation; FMUs of this project support it nevertheless.
     """
     declared = [v for v in probe.fmu.elements if v.keeps_start]
-    may_be_asked = probe.fmu.is_ours or probe.fmu.version > 2
+    is_readable = probe.fmu.is_ours or probe.fmu.version > 2
     with probe.instance() as instance:
-        moments = {"freshly instantiated": instance.get(declared)} if may_be_asked else {}
+        moments = {"freshly instantiated": instance.get(declared)} if is_readable else {}
         instance.initialise({}, probe.start)
         moments["after initialisation"] = instance.get(declared)
     for v in declared:
@@ -64,19 +65,19 @@ def start_values(probe: Probe) -> Iterator[str]:
 
 
 def _starts(found: Value, declared: Value, *, exactly: bool) -> bool:
-    """Whether a value is the declared one; of FMUs of this project to the last bit."""
+    """Whether a value is the declared one, to the last bit if `exactly`."""
     if exactly or not (isinstance(found, float) and isinstance(declared, float)):
         return same(found, declared)
     return math.isclose(found, declared, rel_tol=_DIGITS)
 
 
 def finite_outputs(probe: Probe) -> Iterator[str]:
-    """Outputs are finite after initialisation and after every step, with inputs at rest and moving."""
+    """Outputs are finite after initialisation and after every step, with constant and moving inputs."""
     named: set[str] = set()
-    for plan in (PLAIN, probe.rich):
+    for plan in (PLAIN, probe.general_plan):
         with probe.instance() as instance:
             probe.begin(instance, plan)
-            rows = [instance.get(probe.outputs), *probe.fly(instance, plan)]
+            rows = [instance.get(probe.outputs), *probe.run_steps(instance, plan)]
         for k, row in enumerate(rows):
             for name, value in _not_finite(row, probe.outputs):
                 if name not in named:
@@ -90,7 +91,7 @@ def _not_finite(row: Row, outputs: tuple[Variable, ...]) -> list[tuple[str, floa
 
 
 def variable_steps(probe: Probe) -> Iterator[str]:
-    """An FMU that declares it takes steps of different lengths does, and a step is as long as its halves."""
+    """An FMU that declares variable step sizes takes them, and a step is as long as its halves."""
     if not probe.fmu.can("canHandleVariableCommunicationStepSize"):
         return
     whole = probe.points(Plan(uneven=True, steps=20))
@@ -106,34 +107,40 @@ def variable_steps(probe: Probe) -> Iterator[str]:
     for end in ends:
         for name, value in _not_finite(end, probe.outputs):
             yield f"{name} = {value} after steps of different lengths: expected it finite"
-    for v in probe.of("independent"):
+    for v in probe.elements_of("independent"):
         a, b = (float(end[v.name]) for end in ends)
         if not math.isclose(a, b, rel_tol=1e-9, abs_tol=1e-9):
             yield f"{v.name} = {b!r} after halved steps, expected {a!r} as after whole ones"
 
 
 def repeatable(probe: Probe) -> Iterator[str]:
-    """Two fresh instances run the same; without that, as with `rand()`, the rules that compare runs are not tried."""
+    """Two fresh instances give the same run; otherwise, as with `rand()`, rules that compare runs are not tried."""
     if probe.repeats is not None:
-        text = f"{probe.repeats}, as in an equal run before; what compares runs is not tried"
+        text = f"{probe.repeats}, as in an equal run before; rules that compare runs are not tried"
         yield text if probe.fmu.is_ours else Note(text)
 
 
 def inputs_set_twice(probe: Probe) -> Iterator[str]:
-    """Setting an input again to what it is changes nothing."""
-    twice = probe.flown(replace(probe.rich, times_set=2))
-    yield from probe.parted(twice, probe.expected, "{}, as with inputs set once")
+    """Setting an input twice to the same value changes nothing."""
+    twice = probe.run(replace(probe.general_plan, times_set=2))
+    yield from probe.deviations(twice, probe.expected_rows, "{}, as with inputs set once")
 
 
 def reset(probe: Probe) -> Iterator[str]:
-    """A run after a reset is the run of a fresh instance, whatever was run before."""
+    """A run after a reset equals the run of a fresh instance, whatever was run before."""
     short = Plan(steps=20)
-    fresh = probe.flown(short)
+    fresh = probe.run(short)
     with probe.instance() as instance:
-        for plan, expected in ((probe.rich, probe.expected), (short, fresh), (probe.rich, probe.expected)):
+        for plan, expected in (
+            (probe.general_plan, probe.expected_rows),
+            (short, fresh),
+            (probe.general_plan, probe.expected_rows),
+        ):
             probe.begin(instance, plan)
             texts = list(
-                probe.parted(probe.fly(instance, plan), expected, "{}, as without the run and reset before it")
+                probe.deviations(
+                    probe.run_steps(instance, plan), expected, "{}, as without the run and reset before it"
+                )
             )
             if texts:
                 yield from texts
@@ -142,54 +149,56 @@ def reset(probe: Probe) -> Iterator[str]:
 
 
 def instances(probe: Probe) -> Iterator[str]:
-    """An instance runs the same beside another one."""
+    """A run is the same beside another instance."""
     if probe.fmu.can("canBeInstantiatedOnlyOncePerProcess"):
         return
-    plan, other = probe.rich, Plan(steps=probe.rich.steps)
+    plan, other = probe.general_plan, Plan(steps=probe.general_plan.steps)
     rows = []
     with probe.instance() as first, probe.instance() as second:
         probe.begin(first, plan)
         probe.begin(second, other)
-        for k in range(len(probe.expected)):
-            rows += probe.fly(first, plan, k, k + 1)
-            probe.fly(second, other, k, k + 1)
-    yield from probe.parted(rows, probe.expected, "{}, as without a second instance")
+        for k in range(len(probe.expected_rows)):
+            rows += probe.run_steps(first, plan, k, k + 1)
+            probe.run_steps(second, other, k, k + 1)
+    yield from probe.deviations(rows, probe.expected_rows, "{}, as without a second instance")
 
 
 def saved_state(probe: Probe) -> Iterator[str]:
-    """A run that goes on from a state that was saved goes on as it did."""
+    """A run from a restored state continues as it did from the saved one."""
     if not probe.fmu.saves:
         return
-    plan, half = probe.rich, len(probe.expected) // 2
+    plan, half = probe.general_plan, len(probe.expected_rows) // 2
     with probe.instance() as instance:
         probe.begin(instance, plan)
-        probe.fly(instance, plan, 0, half)
+        probe.run_steps(instance, plan, 0, half)
         state = instance.state()
-        after = probe.fly(instance, plan, half)
-        yield from probe.parted(after, probe.expected[half:], f"after the state was taken at step {half}: {{}}")
-        instance.put_back(state)
-        after = probe.fly(instance, plan, half)
-    yield from probe.parted(after, probe.expected[half:], f"from the state of step {half}: {{}}")
+        after = probe.run_steps(instance, plan, half)
+        yield from probe.deviations(
+            after, probe.expected_rows[half:], f"after the state was taken at step {half}: {{}}"
+        )
+        instance.restore(state)
+        after = probe.run_steps(instance, plan, half)
+    yield from probe.deviations(after, probe.expected_rows[half:], f"from the state of step {half}: {{}}")
 
 
 def serialised_state(probe: Probe) -> Iterator[str]:
-    """Another instance goes on from a serialised state as the first one did."""
+    """Another instance continues from a serialised state as the first one did."""
     if not (probe.fmu.serialises and probe.fmu.saves):
         return
-    plan, half = probe.rich, len(probe.expected) // 2
+    plan, half = probe.general_plan, len(probe.expected_rows) // 2
     with probe.instance() as instance:
         probe.begin(instance, plan)
-        probe.fly(instance, plan, 0, half)
+        probe.run_steps(instance, plan, 0, half)
         content = instance.serialised()
     with probe.instance() as other:
-        other.put_back_bytes(content)
-        after = probe.fly(other, plan, half)
+        other.restore_bytes(content)
+        after = probe.run_steps(other, plan, half)
     text = f"another instance, from the bytes of the state of step {half}: {{}}"
-    yield from probe.parted(after, probe.expected[half:], text)
+    yield from probe.deviations(after, probe.expected_rows[half:], text)
 
 
 def stop_time(probe: Probe) -> Iterator[str]:
-    """A step past the stop time that was set is an error, or ends the run (FMI 2.0.4, section 2.1.6)."""
+    """A step past the stop time is an error, or ends the run (FMI 2.0.4, section 2.1.6)."""
     *allowed, (t, h) = probe.points(Plan(steps=FEWEST))
     if not allowed:
         return
@@ -203,9 +212,9 @@ def stop_time(probe: Probe) -> Iterator[str]:
 
 
 FIRST = (runs, getters)
-"""Without these the others cannot be tried"""
+"""the others rely on these"""
 RULES = (start_values, finite_outputs, variable_steps, repeatable)
 COMPARED = (inputs_set_twice, reset, instances, saved_state, serialised_state)
-"""For FMUs whose runs can be repeated"""
+"""for FMUs whose runs are repeatable"""
 LAST = (stop_time,)
-"""They leave an instance that has failed, which another one may not stand beside"""
+"""they leave a failed instance, which may disturb others"""

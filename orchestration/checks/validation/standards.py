@@ -1,4 +1,4 @@
-"""What FMI 2.0 and FMI 3.0 call what both have."""
+"""The names in FMI 2.0 and FMI 3.0 of what both have."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Lists:
-    """Of a description, the lists of the model structure: what findings call each, and where its entries are."""
+    """The lists of the model structure: the name of each in findings, and the path of its entries."""
 
     outputs: tuple[str, str]
     derivatives: tuple[str, str]
@@ -20,22 +20,22 @@ class Standard:
 
     version: int
     token: str
-    """The attribute by which a library knows its description"""
+    """attribute by which a library identifies its description"""
     handle: str
-    """The attribute of the model structure that says which variable is meant"""
+    """attribute of the model structure that refers to a variable"""
     saves: str
-    """The capability to save a state, and set it"""
+    """capability to save and restore a state"""
     serialises: str
-    """The capability to make bytes of a state"""
+    """capability to serialise a state"""
     lists: Lists
     types: Mapping[str, str]
-    """Kind of variable, as FMI 2.0 calls its types, by the type"""
+    """kind of variable, a type of FMI 2.0, by type"""
     access: Mapping[str, str]
-    """The end of the name of the functions that get and set a variable, by its type"""
+    """suffix of the names of the functions that get and set a variable, by its type"""
 
     @property
     def instantiates(self) -> str:
-        """The function that makes an instance."""
+        """The function that instantiates an FMU."""
         return "fmi2Instantiate" if self.version == 2 else "fmi3InstantiateCoSimulation"
 
 

@@ -30,10 +30,10 @@ def outputs(fmu: Fmu) -> Iterator[str]:
 
 
 def initial_unknowns(fmu: Fmu) -> Iterator[str]:
-    """InitialUnknowns lists what initialisation calculates and others may ask for, in FMI 2.0 in order.
+    """InitialUnknowns lists the variables that initialisation calculates and others may read, in FMI 2.0 in order.
 
-    Of what has a derivative only that of a derivative under Derivatives is a state (FMI 2.0.4, section 2.2.8). What
-    ticks with a clock may be there, and need not.
+    Of variables with a derivative only those whose derivative is under Derivatives are states (FMI 2.0.4, section
+    2.2.8). Clocked variables may be listed, and need not.
     """
     where = fmu.standard.lists.initial_unknowns[0]
     listed_derivatives = {unknown.handle for unknown in fmu.derivatives}
@@ -55,9 +55,9 @@ def initial_unknowns(fmu: Fmu) -> Iterator[str]:
 
 
 def known_dependencies(fmu: Fmu) -> Iterator[str]:
-    """Outputs depend on what is known in that mode, in FMI 2.0 listed in the order of the indices.
+    """Outputs depend on variables known in that mode, in FMI 2.0 listed in the order of the indices.
 
-    Derivatives are not looked at: for co-simulation they mean nothing, and the FMI project's own FMUs list parameters.
+    Derivatives are not checked: for co-simulation they mean nothing, and the FMI project's own FMUs list parameters.
     """
     called = fmu.standard.lists
     states = {v.derivative_of for v in fmu.variables if v.derivative_of is not None}
@@ -69,13 +69,13 @@ def known_dependencies(fmu: Fmu) -> Iterator[str]:
             if fmu.version == 2 and list(listed) != sorted(set(listed)):
                 yield f"{where}: {name}: expected its dependencies once each, in the order of their indices"
             for known in filter(None, map(fmu.variable, listed)):
-                given = known.causality in ("input", "independent") or known.handle in states or known.is_clocked
-                if not (given or (known.initial == "exact" if initially else _is_kept(fmu, known))):
+                is_known = known.causality in ("input", "independent") or known.handle in states or known.is_clocked
+                if not (is_known or (known.initial == "exact" if initially else _is_kept(fmu, known))):
                     yield f"{where}: {name} depends on {known.name}, a {known.causality}: expected an input"
 
 
 def _is_kept(fmu: Fmu, variable: Variable) -> bool:
-    """Whether FMI 3.0 takes it for known at a communication point: parameters, and states that are discrete in time."""
+    """Whether FMI 3.0 takes it for known at a communication point: parameters, and states in discrete time."""
     parameter = variable.causality in ("parameter", "structuralParameter")
     return fmu.version > 2 and (parameter or variable.variability == "discrete")
 

@@ -1,4 +1,4 @@
-"""Rules on units: that a unit is to its base units what its name says."""
+"""Rules on units: their base units correspond to their names."""
 
 import re
 from collections import Counter
@@ -17,7 +17,7 @@ _SYMBOLS: dict[str, dict[str, int]] = {
     "W": {"kg": 1, "m": 2, "s": -3},
     "V": {"kg": 1, "m": 2, "s": -3, "A": -1},
 }
-"""Coherent symbols that mean one thing only; `Hz`, with or without a turn, and `C` do not."""
+"""Coherent symbols with one meaning only; `Hz`, with or without a turn, and `C` have two"""
 
 
 def dimensions(name: str) -> Counter[str] | None:
@@ -40,7 +40,7 @@ def base_units(fmu: Fmu) -> dict[str, Element | None]:
 
 
 def unit_meaning(fmu: Fmu) -> Iterator[str]:
-    """A unit with a coherent name has the exponents that it says, a factor of 1 and no offset."""
+    """A unit with a coherent name has the exponents of that name, a factor of 1 and no offset."""
     for name, base in base_units(fmu).items():
         expected = dimensions(name)
         if base is None or expected is None:
@@ -48,7 +48,7 @@ def unit_meaning(fmu: Fmu) -> Iterator[str]:
         found = {symbol: int(base.get(symbol, "0")) for symbol in BASE}
         wrong = [symbol for symbol in BASE if found[symbol] != expected[symbol]]
         if wrong == ["rad"] and found["rad"] == 0 and not fmu.is_ours:
-            wrong = []  # FMI lets a tool take the radian for 1
+            wrong = []  # FMI allows a tool to take the radian for 1
         if wrong:
             yield f"unit {name}: base units {_listed(found)}, expected {_listed(expected)}"
         factor, offset = float(base.get("factor", "1")), float(base.get("offset", "0"))

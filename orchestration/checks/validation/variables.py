@@ -15,13 +15,13 @@ _NAMES = {
     "structured": re.compile(rf"{_IDENTIFIER}|der\({_IDENTIFIER}(?:,[0-9]+)?\)"),
     "flat": re.compile(r"[^\r\n\t]+"),
 }
-"""What a name is by each convention"""
+"""valid names by convention"""
 
 
 def names(fmu: Fmu) -> Iterator[str]:
-    """A name is one by the convention that the FMU declares (FMI 2.0.4, section 2.2.9; FMI 3.0, section 2.4.7)."""
+    """Names follow the convention that the FMU declares (FMI 2.0.4, section 2.2.9; FMI 3.0, section 2.4.7)."""
     convention = fmu.root.get("variableNamingConvention", "flat")
-    legal = _NAMES.get(convention, _NAMES["flat"])  # that there is another one the schema finds
+    legal = _NAMES.get(convention, _NAMES["flat"])  # any other one violates the schema
     for v in fmu.variables:
         for name in (v.name, *v.further_names):
             if not legal.fullmatch(name):
@@ -46,7 +46,7 @@ def bounds(fmu: Fmu) -> Iterator[str]:
 
 
 def limits(variable: Variable) -> tuple[float, float]:
-    """The smallest and the largest value that a variable is declared to take."""
+    """The smallest and the largest declared value of a variable."""
     low = -math.inf if variable.minimum is None else float(variable.minimum)
     return low, math.inf if variable.maximum is None else float(variable.maximum)
 
@@ -78,12 +78,12 @@ def aliases(fmu: Fmu) -> Iterator[str]:
     for (_, reference), members in sets.items():
         if len(members) > 1:
             names = ", ".join(v.name for v in members)
-            wrong = ["FMI 3.0 has one for each variable"] if fmu.version > 2 else _wrong_with_aliases(members)
+            wrong = ["FMI 3.0 has one for each variable"] if fmu.version > 2 else _alias_problems(members)
             for problem in wrong:
                 yield f"{names}: value reference {reference} for all of them, but {problem}"
 
 
-def _wrong_with_aliases(members: list[Variable]) -> Iterator[str]:
+def _alias_problems(members: list[Variable]) -> Iterator[str]:
     constants = [v for v in members if v.variability == "constant"]
     if constants:
         if len(constants) < len(members):

@@ -172,7 +172,7 @@ def test_model_exchange_alone_is_not_tried(plant: Path, tmp_path: Path) -> None:
 
 
 def failure(path: Path, **limits: float) -> str | None:
-    return loading.attempt(path, Limits(**limits)).failure
+    return loading.try_loading(path, Limits(**limits)).failure
 
 
 def test_an_fmu_that_takes_its_process_down_does_not_take_the_doctor_along(plant: Path, tmp_path: Path) -> None:

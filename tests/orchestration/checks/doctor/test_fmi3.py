@@ -7,7 +7,7 @@ import pytest
 
 from orchestration.checks.doctor.as_lines import as_text
 from orchestration.checks.doctor.fmu import Fmu, read_fmu
-from orchestration.checks.doctor.loading import attempt
+from orchestration.checks.doctor.loading import try_loading
 from orchestration.checks.doctor.report import Report, examine
 from orchestration.checks.doctor.verdict import judge
 from orchestration.processes.limits import Limits
@@ -44,7 +44,7 @@ def test_one_that_is_sound_loads_and_needs_nothing_more(fmu: Path) -> None:
 
 def test_a_library_in_a_folder_of_fmi_2_is_none_of_fmi_3(fmu: Path, tmp_path: Path) -> None:
     path = changed(fmu, tmp_path / "a.fmu", {HERE: None, "binaries/linux64/Small.so": files_of(fmu)[HERE]})
-    assert attempt(path, Limits()).failure == f"has no binary for {fmpy.platform_tuple}, only for linux64"
+    assert try_loading(path, Limits()).failure == f"has no binary for {fmpy.platform_tuple}, only for linux64"
     assert any(line.endswith("; FMI 3.0 has no such platform") for line in lines(read_fmu(path)))
 
 
@@ -85,13 +85,13 @@ def test_a_folder_without_the_library_of_the_model_is_a_problem(fmu: Path, tmp_p
 def test_what_is_for_no_co_simulation_is_not_tried(
     old: str, new: str, kinds: tuple[str, ...], said: str, fmu: Path, tmp_path: Path
 ) -> None:
-    trial = attempt(described(fmu, tmp_path / "a.fmu", old, new), Limits())
+    trial = try_loading(described(fmu, tmp_path / "a.fmu", old, new), Limits())
     assert (trial.fmu.kinds, trial.failure) == (kinds, f"not tried: it is for {said} only")
 
 
 def test_a_library_without_the_functions_of_fmi_3_does_not_load(fmu: Path, tmp_path: Path) -> None:
     two = files_of(small(tmp_path))[f"binaries/{fmpy.platform}/Small{fmpy.sharedLibraryExtension}"]
-    failure = attempt(changed(fmu, tmp_path / "a.fmu", {HERE: two}), Limits()).failure
+    failure = try_loading(changed(fmu, tmp_path / "a.fmu", {HERE: two}), Limits()).failure
     assert failure is not None
     assert failure.startswith("loading: ")
     assert "undefined symbol: fmi3" in failure

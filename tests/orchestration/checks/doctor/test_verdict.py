@@ -268,8 +268,8 @@ def test_of_a_mach_o_binary_nothing_is_claimed(plant: Path, tmp_path: Path) -> N
     machine = machine_for(fmu, system=MACOS, architecture="aarch64", python_libraries=())
     verdict = judge(fmu, machine, None)
     assert needs(verdict) == ((), ())
-    assert verdict.other_host.note == "what its binary needs is unknown"
-    assert "ready; what its binary needs is unknown" in as_text(Report(machine=machine, verdicts=(verdict,)))
+    assert verdict.other_host.note == "the dependencies of its binary are unknown"
+    assert "ready; the dependencies of its binary are unknown" in as_text(Report(machine=machine, verdicts=(verdict,)))
 
 
 # -- the two forms of a report --------------------------------------------------------------------------------
@@ -296,4 +296,4 @@ def test_text_names_the_tool_that_an_fmu_asks_for(fmu: Fmu) -> None:
     verdict = judged(asking)
     assert verdict.good
     text = as_text(Report(machine=machine_for(fmu), verdicts=(verdict,)))
-    assert "Modelotron 3, says the FMU (needsExecutionTool)" in text
+    assert "Modelotron 3, declared by the FMU (needsExecutionTool)" in text
