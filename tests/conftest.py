@@ -10,6 +10,7 @@ from pathlib import Path
 
 import hypothesis
 import pytest
+from hypothesis.internal.conjecture import providers
 
 import quadcosim  # noqa: F401 - errors are told in the words of Python, those of the command line in its own
 from orchestration.basics import terminal
@@ -23,6 +24,10 @@ hypothesis.settings.register_profile("ci", derandomize=True, deadline=None)
 hypothesis.settings.register_profile("local", deadline=None)
 hypothesis.settings.register_profile("quick", derandomize=True, deadline=None, max_examples=20)  # make check
 hypothesis.settings.load_profile("ci" if os.environ.get("CI") else "local")
+
+# Else the constants of all modules that happen to be loaded are read from their sources, and drawn among others: three
+# seconds of each process, and examples that are others with another neighbour.
+providers._get_local_constants = lambda: providers._local_constants
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell's background job, from which commands would inherit it
     signal.signal(signal.SIGINT, signal.default_int_handler)
