@@ -1,4 +1,4 @@
-"""The flag of every command that may build FMUs, and the question where it is not given."""
+"""The flag of every command that may build FMUs, and the question that is asked without it."""
 
 import sys
 from collections.abc import Callable
@@ -8,12 +8,12 @@ from typing import Annotated, Any
 
 import typer
 
-from orchestration.command.shared_flags import takes
+from orchestration.command.option_group import option_group
 
 
 @dataclass(frozen=True, kw_only=True)
 class BuildFlag:
-    """What was given on the command line."""
+    """The flag on the command line."""
 
     build: Annotated[
         bool,
@@ -25,13 +25,13 @@ class BuildFlag:
     ] = False
 
 
-def builds(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command the flag, which holds as long as it runs."""
+def build_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command the flag, which applies while the command runs."""
 
-    @takes("given", BuildFlag)
+    @option_group("flag", BuildFlag)
     @wraps(command)
-    def call(given: BuildFlag, **others: Any) -> Any:
-        if given.build:
+    def call(flag: BuildFlag, **others: Any) -> Any:
+        if flag.build:
             from orchestration.building import consent
 
             consent.allow()
@@ -41,7 +41,7 @@ def builds(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def ask(question: str) -> bool:
-    """Whether somebody at a terminal says yes; nobody says no."""
+    """Ask on a terminal; True for yes, False without a terminal."""
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
         return False
     print(f"{question} [y/N] ", end="", file=sys.stderr, flush=True)

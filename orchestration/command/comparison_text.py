@@ -10,13 +10,13 @@ from orchestration.comparison.outcome import Outcome
 
 
 def lines(comparison: Comparison, outcome: Outcome) -> Iterator[str]:
-    """For each vehicle and condition how many survive and settle, by value of the axis; then how far each goes."""
+    """For each vehicle and condition, counts that survive and settle by value of the axis; then the limits."""
     names = [one.name for one in comparison.controllers]
     axis = comparison.axis.name
     for (vehicle, condition), group in groupby(outcome.cells, lambda cell: (cell.vehicle, cell.condition)):
         cells = [*group]
         yield (
-            f"{vehicle}, {condition}: of {len(comparison.initial_conditions)} starts, those that survive / settle by "
+            f"{vehicle}, {condition}: of {len(comparison.initial_conditions)} runs, those that survive / settle by "
             f"{comparison.study.origin.stop_time:g} s, and the share that survives with its 95 % interval"
         )
         rows = [[axis, *names]]
@@ -26,13 +26,13 @@ def lines(comparison: Comparison, outcome: Outcome) -> Iterator[str]:
         yield from _table(rows)
         yield ""
     if outcome.limits:
-        yield f"up to which {axis} half of the starts, and nine in ten, survive, and settle, with 95 % intervals"
-        heads = ["controller", "vehicle", "condition", "they", "half", "nine in ten", "rad/s"]
+        yield f"{axis} up to which half and nine in ten of the runs survive, and settle, with 95 % intervals"
+        heads = ["controller", "vehicle", "condition", "runs", "half", "nine in ten", "rad/s"]
         yield from _table([heads, *_limits(outcome)])
 
 
 def cell_lines(comparison: Comparison, cell: CellSummary) -> Iterator[str]:
-    """One cell, a quantity a line."""
+    """One cell, a quantity per line."""
     place = f"{cell.controller}, {cell.vehicle}, {cell.condition}, {comparison.axis.name} {cell.value:g}"
     yield f"cell {cell.cell}: {place}"
     yield f"{'survives':<22}  {cell.survives.count} of {cell.count}: {_share(cell.survives)}"
@@ -41,8 +41,8 @@ def cell_lines(comparison: Comparison, cell: CellSummary) -> Iterator[str]:
     yield f"{'settles':<22}  {cell.settles.count} of {cell.count}: {_share(cell.settles)}"
     units = {PEAK: " N.m", VARIATION: " N.m", "settling_time": " s", "residual": " m"}
     for name, median in cell.medians.items():
-        those = "settle" if name == "settling_time" else "survive"
-        yield f"{name:<22}  {_median(median)}{units.get(name, '')}, median of those that {those}"
+        fate = "settle" if name == "settling_time" else "survive"
+        yield f"{name:<22}  {_median(median)}{units.get(name, '')}, median of those that {fate}"
 
 
 def _limits(outcome: Outcome) -> Iterator[list[str]]:

@@ -1,14 +1,14 @@
-"""What a shell proposes for a value: names that there are, looked up when they are asked for."""
+"""Shell completion of values: existing names, looked up on demand."""
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
 Complete = Callable[[str], list[str]]
-"""What can stand where `incomplete` does; of nothing, the shell proposes files"""
+"""Completions of an incomplete value; if there are none, the shell proposes files"""
 
 
 def among(*names: str) -> Complete:
-    """Some of a few names."""
+    """Completion among fixed names."""
     return lambda incomplete: starting(incomplete, names)
 
 
@@ -28,28 +28,29 @@ def plants(incomplete: str) -> list[str]:
 
 
 def vehicles(incomplete: str) -> list[str]:
-    """Vehicles that have a name, and files of others."""
+    """The names of vehicles, and vehicle files."""
     from orchestration.quadrotor.vehicle import ENDING, names
 
     return starting(incomplete, names()) + _files(incomplete, ENDING)
 
 
 def presets(incomplete: str) -> list[str]:
-    """Timings that have a name."""
+    """The names of presets of timings."""
     from orchestration.quadrotor.presets import PRESETS
 
     return starting(incomplete, PRESETS)
 
 
 def starting(incomplete: str, names: Iterable[str]) -> list[str]:
-    """Those names that go on from what is typed."""
+    """The names that begin with the incomplete value."""
     return [name for name in names if name.startswith(incomplete)]
 
 
 def _files(incomplete: str, ending: str) -> list[str]:
-    """Files of that ending and folders, by what is typed of a path."""
+    """Files with this ending, and folders, that begin with the incomplete path."""
     folder = Path(incomplete) if incomplete.endswith("/") else Path(incomplete).parent
     typed = incomplete.rpartition("/")
-    found = sorted(folder.iterdir()) if folder.is_dir() else []
-    kept = [f"{each.name}/" if each.is_dir() else each.name for each in found if each.is_dir() or each.suffix == ending]
+    entries = sorted(folder.iterdir()) if folder.is_dir() else []
+    fitting = [each for each in entries if each.is_dir() or each.suffix == ending]
+    kept = [f"{each.name}/" if each.is_dir() else each.name for each in fitting]
     return [f"{typed[0]}{typed[1]}{name}" for name in kept if name.startswith(typed[2]) and not name.startswith(".")]

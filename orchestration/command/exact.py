@@ -1,4 +1,4 @@
-"""The command that answers without a run."""
+"""The command `expect`, which needs no run."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from orchestration.basics.terminal import warn
-from orchestration.command import registry as registering
-from orchestration.command.answer import Answer
-from orchestration.command.flags import FlightFlags, Timing, flies, request_from
+from orchestration.command import registry
+from orchestration.command.command_result import CommandResult
+from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from orchestration.system.request import Request
 
 
-@flies
+@flight_options
 def expect(
     scenario: Annotated[
         Path | None,
@@ -27,7 +27,7 @@ def expect(
     ] = None,
     timing: Timing = None,
     as_simulated: Annotated[
-        bool, typer.Option("--as-simulated", help="What runs print on average: noise held, means over their rows.")
+        bool, typer.Option("--as-simulated", help="The average of what runs print: noise held, means over their rows.")
     ] = False,
     horizon: Annotated[
         float | None,
@@ -35,16 +35,18 @@ def expect(
     ] = None,
     *,
     flags: FlightFlags,
-) -> Answer:
-    """Expect the objectives that are means of squares exactly, of the loop about its operating point, without a run."""
-    from orchestration.exact.expect import expect as expected
+) -> CommandResult:
+    """Compute exact expectations of mean-square objectives of the loop about its operating point, without a run."""
+    from orchestration.exact.expect import expect as expectations
 
-    found = expected(request_from(scenario, flags, timing), as_simulated=as_simulated, horizon=horizon)
-    return Answer(document=found, lines=_lines(found))
+    expected = expectations(request_from(scenario, flags, timing), as_simulated=as_simulated, horizon=horizon)
+    return CommandResult(document=expected, lines=_lines(expected))
 
 
-def say_if_endless(request: "Request", systems: "Sequence[System] | None" = None, files: "Files | None" = None) -> None:
-    """Warn where averages over such runs mean nothing."""
+def warn_if_means_are_infinite(
+    request: "Request", systems: "Sequence[System] | None" = None, files: "Files | None" = None
+) -> None:
+    """Warn if averages over runs of these systems have no finite expectation."""
     from orchestration.building.inputs import files_of
     from orchestration.exact.infinite_means import infinite_means_warning
     from orchestration.system.request import system_of
@@ -55,25 +57,25 @@ def say_if_endless(request: "Request", systems: "Sequence[System] | None" = None
         warn(text)
 
 
-def _lines(found: "Expected") -> list[str]:
-    fourth = found.fourth_moment_radius
-    told = {
-        **{name: "-" if value is None else f"{value:.12g}" for name, value in found.objectives.items()},
-        "mean_square_radius": f"{found.mean_square_radius:.12g} in {found.period:g} s",
+def _lines(expected: "Expected") -> list[str]:
+    fourth = expected.fourth_moment_radius
+    texts = {
+        **{name: "-" if value is None else f"{value:.12g}" for name, value in expected.objectives.items()},
+        "mean_square_radius": f"{expected.mean_square_radius:.12g} in {expected.period:g} s",
         "fourth_moment_radius": "-" if fourth is None else f"{fourth:.12g}",
-        "accuracy": f"{found.accuracy:.1g} of each",
-        "method": found.method,
+        "accuracy": f"{expected.accuracy:.1g} of each",
+        "method": expected.method,
     }
-    width = max(map(len, told))
-    lines = [f"{name:<{width}}  {value}" for name, value in told.items()]
-    if fourth is not None and found.mean_square_radius < 1.0 <= fourth:
-        lines.append("fourth moments have no end: an interval of a mean square over runs means nothing here")
-    without: dict[str, list[str]] = {}
-    for name, why in found.reasons.items():
-        without.setdefault(why, []).append(name)
-    return [*lines, *(f"no {', '.join(listed)}: {why}" for why, listed in without.items())]
+    width = max(map(len, texts))
+    lines = [f"{name:<{width}}  {value}" for name, value in texts.items()]
+    if fourth is not None and expected.mean_square_radius < 1.0 <= fourth:
+        lines.append("fourth moments are infinite: confidence intervals of mean squares over runs are meaningless here")
+    names_by_reason: dict[str, list[str]] = {}
+    for name, reason in expected.reasons.items():
+        names_by_reason.setdefault(reason, []).append(name)
+    return [*lines, *(f"no {', '.join(names)}: {reason}" for reason, names in names_by_reason.items())]
 
 
 def register(app: typer.Typer) -> None:
     """Add the command to the command line."""
-    registering.add(app, registering.STUDY, expect)
+    registry.add(app, registry.STUDY, expect)

@@ -1,4 +1,4 @@
-"""Flags of the commands that draw: in which formats, how large, in which style."""
+"""Flags of the commands that draw: formats, size and style."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class FigureFlags:
-    """What was given on the command line; raises `UsageError` for what cannot be."""
+    """The flags on the command line; raises `UsageError` for invalid values."""
 
     format: Annotated[
         list[str] | None,
         typer.Option(
-            "--format", help=f"Of the files; default: {' and '.join(WRITTEN)}; may be repeated.",
+            "--format", help=f"Format of the files; default: {' and '.join(WRITTEN)}; may be repeated.",
             metavar="|".join(FORMATS), show_default=False,
         ),
     ] = None  # fmt: skip
@@ -30,7 +30,8 @@ class FigureFlags:
     width: Annotated[
         str | None,
         typer.Option(
-            "--width", help="In mm, or a column of a journal: single is 88.9, double 181.", metavar="MM|single|double",
+            "--width", help="Width in mm, or a column of a journal: single is 88.9, double 181.",
+            metavar="MM|single|double",
             show_default=False,
         ),
     ] = None  # fmt: skip
@@ -38,7 +39,7 @@ class FigureFlags:
         str | None, typer.Option("--size", help="Width and height in mm.", metavar="MMxMM", show_default=False)
     ] = None
     font_size: Annotated[
-        float | None, typer.Option("--font-size", help="Of the text, in points.", metavar="PT", show_default=False)
+        float | None, typer.Option("--font-size", help="Size of the text in points.", metavar="PT", show_default=False)
     ] = None
 
     def __post_init__(self) -> None:
@@ -48,14 +49,14 @@ class FigureFlags:
         if self.style not in STYLES:
             raise UsageError(f"--style {self.style}: expected one of {', '.join(STYLES)}")
         if self.size is not None and self.width is not None:
-            raise UsageError("--size: expected no --width with it; it has the width")
+            raise UsageError("--size: expected no --width; the size includes the width")
         if self.font_size is not None and not 1.0 <= self.font_size <= 100.0:
             raise UsageError(f"--font-size {self.font_size:g}: expected 1 to 100 points")
         _ = self._extent
 
     @property
-    def chosen(self) -> "Style":
-        """The style with what was given beside it."""
+    def figure_style(self) -> "Style":
+        """The style with the sizes and formats of these flags."""
         from dataclasses import replace
 
         from orchestration.figures.style import STYLES as KNOWN
@@ -76,12 +77,12 @@ class FigureFlags:
         return {"width": COLUMNS.get(self.width) or _millimetres("--width", self.width, self.width)}
 
 
-def _millimetres(flag: str, given: str, text: str) -> float:
+def _millimetres(flag: str, argument: str, text: str) -> float:
     try:
         value = float(text.removesuffix("mm"))
     except ValueError:
         value = -1.0
     if not 20.0 <= value <= 2000.0:
         expected = "MMxMM, as in 120x80" if flag == "--size" else f"{', '.join(COLUMNS)} or millimetres"
-        raise UsageError(f"{flag} {given}: expected {expected}, each from 20 to 2000 mm")
+        raise UsageError(f"{flag} {argument}: expected {expected}, each from 20 to 2000 mm")
     return value

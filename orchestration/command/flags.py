@@ -1,4 +1,4 @@
-"""The flags of every command that flies, declared once."""
+"""The flags of every command that runs a scenario or a system."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -11,8 +11,8 @@ from orchestration.basics.attribute_docs import FieldDoc, attribute_docs
 from orchestration.basics.documents import toml_of
 from orchestration.basics.errors import UsageError
 from orchestration.command import completion
-from orchestration.command.build_flag import builds
-from orchestration.command.shared_flags import Command, takes
+from orchestration.command.build_flag import build_option
+from orchestration.command.option_group import Command, option_group
 from orchestration.system.choices import Clock, Hold, Order, Spread
 
 if TYPE_CHECKING:
@@ -24,13 +24,13 @@ TIMING, EFFECTS, MODEL = "Timing", "Disturbances of the loop", "Model"
 
 
 def _option(*names: str, panel: str, text: str, metavar: str = "SECONDS", **options: Any) -> Any:
-    if "autocompletion" not in options and metavar.islower():  # alternatives, but for P, N, R and what they are of
+    if "autocompletion" not in options and metavar.islower():  # alternatives, unlike P, N and R
         options["autocompletion"] = completion.among(*metavar.split("|"))
     return typer.Option(*names, help=text, metavar=metavar, rich_help_panel=panel, show_default=False, **options)
 
 
 def _of_timing(key: str, *, panel: str = EFFECTS, **options: Any) -> Any:
-    """The flag of a key of `[timing]`, in the words of the record."""
+    """The flag of a key of `[timing]`, with the text of the record."""
     return _of_record("timing", "Timing", key, panel=panel, **options)
 
 
@@ -49,7 +49,7 @@ def _of_record(
 
 @dataclass(frozen=True, kw_only=True)
 class FlightFlags:
-    """What was given on the command line; None: not given, the scenario decides."""
+    """The flags on the command line; None: not set, the scenario's value applies."""
 
     period: Annotated[float | None, _of_timing("period", panel=TIMING, tells_default=True)] = None
     offset: Annotated[float | None, _of_timing("offset", panel=TIMING)] = None
@@ -121,7 +121,7 @@ class FlightFlags:
             "--reference",
             panel=MODEL,
             metavar="NAME|FILE.csv",
-            text="What to follow: hover, step, circle, lemniscate, helix, paper, or way-points; parameters by --set.",
+            text="The reference: hover, step, circle, lemniscate, helix, paper, or way-points; parameters by --set.",
         ),
     ] = None
     disturbance: Annotated[
@@ -130,7 +130,7 @@ class FlightFlags:
             "--disturbance",
             panel=MODEL,
             metavar="NAME|FILE.csv",
-            text="What pushes the vehicle: dryden (gusts), or force or wind over time; its parameters by --set.",
+            text="Disturbance of the vehicle: dryden (gusts), or force or wind over time; parameters by --set.",
         ),
     ] = None
     native: Annotated[
@@ -139,7 +139,7 @@ class FlightFlags:
             "--native",
             panel=MODEL,
             metavar="",
-            text="Native twins (no Python inside) of FMUs built from sources here; built if need be.",
+            text="Use native twins (no Python inside) of FMUs with sources here; built if need be.",
         ),
     ] = None
     set: Annotated[
@@ -153,7 +153,7 @@ class FlightFlags:
     ] = None
 
     def applied_to(self, scenario: "Scenario") -> "Scenario":
-        """`scenario` with what was given; raises `UsageError` for what cannot be."""
+        """`scenario` with these flags; raises `UsageError` for invalid values."""
         from orchestration.building.fmus import native_twins
         from orchestration.quadrotor.presets import preset_timing
         from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice, choice_of
@@ -166,10 +166,10 @@ class FlightFlags:
         if (loss := self._timed("loss")) is not None:
             timing = {"measurement_loss": loss, "command_loss": loss, **timing}
         for name in _BY_MEASUREMENT:
-            given = getattr(self, name)
-            if given:
+            texts = getattr(self, name)
+            if texts:
                 old: Mapping[str, float] = getattr(scenario.timing, name)
-                timing[name] = {**old, **{key: _number(f"--{name} {key} =", text) for key, text in _pairs(name, given)}}
+                timing[name] = {**old, **{key: _number(f"--{name} {key} =", text) for key, text in _pairs(name, texts)}}
         top: dict[str, Any] = {
             name: value
             for name in ("seed", "stop_time", "model_mismatch")
@@ -189,19 +189,19 @@ class FlightFlags:
         return native_twins(changed) if self.native else changed
 
     def _timed(self, key: str) -> Any:
-        """The value of a flag; of one that may be drawn a number, or the text of the table that says how."""
+        """The value of a flag; of one that may be random a number, or the text of the table of its distribution."""
         from orchestration.quadrotor.timing import Timing
         from orchestration.system.distribution import AS_TABLE
         from orchestration.system.distribution_table import is_table, may_vary
 
-        given = getattr(self, key)
-        if given is None or is_table(given) or not (key == "loss" or key in may_vary(Timing)):
-            return given
-        expected = f"a number, or a table that says how it is distributed, {AS_TABLE}"
-        return _number(f"--{key.replace('_', '-')}", given, expected)
+        text = getattr(self, key)
+        if text is None or is_table(text) or not (key == "loss" or key in may_vary(Timing)):
+            return text
+        expected = f"a number, or a table of its distribution, {AS_TABLE}"
+        return _number(f"--{key.replace('_', '-')}", text, expected)
 
     def applied_to_system(self, system: "System") -> "System":
-        """`system` with what was given; raises `UsageError` for flags that are for the quadrotor only."""
+        """`system` with these flags; raises `UsageError` for flags that apply to the quadrotor only."""
         from orchestration.building.fmus import native_twins
         from orchestration.system.paths import changed
 
@@ -209,9 +209,9 @@ class FlightFlags:
         top: dict[str, Any] = {
             name: value for name in ("seed", "stop_time") if (value := getattr(self, name)) is not None
         }
-        foreign = [f.name for f in fields(self) if f.name not in of_systems and getattr(self, f.name)]
-        if foreign:
-            flags = ", ".join(f"--{name.replace('_', '-')}" for name in foreign)
+        of_quadrotor = [f.name for f in fields(self) if f.name not in of_systems and getattr(self, f.name)]
+        if of_quadrotor:
+            flags = ", ".join(f"--{name.replace('_', '-')}" for name in of_quadrotor)
             raise UsageError(
                 f"{flags}: for the quadrotor only; expected --set PATH=V for a system, as connections.NAME.delay"
             )
@@ -238,13 +238,13 @@ Timing = Annotated[
 _BY_MEASUREMENT = ("noise", "quantisation")
 
 
-def flies(command: Command) -> Command:
-    """Give a command all flight flags, and that by which it may build."""
-    return builds(takes("flags", FlightFlags)(command))
+def flight_options(command: Command) -> Command:
+    """Give a command the flags of this module and `--build`."""
+    return build_option(option_group("flags", FlightFlags)(command))
 
 
 def request_from(path: Path | None, flags: FlightFlags, timing: Path | None = None) -> "Request":
-    """The system or the scenario of a file, an SSP's with its timing, or the paper's, with the flags applied."""
+    """The system or scenario of a file, an SSP with its timing, or the paper's scenario, with the flags applied."""
     from orchestration.quadrotor.scenario import Scenario
     from orchestration.requests.request import load_request
 
@@ -252,18 +252,18 @@ def request_from(path: Path | None, flags: FlightFlags, timing: Path | None = No
     return flags.applied_to(request) if isinstance(request, Scenario) else flags.applied_to_system(request)
 
 
-def assigned(flag: str, given: list[str] | None) -> dict[str, Any]:
-    """The values of a flag that may be repeated, by name; raises `UsageError` for what is no NAME=VALUE."""
-    return {key: _value(text) for key, text in _pairs(flag, given or [])}
+def assigned(flag: str, texts: list[str] | None) -> dict[str, Any]:
+    """The values of a repeated flag by name; raises `UsageError` for a text that is not NAME=VALUE."""
+    return {key: _value(text) for key, text in _pairs(flag, texts or [])}
 
 
-def _pairs(flag: str, given: list[str]) -> list[tuple[str, str]]:
+def _pairs(flag: str, texts: list[str]) -> list[tuple[str, str]]:
     pairs = []
-    for text in given:
+    for text in texts:
         key, equals, value = text.partition("=")
         if key.strip() in ("controller.fmu", "plant.fmu"):
             side = key.strip().removesuffix(".fmu")
-            raise UsageError(f"--{flag} {text}: expected a parameter; the FMU is given by --{side} NAME|PATH")
+            raise UsageError(f"--{flag} {text}: expected a parameter; set the FMU by --{side} NAME|PATH")
         if not (key and equals and value):
             raise UsageError(f"--{flag} {text}: expected NAME=VALUE")
         pairs.append((key.strip(), value.strip()))
@@ -278,7 +278,7 @@ def _number(place: str, text: str, expected: str = "a number") -> float:
 
 
 def _value(text: str) -> Any:
-    """What somebody means: true or false, a number, an array, else a text; what is in quotes is a text in any case."""
+    """The value of a text: true or false, a number, an array, else the text itself, as always in quotes."""
     if text.startswith("["):
         return toml_of(f"value = {text}", text)["value"]
     if text.lower() in ("true", "false"):

@@ -6,10 +6,9 @@ from typing import Annotated
 import typer
 
 from orchestration.basics.terminal import inform, progress_bar
-from orchestration.command import completion
-from orchestration.command import registry as registering
-from orchestration.command.answer import Answer
-from orchestration.command.flags import FlightFlags, Timing, flies, request_from
+from orchestration.command import completion, registry
+from orchestration.command.command_result import CommandResult
+from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
 
 
 def _tools(incomplete: str) -> list[str]:
@@ -18,7 +17,7 @@ def _tools(incomplete: str) -> list[str]:
     return completion.starting(incomplete, [name for name in TOOLS if " " not in name])
 
 
-@flies
+@flight_options
 def interop(
     scenario: Annotated[
         Path | None,
@@ -34,7 +33,7 @@ def interop(
     ] = None,
     *,
     flags: FlightFlags,
-) -> Answer:
+) -> CommandResult:
     """Run a system in third-party masters and compare every signal with this one's.
 
     Exit code 1 if a tool is farther than 1e-9 in a state, its own first inputs given to this master too.
@@ -44,10 +43,10 @@ def interop(
     from orchestration.interop.compare import agreements
     from orchestration.system.request import system_of
 
-    asked = request_from(scenario, flags, timing)
-    tools = chosen(tool, system_of(asked).components)
-    with progress_bar("flying in other masters") as progress:
-        found = agreements(asked, tools, announce=inform, progress=progress)
+    request = request_from(scenario, flags, timing)
+    tools = chosen(tool, system_of(request).components)
+    with progress_bar("running other masters") as progress:
+        found = agreements(request, tools, announce=inform, progress=progress)
     if out is not None:
         from orchestration.interop.figure import draw
 
@@ -57,9 +56,9 @@ def interop(
     if far:
         inform(f"farther than {table.AIM:g} from this project's master: {'; '.join(far)}")
     document = [table.as_dict(agreement) for agreement in found]
-    return Answer(document=document, lines=table.text(found).splitlines(), good=not far)
+    return CommandResult(document=document, lines=table.text(found).splitlines(), good=not far)
 
 
 def register(app: typer.Typer) -> None:
     """Add the command to the command line."""
-    registering.add(app, registering.TOOLS, interop)
+    registry.add(app, registry.TOOLS, interop)

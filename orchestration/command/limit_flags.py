@@ -1,4 +1,4 @@
-"""Flags of what a process may take: one that looks at foreign files, and one that flies."""
+"""Flags for the resource limits of processes: of checks of FMUs, and of runs."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -11,20 +11,22 @@ from orchestration.processes.limits import Limits
 
 @dataclass(frozen=True, kw_only=True)
 class LimitFlags:
-    """What was given on the command line; raises `UsageError` for what is not positive."""
+    """The limits of checks; raises `UsageError` for values that are not positive."""
 
     time_limit: Annotated[
-        float, typer.Option("--time-limit", help="For all that is done with an FMU.", metavar="SECONDS")
+        float,
+        typer.Option("--time-limit", help="Time limit for all checks of an FMU.", metavar="SECONDS"),
     ] = Limits.time
     memory_limit: Annotated[
-        float, typer.Option("--memory-limit", help="Of the FMU's process and what it starts (Linux).", metavar="MB")
+        float,
+        typer.Option("--memory-limit", help="Memory of the FMU's process and its children (Linux).", metavar="MB"),
     ] = Limits.memory
     size_limit: Annotated[
-        float, typer.Option("--size-limit", help="That an FMU may unpack to, and a file that it writes.", metavar="MB")
+        float, typer.Option("--size-limit", help="Size of an unpacked FMU, and of a file that it writes.", metavar="MB")
     ] = Limits.size
-    output_limit: Annotated[float, typer.Option("--output-limit", help="That an FMU may print.", metavar="MB")] = (
-        Limits.output
-    )
+    output_limit: Annotated[
+        float, typer.Option("--output-limit", help="Output that an FMU may print.", metavar="MB")
+    ] = Limits.output
 
     def __post_init__(self) -> None:
         for name in ("time", "memory", "size", "output"):
@@ -32,7 +34,7 @@ class LimitFlags:
 
     @property
     def limits(self) -> Limits:
-        """The same for the process."""
+        """The limits for the process."""
         return Limits(time=self.time_limit, memory=self.memory_limit, size=self.size_limit, output=self.output_limit)
 
 
@@ -49,7 +51,7 @@ TimeLimit = Annotated[
 
 @dataclass(frozen=True, kw_only=True)
 class ProcessFlags:
-    """What was given on the command line of a run; raises `UsageError` for what is not positive."""
+    """The limits of a run; raises `UsageError` for values that are not positive."""
 
     in_process: Annotated[
         bool,
@@ -70,6 +72,6 @@ class ProcessFlags:
 
 
 def expect_positive(flag: str, value: float | None, unit: str) -> None:
-    """Raise `UsageError` for a limit that is none."""
+    """Raise `UsageError` for a limit that is not positive."""
     if value is not None and not value > 0.0:
         raise UsageError(f"{flag} {value:g}: expected a positive number of {unit}")

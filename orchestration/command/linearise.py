@@ -5,14 +5,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from orchestration.command.answer import Answer
-from orchestration.command.flags import FlightFlags, Timing, flies, request_from
+from orchestration.command.command_result import CommandResult
+from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
 
 if TYPE_CHECKING:
     from orchestration.stability.state_space import StateSpace
 
 
-@flies
+@flight_options
 def linearise(
     scenario: Annotated[
         Path | None,
@@ -32,25 +32,25 @@ def linearise(
     ] = None,
     *,
     flags: FlightFlags,
-) -> Answer:
-    """A loop about its operating point as matrices, from sample to sample: a component, and all else as it sees it.
+) -> CommandResult:
+    """Linearise a loop about its operating point, from sample to sample: a component, and the rest of the loop.
 
-    With --json A, B, C and D of both, and what their inputs and outputs are.
+    With --json A, B, C and D of both, and the names of their inputs and outputs.
     """
-    from orchestration.stability.linearise import linearise as linearised
+    from orchestration.stability.linearise import linearise as linearised_loop
 
-    found = linearised(request_from(scenario, flags, timing), component)
-    halves = {found.name: found.component, "rest": found.rest}
-    document = {"name": found.name, "component": _matrices(found.component), "rest": _matrices(found.rest)}
-    return Answer(document=document, lines=[f"{name:<17}  {_in_words(half)}" for name, half in halves.items()])
+    loop = linearised_loop(request_from(scenario, flags, timing), component)
+    halves = {loop.name: loop.component, "rest": loop.rest}
+    document = {"name": loop.name, "component": _matrices(loop.component), "rest": _matrices(loop.rest)}
+    return CommandResult(document=document, lines=[f"{name:<17}  {_summary(half)}" for name, half in halves.items()])
 
 
 def _matrices(system: "StateSpace") -> dict[str, object]:
-    """As a document."""
+    """A system as a document."""
     matrices = {name: getattr(system, name).tolist() for name in "ABCD"}
     return {**matrices, "dt": system.dt, "inputs": system.inputs, "outputs": system.outputs}
 
 
-def _in_words(system: "StateSpace") -> str:
+def _summary(system: "StateSpace") -> str:
     inputs, outputs = (", ".join(names) for names in (system.inputs, system.outputs))
     return f"{inputs} → {outputs}; {len(system.A)} states, every {system.dt:g} s"

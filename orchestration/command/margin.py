@@ -1,4 +1,4 @@
-"""The command about what linear theory promises: how late, and how unevenly late, a loop may be."""
+"""The commands of linear theory: tolerated delays and their variation, and the linearised loop."""
 
 import dataclasses
 from pathlib import Path
@@ -8,16 +8,16 @@ import typer
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.terminal import inform
-from orchestration.command import registry as registering
-from orchestration.command.answer import Answer
-from orchestration.command.flags import FlightFlags, Timing, flies, request_from
+from orchestration.command import registry
+from orchestration.command.command_result import CommandResult
+from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
 from orchestration.command.linearise import linearise
 
 if TYPE_CHECKING:
     from orchestration.system.request import Request
 
 
-@flies
+@flight_options
 def margin(
     scenario: Annotated[
         Path | None,
@@ -31,43 +31,45 @@ def margin(
         str | None,
         typer.Option(
             "--of",
-            help="What varies from draw to draw: the path of a delay_jitter, of a sampling.jitter, of a task's "
-            "execution or jitter, or of a loss, which stands for the longest run of losses. Default: the delays of the "
-            "quadrotor's command, by bounds.",
+            help="The quantity that varies: the path of a delay_jitter, of a sampling.jitter, of a task's execution or "
+            "jitter, or of a loss (here the longest run of losses). Default: the delays of the quadrotor's command, by "
+            "bounds.",
             metavar="PATH",
             show_default=False,
         ),
     ] = None,
     and_of: Annotated[
         str | None,
-        typer.Option("--and", help="With --of: what varies beside it; a region is drawn.", metavar="PATH"),
+        typer.Option("--and", help="With --of: a second quantity that varies; draws a region.", metavar="PATH"),
     ] = None,
     check: Annotated[
         Path | None,
-        typer.Option("--check", help="Verify a certificate, and with a file that it is of that loop.", metavar="FILE"),
+        typer.Option(
+            "--check", help="Verify a certificate, and with a file that it belongs to that loop.", metavar="FILE"
+        ),
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", help="Where the certificate is written; with --and the folder.", metavar="CERTIFICATE"),
+        typer.Option("--out", help="File of the certificate; with --and the folder.", metavar="CERTIFICATE"),
     ] = None,
     *,
     flags: FlightFlags,
-) -> Answer:
-    """How late, and how unevenly, messages and samples may be before the linear loop can become unstable; proofs."""
+) -> CommandResult:
+    """Find how late, and how irregular, messages and samples may be with the linear loop provably stable."""
     if of is None and (and_of is not None or (check is None and out is not None)):
         raise UsageError(f"{'--out' if and_of is None else '--and'}: expected --of PATH beside it")
     if check is not None:
         if of is not None or out is not None:
-            raise UsageError("--check: expected neither --of nor --out; what varies is in the certificate")
-        given = scenario is not None or flags != FlightFlags()
-        return _checked(check, request_from(scenario, flags, timing) if given else None)
+            raise UsageError("--check: expected neither --of nor --out; the certificate has what varies")
+        has_loop = scenario is not None or flags != FlightFlags()
+        return _checked(check, request_from(scenario, flags, timing) if has_loop else None)
     request = request_from(scenario, flags, timing)
     if of is None:
         return _of_hover(request)
     return _certified(request, of, out) if and_of is None else _region(request, of, and_of, out)
 
 
-def _certified(request: "Request", of: str, out: Path | None) -> Answer:
+def _certified(request: "Request", of: str, out: Path | None) -> CommandResult:
     from orchestration.certificates.margin import margin as certify
 
     found = certify(request, of, progress="bar")
@@ -85,10 +87,10 @@ def _certified(request: "Request", of: str, out: Path | None) -> Answer:
         "states": found.states,
         "certificate": written or "-",
     }
-    return Answer(document=document, lines=[f"{name:<17}  {value}" for name, value in shown.items()])
+    return CommandResult(document=document, lines=[f"{name:<17}  {value}" for name, value in shown.items()])
 
 
-def _region(request: "Request", of: str, and_of: str, out: Path | None) -> Answer:
+def _region(request: "Request", of: str, and_of: str, out: Path | None) -> CommandResult:
     from orchestration.certificates.region import region
 
     found = region(request, of, and_of, progress="bar")
@@ -99,10 +101,10 @@ def _region(request: "Request", of: str, and_of: str, out: Path | None) -> Answe
     lines = [f"{of} and {and_of}", f"searched           {found.searched}"]
     lines += [f"certified          {a:.6g} s and {b:.6g} s" for a, b in found.certified]
     lines += [f"breaking           {a:.6g} s and {b:.6g} s" for a, b in found.breaking]
-    return Answer(document=document, lines=lines)
+    return CommandResult(document=document, lines=lines)
 
 
-def _checked(path: Path, request: "Request | None") -> Answer:
+def _checked(path: Path, request: "Request | None") -> CommandResult:
     from orchestration.certificates.check import check
 
     found = check(path, request)
@@ -113,15 +115,15 @@ def _checked(path: Path, request: "Request | None") -> Answer:
         often = "any number of times in a row" if run is None else f"at most {run} times in a row"
         lines.append(f"{name:<17}  {', '.join(filter(None, [values, often]))}")
     lines.append(f"{'proved':<17}  no sequence of these makes the {found.states} numbers of the loop grow")
-    lines.append(f"{'radius':<17}  {found.radius:g} of what was measured")
+    lines.append(f"{'radius':<17}  {found.radius:g} of the measured one")
     of = " and ".join(found.of)
     if found.up_to is not None:
         lines.append(f"{'so it holds for':<17}  {of} from 0 to {found.up_to:.9g} s")
     lines.append(f"{'loop':<17}  {of + ' of this system' if of else 'the matrices in the file; no system was given'}")
-    return Answer(document=found, lines=lines)
+    return CommandResult(document=found, lines=lines)
 
 
-def _of_hover(chosen: "Request") -> Answer:
+def _of_hover(request: "Request") -> CommandResult:
     """The delays of the quadrotor about hover: constant ones exactly, varying ones by bounds."""
     from orchestration.building.inputs import files_of
     from orchestration.flight.margin import margin_of
@@ -129,14 +131,14 @@ def _of_hover(chosen: "Request") -> Answer:
     from orchestration.quadrotor.scenario import Scenario
     from orchestration.system.request import system_of
 
-    if not isinstance(chosen, Scenario):
+    if not isinstance(request, Scenario):
         raise UsageError("margin: expected a scenario of the quadrotor, or --of PATH")
-    found = dataclasses.asdict(isolated_call(files_of(system_of(chosen)).fmus.values(), margin_of, chosen))
+    found = dataclasses.asdict(isolated_call(files_of(system_of(request)).fmus.values(), margin_of, request))
     lines = []
     for name, value in found.items():
         shown = " ".join(f"{share:g}" for share in value) if isinstance(value, tuple) else value
         lines.append(f"{name:<17}  {f'{value:.6g} s' if isinstance(value, float) else '-' if value is None else shown}")
-    return Answer(document=found, lines=lines)
+    return CommandResult(document=found, lines=lines)
 
 
 def _number(value: float | None, unit: str) -> str:
@@ -144,5 +146,5 @@ def _number(value: float | None, unit: str) -> str:
 
 
 def register(app: typer.Typer) -> None:
-    """Add what is asked of linear theory to the command line."""
-    registering.add(app, registering.STUDY, margin, linearise)
+    """Add the commands to the command line."""
+    registry.add(app, registry.STUDY, margin, linearise)

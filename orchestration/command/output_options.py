@@ -1,4 +1,4 @@
-"""The flags that every command has: how it talks, and to whom."""
+"""The output flags of every command."""
 
 import logging
 from dataclasses import dataclass, fields
@@ -16,8 +16,8 @@ def _option(*names: str, text: str, metavar: str = "") -> Any:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Manners:
-    """What was given on the command line; raises `UsageError` for flags that contradict each other."""
+class OutputOptions:
+    """The output flags; raises `UsageError` for flags that contradict each other."""
 
     as_json: Annotated[
         bool, _option("--json", text="Print the result as one JSON document; all else goes to standard error.")
@@ -27,16 +27,16 @@ class Manners:
     log: Annotated[
         Path | None, _option("--log", metavar="FILE", text="Append all output and steps to FILE, with times.")
     ] = None
-    debug: Annotated[bool, _option("--debug", text="Show where in the program an error came from.")] = False
+    debug: Annotated[bool, _option("--debug", text="Print the traceback of an error.")] = False
 
     def __post_init__(self) -> None:
         if self.quiet and self.verbose:
             raise UsageError("--quiet --verbose: expected one of them")
 
-    def joined(self, other: "Manners") -> "Manners":
-        """These and those of `other`: what stands before a command and what stands behind it."""
-        return Manners(**{f.name: getattr(other, f.name) or getattr(self, f.name) for f in fields(self)})
+    def joined(self, other: "OutputOptions") -> "OutputOptions":
+        """These and those of `other`: the flags before a command and those after it."""
+        return OutputOptions(**{f.name: getattr(other, f.name) or getattr(self, f.name) for f in fields(self)})
 
-    def take_hold(self) -> None:
-        """From now on messages go where these flags say; raises `OSError` for a log that cannot be written."""
+    def apply(self) -> None:
+        """Configure messages by these flags; raises `OSError` for a log that cannot be written."""
         terminal.configure(logging.DEBUG if self.verbose else logging.WARNING if self.quiet else logging.INFO, self.log)

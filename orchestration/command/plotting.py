@@ -1,4 +1,4 @@
-"""The command that draws runs: one, or several laid over each other."""
+"""The command that draws runs: one, or several overlaid."""
 
 import math
 import os
@@ -10,27 +10,27 @@ import typer
 
 from orchestration.basics.errors import UsageError, shown
 from orchestration.basics.terminal import Share, progress_bar
-from orchestration.command import registry as registering
-from orchestration.command.answer import Answer, of_files
+from orchestration.command import registry
+from orchestration.command.command_result import CommandResult, result_of_files
 from orchestration.command.figure_flags import FigureFlags
-from orchestration.command.shared_flags import takes
+from orchestration.command.option_group import option_group
 from orchestration.flight.names import FIGURES
 
 if TYPE_CHECKING:
     from orchestration.figures.style import Style
     from orchestration.runs.result import Result
 
-TOGETHER = "overlay"
-"""Folder beside the runs for what shows several of them"""
+OVERLAY = "overlay"
+"""Folder beside the runs for figures of several of them"""
 
 
-@takes("look", FigureFlags)
+@option_group("look", FigureFlags)
 def plot(
     directory: Annotated[list[Path], typer.Argument(help="Directories of runs.", metavar="DIR…")],
     start: Annotated[
-        float | None, typer.Option("--from", help="Start of what is seen, in seconds.", show_default=False)
+        float | None, typer.Option("--from", help="Start of the time axis, in seconds.", show_default=False)
     ] = None,
-    end: Annotated[float | None, typer.Option("--to", help="End of what is seen.", show_default=False)] = None,
+    end: Annotated[float | None, typer.Option("--to", help="End of the time axis.", show_default=False)] = None,
     figure: Annotated[
         list[str] | None,
         typer.Option(
@@ -40,7 +40,7 @@ def plot(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", help=f"Folder of the figures; default: that of the run, or {TOGETHER}/ beside several.",
+            "--out", help=f"Folder of the figures; default: that of the run, or {OVERLAY}/ beside several.",
             metavar="DIR", show_default=False,
         ),
     ] = None,
@@ -53,9 +53,9 @@ def plot(
     ] = None,
     *,
     look: FigureFlags,
-) -> Answer:  # fmt: skip
-    """Draw the figures of a run again, or of several runs laid over each other, for a screen, a paper or slides."""
-    with progress_bar("drawing") as progress:  # before what draws is loaded, which takes its time
+) -> CommandResult:  # fmt: skip
+    """Draw the figures of a run again, or of several runs overlaid, for a screen, a paper or slides."""
+    with progress_bar("drawing") as progress:  # first, as importing matplotlib takes time
         from orchestration.figures.style import save
         from orchestration.runs.draw import draw
         from orchestration.runs.run_directory import load_run
@@ -65,13 +65,13 @@ def plot(
         names = labels_of_runs(results, [str(one) for one in directory])
         window = _window(results, start, end)
         if film is not None:
-            return of_files([_filmed(results, names, window, film, look.chosen, progress)])
-        made = draw(results, figure, names=names, window=window, style=look.chosen)
-        place = out or (directory[0] if len(directory) == 1 else _beside(directory))
-        return of_files(save(made, place, look.chosen, progress))
+            return result_of_files([_write_film(results, names, window, film, look.figure_style, progress)])
+        figures = draw(results, figure, names=names, window=window, style=look.figure_style)
+        folder = out or (directory[0] if len(directory) == 1 else _beside(directory))
+        return result_of_files(save(figures, folder, look.figure_style, progress))
 
 
-def _filmed(
+def _write_film(
     results: "Sequence[Result]",
     names: Sequence[str],
     window: tuple[float, float] | None,
@@ -83,7 +83,7 @@ def _filmed(
     from orchestration.runs.draw import runs_of
 
     if not all({*result.recording.columns} >= filming.COLUMNS for result in results):
-        raise UsageError("--film: expected runs of a quadrotor; figures show what other systems do")
+        raise UsageError("--film: expected runs of a quadrotor; other systems have figures only")
     return filming.film(runs_of(results, names, filming.COLUMNS | {"time"}, window), film, style, progress)
 
 
@@ -101,10 +101,10 @@ def _window(results: "Sequence[Result]", start: float | None, end: float | None)
 
 
 def _beside(directories: Sequence[Path]) -> Path:
-    """A folder in the nearest one that holds all of them."""
-    return Path(os.path.commonpath([path.absolute().parent for path in directories])) / TOGETHER
+    """The folder of overlaid figures, in the nearest folder that contains all runs."""
+    return Path(os.path.commonpath([path.absolute().parent for path in directories])) / OVERLAY
 
 
 def register(app: typer.Typer) -> None:
     """Add the command to the command line."""
-    registering.add(app, registering.FLY, plot)
+    registry.add(app, registry.RUN, plot)

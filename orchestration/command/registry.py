@@ -1,4 +1,4 @@
-"""How a function becomes a command: it answers, and what every command has is added here."""
+"""Turns functions into commands: adds the flags of every command and prints their results."""
 
 import shlex
 from collections.abc import Callable, Sequence
@@ -8,48 +8,48 @@ from typing import Any
 import typer
 
 from orchestration.basics import terminal
-from orchestration.command.answer import Answer
-from orchestration.command.output_options import Manners
-from orchestration.command.shared_flags import takes
+from orchestration.command.command_result import CommandResult
+from orchestration.command.option_group import option_group
+from orchestration.command.output_options import OutputOptions
 
-FLY, STUDY, FMUS, TOOLS = "Run", "Study", "FMUs", "Other tools"
+RUN, STUDY, FMUS, TOOLS = "Run", "Study", "FMUs", "Other tools"
 """Groups of commands in the help"""
 
 arguments: Sequence[str] = ()
-"""What the command line was started with"""
-manners = Manners()
-"""Of the command at hand: what stands before it, and then what stands behind it too"""
+"""of the command line"""
+output_options = OutputOptions()
+"""of the current command: those before it, then also those after it"""
 
 
-def behave(given: Manners, *, anew: bool = False) -> None:
-    """Add flags to those that hold; `anew`: instead of them."""
-    global manners
-    manners = given if anew else manners.joined(given)
-    manners.take_hold()
+def set_output_options(options: OutputOptions, *, anew: bool = False) -> None:
+    """Add flags to the current ones, or with `anew` replace them."""
+    global output_options
+    output_options = options if anew else output_options.joined(options)
+    output_options.apply()
 
 
-def add(app: typer.Typer, group: str, *commands: Callable[..., Answer]) -> None:
+def add(app: typer.Typer, group: str, *commands: Callable[..., CommandResult]) -> None:
     """Add commands to the command line, in a group of its help."""
     for command in commands:
-        app.command(rich_help_panel=group)(_answering(command))
+        app.command(rich_help_panel=group)(_printing(command))
 
 
-def _answering(command: Callable[..., Answer]) -> Callable[..., None]:
-    @takes("manners", Manners)
+def _printing(command: Callable[..., CommandResult]) -> Callable[..., None]:
+    @option_group("output_options", OutputOptions)
     @wraps(command)
-    def call(manners: Manners, **given: Any) -> None:
-        behave(manners)
+    def call(output_options: OutputOptions, **others: Any) -> None:
+        set_output_options(output_options)
         terminal.detail(shlex.join(["quadcosim", *arguments]))
-        give(command(**given))
+        print_result(command(**others))
 
     return call
 
 
-def give(answer: Answer) -> None:
-    """Print what a command answers, as the flags have it."""
-    text = answer.as_json if manners.as_json else "\n".join(answer.lines)
+def print_result(result: CommandResult) -> None:
+    """Print the result of a command in the form of the flags."""
+    text = result.as_json if output_options.as_json else "\n".join(result.lines)
     if text:
         print(text)
         terminal.note(text)
-    if not answer.good:
+    if not result.good:
         raise typer.Exit(1)

@@ -6,12 +6,12 @@ from typing import Annotated
 import typer
 
 from orchestration.basics.terminal import progress_bar
-from orchestration.command import registry as registering
-from orchestration.command.answer import Answer, of_files
-from orchestration.command.build_flag import builds
+from orchestration.command import registry
+from orchestration.command.build_flag import build_option
+from orchestration.command.command_result import CommandResult, result_of_files
 
 
-@builds
+@build_option
 def report(
     what: Annotated[
         list[Path],
@@ -25,8 +25,8 @@ def report(
         Path | None,
         typer.Option(
             "--out",
-            help="The file, default report_NAME.html here; or the folder of the study's store, default results/NAME, "
-            "where the file goes then.",
+            help="The file; default: report_NAME.html here. Or the folder of the study's store, default results/NAME, "
+            "which the file is then written to.",
             metavar="FILE.html|DIR",
         ),
     ] = None,
@@ -35,7 +35,7 @@ def report(
         typer.Option(
             "--flights",
             min=0,
-            help="How many runs of a study are embedded with their signals; default: 1000.",
+            help="Number of runs of a study whose signals are embedded; default: 1000.",
             metavar="N",
             show_default=False,
         ),
@@ -44,14 +44,14 @@ def report(
         list[int] | None,
         typer.Option("--run", help="A run of the study to embed; may be repeated.", metavar="K"),
     ] = None,
-) -> Answer:
+) -> CommandResult:
     """Write runs, a study or a comparison as one HTML file: replay, plots, maps; it needs no network."""
     from orchestration.report.writing import report as write
 
-    with progress_bar("flying") as progress:
-        return of_files([write(*what, out=out, flights=flights, runs=run or [], progress=progress)])
+    with progress_bar("running") as progress:
+        return result_of_files([write(*what, out=out, flights=flights, runs=run or [], progress=progress)])
 
 
 def register(app: typer.Typer) -> None:
     """Add the command to the command line."""
-    registering.add(app, registering.FLY, report)
+    registry.add(app, registry.RUN, report)

@@ -1,4 +1,4 @@
-"""The command that is about computers and networks alone: who has them when, and what theory says of it."""
+"""The command `schedule`: timeline and response times of computers and networks, with bounds of theory."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
@@ -9,8 +9,8 @@ import typer
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.terminal import inform
-from orchestration.command import registry as registering
-from orchestration.command.answer import Answer
+from orchestration.command import registry
+from orchestration.command.command_result import CommandResult
 from orchestration.command.flags import assigned
 from orchestration.figures.names import FORMATS
 
@@ -25,10 +25,10 @@ HEAD = (
 
 
 def schedule(
-    system: Annotated[Path, typer.Argument(help="System file, or SSP; its FMUs need not be there.")],
+    system: Annotated[Path, typer.Argument(help="System file, or SSP; its FMUs need not exist.")],
     until: Annotated[
         float | None,
-        typer.Option("--until", help="How far; default: stop_time.", metavar="SECONDS", show_default=False),
+        typer.Option("--until", help="End of the schedule; default: stop_time.", metavar="SECONDS", show_default=False),
     ] = None,
     out: Annotated[
         Path | None,
@@ -36,16 +36,16 @@ def schedule(
                      show_default=False),
     ] = None,
     start: Annotated[
-        float | None, typer.Option("--from", help="Start of what is drawn, in seconds.", show_default=False)
+        float | None, typer.Option("--from", help="Start of the chart, in seconds.", show_default=False)
     ] = None,
-    end: Annotated[float | None, typer.Option("--to", help="End of what is drawn.", show_default=False)] = None,
+    end: Annotated[float | None, typer.Option("--to", help="End of the chart.", show_default=False)] = None,
     changes: Annotated[
         list[str] | None,
         typer.Option("--set", help="A value by its path, as computers.NAME.scheduling=V; may be repeated.",
                      metavar="PATH=V", show_default=False),
     ] = None,
-) -> Answer:  # fmt: skip
-    """Show who has the computers and networks of a system when: response times, missed deadlines, bounds of theory."""
+) -> CommandResult:  # fmt: skip
+    """Simulate the computers and networks of a system: response times, missed deadlines, bounds of theory."""
     if until is not None and not 0.0 < until < float("inf"):
         raise UsageError(f"--until {until:g}: expected a positive number of seconds")
     if out is not None and out.suffix[1:] not in FORMATS:
@@ -57,17 +57,17 @@ def schedule(
     request = scheduling.request_until(system, until)
     found = scheduling.schedule(changed(system_of(request), assigned("set", changes)))
     if out is not None:
-        inform(str(_drawn(found, out, start, end)))
+        inform(str(_draw(found, out, start, end)))
     document = {
         "until": found.until,
         "tasks": {name: asdict(each) for name, each in found.tasks.items()},
         "messages": {name: asdict(each) for name, each in found.messages.items()},
         "busy": found.busy,
     }
-    return Answer(document=document, lines=list(_lines(found)))
+    return CommandResult(document=document, lines=list(_lines(found)))
 
 
-def _drawn(found: "Scheduled", out: Path, start: float | None, end: float | None) -> Path:
+def _draw(found: "Scheduled", out: Path, start: float | None, end: float | None) -> Path:
     from dataclasses import replace
 
     from orchestration.figures import gantt
@@ -112,7 +112,7 @@ def _table(kind: str, each: "Mapping[str, Responses]") -> Iterator[str]:
 def _row(of: "Responses") -> Sequence[str]:
     from orchestration.system.description import seconds
 
-    def said(time: float | None) -> str:
+    def text_of(time: float | None) -> str:
         return "-" if time is None else seconds(float(f"{time:.4g}"))
 
     response, latency = of.response, of.latency
@@ -120,12 +120,12 @@ def _row(of: "Responses") -> Sequence[str]:
     return (
         str(of.jobs),
         f"{100.0 * of.utilisation:.4g} %",
-        *map(said, times),
-        said(of.bound),
-        said(of.start_jitter),
-        said(of.end_jitter),
-        said(None if latency is None else latency.max),
-        said(of.deadline),
+        *map(text_of, times),
+        text_of(of.bound),
+        text_of(of.start_jitter),
+        text_of(of.end_jitter),
+        text_of(None if latency is None else latency.max),
+        text_of(of.deadline),
         "-" if of.missed is None else f"{100.0 * of.missed:.4g} %",
         str(of.unfinished),
     )
@@ -133,4 +133,4 @@ def _row(of: "Responses") -> Sequence[str]:
 
 def register(app: typer.Typer) -> None:
     """Add the command to the command line."""
-    registering.add(app, registering.FLY, schedule)
+    registry.add(app, registry.RUN, schedule)

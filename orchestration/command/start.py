@@ -1,4 +1,4 @@
-"""Where `quadcosim` starts: it holds as little as it can, for the environment may have Python find foreign modules."""
+"""The entry point of `quadcosim`; it imports little, as the environment may make Python find foreign modules."""
 
 import os
 import sys
@@ -9,26 +9,26 @@ _AGAIN = "import sys; sys.path.insert(0, sys.argv.pop(1)); from orchestration.co
 
 
 def main() -> None:
-    """Run the command line; where it cannot be loaded, say which variable is in the way.
+    """Run the command line; if it cannot be loaded, report the environment variables that may be the cause.
 
-    `doctor` goes on without it, to say what that does to FMUs. A Python that PYTHONHOME keeps from starting at all
-    never comes here.
+    `doctor` then runs without them, to report their effect on FMUs. If PYTHONHOME keeps Python from starting, this is
+    not reached.
     """
     one_thread()
-    if sys.argv[1:] == ["--version"]:  # which scripts ask, and which needs no command line
-        from orchestration.command.version import own
+    if sys.argv[1:] == ["--version"]:  # fast for scripts: needs no command line
+        from orchestration.command.version import own_version
 
-        print(own())
+        print(own_version())
         return
     try:
         from orchestration.command import cli
     except Exception as error:
-        given = misleading_variables()
-        if not given or sys.flags.ignore_environment:
+        misleading = misleading_variables()
+        if not misleading or sys.flags.ignore_environment:
             raise
         if sys.argv[1:2] == ["doctor"] and os.name == "posix":
             os.execv(sys.executable, [sys.executable, "-E", "-c", _AGAIN, ROOT, *sys.argv[1:]])
-        variables = " ".join(f"{name}={value}" for name, value in given.items())
+        variables = " ".join(f"{name}={value}" for name, value in misleading.items())
         print(f"quadcosim: it does not start with {variables}: {type(error).__name__}: {error}", file=sys.stderr)
         sys.exit(1)
     cli.main()

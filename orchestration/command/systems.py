@@ -1,4 +1,4 @@
-"""The commands that are about a system as a file: its schema, a proposal for one, a picture of one."""
+"""The commands for system files: their schema, a proposal for FMUs, a description or diagram."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -7,25 +7,25 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from orchestration.basics.terminal import inform
-from orchestration.command import registry as registering
-from orchestration.command.answer import Answer
-from orchestration.command.build_flag import builds
-from orchestration.command.flags import FlightFlags, Timing, flies, request_from
-from orchestration.command.registry import FLY
+from orchestration.command import registry
+from orchestration.command.build_flag import build_option
+from orchestration.command.command_result import CommandResult
+from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
+from orchestration.command.registry import RUN
 
 if TYPE_CHECKING:
     from orchestration.system.model import System
 
 
-def schema() -> Answer:
-    """Print the JSON schema of a system file, from which editors complete and check it."""
+def schema() -> CommandResult:
+    """Print the JSON schema of system files, with which editors complete and check them."""
     from orchestration.system import system_file
 
-    answer = Answer(document=system_file.schema(), lines=[])
-    return replace(answer, lines=answer.as_json.splitlines())
+    result = CommandResult(document=system_file.schema(), lines=[])
+    return replace(result, lines=result.as_json.splitlines())
 
 
-@builds
+@build_option
 def connect(
     fmu: Annotated[
         list[str],
@@ -37,8 +37,8 @@ def connect(
     out: Annotated[
         Path | None, typer.Option("--out", help="The system file; default: printed.", metavar="SYSTEM.toml")
     ] = None,
-) -> Answer:
-    """Propose a system file for FMUs: outputs to inputs by name, type and unit; what is open is said in it."""
+) -> CommandResult:
+    """Propose a system file for FMUs: outputs to inputs by name, type and unit; open points are marked in it."""
     from orchestration.basics.errors import UsageError
     from orchestration.building import fmus
     from orchestration.fmi.model import read_model
@@ -59,13 +59,13 @@ def connect(
         inform(f"not decided: {line}")
     document = {"file": out, "text": proposal.text, "guessed": proposal.guessed, "undecided": proposal.undecided}
     if out is None:
-        return Answer(document=document, lines=proposal.text.splitlines())
+        return CommandResult(document=document, lines=proposal.text.splitlines())
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(proposal.text, encoding="utf-8")
-    return Answer(document=document, lines=[str(out)])
+    return CommandResult(document=document, lines=[str(out)])
 
 
-@flies
+@flight_options
 def show(
     system: Annotated[
         Path | None,
@@ -77,7 +77,7 @@ def show(
     ] = None,
     *,
     flags: FlightFlags,
-) -> Answer:
+) -> CommandResult:
     """Show a system: components with their rates, connections with their delay, jitter, loss and hold, units."""
     from orchestration.system.description import as_text
     from orchestration.system.request import system_of
@@ -88,13 +88,13 @@ def show(
         from orchestration.figures import diagram
 
         inform(str(diagram.write(meant, out)))
-    return Answer(document=tables_of(meant), lines=as_text(meant, *_said_by_fmus(meant)).splitlines())
+    return CommandResult(document=tables_of(meant), lines=as_text(meant, *_from_fmus(meant)).splitlines())
 
 
-def _said_by_fmus(system: "System") -> tuple[dict[str, str], str]:
-    """The units of its objectives, and what is followed by whom.
+def _from_fmus(system: "System") -> tuple[dict[str, str], str]:
+    """The units of its objectives, and the references of its components.
 
-    Nothing where its FMUs are not there, or do not fit: who looks runs no foreign module.
+    Empty if FMUs are missing or do not fit: nothing is built, so that no foreign module runs.
     """
     from orchestration.basics.errors import QuadcosimError
     from orchestration.building import fmus
@@ -114,4 +114,4 @@ def _said_by_fmus(system: "System") -> tuple[dict[str, str], str]:
 
 def register(app: typer.Typer) -> None:
     """Add the commands to the command line."""
-    registering.add(app, FLY, show, connect, schema)
+    registry.add(app, RUN, show, connect, schema)

@@ -1,33 +1,33 @@
-"""What `--version` says."""
+"""The output of `--version`."""
 
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from orchestration.command.answer import Answer
+    from orchestration.command.command_result import CommandResult
 
 BESIDE = ("numpy", "fmpy", "pythonfmu", "pyarrow", "matplotlib", "scipy", "pandas", "dask")
-"""Packages by which numbers, files and figures are made"""
+"""Packages that affect numbers, files and figures"""
 
 
-def own() -> str:
+def own_version() -> str:
     """The line with this package's version."""
     return f"quadcosim {_version('quadcosim')}"
 
 
-def versions(*, everything: bool) -> "Answer":
-    """This package's version, or everything's that a report of an error should name."""
-    from orchestration.command.answer import Answer  # not before: `own` does without
+def versions(*, everything: bool) -> "CommandResult":
+    """This package's version, or `everything` that an error report should state."""
+    from orchestration.command.command_result import CommandResult  # not before: `own_version` does without
 
     found = {"quadcosim": _version("quadcosim")}
-    lines = [own()]
+    lines = [own_version()]
     if everything:
         import platform
 
         found |= {"python": platform.python_version(), "platform": platform.platform()}
         found |= {name: _version(name) for name in BESIDE}
         lines = [f"{name:<10}  {value}" for name, value in found.items()]
-    return Answer(document=found, lines=lines)
+    return CommandResult(document=found, lines=lines)
 
 
 def _version(package: str) -> str:

@@ -117,7 +117,7 @@ def test_a_redesign_that_is_fixed_flies_in_masters_that_set_no_enumeration(
 @pytest.mark.parametrize(
     ("flags", "message"),
     [
-        (["--set", "mass=2"], "--set, --vehicle: expected --name NAME, what the FMU with these values is called"),
+        (["--set", "mass=2"], "--set, --vehicle: expected --name NAME, the name of the FMU with these values"),
         (["--name", "2nd"], "--name 2nd: expected letters, digits and _, no digit first"),
         (["--name", "UnifiedController"], "--name UnifiedController: expected another name than that of a slave"),
         (["--name", "X", "--set", "mas=2"], "X: mas: no parameter of X; did you mean mass?"),

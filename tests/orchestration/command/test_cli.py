@@ -366,7 +366,7 @@ def test_a_run_paused_and_resumed_is_the_same_run(main: Main, here: Path) -> Non
         (["--set", "plant.mass"], "--set plant.mass: expected NAME=VALUE"),
         (["--set", "plant.mass=heavy"], "plant.mass = heavy: expected a number"),
         (["--set", "plant.mas=1"], "did you mean mass?"),
-        (["--set", "controller.fmu="], "expected a parameter; the FMU is given by --controller NAME|PATH"),
+        (["--set", "controller.fmu="], "expected a parameter; set the FMU by --controller NAME|PATH"),
         (["--plant", "nowhere.fmu"], "plant.fmu"),
         (["--set", "controller.sample_period=0.1"], "controller.sample_period: expected --period and --clock instead"),
         (["--preset", "arducopter"], "preset arducopter: expected one of px4"),

@@ -14,8 +14,8 @@ import pytest
 import typer.main
 
 from orchestration.basics.terminal import configure
-from orchestration.command.answer import Answer
 from orchestration.command.cli import app
+from orchestration.command.command_result import CommandResult
 from tests.commands import Main
 
 GROUP: Any = typer.main.get_command(app)
@@ -46,7 +46,7 @@ def test_every_command_has_the_same_manners_and_a_group_in_the_help(command: str
     flags = {name for parameter in of_it.params for name in parameter.opts}
     assert {"--json", "--quiet", "-q", "--verbose", "-v", "--log", "--debug"} <= flags
     assert of_it.rich_help_panel in {"Run", "Study", "FMUs", "Other tools"}
-    assert inspect.unwrap(of_it.callback).__annotations__["return"] in (Answer, "Answer")
+    assert inspect.unwrap(of_it.callback).__annotations__["return"] in (CommandResult, "CommandResult")
 
 
 def test_help_says_what_each_exit_code_means(main: Main) -> None:

@@ -57,7 +57,7 @@ def flown(swept: tuple[Path, Done], folder: Path) -> Path:
 
 
 def test_a_study_is_flown_looked_at_and_exported(flown: Path, swept: tuple[Path, Done], main: Main) -> None:
-    assert swept[1].stdout == f"{STORE}: 6 runs, 6 flown now\n"
+    assert swept[1].stdout == f"{STORE}: 6 runs, 6 of them new\n"
     told = [line for line in swept[1].stderr.splitlines() if " of 6 runs" not in line]  # or how far, if slow
     assert told == ["follows the trajectory that UnifiedController has built in"]
     assert main("status", "study.toml").stdout == f"{STORE}: 6 of 6 runs, 0 failed, 0 missing\n"
@@ -97,7 +97,7 @@ def test_status_tells_how_far_a_sweep_in_another_process_is(folder: Path, main: 
 def test_failed_runs_are_told_at_once_and_fail_the_command(folder: Path, main: Main) -> None:
     (folder / "study.toml").write_text(GRID + '[[axes]]\nname = "plant.mass"\nvalues = [1.0, 0.0]\n')
     done = main("sweep", "study.toml", "--engine", "compiled", code=1)
-    assert "12 runs, 12 flown now, 6 failed (quadcosim export shows why; --retry-failed)" in done.stdout
+    assert "12 runs, 12 of them new, 6 failed (quadcosim export shows why; --retry-failed)" in done.stdout
     told = done.stderr.splitlines()
     assert told.pop() == "follows the trajectory that UnifiedController has built in"
     assert len(told) == 3
@@ -105,7 +105,7 @@ def test_failed_runs_are_told_at_once_and_fail_the_command(folder: Path, main: M
     assert told[2].endswith("; further ones are not told")
     assert "12 of 12 runs, 6 failed, 0 missing" in main("status", "study.toml").stdout
     again = main("sweep", "study.toml", "--engine", "compiled", "--retry-failed", code=1)
-    assert "12 runs, 6 flown now, 6 failed" in again.stdout
+    assert "12 runs, 6 of them new, 6 failed" in again.stdout
 
 
 def test_two_sweeps_at_once_are_refused_in_one_line(folder: Path, main: Main) -> None:

@@ -105,7 +105,7 @@ def test_tables_tell_each_cell_and_pictures_are_drawn(table: str, folder: Path) 
 def test_nothing_is_flown_twice_and_the_result_stays(table: str, folder: Path, main: Main) -> None:
     before = (folder / "out" / "cells.csv").read_bytes()
     done = main("compare", folder / "small.toml", "--native", "--out", folder / "out", "--no-figures", "--json")
-    assert "48 runs, 0 flown now" in done.stderr
+    assert "48 runs, 0 of them new" in done.stderr
     assert len(json.loads(done.stdout)["cells"]) == CELLS
     assert (folder / "out" / "cells.csv").read_bytes() == before
 

@@ -43,14 +43,14 @@ def test_text_stays_text_in_svg_and_pdf_with_its_font(tmp_path: Path) -> None:
 
 
 def test_a_figure_has_the_size_that_was_asked_for_to_a_tenth_of_a_millimetre(tmp_path: Path) -> None:
-    style = FigureFlags(format=["svg"], style="paper", width="single").chosen
+    style = FigureFlags(format=["svg"], style="paper", width="single").figure_style
     (path,) = save({"a": drawn(style)}, tmp_path, style)
     width = re.search(r'<svg[^>]* width="([\d.]+)pt"', path.read_text(encoding="utf-8"))
     assert width is not None
     assert float(width[1]) * 25.4 / 72.0 == pytest.approx(88.9, abs=0.1)
     (label,) = [line for line in path.read_text(encoding="utf-8").splitlines() if ">time [s]<" in line]
     assert "font-size: 8px; font-family: 'STIXGeneral'" in label or "font: 8px 'STIXGeneral'" in label, "8 pt"
-    sized = FigureFlags(size="120x80mm", font_size=9.0).chosen
+    sized = FigureFlags(size="120x80mm", font_size=9.0).figure_style
     assert (sized.width, sized.height, sized.font) == (120.0, 80.0, 9.0)
 
 
@@ -60,8 +60,8 @@ def test_every_figure_is_written_as_a_sharp_picture_and_as_svg_unless_other_form
     assert [path.name for path in save({"a": drawn(STYLES["screen"])}, tmp_path)] == ["a.png", "a.svg"]
     with Image.open(tmp_path / "a.png") as picture:
         assert picture.size[0] == int(203.0 / 25.4 * 200.0)
-    assert FigureFlags().chosen.formats == ("png", "svg")
-    assert FigureFlags(format=["pdf"]).chosen.formats == ("pdf",)
+    assert FigureFlags().figure_style.formats == ("png", "svg")
+    assert FigureFlags(format=["pdf"]).figure_style.formats == ("pdf",)
 
 
 def test_few_colours_make_a_smaller_file_that_is_the_same_each_time(tmp_path: Path) -> None:
@@ -94,7 +94,7 @@ def test_writing_a_figure_leaves_it_to_be_laid_out_anew(tmp_path: Path) -> None:
         ({"style": "poster"}, "style = poster: expected one of screen, paper, slides"),
         ({"width": "wide"}, "width = wide: expected single, double or millimetres, each from 20 to 2000 mm"),
         ({"size": "120"}, "size = 120: expected MMxMM, as in 120x80, each from 20 to 2000 mm"),
-        ({"size": "120x80", "width": "90"}, "size: expected no width with it"),
+        ({"size": "120x80", "width": "90"}, "size: expected no width; the size includes the width"),
         ({"font_size": 0.0}, "font_size = 0: expected 1 to 100 points"),
     ],
 )

@@ -16,7 +16,7 @@ NAMES = [f"{name.removesuffix(', SSP')} {version(TOOLS[name].packages[0])}" for 
 
 def test_each_master_that_is_installed_says_that_it_flies_a_system(tmp_path: Path, main: Main) -> None:
     done = main("ssp", EXAMPLES / "double_integrator" / "system.toml", "--read-back", "--out", tmp_path / "loop.ssp")
-    assert done.stderr.splitlines()[-3:] == [f"{name} flies it" for name in NAMES]
+    assert done.stderr.splitlines()[-3:] == [f"{name} runs it" for name in NAMES]
     assert [name.partition(" ")[0] for name in NAMES] == ["libcosim", "ecos", "fmpy"]
 
 

@@ -59,7 +59,7 @@ def test_a_killed_sweep_leaves_no_workers_flies_only_what_is_missing_and_ends_wi
         before = {found["design_index"]: found["duration"] for found in store.rows()}
     monkeypatch.chdir(folder)
     done = main("sweep", "study.toml", "--engine", "compiled")
-    assert done.stdout == f"{STORE}: {RUNS} runs, {RUNS - there} flown now\n"
+    assert done.stdout == f"{STORE}: {RUNS} runs, {RUNS - there} of them new\n"
     assert bits(folder / STORE) == reference
     with open_for_reading(folder / STORE) as store:
         after = {found["design_index"]: found["duration"] for found in store.rows()}
@@ -97,7 +97,7 @@ def test_a_run_whose_worker_is_killed_from_outside_stops_the_sweep_and_has_no_ro
     assert len(err.splitlines()) == 1, err
     assert rows_in(tmp_path / STORE) == 0
     monkeypatch.chdir(tmp_path)
-    assert main("sweep", "study.toml", "--engine", "compiled").stdout == f"{STORE}: 1 runs, 1 flown now\n"
+    assert main("sweep", "study.toml", "--engine", "compiled").stdout == f"{STORE}: 1 runs, 1 of them new\n"
 
 
 @pytest.mark.parametrize(("workers", "kills"), [(1, 1), (2, 3)])

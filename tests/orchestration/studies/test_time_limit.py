@@ -60,6 +60,6 @@ def test_the_command_limits_each_run(tmp_path: Path, main: Main) -> None:
         "sweep", tmp_path / "study.toml", "--out", tmp_path / "out", "--time-limit", "1", "--engine", "compiled", code=1
     )
     assert "failed: it was ended: it takes more than the time limit of 1 s" in done.stderr
-    assert "3 runs, 3 flown now, 1 failed" in done.stdout
+    assert "3 runs, 3 of them new, 1 failed" in done.stdout
     done = main("sweep", tmp_path / "study.toml", "--out", tmp_path / "out", "--time-limit", "-1", code=2)
     assert done.stderr == "quadcosim: --time-limit -1: expected a positive number of seconds\n"

@@ -1,0 +1,81 @@
+"""The commands that compare controllers and tune them."""
+
+import dataclasses
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from orchestration.basics.errors import UsageError
+from orchestration.command import registry
+from orchestration.command.build_flag import build_option
+from orchestration.command.command_result import CommandResult, result_of_files
+from orchestration.command.figure_flags import FigureFlags
+from orchestration.command.limit_flags import TimeLimit
+from orchestration.command.option_group import option_group
+from orchestration.command.study_flags import Out, StudyEngineFlag, Workers
+
+
+@build_option
+@option_group("look", FigureFlags)
+def compare(
+    comparison: Annotated[Path, typer.Argument(help="Comparison file.", metavar="COMPARISON.toml", show_default=False)],
+    out: Out = None,
+    workers: Workers = 1,
+    native: Annotated[
+        bool, typer.Option("--native", help="Use the native twins of this project's FMUs, built if need be.")
+    ] = False,
+    engine: StudyEngineFlag = "auto",
+    time_limit: TimeLimit = None,
+    cell: Annotated[
+        int | None,
+        typer.Option("--cell", help="Run only this cell again.", metavar="K", show_default=False),
+    ] = None,
+    start: Annotated[
+        int | None,
+        typer.Option("--start", help="One run of that cell, kept in --out DIR.", metavar="I", show_default=False),
+    ] = None,
+    figures: Annotated[bool, typer.Option(help="Draw the pictures beside the tables.")] = True,
+    *,
+    look: FigureFlags,
+) -> CommandResult:
+    """Compare controllers from the same initial conditions: survival, settling, limits, error and effort."""
+    from orchestration.command import comparison as command
+    from orchestration.comparison.file import load_comparison
+    from orchestration.workers.choice import engine_choice
+
+    how = engine_choice(engine)
+    loaded = dataclasses.replace(load_comparison(comparison), native=native)
+    if time_limit is not None and (cell is not None or start is not None):
+        raise UsageError("--time-limit: expected no --cell; the limit is for whole comparisons")
+    if start is not None:
+        return command.flight(loaded, cell, start, out, engine=how)
+    if cell is not None:
+        return command.cell(loaded, cell, out, workers=workers, engine=how)
+    flags = (" --native" if native else "") + (f" --engine {engine}" if engine != "auto" else "")
+    return command.all_cells(
+        loaded, out, workers=workers, engine=how, time_limit=time_limit, figures=figures, look=look,
+        again=f"quadcosim compare {comparison}{flags} --cell",
+    )  # fmt: skip
+
+
+@build_option
+def tune(
+    tuning: Annotated[Path, typer.Argument(help="Tuning file.", metavar="TUNING.toml", show_default=False)],
+    out: Annotated[Path, typer.Option("--out", help="Folder for the files of tuned parameters.", metavar="DIR")],
+    workers: Workers = 1,
+    engine: StudyEngineFlag = "auto",
+) -> CommandResult:
+    """Tune a controller on some initial conditions and evaluate it on others; it resumes where it was stopped."""
+    from orchestration.tuning.tune import tune as search_all
+    from orchestration.tuning.tuning_file import load_tuning
+    from orchestration.workers.choice import engine_choice
+
+    command = f"quadcosim tune {tuning} --out {out}" + (f" --engine {engine}" if engine != "auto" else "")
+    tuned = search_all(load_tuning(tuning), out=out, workers=workers, engine=engine_choice(engine), command=command)
+    return result_of_files(tuned.written)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the command line."""
+    registry.add(app, registry.STUDY, compare, tune)

@@ -1,0 +1,82 @@
+"""The commands that write files for other tools: C for a microcontroller, and SSP."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from orchestration.basics.terminal import inform, warn
+from orchestration.command import registry
+from orchestration.command.command_result import CommandResult, result_of_files
+from orchestration.command.flags import FlightFlags, flight_options, request_from
+from orchestration.command.option_group import option_group
+from orchestration.command.variant_flags import VariantFlags
+
+
+@option_group("variant", VariantFlags)
+def export_c(
+    out: Annotated[Path, typer.Option("--out", help="Folder for NAME.h and NAME.c.", metavar="DIR")],
+    slave: Annotated[
+        str,
+        typer.Argument(
+            help="UnifiedController, QuadrotorPlant, a folder of modules that define slaves, or FOLDER/NAME."
+        ),
+    ] = "UnifiedController",
+    single: Annotated[
+        bool, typer.Option("--single", help="In single precision, with the functions of libm; else double, without.")
+    ] = False,
+    *,
+    variant: VariantFlags,
+) -> CommandResult:
+    """Write a controller, or any slave, as two files in C for a microcontroller: no allocation, C99."""
+    from orchestration.building import builder
+
+    written = builder.export_c(variant.applied_to(builder.slaves_named(slave)), out, single=single)
+    return result_of_files(each for path in written for each in (path.with_suffix(".h"), path))
+
+
+@flight_options
+def ssp(
+    scenario: Annotated[
+        Path | None,
+        typer.Argument(help="System or scenario file; without one, the paper's flight.", show_default=False),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", help="The file; default: QuadrotorLoop.ssp in fmus/, or NAME.ssp here.", metavar="FILE"),
+    ] = None,
+    read_back: Annotated[
+        bool,
+        typer.Option(
+            "--read-back", help="Begin to fly it in libcosim, ecos and fmpy, where installed, and tell what each says."
+        ),
+    ] = False,
+    *,
+    flags: FlightFlags,
+) -> CommandResult:
+    """Write FMUs, connections and parameters as one SSP 1.0 file for other tools, and its timing beside it."""
+    from orchestration.building import fmus
+    from orchestration.interop.reading_back import readings
+    from orchestration.requests.ssp import writing
+    from orchestration.requests.ssp.export import export_of
+
+    request = request_from(scenario, flags)
+    if request.title is not None or scenario is None:
+        default = fmus.default_folder() / f"{request.title}.ssp"
+    else:
+        default = Path(f"{scenario.stem}.ssp")
+    written, timing = writing.write_with_timing(request, out or default, inform, warn)
+    inform(f"{timing} has its timing, for quadcosim run")
+    masters: dict[str, str | None] = {}
+    for reading in readings(written, export_of(request)) if read_back else ():
+        masters[reading.master] = reading.refusal
+        if reading.refusal is None:
+            inform(f"{reading.master} runs it")
+        else:
+            warn(f"{reading.master} does not run it: {reading.refusal}")
+    return CommandResult(document={"files": [written, timing], "masters": masters}, lines=[str(written)])
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the command line."""
+    registry.add(app, registry.TOOLS, export_c, ssp)

@@ -1,0 +1,132 @@
+"""The commands that build and check FMUs."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from orchestration.basics.errors import UsageError
+from orchestration.basics.terminal import inform, progress_bar
+from orchestration.building import consent
+from orchestration.command import completion, registry
+from orchestration.command.command_result import CommandResult, result_of_files
+from orchestration.command.limit_flags import LimitFlags
+from orchestration.command.option_group import option_group
+from orchestration.command.variant_flags import VariantFlags
+
+
+@option_group("variant", VariantFlags)
+def build(
+    slave: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[FOLDER]",
+            help="Folder of modules that define slaves, FOLDER/NAME for one, or the name of a slave of this project; "
+            "default: all of this project, with --name UnifiedController.",
+            show_default=False,
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", help="Folder for the FMUs; default: FOLDER, or fmus/ for this project's."),
+    ] = None,
+    native: Annotated[
+        bool,
+        typer.Option("--native", help="Without Python inside, by a C compiler; default folder: native/."),
+    ] = False,
+    target: Annotated[
+        str | None,
+        typer.Option(
+            "--target",
+            metavar="all|linux64,linux-aarch64,win64,darwin64",
+            autocompletion=completion.among("all", "linux64", "linux-aarch64", "win64", "darwin64"),
+            help="Systems to build --native for, with the compiler of the package ziglang.",
+            show_default=False,
+        ),
+    ] = None,
+    fmi: Annotated[
+        int, typer.Option("--fmi", min=2, max=3, help="Version of FMI, 3 with --native only; then in native/fmi3/.")
+    ] = 2,
+    *,
+    variant: VariantFlags,
+) -> CommandResult:
+    """Build every slave that the modules of FOLDER define, each as an .fmu. Same sources give the same bytes.
+
+    With --name one slave is built as another FMU, in which parameters fixed by --set and --vehicle are constants.
+    """
+    from orchestration.building import builder, fmus
+    from orchestration.building.models import MODELS
+    from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER
+
+    if target is not None and not native:
+        raise UsageError("--target: expected --native with it; FMUs with Python inside are the same for all systems")
+    if fmi == 3 and not native:
+        raise UsageError("--fmi 3: expected --native with it; FMUs with Python inside are of FMI 2.0")
+    packing = builder.IN_PYTHON if not native else builder.NATIVE_FMI_3 if fmi == 3 else builder.NATIVE
+    if variant.is_set and variant.name is None:
+        raise UsageError("--set, --vehicle: expected --name NAME, the name of the FMU with these values")
+    if variant.name is not None and variant.name in MODELS:
+        raise UsageError(f"--name {variant.name}: expected another name than that of a slave")
+    names = [slave] if slave is not None else [DEFAULT_CONTROLLER] if variant.is_set else list(MODELS)
+    slaves = variant.applied_to([each for name in names for each in builder.slaves_named(name)])
+    folder = None if slave in (None, *MODELS) else Path(str(slave))
+    if folder is not None:
+        folder = folder if folder.is_dir() else folder.parent
+        consent.agree(folder)
+    where = out or (folder or fmus.default_folder()) / packing.folder
+    with progress_bar("building") as progress:
+        how: Any = {"packing": packing, "systems": target, "progress": progress}
+        return result_of_files(builder.build_slaves(slaves, where, inform, **how))
+
+
+@option_group("limits", LimitFlags)
+def validate(
+    fmu: Annotated[list[Path] | None, typer.Argument(help="FMUs; without any, those of this project.")] = None,
+    *,
+    limits: LimitFlags,
+) -> CommandResult:
+    """Check FMUs: archive, description and behaviour in test runs; exit code 1 if there is any problem.
+
+    Accepts any co-simulation FMU of FMI 2.0 or 3.0; those built by quadcosim are checked for the rules of this project
+    too. All checks run in a separate process with limits.
+    """
+    from orchestration.building import fmus
+    from orchestration.building.models import MODELS
+    from orchestration.checks.validation.validator import validate as findings_of
+
+    paths = fmu or [fmus.locate(name, inform) for name in MODELS]
+    for path in paths:
+        if not path.is_file():
+            raise UsageError(f"{path}: expected an .fmu file")
+    document, lines, problems = [], [], 0
+    with progress_bar("checking") as progress:
+        for done, path in enumerate(paths):
+            progress(done / len(paths))
+            findings = findings_of(path, limits=limits.limits)
+            document.append({"fmu": path, "findings": findings})
+            count = sum(not finding.note for finding in findings)
+            problems += count
+            lines.append(f"{path}: {count or 'no'} problem{'' if count == 1 else 's'}{'' if count else ' found'}")
+            lines.extend(f"  {finding}" for finding in findings)
+    return CommandResult(document=document, lines=lines, good=not problems)
+
+
+@option_group("limits", LimitFlags)
+def doctor(
+    fmu: Annotated[list[Path] | None, typer.Argument(help="FMUs; without any, those of this project.")] = None,
+    *,
+    limits: LimitFlags,
+) -> CommandResult:
+    """List what FMUs require and what this machine lacks, and load them; exit code 1 if anything is missing."""
+    from orchestration.building import fmus
+    from orchestration.building.models import MODELS
+    from orchestration.checks.doctor.as_lines import as_text
+    from orchestration.checks.doctor.report import as_tables, examine
+
+    report = examine(fmu or [fmus.locate(name, inform) for name in MODELS], limits.limits)
+    return CommandResult(document=as_tables(report), lines=as_text(report).splitlines(), good=report.good)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the command line."""
+    registry.add(app, registry.FMUS, build, validate, doctor)

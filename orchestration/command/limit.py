@@ -1,0 +1,105 @@
+"""The command `limit`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from orchestration.basics.terminal import inform
+from orchestration.command import completion, registry
+from orchestration.command.command_result import CommandResult
+from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
+
+
+@flight_options
+def limit(
+    scenario: Annotated[
+        Path | None,
+        typer.Argument(help="System or scenario file, or SSP; without one, the paper's flight.", show_default=False),
+    ] = None,
+    timing: Timing = None,
+    of: Annotated[
+        str | None,
+        typer.Option(
+            "--of",
+            help="The quantity: of the quadrotor by name, of any system by path; default: the period of what is "
+            "sampled.",
+            metavar="period|delay|jitter|loss|PATH",
+            autocompletion=completion.among("period", "delay", "jitter", "loss"),
+            show_default=False,
+        ),
+    ] = None,
+    first: Annotated[
+        float | None, typer.Option("--from", help="Start of the scan.", metavar="A", show_default=False)
+    ] = None,
+    last: Annotated[
+        float | None, typer.Option("--to", help="End of the scan.", metavar="B", show_default=False)
+    ] = None,
+    tolerance: Annotated[
+        float | None,
+        typer.Option(
+            "--tolerance",
+            help="Width of the last bracket; default of a PATH: a fiftieth of --scan.",
+            show_default=False,
+        ),
+    ] = None,
+    scan: Annotated[
+        float | None,
+        typer.Option(
+            "--scan",
+            help="Step of the scan upward; default of a PATH: a twentieth of the range.",
+            metavar="STEP",
+            show_default=False,
+        ),
+    ] = None,
+    confidence: Annotated[
+        float,
+        typer.Option(
+            "--confidence",
+            help="With random effects: confidence (0 to 1) that at least nine runs in ten are good.",
+        ),
+    ] = 0.95,
+    continuous: Annotated[
+        bool, typer.Option("--continuous", help="Also run near continuous time (takes as long as ten runs at 1 ms).")
+    ] = False,
+    workers: Annotated[int, typer.Option("--workers", help="Processes for the seeds.", metavar="N")] = 1,
+    engine: Annotated[
+        str,
+        typer.Option(
+            "--engine",
+            help="Simulation loop; auto: native twins of the FMUs where available, compiled where possible.",
+            metavar="auto|python|compiled",
+            autocompletion=completion.among("auto", "python", "compiled"),
+        ),
+    ] = "auto",
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for the figure; default: beside the file.", metavar="DIR")
+    ] = None,
+    figures: Annotated[bool, typer.Option(help="Draw the measurements with both limits.")] = True,
+    *,
+    flags: FlightFlags,
+) -> CommandResult:
+    """Find the largest good value of a period, delay, jitter, loss or any path by runs, and the local limit."""
+    from orchestration.engines.engine import engine_named
+    from orchestration.limits import limit as limits
+
+    how = "auto" if engine == "auto" else engine_named(engine, "auto")
+    request = request_from(scenario, flags, timing)
+    found = limits.find(
+        request, of, first=first, last=last, tolerance=tolerance, scan=scan, confidence=confidence,
+        continuous=continuous, workers=workers, engine=how or "auto", announce=inform,
+    )  # fmt: skip
+    where = out or (None if scenario is None else scenario.parent)
+    if figures and where is not None:
+        from orchestration.limits.figure import draw_limit
+
+        for written in draw_limit(request, found, where):
+            inform(str(written))
+    return CommandResult(
+        document=found, lines=[f"{name:<19}  {value}" for name, value in limits.as_text(found).items()]
+    )
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the command line."""
+    registry.add(app, registry.STUDY, limit)

@@ -1,0 +1,23 @@
+"""Flags that the commands of studies, comparisons and tunings share."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from orchestration.command import completion
+
+Out = Annotated[Path | None, typer.Option("--out", help="Folder of the store; default: results/NAME.", metavar="DIR")]
+
+Workers = Annotated[int, typer.Option("--workers", help="Processes on this machine.", metavar="N")]
+
+StudyEngineFlag = Annotated[
+    str,
+    typer.Option(
+        "--engine",
+        help="Simulation loop; batch: native FMUs, several runs at once in a SIMD batch; cuda: the same on a GPU; "
+        "auto: the fastest available one except cuda.",
+        metavar="auto|python|compiled|batch|cuda",
+        autocompletion=completion.among("auto", "python", "compiled", "batch", "cuda"),
+    ),
+]
