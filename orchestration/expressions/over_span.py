@@ -84,15 +84,26 @@ class SpanValues:
             marks = recorded.arrivals[node.connection].copy()
             marks[:first] = False
             values = np.broadcast_to(self.at_rows(node.argument), recorded.time.shape)[marks]
-            return Course(recorded.time[marks], values, values[1:], None, True, 0)
+            return Course(recorded.time[marks], values, lambda: values[1:], lambda: None, sampled=True, first=0)
         values = self.at_rows(node)
         if values is None:
             values = np.full(recorded.time.shape, math.nan)
         if not isinstance(values, np.ndarray) or not values.ndim:
             raise UsageError(f"{function} of a number; expected a signal")
-        held = all(self._is_held(name) for name in names(node))
-        middles = self._at(node, "middles") if held else None
-        return Course(recorded.time, values, self._at(node, "ends"), middles, False, first)
+
+        def ends() -> Floats:
+            computed = self._at(node, "ends") if any(map(self._is_partly_held, names(node))) else None
+            return values[1:] if computed is None else computed
+
+        def middles() -> Floats | None:
+            return self._at(node, "middles") if all(map(self._is_held, names(node))) else None
+
+        return Course(recorded.time, values, ends, middles, sampled=False, first=first)
+
+    def _is_partly_held(self, name: str) -> bool:
+        """Whether it is another just before a row than at that row."""
+        recorded = self._recorded
+        return any(part in recorded.ends for part in recorded.vectors.get(name, (name,)))
 
     def _is_held(self, name: str) -> bool:
         recorded = self._recorded

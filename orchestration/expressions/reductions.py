@@ -6,7 +6,7 @@ Integrals are exact for signals that are held.
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -14,21 +14,34 @@ from orchestration.basics.simulator import Floats
 from orchestration.expressions.syntax import Call
 
 
-@dataclass(frozen=True)
 class Course:
-    """The course of an expression over the rows of a span."""
+    """The course of an expression over the rows of a span. `ends` and `middles` are computed when first used."""
 
-    time: Floats
-    values: Floats
-    """at the rows, shape (n,)"""
-    ends: Floats
-    """just before the row after each, shape (n - 1,)"""
-    middles: Floats | None
-    """half-way, for expressions of held signals only; None: linear between rows"""
-    sampled: bool
-    """whether the values are samples, with nothing between them"""
-    first: int
-    """the first row that is not in the span before"""
+    def __init__(
+        self,
+        time: Floats,
+        values: Floats,
+        ends: Callable[[], Floats],
+        middles: Callable[[], Floats | None],
+        *,
+        sampled: bool,
+        first: int,
+    ) -> None:
+        """`values` are at the rows, shape (n,); `sampled`: whether they are samples, with nothing between them;
+        `first`: the first row that is not in the span before.
+        """
+        self.time, self.values, self.sampled, self.first = time, values, sampled, first
+        self._ends, self._middles = ends, middles
+
+    @cached_property
+    def ends(self) -> Floats:
+        """Just before the row after each, shape (n - 1,)."""
+        return self._ends()
+
+    @cached_property
+    def middles(self) -> Floats | None:
+        """Half-way between rows, for expressions of held signals only; None: linear between rows."""
+        return self._middles()
 
     def integral(self) -> float:
         """By Simpson's rule over held signals, exact up to their third powers; else by the trapezoidal rule."""
@@ -38,8 +51,18 @@ class Course:
 
     def map(self, function: Callable[[Floats], Floats]) -> "Course":
         """The course of a function of the values."""
-        middles = None if self.middles is None else function(self.middles)
-        return replace(self, values=function(self.values), ends=function(self.ends), middles=middles)
+        return self._of(
+            function(self.values),
+            lambda: function(self.ends),
+            lambda: None if self.middles is None else function(self.middles),
+        )
+
+    def held(self, values: Floats) -> "Course":
+        """The course of values that hold from their row to the next."""
+        return self._of(values, lambda: values[:-1], lambda: values[:-1])
+
+    def _of(self, values: Floats, ends: Callable[[], Floats], middles: Callable[[], Floats | None]) -> "Course":
+        return Course(self.time, values, ends, middles, sampled=self.sampled, first=self.first)
 
 
 class Fold(ABC):
@@ -86,8 +109,7 @@ class _Integral(Fold):
         if self.call.function == "rms":
             x = x.map(np.square)
         elif self.call.function == "share":  # a condition holds from its row to the next
-            true = (x.values != 0.0).astype(float)
-            x = replace(x, values=true, ends=true[:-1], middles=true[:-1])
+            x = x.held((x.values != 0.0).astype(float))
         if not self._count and len(x.values):
             self._first = float(x.values[0])
         self._sampled, new = x.sampled, x.values[x.first :]

@@ -125,8 +125,13 @@ def _arrivals(system: System, time: Floats, events: Events) -> dict[str, Boolean
     for x in system.connections:
         arrived = events.table[events.are("arrived", x.name)]
         sampled, lost = events.table[events.are("sampled", x.name)], events.table[events.are("lost", x.name)]
-        measured = sampled[~np.isin(sampled[:, 3], lost[:, 3])]  # the event of a loss has the time of its sample
-        rows[x.name] = np.isin(instants, np.concatenate([arrived[:, 0], measured[:, 0]]))
+        if len(lost):
+            sampled = sampled[~np.isin(sampled[:, 3], lost[:, 3])]  # the event of a loss has the time of its sample
+        times = np.concatenate([arrived[:, 0], sampled[:, 0]])
+        times = times[(times >= instants[0]) & (times <= instants[-1])]
+        at = np.searchsorted(instants, times)
+        rows[x.name] = np.zeros(len(instants), dtype=np.bool_)
+        rows[x.name][at[instants[at] == times]] = True
     return rows
 
 
