@@ -24,7 +24,8 @@ from orchestration.results.criterion import judged_objective
 from orchestration.results.quantities import quantity
 from orchestration.studies.axis_labels import quantity_of
 from orchestration.studies.shown_first import shown_first
-from orchestration.studies.store import FIXED, TEXTS, UNITS, open_for_reading
+from orchestration.studies.store import open_for_reading
+from orchestration.studies.store_columns import FIXED, TEXTS, UNITS
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import AGREEMENT, expect_current
 from orchestration.system.criterion import DIVERGED, TERMINATED

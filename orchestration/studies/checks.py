@@ -9,7 +9,7 @@ from orchestration.engines.batch.shape import outline
 from orchestration.engines.wiring import check_against_fmus, table_columns
 from orchestration.signals.table_file import read_table
 from orchestration.signals.waypoints import read_waypoints
-from orchestration.studies.store import expect_columns
+from orchestration.studies.store_columns import expect_columns
 from orchestration.studies.study import Study
 from orchestration.system.check import check_parameter
 from orchestration.system.input_files import distributions_in

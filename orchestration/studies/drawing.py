@@ -16,7 +16,8 @@ from orchestration.studies import figures, sensitivity
 from orchestration.studies.axes import Axis, unit_points
 from orchestration.studies.maps import heat_map
 from orchestration.studies.shown_first import shown_first
-from orchestration.studies.store import TEXTS, metrics_with, store_path
+from orchestration.studies.store import store_path
+from orchestration.studies.store_columns import TEXTS, metrics_with
 from orchestration.studies.study import Study
 from orchestration.studies.table import frame, units_in
 

@@ -15,7 +15,7 @@ from orchestration.requests.ranges import paths_in
 from orchestration.results.own_metrics import OwnMetric
 from orchestration.studies.axes import Axis, Method, Points, Value
 from orchestration.studies.linked_settings import LinkedSettings
-from orchestration.studies.store import is_column
+from orchestration.studies.store_columns import is_column
 from orchestration.system.distribution_table import is_table, trace_path
 from orchestration.system.model import System
 from orchestration.system.paths import changed, names_table, value_at

@@ -23,6 +23,7 @@ from orchestration.runs.result import Result
 from orchestration.studies import store
 from orchestration.studies.checks import described, expect_flyable
 from orchestration.studies.run_key import design_parts, difference, place_parts, run_key, study_parts
+from orchestration.studies.store_columns import UNITS
 from orchestration.studies.study import Study
 from orchestration.studies.swept import Swept
 from orchestration.studies.vouching import vouched, with_python_twins
@@ -173,7 +174,7 @@ class _Counted:
     def __init__(self, total: int, opened: store.Store, hear: Count, announce: Announce | None) -> None:
         self.total, self.failed = total, 0
         self._hear, self._announce = hear, announce
-        self._lacking = opened.lacking()
+        self._lacking = opened.missing_counts()
         self.done = total - sum(self._lacking.values())
         self._tell()
 
@@ -265,7 +266,7 @@ def _describe(opened: store.Store, study: Study, files: Files) -> None:
             "grid": json.dumps(grid if all(axis.values is not None for axis in study.axes) else None),
             "guids": json.dumps({name: m.description.guid for name, m in files.models_of(study.origin).items()}),
             "versions": json.dumps(versions()),
-            store.UNITS: json.dumps(_units(study, files)),
+            UNITS: json.dumps(_units(study, files)),
         },
         _places(study, files),
     )

@@ -12,7 +12,8 @@ from pyarrow import csv
 
 from orchestration.basics.errors import UsageError
 from orchestration.recording import mat_file
-from orchestration.studies.store import SETTINGS, TEXTS, UNITS, Store, open_for_reading
+from orchestration.studies.store import Store, open_for_reading
+from orchestration.studies.store_columns import SETTINGS, TEXTS, UNITS
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -17,7 +17,8 @@ from orchestration.building.inputs import Files, files_of
 from orchestration.quadrotor.translation import paths_of, quadrotor
 from orchestration.studies import sweep as sweeping
 from orchestration.studies.axes import Axis
-from orchestration.studies.store import metrics_with, open_for_reading, store_path
+from orchestration.studies.store import open_for_reading, store_path
+from orchestration.studies.store_columns import metrics_with
 from orchestration.studies.study import Study
 from orchestration.studies.swept import Swept
 from orchestration.system.model import System

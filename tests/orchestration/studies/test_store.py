@@ -29,7 +29,8 @@ from orchestration.quadrotor.signals import ReferenceChoice
 from orchestration.quadrotor.wiring import DEFAULT_PLANT
 from orchestration.studies import store as stores
 from orchestration.studies.run_key import run_key
-from orchestration.studies.store import TEXTS, DesignPoint, open_for_reading, open_for_writing
+from orchestration.studies.store import DesignPoint, open_for_reading, open_for_writing
+from orchestration.studies.store_columns import TEXTS, metrics_with
 from orchestration.system.distribution import Distribution
 from orchestration.system.paths import changed as with_changes
 from orchestration.workers import provenance
@@ -368,10 +369,10 @@ def test_a_store_that_is_about_no_study_yet_takes_the_objectives_of_the_next_one
     with open_for_writing(path, ["of_the_first"]):
         pass
     with open_for_writing(path, ["of_the_next"]) as store:
-        assert store.metrics == stores.metrics_with(["of_the_next"])
+        assert store.metrics == metrics_with(["of_the_next"])
         store.add([row(0)])
     with open_for_writing(path, ["of_the_last"]) as store:
-        assert store.metrics == stores.metrics_with(["of_the_next"])
+        assert store.metrics == metrics_with(["of_the_next"])
 
 
 def test_a_locked_store_is_one_line_and_is_whole_afterwards(path: Path) -> None:
@@ -561,7 +562,9 @@ def test_every_header_that_c_on_the_path_of_the_flight_includes_is_one_of_its_so
 def test_what_is_started_by_its_name_is_one_of_the_flights_sources() -> None:
     sources = simulation_sources()
     texts = [path.read_text(encoding="utf-8") for path in sources.values() if path.suffix == ".py"]
-    started = {name for text in texts for name in re.findall(r'command\(\s*"(orchestration\.[\w.]+)"', text)}
+    started = {
+        name for text in texts for name in re.findall(r'(?:command|Module\.of)\(\s*"(orchestration\.[\w.]+)"', text)
+    }
     assert {"orchestration.fmi.isolated_process", "orchestration.runs.apart_process"} <= started
     assert started - {"orchestration.fmi.repeatability_process"} <= {*sources}  # which flies nothing that is kept
 

@@ -17,7 +17,8 @@ from orchestration.requests.request import load_request
 from orchestration.stability.perturbed_runs import growth_of
 from orchestration.studies.axes import Axis
 from orchestration.studies.drawing import draw_study
-from orchestration.studies.store import expect_columns, is_column, open_for_reading, store_path
+from orchestration.studies.store import open_for_reading, store_path
+from orchestration.studies.store_columns import expect_columns, is_column
 from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
 from orchestration.studies.table import frame
