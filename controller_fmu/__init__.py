@@ -1,1 +1,1 @@
-"""Controllers as FMUs, one folder each; beside the folders is what every controller shares."""
+"""Controllers as FMUs, one folder each; beside the folders are the modules that all controllers share."""

@@ -1,4 +1,4 @@
-"""Gains of the attitude as torques, or per unit inertia, so that one set of them flies every vehicle alike."""
+"""Attitude gains as torques, or per unit inertia, so that one set gives every vehicle the same closed loop."""
 
 import enum
 from typing import NamedTuple
@@ -8,16 +8,16 @@ from fmu_kit.scalar import Scalar
 
 
 class GainScaling(enum.IntEnum):
-    """What the gains of the attitude are."""
+    """The meaning of the attitude gains."""
 
     ABSOLUTE = 1
     """torques [N·m] and [N·m·s]"""
     INERTIA = 2
-    """angular accelerations [1/s²] and [1/s], which the nominal inertia matrix J makes torques of"""
+    """angular accelerations [1/s²] and [1/s], multiplied by the nominal inertia matrix J"""
 
 
 class Feedback(NamedTuple):
-    """What a law takes back from the torque, and what its kinetic energy is made of."""
+    """The feedback terms of the torque, and the momentum in the kinetic energy."""
 
     damping: Vec3
     """[N·m]"""
@@ -28,10 +28,10 @@ class Feedback(NamedTuple):
 
 
 def feedback(per_inertia: Scalar, J: Inertia, damping: Vec3, restoring: Vec3, rate: Vec3) -> Feedback:
-    """The two terms of the attitude as torques; `damping` and `restoring` are in units of the gains.
+    """The two attitude terms as torques; `damping` and `restoring` are in units of the gains.
 
-    Per unit inertia they are J times as large, so that J drops out of the rate of `rate` [rad/s]: the closed loop is
-    that of J = 1 kg·m², and so are the energy and the proof that it falls.
+    Per unit inertia they are J times as large, so that J cancels in the derivative of `rate` [rad/s]: the closed loop,
+    its energy and the proof that this decreases are those of J = 1 kg·m².
     """
     if per_inertia:
         return Feedback(J @ damping, J @ restoring, rate)

@@ -16,7 +16,7 @@ _USED = "used when use_reference_inputs is true"
 
 
 class ControllerInterface(Framed):
-    """What makes one controller FMU exchangeable for another."""
+    """Variables by which controller FMUs are interchangeable."""
 
     position = Input("measured position P, inertial frame", "m", ZERO, frame=frames.inertial, terminal="motion")
     velocity = Input("measured velocity V, inertial frame", "m/s", ZERO, frame=frames.inertial, terminal="motion")
@@ -146,7 +146,7 @@ class ControllerInterface(Framed):
 
 
 class ScaledGains(ControllerInterface):
-    """A controller whose gains of the attitude are of either kind."""
+    """A controller whose attitude gains are absolute or per unit inertia."""
 
     gain_scaling = FixedParameter(
         "of the attitude's gains: as they are, or per unit inertia (in 1/s2 and 1/s), times the inertia matrix; "
@@ -156,5 +156,5 @@ class ScaledGains(ControllerInterface):
 
     @property
     def per_inertia(self) -> bool:
-        """Whether they are per unit inertia."""
+        """Whether the gains are per unit inertia."""
         return self.gain_scaling == GainScaling.INERTIA  # type: ignore[no-any-return]

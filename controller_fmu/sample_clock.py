@@ -1,17 +1,17 @@
-"""The controller's own sample clock: when a sample is due, on a grid that does not drift."""
+"""The controller's own sample clock, on a grid that does not drift."""
 
 import math
 from dataclasses import dataclass
 
 TOLERANCE = 1e-6
-"""Of a period: masters accumulate time, and some end with a step of 1e-13 s."""
+"""Relative to a period: masters accumulate time, and some end with a step of 1e-13 s."""
 ROUNDING = 1e-9
-"""Of a time, for the same reason, where there is no period"""
+"""Relative to a time, for the same reason, where there is no period"""
 
 
 @dataclass(slots=True)
 class SampleClock:
-    """Due times offset + k·period, k = 0, 1, …; a sample happens at the first communication point from then."""
+    """Due times offset + k·period, k = 0, 1, …; a sample is taken at the first communication point from then on."""
 
     period: float
     """[s]; 0: every communication point from the offset on is a sample"""

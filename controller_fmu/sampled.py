@@ -1,4 +1,4 @@
-"""A controller behind its own sample clock: what the FMUs of all controllers do, whatever their law."""
+"""A controller with its own sample clock: the common part of all controller FMUs."""
 
 from abc import abstractmethod
 from types import MappingProxyType
@@ -32,7 +32,7 @@ class SampledController(ControllerInterface):
         """Evaluate the law and write its command and locals."""
 
     def read_parameters(self) -> None:
-        """Build the nominal model and the trajectory, and check the clock; laws add what is theirs."""
+        """Build the nominal model and the trajectory, and check the clock; laws add their own parameters."""
         self._model = read_fields(self, Model)
         self._trajectory = read_fields(self, Trajectory, "trajectory_")
         self._mixer = read_fields(self, Mixer, "motor_")
@@ -48,7 +48,7 @@ class SampledController(ControllerInterface):
         self._hold(t, 0.0)
 
     def step(self, t: float, h: float) -> None:
-        """Sample at `t` if it is time, and hold over [t, t + h]."""
+        """Sample at `t` if a sample is due, and hold over [t, t + h]."""
         period = self._clock.period
         if h > period * (1.0 + 1e-6) and period > 0.0:
             self.warn_once(
@@ -63,11 +63,11 @@ class SampledController(ControllerInterface):
         return {"next_index": self._clock.next_index}
 
     def restore(self, state: State) -> None:
-        """Put the clock back."""
+        """Restore the clock."""
         self._clock = SampleClock(self.sample_period, self.sample_offset, int(state["next_index"]))
 
     def _hold(self, t: float, h: float) -> None:
-        """Sample, and show what the command is of each motor."""
+        """Sample, and set the thrusts of the motors for the command."""
         self.sample(t, h)
         self.motor_thrust = self._mixed(Wrench(self.thrust, self.torque))
 
@@ -78,7 +78,7 @@ class SampledController(ControllerInterface):
         return Thrusts(0.0, 0.0, 0.0, 0.0)
 
     def sample(self, t: float, h: float) -> None:
-        """Hold a command for what is measured at `t`, over [t, t + h]; of no length at initialisation."""
+        """Hold a command for the measurement at `t`, over [t, t + h]; h = 0 at initialisation."""
         quaternion = self.quaternion
         if not any(quaternion):
             self._hover()
@@ -95,12 +95,12 @@ class SampledController(ControllerInterface):
         return read_fields(self, Reference, "reference_")
 
     def _built_in(self, t: float) -> Reference:
-        """The trajectory, which is in the axes that the FMU is told in."""
+        """The built-in trajectory, whose parameters are in the axes convention of the FMU."""
         built_in = self._trajectory.at(t)
         return built_in if self.is_turned is False else built_in.turned(self.is_turned)
 
     def _hover(self) -> None:
-        """A zero quaternion means that nothing is connected yet."""
+        """Command hover: a zero quaternion means that nothing is connected yet."""
         self.warn_once(
             "no measurement", "quaternion = (0, 0, 0, 0): no measurement, commanding hover thrust and no torque"
         )

@@ -1,4 +1,4 @@
-"""What any controller knows of the vehicle: what it is told, and what it believes."""
+"""The vehicle as a controller knows it: its measurements and its nominal model."""
 
 from typing import NamedTuple
 
@@ -6,11 +6,11 @@ from fmu_kit.algebra import Quaternion, Vec3
 from fmu_kit.rigid_body import Body
 
 Model = Body
-"""The rigid body that a controller believes in."""
+"""The nominal model of a controller."""
 
 
 class Measurement(NamedTuple):
-    """What the controller is told of the vehicle."""
+    """The measured motion of the vehicle."""
 
     position: Vec3
     """P [m], inertial"""

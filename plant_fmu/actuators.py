@@ -1,4 +1,4 @@
-"""What lies between a commanded wrench and the one that acts: a box of limits, or four motors on an X frame.
+"""Actuators between the commanded and the acting wrench: a box of limits, or four motors on an X frame.
 
 Inertial frame north-east-down, body frame forward-right-down, thrust along -z of the body, SI units.
 """
@@ -14,7 +14,7 @@ from fmu_kit.scalar import Scalar
 
 
 class Channels(NamedTuple):
-    """Four numbers that lag each on its own: thrust and torques x, y, z [N, N·m], or `Thrusts` of four motors [N]."""
+    """Four numbers with independent lags: thrust and torques x, y, z [N, N·m], or `Thrusts` of four motors [N]."""
 
     a: Scalar
     b: Scalar
@@ -24,7 +24,7 @@ class Channels(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Box:
-    """Limits of thrust and of each torque, then a first-order lag of each: no motor has part in it."""
+    """Limits of thrust and of each torque, then a first-order lag of each, without motors."""
 
     thrust_max: float = 1e6
     """[N]; thrust is limited to [thrust_min, thrust_max]"""
@@ -46,7 +46,7 @@ class Box:
     def response(self, start: Channels, target: Channels, elapsed: float) -> Channels:
         """Thrust and torques `elapsed` [s] after `start`, with the limited command held at `target`.
 
-        This is the exact solution of the lag, so no integration step is too long for it.
+        This is the exact solution of the lag, for any integration step.
         """
         if self.time_constant == 0.0:
             return target
@@ -63,29 +63,29 @@ class Box:
 class Motors(Mixer):
     """Four motors, each with its limits and its lag.
 
-    What four motors cannot give is not shared out: each is cut to its own limits, and thrust and torques come out as
-    they may. So a large torque costs thrust or adds to it, and a large thrust costs torque.
+    A saturated command is not reallocated: each motor is clamped to its own limits, and thrust and torques follow. So
+    a large torque reduces or increases the thrust, and a large thrust reduces the torque.
     """
 
     thrust_max: float = 0.0
-    """[N] of one motor; 0: there are no motors, the box alone acts"""
+    """[N] of one motor; 0: no motors, only the box acts"""
     thrust_min: float = 0.0
     """[N] of one motor"""
     arm_x: float = 0.1
     arm_y: float = 0.1
     drag_to_thrust: float = 0.016
     up: float = 0.0
-    """[s], time constant of a thrust that grows; 0: no lag"""
+    """[s], time constant of increasing thrust; 0: no lag"""
     down: float = 0.0
-    """[s], of one that falls"""
+    """[s], time constant of decreasing thrust; 0: no lag"""
 
     def limited(self, command: Wrench) -> Channels:
-        """The thrusts that make up `command`, each within its limits."""
-        return Channels(*(self._cut(thrust) for thrust in self.thrusts(command)))
+        """The thrusts for `command`, each within its limits."""
+        return Channels(*(self._clamped(thrust) for thrust in self.thrusts(command)))
 
     def response(self, start: Channels, target: Channels, elapsed: float) -> Channels:
         """The thrusts `elapsed` [s] after `start`, with the limited command held at `target`: the exact solution."""
-        rising, falling = _left(elapsed, self.up), _left(elapsed, self.down)
+        rising, falling = _remaining(elapsed, self.up), _remaining(elapsed, self.down)
         return Channels(
             _between(start.a, target.a, rising, falling),
             _between(start.b, target.b, rising, falling),
@@ -93,19 +93,19 @@ class Motors(Mixer):
             _between(start.d, target.d, rising, falling),
         )
 
-    def _cut(self, thrust: Scalar) -> Scalar:
+    def _clamped(self, thrust: Scalar) -> Scalar:
         return min(max(thrust, self.thrust_min), self.thrust_max)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Actuators:
-    """The limits of the box, and behind them the motors with their lag if there are any, else the lag of the box."""
+    """The limits of the box, followed by the motors with their lag if there are any, else by the lag of the box."""
 
     box: Box = Box()
     motors: Motors = Motors()
 
     def limited(self, command: Wrench) -> Channels:
-        """What `command` is at the actuators, within the limits."""
+        """The channels for `command`, within the limits."""
         allowed = self.box.limited(command)
         if self.motors.thrust_max > 0.0:
             return self.motors.limited(allowed)
@@ -118,20 +118,20 @@ class Actuators:
         return self.box.response(start, target, elapsed)
 
     def wrench(self, channels: Channels) -> Wrench:
-        """What acts on the body."""
+        """The wrench that acts on the body."""
         if self.motors.thrust_max > 0.0:
             return self.motors.wrench(channels)
         return Wrench(channels.a, Vec3(channels.b, channels.c, channels.d))
 
 
-def _left(elapsed: float, time_constant: float) -> float:
-    """The share of a difference that is left of it after `elapsed` [s]."""
+def _remaining(elapsed: float, time_constant: float) -> float:
+    """The share of a difference that remains after `elapsed` [s]."""
     if time_constant == 0.0:
         return 0.0
     return math.exp(-elapsed / time_constant)
 
 
 def _between(start: Scalar, target: Scalar, rising: float, falling: float) -> Scalar:
-    """On the way from `start` to `target`, with the share that is left of it on the way up and down."""
-    left = rising if target > start else falling
-    return target + left * (start - target)
+    """A value between `start` and `target`, with the remaining shares for a rising and a falling value."""
+    remaining = rising if target > start else falling
+    return target + remaining * (start - target)

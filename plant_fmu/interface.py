@@ -21,7 +21,7 @@ _HOVER = _BODY.mass * _BODY.gravity
 
 
 class PlantInterface(Framed):
-    """What goes in, what comes out, and of what the vehicle is."""
+    """Inputs, outputs and parameters of the vehicle."""
 
     thrust = Input(
         "total thrust, upward in the body, before limits and lag", "N", _HOVER, nominal=_HOVER, terminal="command"

@@ -1,29 +1,29 @@
-"""A payload at the centre of gravity that is let go at a time, as pure functions of time."""
+"""A payload at the centre of gravity that is dropped at a given time, as pure functions of time."""
 
 from dataclasses import dataclass
 
 from fmu_kit.scalar import FLOAT, Scalar, ScalarOps
 
 AT_ONCE = 1e-9
-"""[s]; a drop no farther than this from where a step begins or ends is there"""
+"""[s]; a drop this close to the beginning or the end of a step takes place there"""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Payload:
-    """A point mass: it adds to the mass and not to the inertia, and leaves with the velocity of the vehicle."""
+    """A point mass: it adds to the mass but not to the inertia, and is dropped with the velocity of the vehicle."""
 
     mass: float = 0.0
     """[kg]"""
     drop_time: float = 0.0
-    """[s], from which on it is gone; 0: it stays"""
+    """[s], from which on it is gone; 0: never"""
 
     def carried(self, t: Scalar, ops: ScalarOps = FLOAT) -> Scalar:
-        """The mass [kg] that there is of it at `t` [s]."""
+        """The mass [kg] of the payload still carried at `t` [s]."""
         left = ops.where(t < self.drop_time - AT_ONCE, self.mass, 0.0)
         return ops.where(self.drop_time > 0.0, left, self.mass)
 
     def until_drop(self, t: Scalar, h: Scalar, ops: ScalarOps = FLOAT) -> Scalar:
-        """How long [s] of a step from `t` to `t + h` it is carried, if it is let go inside of the step; else 0."""
+        """The time [s] until the drop in a step from `t` to `t + h`, if it is dropped within the step; else 0."""
         left = self.drop_time - t
         inside = ops.where(left > AT_ONCE, ops.where(left < h - AT_ONCE, left, 0.0), 0.0)
         return ops.where(self.mass > 0.0, ops.where(self.drop_time > 0.0, inside, 0.0), 0.0)

@@ -18,7 +18,7 @@ from plant_fmu.payload import Payload
 from plant_fmu.wind import Wind
 
 MOST_INTERNAL_STEPS = 100_000
-"""In one communication step: some seconds of work, during which no master can get in between"""
+"""Limit for one communication step: some seconds of work, which a master cannot interrupt"""
 _MOTION = tuple(each.name for each in PlantInterface.variables if each.causality == "output")
 
 
@@ -33,7 +33,7 @@ class QuadrotorPlant(PlantInterface):
 
     @classmethod
     def initial_dependencies(cls, output: str) -> frozenset[str]:
-        """The motion on where it starts; the quaternion on all four parts of that, and on how it is rounded."""
+        """The motion depends on its initial value; the quaternion on all of its parts, and on the axes convention."""
         vector, _, axis = output.rpartition(".")
         if vector == "quaternion":
             return frozenset({"frame", f"frame{INDEX}", *(f"initial.quaternion.{other}" for other in "xyzw")})
@@ -56,9 +56,9 @@ class QuadrotorPlant(PlantInterface):
         self._write(t)
 
     def step(self, t: float, h: float) -> None:
-        """Integrate from `t` to `t + h` in equal internal steps, the command held.
+        """Integrate from `t` to `t + h` in equal internal steps, with the command held.
 
-        Where the payload is let go inside of it, both parts of the step have equal internal steps of their own.
+        If the payload is dropped within it, each part of the step is divided into equal internal steps.
         """
         body, wind, actuators = self._body, self._wind, self._actuators
         largest = self.max_internal_step
@@ -74,17 +74,17 @@ class QuadrotorPlant(PlantInterface):
         loaded, bare, drop = self._mass_at(t), self._mass_at(t + carried), t + carried
         first = FLOAT.where(carried > 0.0, internal_steps(carried, largest), 0)
         second = internal_steps(h - carried, largest)
-        before, behind = carried / internal_steps(carried, largest), (h - carried) / second
+        before, after = carried / internal_steps(carried, largest), (h - carried) / second
 
         def move(i: int, state: RigidState) -> RigidState:
-            flying = body.with_mass(FLOAT.where(i < first, loaded, bare))
-            time = FLOAT.where(i < first, t + i * before, drop + (i - first) * behind)
+            current = body.with_mass(FLOAT.where(i < first, loaded, bare))
+            time = FLOAT.where(i < first, t + i * before, drop + (i - first) * after)
 
             def f(at: float, x: RigidState) -> RigidState:
                 wrench = actuators.wrench(actuators.response(start, target, at - t))
-                return derivative(x, wrench, wind.force(at) + external, flying)
+                return derivative(x, wrench, wind.force(at) + external, current)
 
-            return rk4_step(f, time, state, FLOAT.where(i < first, before, behind)).normalised()
+            return rk4_step(f, time, state, FLOAT.where(i < first, before, after)).normalised()
 
         self._state = repeat(first + second, move, self._state)
         self._channels = actuators.response(start, target, h)
@@ -95,11 +95,11 @@ class QuadrotorPlant(PlantInterface):
         return {"actuators": list(self._channels), "attitude": list(self._state.quaternion)}
 
     def restore(self, state: State) -> None:
-        """Put the actuators and the motion back."""
+        """Restore the actuators and the motion."""
         a, b, c, d = map(float, state["actuators"])
         self._channels = Channels(a, b, c, d)
         x, y, z, w = map(float, state["attitude"])
-        attitude = Quaternion.from_xyzw(x, y, z, w)  # in other axes, the variable is not it to the last bit
+        attitude = Quaternion.from_xyzw(x, y, z, w)  # in other axes, the variable differs in the last bit
         self._state = RigidState(self.position, self.velocity, attitude, self.angular_velocity)
 
     def _read_actuators(self) -> Actuators:
@@ -138,7 +138,7 @@ class QuadrotorPlant(PlantInterface):
 
 
 def _unless_zero(own: float, general: float) -> float:
-    """What a motor has of its own, else what is said of all actuators."""
+    """The value of the motors if given, else that of all actuators."""
     if own == 0.0:
         return general
     return own

@@ -1,4 +1,4 @@
-"""From the force to exert to an attitude, and from attitude errors to angular velocities.
+"""From the desired force to an attitude, and from attitude errors to angular velocities.
 
 PX4: ControlMath.cpp, AttitudeControl.cpp.
 """
@@ -11,9 +11,9 @@ from fmu_kit.algebra import Quaternion, Vec3
 from fmu_kit.scalar import FLOAT
 
 SMALLEST_SINE = 1e-5
-"""Thrust axes that are opposite up to it have no shortest way from one to the other."""
+"""Below it, thrust axes are opposite, and there is no shortest rotation between them."""
 SMALLEST_WEIGHT = 1e-4
-"""A yaw weight up to it is none."""
+"""A yaw weight up to it counts as zero."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -32,10 +32,10 @@ class AttitudeLoop:
 
         `yaw_rate` dψ_d [rad/s], about z of the inertial frame, is fed forward.
         """
-        error = attitude.inverse() * with_less_yaw(attitude, desired, self.yaw_weight)
-        sign = FLOAT.where(error.scalar < 0.0, -2.0, 2.0)  # Q and -Q are one attitude: the short way round
+        error = attitude.inverse() * with_weighted_yaw(attitude, desired, self.yaw_weight)
+        sign = FLOAT.where(error.scalar < 0.0, -2.0, 2.0)  # Q and -Q are one attitude: rotate the short way
         weighted = self.yaw_weight > SMALLEST_WEIGHT
-        yaw_gain = self.gain.z / FLOAT.where(weighted, self.yaw_weight, 1.0)  # so the weight leaves small yaw errors be
+        yaw_gain = self.gain.z / FLOAT.where(weighted, self.yaw_weight, 1.0)  # cancels the weight for small yaw errors
         feedback = Vec3(self.gain.x, self.gain.y, yaw_gain) * (sign * error.vector)
         return clamped_axes(feedback + attitude.to_body(Vec3(0.0, 0.0, yaw_rate)), self.rate_limit)
 
@@ -49,10 +49,10 @@ def attitude_of(force: Vec3, yaw: float) -> Quaternion:
     return Quaternion.from_axes(x, z.cross(x), z)
 
 
-def with_less_yaw(attitude: Quaternion, desired: Quaternion, weight: float) -> Quaternion:
-    """`desired` with its turn about the thrust axis times `weight` [1]: Q_d = Q_tilt ⊙ Q_yaw becomes Q_tilt ⊙ Q_yaw^w.
+def with_weighted_yaw(attitude: Quaternion, desired: Quaternion, weight: float) -> Quaternion:
+    """`desired` with its yaw scaled by `weight` [1]: Q_d = Q_tilt ⊙ Q_yaw becomes Q_tilt ⊙ Q_yaw^w.
 
-    Q_tilt is `attitude` turned the shortest way until its thrust axis is that of `desired`.
+    Q_tilt is `attitude` after the shortest rotation to the thrust axis of `desired`.
     """
     tilted = tilted_to(attitude, desired)
     yaw = tilted.inverse() * desired  # about z alone
@@ -62,12 +62,9 @@ def with_less_yaw(attitude: Quaternion, desired: Quaternion, weight: float) -> Q
 
 
 def tilted_to(attitude: Quaternion, desired: Quaternion) -> Quaternion:
-    """`attitude` turned the shortest way until its thrust axis is that of `desired`.
-
-    Where the two axes are opposite there is no shortest way: it is `desired`.
-    """
-    now, then = attitude.z_axis(), desired.z_axis()
-    axis, cosine = now.cross(then), now @ then
+    """`attitude` after the shortest rotation to the thrust axis of `desired`; for opposite axes, `desired` itself."""
+    current, target = attitude.z_axis(), desired.z_axis()
+    axis, cosine = current.cross(target), current @ target
     opposite = (cosine < 0.0) & (axis @ axis < SMALLEST_SINE * SMALLEST_SINE)
     turn = Quaternion(axis, FLOAT.where(opposite, 1.0, 1.0 + cosine)).normalised()
     tilted = turn * attitude

@@ -1,6 +1,6 @@
-"""What a loop needs between its samples: a first-order low-pass, a filtered derivative, a value kept within bounds.
+"""Filters of a sampled loop: a first-order low-pass, a filtered derivative, and clamping.
 
-An elapsed time of 0 leaves each as it is, which makes the first run of a loop no special case.
+After an elapsed time of 0 they are unchanged, so that the first run of a loop is no special case.
 """
 
 from fmu_kit.algebra import Vec3
@@ -15,7 +15,7 @@ def low_pass(filtered: float, sample: float, elapsed: float, cutoff: float) -> f
 
 
 def filtered_derivative(derivative: Vec3, change: Vec3, elapsed: float, cutoff: float) -> Vec3:
-    """The low-pass of change/elapsed, each axis, `elapsed` [s] after it was `derivative`; no division by 0."""
+    """The low-pass of change/elapsed, per axis, `elapsed` [s] after it was `derivative`, without division by 0."""
     return derivative + (change - elapsed * derivative) / (1.0 / cutoff + elapsed)
 
 
@@ -25,5 +25,5 @@ def clamped(value: float, lowest: float, highest: float) -> float:
 
 
 def clamped_axes(v: Vec3, bounds: Vec3) -> Vec3:
-    """`v` within ±`bounds`, each axis."""
+    """`v` within ±`bounds`, per axis."""
     return Vec3(clamped(v.x, -bounds.x, bounds.x), clamped(v.y, -bounds.y, bounds.y), clamped(v.z, -bounds.z, bounds.z))

@@ -1,4 +1,4 @@
-"""The variables of the cascade's FMU: those of every controller, and what its loops add, with PX4's names for them."""
+"""The variables of the cascade's FMU: those of every controller, and those of its loops, with PX4's names."""
 
 from controller_fmu.cascaded.airframe import Airframe
 from controller_fmu.cascaded.attitude_loop import AttitudeLoop
@@ -11,15 +11,15 @@ from fmu_kit.algebra import ZERO
 from fmu_kit.interface import FixedParameter, Local, Parameter
 
 VELOCITY_RATIO, ATTITUDE_RATIO = 20, 4
-"""With a `sample_period` of 1 ms these are PX4's 50 and 250 Hz below a rate loop of 1000 Hz."""
+"""With a `sample_period` of 1 ms these give PX4's 50 and 250 Hz, for a rate loop of 1000 Hz."""
 STEEPEST = 89.0 / 90.0 * 1.5707963267948966
-"""[rad]; a tilt limit is no larger, as with PX4"""
+"""[rad], bound of the tilt limit, as in PX4"""
 
 _POSITION, _VELOCITY, _ATTITUDE, _RATE, _FRAME = PositionLoop(), VelocityLoop(), AttitudeLoop(), RateLoop(), Airframe()
 
 
 class CascadeInterface(ControllerInterface):
-    """Airframe, gains and limits of the loops, and how often each runs."""
+    """Airframe, gains, limits and rates of the loops."""
 
     motor_thrust_max = FixedParameter(
         "largest thrust T_m of each motor", "N", _FRAME.thrust_max, name="motor.thrust_max", above=0.0

@@ -1,4 +1,4 @@
-"""The outermost loop: from position errors to the velocity to fly, within its limits (PX4: PositionControl.cpp)."""
+"""The outermost loop: from position errors to the desired velocity, within its limits (PX4: PositionControl.cpp)."""
 
 import math
 from dataclasses import dataclass
@@ -27,8 +27,8 @@ class PositionLoop:
     def velocity(self, position: Vec3, desired: Vec3, feedforward: Vec3) -> Vec3:
         """The desired velocity [m/s], inertial: K_p ∘ (P_d - P) + V_d within the limits.
 
-        `position` and `desired` [m], `feedforward` V_d [m/s], all inertial. Where the horizontal sum is too fast,
-        the part from the position error comes first, and of the feed-forward as much as there is room for.
+        `position` and `desired` [m], `feedforward` V_d [m/s], all inertial. If the horizontal sum exceeds its limit,
+        the part from the position error has priority over the feed-forward.
         """
         correction = self.gain * (desired - position)
         x, y = limited_sum(correction.x, correction.y, feedforward.x, feedforward.y, self.horizontal_limit)
@@ -36,7 +36,7 @@ class PositionLoop:
 
 
 def limited_sum(ax: float, ay: float, bx: float, by: float, limit: float) -> tuple[float, float]:
-    """a + b of two vectors of a plane, no longer than `limit`: a first, then along b as far as the limit allows."""
+    """a + b of two vectors in a plane, no longer than `limit`: a has priority, and b is shortened."""
     a = math.sqrt(ax * ax + ay * ay)
     b = max(math.sqrt(bx * bx + by * by), SMALLEST_SPEED)
     ux, uy = bx / b, by / b

@@ -1,4 +1,4 @@
-"""The innermost loop: from angular velocities to torques, with what is kept from run to run.
+"""The innermost loop: from angular velocities to torques, with its state.
 
 PX4: rate_control.cpp, MulticopterRateControl.cpp.
 """
@@ -13,10 +13,10 @@ from fmu_kit.algebra import ZERO, Inertia, Vec3
 from fmu_kit.scalar import FLOAT
 
 LARGE_ERROR = math.radians(400.0)
-"""[rad/s]; the integral takes up less of an error the nearer it is to this, and none beyond"""
+"""[rad/s]; the integral weights an error less the nearer it is to this, and ignores it beyond"""
 
 _PER_COMMAND = Airframe().full_torque
-"""[rad/s²] of a full command, where J = I₃ kg·m²: PX4's gains are commands, those here angular accelerations"""
+"""[rad/s²] for a full command with J = I₃ kg·m²: PX4's gains give commands, those here angular accelerations"""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -40,7 +40,7 @@ class RateLoop:
 
 
 class RateState(NamedTuple):
-    """What the rate loop keeps from run to run."""
+    """The state of the rate loop between runs."""
 
     integral: Vec3
     """[rad/s²], body"""
@@ -50,12 +50,12 @@ class RateState(NamedTuple):
     """filtered derivative of the measured angular velocity [rad/s²], body"""
     yaw_command: float
     """filtered [1]"""
-    cut: Vec3
-    """what the limits took of the command of the last run [1]"""
+    excess: Vec3
+    """part of the last command beyond the limits [1]"""
 
 
-def rate_state_at(angular_velocity: Vec3) -> RateState:
-    """What there is to keep before the first run, at a measured `angular_velocity` [rad/s]."""
+def initial_rate_state(angular_velocity: Vec3) -> RateState:
+    """The state before the first run, at a measured `angular_velocity` [rad/s]."""
     return RateState(Vec3(0.0, 0.0, 0.0), angular_velocity, Vec3(0.0, 0.0, 0.0), 0.0, Vec3(0.0, 0.0, 0.0))
 
 
@@ -68,40 +68,40 @@ def control_rate(
     inertia: Inertia,
     airframe: Airframe,
 ) -> tuple[Vec3, RateState]:
-    """The torque [N·m], body, and what to keep; `elapsed` [s] after the last run.
+    """The torque [N·m], body, and the new state; `elapsed` [s] after the last run.
 
-    `angular_velocity` and `desired` [rad/s], body. The output has the integral as it was before this run. Torques are
-    limited to commands in [-1, 1], each axis.
+    `angular_velocity` and `desired` [rad/s], body. The output uses the integral before this run. Torques are limited to
+    commands in [-1, 1], per axis.
     """
     change = angular_velocity - state.angular_velocity
     acceleration = filtered_derivative(state.angular_acceleration, change, elapsed, loop.derivative_cutoff)
     error = desired - angular_velocity
-    wanted = (
+    desired_acceleration = (
         loop.proportional * error + state.integral - loop.derivative * acceleration + loop.feedforward * desired
     )  # [rad/s²]
-    raw = airframe.command(inertia @ wanted)
+    raw = airframe.command(inertia @ desired_acceleration)
     yaw = low_pass(state.yaw_command, raw.z, elapsed, loop.yaw_cutoff)
     command = Vec3(raw.x, raw.y, yaw)
-    given = clamped_axes(command, Vec3(1.0, 1.0, 1.0))
-    integral = integrated(loop, state, error, elapsed, inertia, airframe)
-    return airframe.torque(given), RateState(integral, angular_velocity, acceleration, yaw, command - given)
+    limited = clamped_axes(command, Vec3(1.0, 1.0, 1.0))
+    integral = integrate_error(loop, state, error, elapsed, inertia, airframe)
+    return airframe.torque(limited), RateState(integral, angular_velocity, acceleration, yaw, command - limited)
 
 
-def integrated(
+def integrate_error(
     loop: RateLoop, state: RateState, error: Vec3, elapsed: float, inertia: Inertia, airframe: Airframe
 ) -> Vec3:
-    """The integral [rad/s²], body, `elapsed` [s] on: none of an `error` [rad/s] that would drive a limit further."""
+    """The integral [rad/s²], body, after `elapsed` [s], without an `error` [rad/s] that increases an excess."""
     full, bound = airframe.full_torque, loop.integral_limit
 
-    def axis(before: float, gain: float, error: float, cut: float, highest: float) -> float:
-        error = FLOAT.where(cut > 0.0, min(error, 0.0), FLOAT.where(cut < 0.0, max(error, 0.0), error))
+    def axis(before: float, gain: float, error: float, excess: float, highest: float) -> float:
+        error = FLOAT.where(excess > 0.0, min(error, 0.0), FLOAT.where(excess < 0.0, max(error, 0.0), error))
         relative = error / LARGE_ERROR
         share = max(0.0, 1.0 - relative * relative)
         return clamped(before + share * gain * error * elapsed, -highest, highest)
 
-    before, gain, cut = state.integral, loop.integral, state.cut
+    before, gain, excess = state.integral, loop.integral, state.excess
     return Vec3(
-        axis(before.x, gain.x, error.x, cut.x, bound.x * full.x / inertia.xx),
-        axis(before.y, gain.y, error.y, cut.y, bound.y * full.y / inertia.yy),
-        axis(before.z, gain.z, error.z, cut.z, bound.z * full.z / inertia.zz),
+        axis(before.x, gain.x, error.x, excess.x, bound.x * full.x / inertia.xx),
+        axis(before.y, gain.y, error.y, excess.y, bound.y * full.y / inertia.yy),
+        axis(before.z, gain.z, error.z, excess.z, bound.z * full.z / inertia.zz),
     )

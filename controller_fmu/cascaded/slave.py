@@ -1,11 +1,11 @@
-"""The cascade as an FMU: runs each loop when its turn is, holds what it has come to, and keeps what it remembers."""
+"""The cascade as an FMU: it runs each loop at its rate, holds the results, and keeps the states of the loops."""
 
 from controller_fmu.cascaded.airframe import Airframe
 from controller_fmu.cascaded.attitude_loop import AttitudeLoop, attitude_of
 from controller_fmu.cascaded.interface import CascadeInterface
 from controller_fmu.cascaded.position_loop import PositionLoop
-from controller_fmu.cascaded.rate_loop import RateLoop, RateState, control_rate, rate_state_at
-from controller_fmu.cascaded.velocity_loop import VelocityLoop, VelocityState, control_velocity, velocity_state_at
+from controller_fmu.cascaded.rate_loop import RateLoop, RateState, control_rate, initial_rate_state
+from controller_fmu.cascaded.velocity_loop import VelocityLoop, VelocityState, control_velocity, initial_velocity_state
 from controller_fmu.sampled import SampledController
 from controller_fmu.vehicle import Measurement
 from fmu_kit.algebra import Quaternion, Vec3
@@ -20,7 +20,7 @@ _RESULTS = ("thrust", "torque.x", "torque.y", "torque.z")
 class CascadedController(SampledController, CascadeInterface):
     """Cascade of position, velocity, attitude and rate loops for a quadrotor, with PX4's structure, sampled.
 
-    A sample runs the rate loop, and the others every few samples.
+    Each sample runs the rate loop; the other loops run every few samples.
     """
 
     initially_idle = SampledController.initially_idle | {
@@ -29,7 +29,7 @@ class CascadedController(SampledController, CascadeInterface):
     }
 
     def read_parameters(self) -> None:
-        """Take over the airframe and the loops."""
+        """Read the airframe and the loops."""
         super().read_parameters()
         self._airframe = read_fields(self, Airframe, "motor_")
         self._read_translation()
@@ -39,18 +39,18 @@ class CascadedController(SampledController, CascadeInterface):
         self._rate_loop = read_fields(self, RateLoop, "rate_")
 
     def initialise(self, t: float) -> None:
-        """Hold the command for the initial inputs; nothing of them is remembered, as this is not a sample."""
+        """Hold the command for the initial inputs; as this is not a sample, the loops keep no state of it."""
         self._now = self._velocity_time = self._rate_time = t
-        self._begun, self._runs = False, 0
-        self._velocity_state, self._rate_state = velocity_state_at(_zero()), rate_state_at(_zero())
+        self._started, self._runs = False, 0
+        self._velocity_state, self._rate_state = initial_velocity_state(_zero()), initial_rate_state(_zero())
         self._thrust, self._desired_attitude, self._desired_rate = 0.0, Quaternion(_zero(), 1.0), _zero()
         super().initialise(t)
-        self._begun = False
+        self._started = False
 
     def control(self, measurement: Measurement, reference: Reference) -> None:
-        """Run the loops whose turn it is; raises `DivergenceError` if they have no finite command."""
-        if not self._begun:
-            self._begin(measurement)
+        """Run the loops that are due; raises `DivergenceError` if they have no finite command."""
+        if not self._started:
+            self._start_loops(measurement)
         if self._runs % self.velocity_ratio == 0:
             self._run_translation(measurement, reference)
         if self._runs % self.attitude_ratio == 0:
@@ -60,15 +60,15 @@ class CascadedController(SampledController, CascadeInterface):
         self._write_errors(measurement, reference)
 
     def internal_state(self) -> State:
-        """The clock, the turns and what the loops remember; what they hold is among it."""
+        """The clock, the count of runs, and the states and held results of the loops."""
         velocity, rate = self._velocity_state, self._rate_state
         return {
             **super().internal_state(),
-            "begun": self._begun,
+            "begun": self._started,
             "runs": self._runs,
             "times": [self._velocity_time, self._rate_time],
             "velocity": [list(v) for v in velocity],
-            "rate": [list(v) for v in (*rate[:3], rate.cut)],
+            "rate": [list(v) for v in (*rate[:3], rate.excess)],
             "yaw_command": rate.yaw_command,
             "thrust": self._thrust,
             "desired_attitude": list(self._desired_attitude),
@@ -76,14 +76,14 @@ class CascadedController(SampledController, CascadeInterface):
         }
 
     def restore(self, state: State) -> None:
-        """Put all of it back."""
+        """Restore all of it."""
         super().restore(state)
-        self._begun, self._runs = bool(state["begun"]), int(state["runs"])
+        self._started, self._runs = bool(state["begun"]), int(state["runs"])
         self._velocity_time, self._rate_time = map(float, state["times"])
         integral, velocity, acceleration = map(_vector, state["velocity"])
         self._velocity_state = VelocityState(integral, velocity, acceleration)
-        integral, velocity, acceleration, cut = map(_vector, state["rate"])
-        self._rate_state = RateState(integral, velocity, acceleration, float(state["yaw_command"]), cut)
+        integral, velocity, acceleration, excess = map(_vector, state["rate"])
+        self._rate_state = RateState(integral, velocity, acceleration, float(state["yaw_command"]), excess)
         self._thrust = float(state["thrust"])
         x, y, z, w = map(float, state["desired_attitude"])
         self._desired_attitude = Quaternion.from_xyzw(x, y, z, w)
@@ -92,16 +92,16 @@ class CascadedController(SampledController, CascadeInterface):
     # -- the loops --------------------------------------------------------------------------------------------
 
     def sample(self, t: float, h: float) -> None:
-        """As any controller; the loops know the time."""
+        """Sample as any controller, recording the time for the loops."""
         self._now = t
         super().sample(t, h)
 
-    def _begin(self, measurement: Measurement) -> None:
-        """The first measurement: from here on there are changes and elapsed times."""
-        self._begun, self._runs = True, 0
+    def _start_loops(self, measurement: Measurement) -> None:
+        """Start the loops at the first measurement."""
+        self._started, self._runs = True, 0
         self._velocity_time = self._rate_time = self._now
-        self._velocity_state = velocity_state_at(measurement.velocity)
-        self._rate_state = rate_state_at(measurement.angular_velocity)
+        self._velocity_state = initial_velocity_state(measurement.velocity)
+        self._rate_state = initial_rate_state(measurement.angular_velocity)
 
     def _run_translation(self, measurement: Measurement, reference: Reference) -> None:
         desired = self._position_loop.velocity(measurement.position, reference.position, reference.velocity)
@@ -175,5 +175,5 @@ def _vector(values: list[float]) -> Vec3:
 
 
 def _zero() -> Vec3:
-    """One of its own each time, as it is kept."""
+    """A new vector each time: the compiler allows no aliases in the state."""
     return Vec3(0.0, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""From the velocity to fly to the force to exert, with what is kept from run to run (PX4: PositionControl.cpp)."""
+"""From the desired velocity to the desired force, with the state of the loop (PX4: PositionControl.cpp)."""
 
 import math
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from fmu_kit.algebra import Vec3
 from fmu_kit.scalar import FLOAT
 
 SMALLEST_LENGTH = 1e-12
-"""A vector shorter than it has no direction: [m/s²] of an acceleration, [N] of a force."""
+"""A shorter vector has no direction: [m/s²] of an acceleration, [N] of a force."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -32,11 +32,11 @@ class VelocityLoop:
     most_thrust: float = 1.0
     """[1], of full thrust (MPC_THR_MAX)"""
     horizontal_margin: float = 0.3
-    """[1], of full thrust: what the vertical leaves to the horizontal if need be (MPC_THR_XY_MARG)"""
+    """[1], of full thrust: reserved for the horizontal force at the thrust limit (MPC_THR_XY_MARG)"""
 
 
 class VelocityState(NamedTuple):
-    """What the velocity loop keeps from run to run."""
+    """The state of the velocity loop between runs."""
 
     integral: Vec3
     """[m/s²], inertial"""
@@ -46,16 +46,16 @@ class VelocityState(NamedTuple):
     """filtered derivative of the measured velocity [m/s²], inertial"""
 
 
-def velocity_state_at(velocity: Vec3) -> VelocityState:
-    """What there is to keep before the first run, at a measured `velocity` [m/s]."""
+def initial_velocity_state(velocity: Vec3) -> VelocityState:
+    """The state before the first run, at a measured `velocity` [m/s]."""
     return VelocityState(Vec3(0.0, 0.0, 0.0), velocity, Vec3(0.0, 0.0, 0.0))
 
 
 class Force(NamedTuple):
-    """Two forces [N], inertial: what was wanted, tilted no further than allowed, and what of it there is thrust for."""
+    """Two forces [N], inertial: the desired one within the tilt limit, and that limited by the thrust."""
 
-    wanted: Vec3
-    given: Vec3
+    desired: Vec3
+    limited: Vec3
 
 
 def control_velocity(
@@ -68,28 +68,28 @@ def control_velocity(
     model: Model,
     full_thrust: float,
 ) -> tuple[Vec3, VelocityState]:
-    """The force of the propellers [N], inertial, and what to keep; `elapsed` [s] after the last run.
+    """The force of the propellers [N], inertial, and the new state; `elapsed` [s] after the last run.
 
-    `velocity` and `desired` [m/s], `feedforward` A_d [m/s²], all inertial. The output has the integral as it was
-    before this run.
+    `velocity` and `desired` [m/s], `feedforward` A_d [m/s²], all inertial. The output uses the integral before this
+    run.
     """
     acceleration = filtered_derivative(state.acceleration, velocity - state.velocity, elapsed, loop.derivative_cutoff)
     g = model.gravity
     integral = Vec3(state.integral.x, state.integral.y, clamped(state.integral.z, -g, g))
     error = desired - velocity
-    wanted = feedforward + loop.proportional * error + integral - loop.derivative * acceleration
-    force = limited_force(loop, wanted, model, full_thrust)
-    to_integrate = without_windup(loop, error, wanted, force, model, full_thrust)
+    total = feedforward + loop.proportional * error + integral - loop.derivative * acceleration
+    force = limited_force(loop, total, model, full_thrust)
+    to_integrate = error_without_windup(loop, error, total, force, model, full_thrust)
     integral = integral + elapsed * (loop.integral * to_integrate)
-    return force.given, VelocityState(integral, velocity, acceleration)
+    return force.limited, VelocityState(integral, velocity, acceleration)
 
 
 def limited_force(loop: VelocityLoop, acceleration: Vec3, model: Model, full_thrust: float) -> Force:
     """The force of the propellers for an `acceleration` [m/s²], inertial, within tilt and thrust; `full_thrust` [N].
 
-    The direction is that of the horizontal acceleration against g, whatever the vertical one (MPC_ACC_DECOUPLE = 1);
-    the length is what the vertical one needs in that direction. If that is too much thrust, the vertical comes first
-    but for a margin of the horizontal.
+    The direction is that of the horizontal acceleration and g, independent of the vertical acceleration
+    (MPC_ACC_DECOUPLE = 1); the length is what the vertical acceleration needs in that direction. At the thrust limit,
+    the vertical force has priority except for a margin of the horizontal force.
     """
     least, most = loop.least_thrust * full_thrust, loop.most_thrust * full_thrust
     horizontal = math.sqrt(acceleration.x * acceleration.x + acceleration.y * acceleration.y)
@@ -97,29 +97,29 @@ def limited_force(loop: VelocityLoop, acceleration: Vec3, model: Model, full_thr
     sine, cosine = math.sin(angle), math.cos(angle)
     thrust = max(model.mass * (model.gravity - acceleration.z) / cosine, least)
     sideways = thrust * sine / max(horizontal, SMALLEST_LENGTH)
-    wanted = Vec3(sideways * acceleration.x, sideways * acceleration.y, -thrust * cosine)
+    desired = Vec3(sideways * acceleration.x, sideways * acceleration.y, -thrust * cosine)
 
-    length = math.sqrt(wanted.x * wanted.x + wanted.y * wanted.y)
-    kept = min(length, loop.horizontal_margin * full_thrust)
-    z = max(wanted.z, -math.sqrt(max(0.0, most * most - kept * kept)))
+    length = math.sqrt(desired.x * desired.x + desired.y * desired.y)
+    reserved = min(length, loop.horizontal_margin * full_thrust)
+    z = max(desired.z, -math.sqrt(max(0.0, most * most - reserved * reserved)))
     left = math.sqrt(max(0.0, most * most - z * z))
     share = min(1.0, left / max(length, SMALLEST_LENGTH))
-    return Force(wanted, Vec3(share * wanted.x, share * wanted.y, z))
+    return Force(desired, Vec3(share * desired.x, share * desired.y, z))
 
 
-def without_windup(
+def error_without_windup(
     loop: VelocityLoop, error: Vec3, wanted: Vec3, force: Force, model: Model, full_thrust: float
 ) -> Vec3:
-    """The velocity error [m/s] as it is to be integrated.
+    """The velocity error [m/s] to be integrated.
 
-    Vertical: none that would drive a thrust at its limit further. Horizontal: where less acceleration is given than
-    `wanted` [m/s²], as much less as brings the integral back (tracking anti-windup, with the gain 2/P).
+    Vertical: zero where it would drive a thrust at its limit further. Horizontal: where the acceleration is less than
+    `wanted` [m/s²], reduced so that the integral returns (tracking anti-windup, with the gain 2/P).
     """
     least, most = loop.least_thrust * full_thrust, loop.most_thrust * full_thrust
-    at_least = (force.wanted.z >= -least) & (error.z >= 0.0)
-    at_most = (force.wanted.z <= -most) & (error.z <= 0.0)
+    at_least = (force.desired.z >= -least) & (error.z >= 0.0)
+    at_most = (force.desired.z <= -most) & (error.z <= 0.0)
     z = FLOAT.where(at_least | at_most, 0.0, error.z)
-    x, y = force.given.x / model.mass, force.given.y / model.mass
+    x, y = force.limited.x / model.mass, force.limited.y / model.mass
     saturated = wanted.x * wanted.x + wanted.y * wanted.y > x * x + y * y
     gain = FLOAT.where(saturated, 2.0 / loop.proportional.x, 0.0)
     return Vec3(error.x - gain * (wanted.x - x), error.y - gain * (wanted.y - y), z)

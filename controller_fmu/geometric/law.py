@@ -2,11 +2,11 @@
 
 Source: T. Lee, M. Leok, N. H. McClamroch, "Geometric Tracking Control of a Quadrotor UAV on SE(3)", 49th IEEE
 Conference on Decision and Control (CDC), 2010; their "Control of Complex Maneuvers for a Quadrotor UAV using
-Geometric Methods on SE(3)", arXiv:1003.2005, writes the derivatives out. Names in the comments are theirs.
+Geometric Methods on SE(3)", arXiv:1003.2005, gives the derivatives. Names in the comments are theirs.
 
 Their R takes body to inertial components, and so is R(Q)ᵀ here; b_i are the body's axes in inertial components, the
-columns of R. Their A [N] is -m u here, and what they divide by m is divided here from the start: k_x and k_v are per
-unit mass, as in their example, so that no mass is left in the attitude that is asked for.
+columns of R. Their A [N] is -m u here, and all that they divide by m is divided here from the start: k_x and k_v are
+per unit mass, as in their example, so that the desired attitude does not depend on the mass.
 
 Everything here is a pure function of the state, the reference and the parameters, on any scalar.
 Inertial frame north-east-down, body frame forward-right-down, SI units; `_c` computed, `_d` desired, `_dot` rate;
@@ -31,9 +31,9 @@ SMALLEST_SINE = 1e-9
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Gains:
-    """The gains of the law. Of attitude those of the published example, per unit inertia.
+    """The gains of the law. The attitude gains are those of the published example, per unit inertia.
 
-    Of position half its natural frequency, with the same damping: it has k_x/m = 16 and k_v/m = 5.6.
+    The position gains have half its natural frequency and the same damping: it has k_x/m = 16 and k_v/m = 5.6.
     """
 
     k_x: float = 4.0
@@ -49,7 +49,7 @@ class Gains:
 
 
 class Heading(NamedTuple):
-    """The direction that b1 is to have, and its rates; of unit length, as it is there, or of any other."""
+    """The desired direction of b1, and its rates; of unit length, as in the paper, or of any other."""
 
     direction: Vec3 = Vec3(1.0, 0.0, 0.0)
     """b1d [1], inertial"""
@@ -60,7 +60,7 @@ class Heading(NamedTuple):
 
     @classmethod
     def at(cls, yaw: Scalar, rate: Scalar, ops: ScalarOps = FLOAT) -> "Heading":
-        """The one of a yaw [rad], from x of the inertial frame towards y, that has a steady rate [rad/s]."""
+        """The heading of a yaw [rad], from x of the inertial frame towards y, with a constant rate [rad/s]."""
         sine, cosine = ops.sin(yaw), ops.cos(yaw)
         return cls(
             Vec3(cosine, sine, 0.0),
@@ -84,9 +84,9 @@ class Evaluation(NamedTuple):
     velocity_error: Vec3
     """e_v [m/s], inertial"""
     acceleration_error: Vec3
-    """e_a [m/s²], its rate in the model"""
+    """e_a [m/s²], rate of e_v in the model"""
     jerk_error: Vec3
-    """e_j [m/s³], the rate of that"""
+    """e_j [m/s³], rate of e_a"""
     force: Vec3
     """-A/m [m/s²], inertial"""
     force_dot: Vec3
@@ -119,7 +119,7 @@ class Unit(NamedTuple):
     ddot: Vec3
 
     def cross(self, other: "Unit | Heading") -> tuple[Vec3, Vec3, Vec3]:
-        """The vector product with another that moves, and its first two derivatives."""
+        """The vector product with another moving vector, and its first two derivatives."""
         (a, a_dot, a_ddot), (b, b_dot, b_ddot) = self, other
         return (
             a.cross(b),
@@ -129,7 +129,7 @@ class Unit(NamedTuple):
 
 
 def unit(v: Vec3, v_dot: Vec3, v_ddot: Vec3, length: Scalar) -> Unit:
-    """v/|v| and its derivatives, of a vector of this length that is not zero."""
+    """v/|v| and its derivatives, for a vector of this length, not zero."""
     direction = v / length
     length_dot = direction @ v_dot
     direction_dot = (v_dot - length_dot * direction) / length
@@ -140,7 +140,7 @@ def unit(v: Vec3, v_dot: Vec3, v_ddot: Vec3, length: Scalar) -> Unit:
 
 
 class Frame(NamedTuple):
-    """The columns of R_c, inertial components, and how they turn."""
+    """The columns of R_c, inertial components, with their derivatives."""
 
     b1: Unit
     b2: Unit
@@ -162,7 +162,7 @@ class Frame(NamedTuple):
 
 
 def computed_frame(u: Vec3, u_dot: Vec3, u_ddot: Vec3, heading: Heading, ops: ScalarOps = FLOAT) -> Frame:
-    """R_c with its third axis along `u` = -A/m [m/s²] and its first as near to b1d as that allows.
+    """R_c with its third axis along `u` = -A/m [m/s²] and its first axis as near to b1d as possible.
 
     Raises `DivergenceError` where u vanishes or points along b1d or against it: there is no such frame.
     """
@@ -193,11 +193,11 @@ def evaluate(
     ops: ScalarOps = FLOAT,
     heading: Heading = NORTH,
 ) -> Evaluation:
-    """Thrust and torque that track the path of `reference` and `heading` from `state`, with all that they are made of.
+    """Thrust and torque that track the path of `reference` and `heading` from `state`, with intermediate quantities.
 
     Scalars may be floats or batches; every component of the result has the (broadcast) shape of the inputs.
-    `state.quaternion` must have unit length; Q and -Q give the same command. Rates are the model's predictions: they
-    do not know wind, and take the thrust as it is commanded, negative or not.
+    `state.quaternion` must have unit length; Q and -Q give the same command. Rates are the model's predictions,
+    without wind and with the commanded thrust, negative or not.
 
     Raises `DivergenceError` where the desired attitude does not exist.
     """

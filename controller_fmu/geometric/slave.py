@@ -1,4 +1,4 @@
-"""The geometric controller as an FMU: its parameters, and what it shows."""
+"""The geometric controller as an FMU: its parameters and locals."""
 
 from controller_fmu.geometric.law import Evaluation, Gains, Heading, evaluate
 from controller_fmu.interface import ScaledGains
@@ -41,7 +41,7 @@ class GeometricController(ScaledGains, RedesignedController):
     energy = Local("of position, velocity, attitude and angular velocity errors, at the last sample", "J")
 
     def read_parameters(self) -> None:
-        """Take over the gains."""
+        """Read the gains."""
         super().read_parameters()
         self._gains = read_fields(self, Gains)
 

@@ -1,1 +1,1 @@
-"""Sampled redesigns of a law, and a predictor for a known delay: over any law that is a pure function."""
+"""Sampled redesigns of a law, and a predictor for a known delay, for any law that is a pure function."""

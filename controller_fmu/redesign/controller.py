@@ -1,13 +1,13 @@
-"""A controller whose command may be redesigned for the time that it is held, and for a known delay."""
+"""A controller whose command may be redesigned for the time during which it is held, and for a known delay."""
 
 import math
 from abc import abstractmethod
 from typing import Any, ClassVar
 
 from controller_fmu.redesign.interface import Discretisation, RedesignInterface
-from controller_fmu.redesign.matching import matched
-from controller_fmu.redesign.nominal import closed_loop, held
-from controller_fmu.redesign.prediction import MOST_ON_THEIR_WAY, Sent, at_rest, predicted, with_newest
+from controller_fmu.redesign.matching import matched_command
+from controller_fmu.redesign.nominal import closed_loop, under_command
+from controller_fmu.redesign.prediction import MOST_PENDING, SentCommand, all_sent, predicted_state, with_command
 from controller_fmu.sampled import SHORTEST_PERIOD, SampledController
 from controller_fmu.vehicle import Measurement
 from fmu_kit.algebra import Vec3
@@ -21,34 +21,34 @@ _COMMAND = ("thrust", "torque.x", "torque.y", "torque.z")
 
 
 def _of(condition: bool, one: float, other: float) -> float:
-    """One of two values; in C, what is done with it is written out once."""
+    """One of two values; chosen by a function, so that the C that uses it is not duplicated."""
     return one if condition else other
 
 
 class RedesignedController(SampledController, RedesignInterface):
-    """Holds what a redesign makes of a law that is a pure function: laws define `evaluation`.
+    """Holds the redesigned command of a law that is a pure function: laws define `evaluation`.
 
-    Thrust and torque are the redesign's; all else that is shown is the law's at the sample.
+    Thrust and torque are the redesign's; all other outputs and locals are the law's at the sample.
     """
 
     offers_semi_implicit: ClassVar[bool] = False
-    """Whether `evaluation` knows a time that is not zero."""
+    """Whether `evaluation` accepts an `implicit` time other than zero."""
 
     @abstractmethod
     def evaluation(self, measurement: Measurement, reference: Reference, implicit: float) -> Any:
-        """What the law comes to, thrust, torque and energy among it, as a named tuple of what variables show.
+        """The result of the law, with thrust, torque and energy, as a named tuple with the names of variables.
 
-        With `implicit` > 0 [s] that of its semi-implicit form over this time.
+        With `implicit` > 0 [s], that of its semi-implicit form over this time.
         """
 
     def control(self, measurement: Measurement, reference: Reference) -> None:
-        """Evaluate the law and show it; raises `DivergenceError` if it has no finite command."""
-        found = self.evaluation(measurement, reference, 0.0)
-        require_finite_state((*_COMMAND, "energy"), (found.thrust, *found.torque, found.energy))
-        set_fields(self, found)
+        """Evaluate the law and set the variables; raises `DivergenceError` if it has no finite command."""
+        result = self.evaluation(measurement, reference, 0.0)
+        require_finite_state((*_COMMAND, "energy"), (result.thrust, *result.torque, result.energy))
+        set_fields(self, result)
 
     def read_parameters(self) -> None:
-        """Take over the redesign too."""
+        """Read the parameters, those of the redesign included."""
         super().read_parameters()
         period = self.hold_period
         require(period == 0.0 or period >= SHORTEST_PERIOD, "hold_period", period, f"0 or at least {SHORTEST_PERIOD} s")
@@ -61,44 +61,44 @@ class RedesignedController(SampledController, RedesignInterface):
         )
 
     def initialise(self, t: float) -> None:
-        """Hold the command for the initial inputs: it acts at once, and until the first sample's does."""
-        self._pending = at_rest(t, self._held_command())  # which is none yet; nothing is predicted from it
+        """Hold the command for the initial inputs, which acts at once and until that of the first sample."""
+        self._pending = all_sent(t, self._held_command())  # a placeholder: nothing is predicted from it
         super().initialise(t)
-        self._pending = at_rest(t - self.prediction, self._held_command())
+        self._pending = all_sent(t - self.prediction, self._held_command())
 
     def internal_state(self) -> State:
-        """The clock, and the commands on their way."""
+        """The clock, and the pending commands."""
         pending = [[sent.time, sent.command.thrust, *sent.command.torque] for sent in self._pending]
         return {**super().internal_state(), "pending": pending}
 
     def restore(self, state: State) -> None:
-        """Put clock and commands back."""
+        """Restore the clock and the pending commands."""
         super().restore(state)
         pending = [[float(number) for number in sent] for sent in state["pending"]]
-        self._pending = tuple(Sent(t, Wrench(thrust, Vec3(x, y, z))) for t, thrust, x, y, z in pending)
-        if len(self._pending) != MOST_ON_THEIR_WAY:
+        self._pending = tuple(SentCommand(t, Wrench(thrust, Vec3(x, y, z))) for t, thrust, x, y, z in pending)
+        if len(self._pending) != MOST_PENDING:
             raise ValueError(len(self._pending))
 
     def sample(self, t: float, h: float) -> None:
-        """Hold the redesigned command, and remember it if it is to be on its way."""
+        """Hold the redesigned command, and record it as pending if there is a delay."""
         super().sample(t, h)
         if self.prediction > 0.0 and h > 0.0:
-            self._remember(t)
+            self._record_command(t)
 
     def respond(self, t: float, h: float, measurement: Measurement) -> None:
-        """Write what the law says here and now; then, if asked for, another command."""
+        """Write the law's command at the sample; then, if configured, the redesigned one."""
         super().respond(t, h, measurement)
         if self.discretisation != Discretisation.EXPLICIT or self.prediction > 0.0:
             self._redesign(t, h, measurement)
 
-    def _remember(self, t: float) -> None:
-        self._pending = with_newest(self._pending, t, self._held_command())
+    def _record_command(self, t: float) -> None:
+        self._pending = with_command(self._pending, t, self._held_command())
 
     def _held_command(self) -> Wrench:
         return Wrench(self.thrust, self.torque)
 
     def _redesign(self, t: float, h: float, measurement: Measurement) -> None:
-        """Hold the redesigned command; at initialisation (`h` = 0) none is on its way, and this one acts at once."""
+        """Hold the redesigned command; at initialisation (`h` = 0) none is pending, and it acts at once."""
         hold = self._hold_period if self._hold_period > 0.0 else h
         state, start = RigidState(*measurement), t
         if self.prediction > 0.0 and h > 0.0:
@@ -115,30 +115,30 @@ class RedesignedController(SampledController, RedesignInterface):
         if kind <= Discretisation.SEMI_IMPLICIT:
             return self._law(sampled, t, state, _of(kind == Discretisation.SEMI_IMPLICIT, hold, 0.0))
         horizon = _of(kind == Discretisation.MIDPOINT, 0.5 * hold, hold)
-        flight = closed_loop(
+        end = closed_loop(
             lambda time, x: self._law(sampled, time, x, 0.0), self._model, t, state, horizon / count, count
         )
         if kind == Discretisation.MIDPOINT:
-            return self._law(sampled, t + horizon, flight.state, 0.0)
-        mean = Wrench(flight.impulse.thrust / hold, flight.impulse.torque / hold)
+            return self._law(sampled, t + horizon, end.state, 0.0)
+        mean = Wrench(end.impulse.thrust / hold, end.impulse.torque / hold)
         if kind == Discretisation.MEAN:
             return mean
-        return self._matched(state, flight.state, mean, hold)
+        return self._matched(state, end.state, mean, hold)
 
     def _matched(self, state: RigidState, target: RigidState, first: Wrench, hold: float) -> Wrench:
-        def flight(command: Wrench) -> RigidState:
+        def simulate(command: Wrench) -> RigidState:
             return self._advanced(state, command, hold / self.stages, self.stages)
 
-        return matched(flight, self._model, target, first, self.weight / hold)
+        return matched_command(simulate, self._model, target, first, self.weight / hold)
 
     def _predicted(self, t: float, state: RigidState, hold: float) -> RigidState:
-        """Where the vehicle is when a command given at `t` acts."""
+        """The predicted state at the time when a command sent at `t` acts."""
         oldest, delay = self._pending[0].time, self.prediction
         require(
             oldest + delay <= t + 1e-6 * delay,
             "prediction",
             delay,
-            f"at most {t - oldest:g} s: {MOST_ON_THEIR_WAY} commands can be on their way",
+            f"at most {t - oldest:g} s: {MOST_PENDING} commands can be pending",
         )
         longest = hold / self.stages
 
@@ -146,20 +146,20 @@ class RedesignedController(SampledController, RedesignInterface):
             count = math.ceil(time / longest - 1e-6)
             return self._advanced(x, command, time / max(count, 1), count)
 
-        return predicted(advanced, state, t, delay, self._pending)
+        return predicted_state(advanced, state, t, delay, self._pending)
 
     def _advanced(self, state: RigidState, command: Wrench, step: float, count: int) -> RigidState:
         """The nominal model after some steps under a held command."""
-        return held(self._model, state, command, step, count)
+        return under_command(self._model, state, command, step, count)
 
     def _law(self, sampled: float, t: float, state: RigidState, implicit: float) -> Wrench:
-        """The law's command at `t` in a state of the nominal model, with the reference as known when `sampled`."""
+        """The law's command at `t` in a state of the nominal model, with the reference known at the time `sampled`."""
         measurement = Measurement(state.position, state.velocity, state.quaternion, state.angular_velocity)
-        found = self.evaluation(measurement, self._reference_ahead(sampled, t), implicit)
-        return Wrench(found.thrust, found.torque)
+        result = self.evaluation(measurement, self._reference_ahead(sampled, t), implicit)
+        return Wrench(result.thrust, result.torque)
 
     def _reference_ahead(self, sampled: float, t: float) -> Reference:
-        """The built-in trajectory at `t`; else what follows from the inputs as they are."""
+        """The built-in trajectory at `t`, or the extrapolation of the reference inputs."""
         if not self.use_reference_inputs:
             return self._built_in(t)
         return self._reference(sampled).after(t - sampled)

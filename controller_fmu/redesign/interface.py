@@ -1,4 +1,4 @@
-"""The parameters of every controller whose command may be redesigned for the time that it is held."""
+"""The parameters of controllers whose command may be redesigned for the time during which it is held."""
 
 import enum
 
@@ -7,18 +7,18 @@ from fmu_kit.interface import FixedParameter
 
 
 class Discretisation(enum.IntEnum):
-    """How a law in continuous time becomes a command that is held."""
+    """How a law in continuous time is converted to a held command."""
 
     EXPLICIT = 1
     """the law at the sample"""
     SEMI_IMPLICIT = 2
-    """the law at the sliding variable that it leads to by the end of the hold period"""
+    """the law at the sliding variable to which it leads at the end of the hold period"""
     MIDPOINT = 3
     """the law in the middle of the hold period"""
     MEAN = 4
     """the mean of the law over the hold period"""
     MATCH = 5
-    """the command that leads where the law leads"""
+    """the constant command that leads to the same state as the law"""
 
 
 class RedesignInterface(ControllerInterface):

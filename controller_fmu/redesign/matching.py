@@ -9,61 +9,61 @@ from fmu_kit.rigid_body import Body, RigidState, Wrench
 from fmu_kit.scalar import FLOAT, Scalar, ScalarOps, repeat
 
 ITERATIONS = 4
-"""Of Gauss-Newton: see `matched`."""
+"""Iterations of Gauss-Newton: see `matched_command`."""
 DIFFERENCE, ROUNDINGS = 1e-5, 200.0
-"""[m/s²], [rad/s²]: between the commands that the Jacobian is found from; in coarser numbers it is this many times the
-root of their resolution, so that a period of milliseconds leaves a difference between where they lead."""
+"""[m/s²], [rad/s²]: difference of the commands for the Jacobian; in coarser numbers it is this many times the root of
+their resolution, so that the states after a period of milliseconds still differ."""
 TINY = 1e-150
 """[1]: below this, the vector part of a quaternion counts as zero."""
 
 
-class _Try(NamedTuple):
-    """A command, and what it comes to."""
+class _Candidate(NamedTuple):
+    """A command, and its residuals."""
 
     command: tuple[Scalar, ...]
-    """T/m [m/s²] and J⁻¹ Γ [rad/s²]: of one size whatever the vehicle"""
-    misses: tuple[Scalar, ...]
+    """T/m [m/s²] and J⁻¹ Γ [rad/s²]: of similar size for every vehicle"""
+    residuals: tuple[Scalar, ...]
 
 
-def matched(
-    flight: Callable[[Wrench], RigidState],
+def matched_command(
+    simulate: Callable[[Wrench], RigidState],
     model: Body,
     target: RigidState,
     first: Wrench,
     weight: Scalar,
     ops: ScalarOps = FLOAT,
 ) -> Wrench:
-    """The constant command that minimises ‖δv‖² + ‖δΩ‖² + ‖`weight` δθ‖² between where `flight` ends and `target`.
+    """The constant command that minimises ‖δv‖² + ‖δΩ‖² + ‖`weight` δθ‖² between the end of `simulate` and `target`.
 
     Gauss-Newton from the command `first`, in a fixed number of iterations; a step that does not improve is not taken.
-    The Jacobian is that of forward differences: the model is one function more to call, not a second set of equations,
-    and an error in it delays the descent but does not move the minimum by more than the error times what is missed.
+    The Jacobian is by forward differences, so the model's equations need not be differentiated; its error slows the
+    descent, and moves the minimum by no more than this error times the residual.
     """
 
-    def tried(command: tuple[Scalar, ...]) -> _Try:
-        return _Try(command, misses(flight(_wrench(command, model)), target, weight, ops))
+    def candidate(command: tuple[Scalar, ...]) -> _Candidate:
+        return _Candidate(command, residuals(simulate(_wrench(command, model)), target, weight, ops))
 
     difference = max(DIFFERENCE, ROUNDINGS * math.sqrt(ops.resolution))
 
-    def improved(i: int, now: _Try) -> _Try:
+    def iterated(i: int, now: _Candidate) -> _Candidate:
         columns = [
             [
                 (there - here) / difference
-                for there, here in zip(tried(_moved(now.command, k, difference)).misses, now.misses)
+                for there, here in zip(candidate(_shifted(now.command, k, difference)).residuals, now.residuals)
             ]
             for k in range(4)
         ]
         matrix = [[_inner(a, b) for b in columns] for a in columns]
-        step = solved(matrix, [-_inner(column, now.misses) for column in columns])
-        then = tried(tuple(x + dx for x, dx in zip(now.command, step)))
-        better = _inner(then.misses, then.misses) < _inner(now.misses, now.misses)
-        return _Try(*(tuple(ops.where(better, a, b) for a, b in zip(*parts)) for parts in zip(then, now)))
+        step = solve(matrix, [-_inner(column, now.residuals) for column in columns])
+        after = candidate(tuple(x + dx for x, dx in zip(now.command, step)))
+        better = _inner(after.residuals, after.residuals) < _inner(now.residuals, now.residuals)
+        return _Candidate(*(tuple(ops.where(better, a, b) for a, b in zip(*parts)) for parts in zip(after, now)))
 
     start = (first.thrust / model.mass, *model.inertia.solve(first.torque))
-    return _wrench(repeat(ITERATIONS, improved, tried(start)).command, model)
+    return _wrench(repeat(ITERATIONS, iterated, candidate(start)).command, model)
 
 
-def misses(state: RigidState, target: RigidState, weight: Scalar, ops: ScalarOps = FLOAT) -> tuple[Scalar, ...]:
+def residuals(state: RigidState, target: RigidState, weight: Scalar, ops: ScalarOps = FLOAT) -> tuple[Scalar, ...]:
     """δv [m/s], δΩ [rad/s] and `weight` δθ."""
     attitude = rotation_vector(target.quaternion.inverse() * state.quaternion, ops)
     return (
@@ -74,15 +74,15 @@ def misses(state: RigidState, target: RigidState, weight: Scalar, ops: ScalarOps
 
 
 def rotation_vector(Q: Quaternion, ops: ScalarOps = FLOAT) -> Vec3:
-    """The shortest rotation [rad] from no rotation to the unit quaternion `Q`, along its axis."""
+    """The rotation vector [rad] of the unit quaternion `Q`, the shorter way."""
     size = Q.vector.norm(ops)
     angle = 2.0 * ops.atan2(size, abs(Q.scalar))
     vector: Vec3 = (ops.where(Q.scalar < 0.0, -angle, angle) / ops.maximum(size, TINY)) * Q.vector
     return vector
 
 
-def solved(matrix: list[list[Scalar]], right: list[Scalar]) -> list[Scalar]:
-    """x with `matrix` x = `right`, for a symmetric positive definite matrix: by elimination, in place."""
+def solve(matrix: list[list[Scalar]], right: list[Scalar]) -> list[Scalar]:
+    """Solve `matrix` x = `right` for a symmetric positive definite matrix, by elimination in place."""
     size = len(right)
     for k in range(size):
         for i in range(k + 1, size):
@@ -97,7 +97,7 @@ def solved(matrix: list[list[Scalar]], right: list[Scalar]) -> list[Scalar]:
     return right
 
 
-def _moved(command: tuple[Scalar, ...], k: int, by: float) -> tuple[Scalar, ...]:
+def _shifted(command: tuple[Scalar, ...], k: int, by: float) -> tuple[Scalar, ...]:
     return tuple(x + by if i == k else x for i, x in enumerate(command))
 
 

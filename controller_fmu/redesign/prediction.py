@@ -1,4 +1,4 @@
-"""Where the vehicle will be when a command acts that is computed now, with a known delay."""
+"""Prediction of the state at the time when a command computed now acts, for a known delay."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -7,33 +7,33 @@ from fmu_kit.algebra import Vec3
 from fmu_kit.rigid_body import RigidState, Wrench
 from fmu_kit.scalar import Scalar, repeat
 
-MOST_ON_THEIR_WAY = 32
-"""Commands that are remembered; in C, each turn of the loop below moves all of them."""
+MOST_PENDING = 32
+"""Number of commands that are recorded; in C, each round of the loop below moves all of them."""
 
 
-class Sent(NamedTuple):
-    """A command that is on its way, or has arrived."""
+class SentCommand(NamedTuple):
+    """A command that is pending, or acts."""
 
     time: Scalar
-    """[s], when it was given; with a delay d it acts from time + d on"""
+    """[s], when it was sent; with a delay d it acts from time + d on"""
     command: Wrench
 
 
-Pending = tuple[Sent, ...]
-"""The last commands that were given, the oldest first; always as many."""
+Pending = tuple[SentCommand, ...]
+"""The last commands, the oldest first; their number is fixed."""
 
 
-def at_rest(t: Scalar, command: Wrench) -> Pending:
-    """What is pending where `command` acts, and has been given at `t` [s] at the latest."""
-    return tuple(Sent(t, Wrench(command.thrust, Vec3(*command.torque))) for _ in range(MOST_ON_THEIR_WAY))
+def all_sent(t: Scalar, command: Wrench) -> Pending:
+    """The pending commands if all of them are `command`, sent at `t` [s]."""
+    return tuple(SentCommand(t, Wrench(command.thrust, Vec3(*command.torque))) for _ in range(MOST_PENDING))
 
 
-def with_newest(pending: Pending, t: Scalar, command: Wrench) -> Pending:
-    """What is pending after a `command` given at `t` [s]: the oldest is forgotten."""
-    return (*pending[1:], Sent(t, command))
+def with_command(pending: Pending, t: Scalar, command: Wrench) -> Pending:
+    """The pending commands after a `command` sent at `t` [s], without the oldest."""
+    return (*pending[1:], SentCommand(t, command))
 
 
-def predicted(
+def predicted_state(
     advanced: Callable[[RigidState, Wrench, Scalar], RigidState],
     state: RigidState,
     t: Scalar,
@@ -42,8 +42,8 @@ def predicted(
 ) -> RigidState:
     """x̂(t + delay) from `state` at `t` [s], under the commands that act until then.
 
-    `advanced` is the model after a time [s] under a held command. Of a command given at t_j it is taken that it acts
-    from t_j + delay on, until the next does; the oldest acts at `t`.
+    `advanced` is the model after a time [s] under a held command. A command sent at t_j is assumed to act from
+    t_j + delay until the next does; the oldest acts at `t`.
     """
     end = t + delay
 

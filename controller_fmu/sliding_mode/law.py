@@ -2,7 +2,7 @@
 
 Source: Ali, Hashim, Jayasiri, "A Unified Finite-Time Sliding Mode Quaternion-based Tracking Control for
 Quadrotor UAVs without Time Scale Separation", ACC 2025. `# (22)` is the paper's equation 22; where the
-printed equation cannot be meant, the code has the consistent one and names the erratum of `docs/law.md`.
+printed equation is inconsistent, the code has the consistent one and names the erratum of `docs/law.md`.
 
 Everything here is a pure function of the state, the reference and the parameters, on any scalar.
 Inertial frame north-east-down, body frame forward-right-down, SI units; `_d` desired, `_dot` rate;
@@ -22,7 +22,7 @@ from fmu_kit.trajectory import Reference
 SMALLEST_ACCELERATION = 1e-9
 """Below this, n [m/s²] or n + g - F_z [m/s²] counts as zero and (12) as unsolvable."""
 NEWTON_STEPS = 8
-"""Of `settled`: enough for all digits where time k is up to 100 m/s."""
+"""Iterations of `implicit_sliding`: enough for all digits where time k is up to 100 m/s."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -109,7 +109,7 @@ def surface(e: Vec3, gains: Gains, ops: ScalarOps = FLOAT) -> Surface:
 
     def axis(e: Scalar) -> tuple[Scalar, Scalar, Scalar]:
         outside = abs(e) >= epsilon
-        size = ops.maximum(abs(e), epsilon)  # never 0, so that the power exists where it is not used
+        size = ops.maximum(abs(e), epsilon)  # never 0, so that the power is defined where it is not used
         gamma = k_s * size ** (beta_t - 1.0)
         gamma_prime = beta_t * gamma
         gamma_second = (beta_t - 1.0) * gamma_prime / size * ops.sign(e)  # sgn of e: erratum 6
@@ -138,9 +138,9 @@ def desired_attitude(F: Vec3, n: Scalar, gravity: float, ops: ScalarOps = FLOAT)
 
 
 class Turn:
-    """The turn of the desired attitude about its thrust axis by a yaw ψ [rad] of a steady rate [rad/s]: ours.
+    """The rotation of the desired attitude about its thrust axis by a yaw ψ [rad] of constant rate [rad/s]: our own.
 
-    Nothing else of the law changes with it: (3) asks of Q_d its thrust axis alone, and the proof that Ω_d is its rate.
+    The rest of the law is unchanged: (3) depends only on the thrust axis of Q_d, and the proof on Ω_d being its rate.
     """
 
     def __init__(self, yaw: Scalar, rate: Scalar, ops: ScalarOps = FLOAT) -> None:
@@ -210,21 +210,21 @@ class DesiredRate:
         )
 
 
-def settled(s: Vec3, time: Scalar, k: Vec3, ops: ScalarOps = FLOAT) -> Vec3:
-    """σ [m/s] with σ + time k tanh σ = s: where ds/dt = -k tanh s leads in `time` [s], by the implicit Euler method.
+def implicit_sliding(s: Vec3, time: Scalar, k: Vec3, ops: ScalarOps = FLOAT) -> Vec3:
+    """σ [m/s] with σ + time k tanh σ = s: the implicit Euler step of ds/dt = -k tanh s over `time` [s].
 
-    On each axis by Newton's method for |s|, from below: the left side is concave there, so that no step is too long.
+    Newton's method for |s| on each axis, from below: the left side is concave there, so that no step overshoots.
     """
     if time == 0.0:
         return s
 
-    def next_one(x: Scalar, size: Scalar, a: Scalar) -> Scalar:
+    def newton_step(x: Scalar, size: Scalar, a: Scalar) -> Scalar:
         tanh = ops.tanh(x)
         return x - (x + a * tanh - size) / (1.0 + a * (1.0 - tanh * tanh))
 
     a, size = time * k, s.map(abs)
     start = Vec3(*(ops.maximum(s / (1.0 + a), s - a) for s, a in zip(size, a)))
-    found = repeat(NEWTON_STEPS, lambda i, x: Vec3(*map(next_one, x, size, a)), start)
+    found = repeat(NEWTON_STEPS, lambda i, x: Vec3(*map(newton_step, x, size, a)), start)
     sigma: Vec3 = s.map(ops.sign) * found
     return sigma
 
@@ -237,12 +237,12 @@ def evaluate(
     ops: ScalarOps = FLOAT,
     implicit: Scalar = 0.0,
 ) -> Evaluation:
-    """Thrust and torque that track `reference` from `state`, with all that they are made of.
+    """Thrust and torque that track `reference` from `state`, with all intermediate quantities.
 
     Scalars may be floats or batches; every component of the result has the (broadcast) shape of the
-    inputs. `state.quaternion` must have unit length. Rates are the model's predictions: they do not
-    know wind. The law is not invariant under Q → -Q: it turns to q̃_0 = +1, the long way round if q̃_0 < 0.
-    With `implicit` > 0 [s], it is taken at the sliding variable that is `settled` over this time.
+    inputs. `state.quaternion` must have unit length. Rates are the model's predictions, without wind.
+    The law is not invariant under Q → -Q: it rotates to q̃_0 = +1, the long way if q̃_0 < 0.
+    With `implicit` > 0 [s], it is evaluated at the `implicit_sliding` variable over this time.
 
     Raises `DivergenceError` where the desired attitude does not exist (12).
     """
@@ -252,7 +252,7 @@ def evaluate(
     ev = state.velocity - reference.velocity
     gamma, gamma_prime, gamma_second = surface(e, gains, ops)
     k = gains.k_t + Vec3(gains.beta, gains.beta, gains.beta)  # Υ = -β tanh(s) folded in (32)
-    s = settled(gamma * e + ev, implicit, k, ops)  # (19)-(21)
+    s = implicit_sliding(gamma * e + ev, implicit, k, ops)  # (19)-(21)
     tanh_s = s.map(ops.tanh)  # (23)
     F = reference.acceleration - k * tanh_s  # (22)
     u = Vec3(-F.x, -F.y, g - F.z)

@@ -1,4 +1,4 @@
-"""The unified controller as an FMU: its parameters, and what it shows."""
+"""The unified controller as an FMU: its parameters and locals."""
 
 from controller_fmu.interface import ScaledGains
 from controller_fmu.redesign.controller import RedesignedController
@@ -65,7 +65,7 @@ class UnifiedController(RedesignedController, ScaledGains):
     energy = Local("energy function L_kappa as of the last sample (33), with coupling/2 s.s", "J")
 
     def read_parameters(self) -> None:
-        """Take over the gains."""
+        """Read the gains."""
         super().read_parameters()
         self._gains = read_fields(self, Gains)
 

@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from controller_fmu.cascaded.attitude_loop import AttitudeLoop, attitude_of, with_less_yaw
+from controller_fmu.cascaded.attitude_loop import AttitudeLoop, attitude_of, with_weighted_yaw
 from fmu_kit.algebra import Quaternion, Vec3
 
 FREE = AttitudeLoop(rate_limit=Vec3(1e9, 1e9, 1e9))
@@ -78,11 +78,11 @@ def second_form(attitude: Quaternion, desired: Quaternion, weight: float) -> np.
 def test_the_reduced_weight_of_yaw_is_that_of_rotation_matrices(Q: Quaternion, Q_d: Quaternion, weight: float) -> None:
     now, then = Q.z_axis(), Q_d.z_axis()
     assume(now @ then > -0.999 and now.cross(then).norm() > 1e-6)
-    error = Q.inverse() * with_less_yaw(Q, Q_d, weight)
+    error = Q.inverse() * with_weighted_yaw(Q, Q_d, weight)
     assume(abs(error.scalar) > 1e-3)  # half a turn: either way round
     full = Rotation.from_quat([*Q]).inv() * Rotation.from_quat([*Q_d])
     assume(abs(full.magnitude()) < math.pi - 1e-3)
-    yaw = with_less_yaw(Q, Q_d, 0.0).inverse() * Q_d
+    yaw = with_weighted_yaw(Q, Q_d, 0.0).inverse() * Q_d
     assume(abs(yaw.scalar) > 1e-3)
     loop = AttitudeLoop(gain=Vec3(1.0, 1.0, weight), yaw_weight=weight, rate_limit=FREE.rate_limit)
     assert [*loop.angular_velocity(Q, Q_d, 0.0)] == pytest.approx(list(second_form(Q, Q_d, weight)), abs=1e-9)
@@ -91,9 +91,9 @@ def test_the_reduced_weight_of_yaw_is_that_of_rotation_matrices(Q: Quaternion, Q
 @given(attitudes(), attitudes())
 def test_the_weight_of_one_is_the_whole_error_and_of_none_has_no_yaw(Q: Quaternion, Q_d: Quaternion) -> None:
     assume(Q.z_axis() @ Q_d.z_axis() > -0.999)
-    whole = with_less_yaw(Q, Q_d, 1.0)
+    whole = with_weighted_yaw(Q, Q_d, 1.0)
     assert abs(whole.vector @ Q_d.vector + whole.scalar * Q_d.scalar) == pytest.approx(1.0, abs=1e-12)
-    tilt = Q.inverse() * with_less_yaw(Q, Q_d, 0.0)
+    tilt = Q.inverse() * with_weighted_yaw(Q, Q_d, 0.0)
     assert tilt.vector.z == pytest.approx(0.0, abs=1e-9)
 
 

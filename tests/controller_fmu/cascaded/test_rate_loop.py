@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from controller_fmu.cascaded.airframe import Airframe
-from controller_fmu.cascaded.rate_loop import RateLoop, RateState, control_rate, rate_state_at
+from controller_fmu.cascaded.rate_loop import RateLoop, RateState, control_rate, initial_rate_state
 from fmu_kit.algebra import ZERO, Inertia, Vec3
 
 LOOP, FRAME, T = RateLoop(), Airframe(), 0.004
@@ -29,9 +29,9 @@ def test_a_step_is_answered_as_the_sampled_pid_loop_does(axis: str) -> None:
     matrix = np.array(
         [np.array([1.0, 0.0, 0.0, 0.0]) + T * answer, [-T * integral, 1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], slope]
     )
-    size = 1e-6  # small: the share of an error that is integrated is 1 - (error / 400 deg/s)²
+    size = 1e-6  # small: the share of an error that is integrate_error is 1 - (error / 400 deg/s)²
     desired = size * Vec3(*(float(name == axis) for name in "xyz"))
-    rate, state, found = ZERO, rate_state_at(ZERO), []
+    rate, state, found = ZERO, initial_rate_state(ZERO), []
     for k in range(100):
         torque, state = run(state, rate, desired, T if k else 0.0)
         rate = rate + T * J.solve(torque)
@@ -42,7 +42,7 @@ def test_a_step_is_answered_as_the_sampled_pid_loop_does(axis: str) -> None:
 
 
 def test_the_yaw_command_goes_through_a_low_pass() -> None:
-    tau, state, found = 1.0 / (2.0 * math.pi * 2.0), rate_state_at(ZERO), []
+    tau, state, found = 1.0 / (2.0 * math.pi * 2.0), initial_rate_state(ZERO), []
     loop = RateLoop(integral=ZERO)
     for _ in range(50):
         torque, state = run(state, ZERO, Vec3(0.0, 0.0, 0.1), loop=loop)
@@ -53,14 +53,14 @@ def test_the_yaw_command_goes_through_a_low_pass() -> None:
 
 def test_the_desired_rate_is_fed_forward() -> None:
     loop = RateLoop(proportional=ZERO, integral=ZERO, derivative=ZERO, feedforward=Vec3(3.0, 3.0, 0.0))
-    torque, _ = run(rate_state_at(ZERO), ZERO, Vec3(0.1, 0.2, 0.0), loop=loop)
+    torque, _ = run(initial_rate_state(ZERO), ZERO, Vec3(0.1, 0.2, 0.0), loop=loop)
     assert [*torque] == pytest.approx([*(J @ Vec3(0.3, 0.6, 0.0))])
 
 
 def test_torques_stay_within_full_commands_and_what_is_cut_is_kept() -> None:
-    torque, state = run(rate_state_at(ZERO), ZERO, Vec3(100.0, -100.0, 0.0))
+    torque, state = run(initial_rate_state(ZERO), ZERO, Vec3(100.0, -100.0, 0.0))
     assert [torque.x, torque.y] == pytest.approx([FRAME.full_torque.x, -FRAME.full_torque.y])
-    assert state.cut.x > 0.0 > state.cut.y
+    assert state.excess.x > 0.0 > state.excess.y
 
 
 def test_the_integral_does_not_grow_in_saturation_and_may_shrink() -> None:
@@ -75,7 +75,7 @@ def test_the_integral_does_not_grow_in_saturation_and_may_shrink() -> None:
 
 def test_of_large_errors_less_is_integrated_and_of_the_largest_none() -> None:
     def taken(error: float) -> float:
-        return run(rate_state_at(ZERO), ZERO, Vec3(error, 0.0, 0.0))[1].integral.x / (LOOP.integral.x * error * T)
+        return run(initial_rate_state(ZERO), ZERO, Vec3(error, 0.0, 0.0))[1].integral.x / (LOOP.integral.x * error * T)
 
     assert taken(math.radians(4.0)) == pytest.approx(1.0 - 1e-4)
     assert taken(math.radians(200.0)) == pytest.approx(0.75)
@@ -83,7 +83,7 @@ def test_of_large_errors_less_is_integrated_and_of_the_largest_none() -> None:
 
 
 def test_the_integral_stays_within_its_share_of_a_full_command() -> None:
-    state = rate_state_at(ZERO)
+    state = initial_rate_state(ZERO)
     for _ in range(2000):
         _, state = run(RateState(state.integral, ZERO, ZERO, 0.0, ZERO), ZERO, Vec3(1.0, -1.0, 0.0))
     bound = [0.3 * FRAME.full_torque.x / J.xx, -0.3 * FRAME.full_torque.y / J.yy]

@@ -9,9 +9,9 @@ import pytest
 from controller_fmu.cascaded.airframe import Airframe
 from controller_fmu.cascaded.attitude_loop import AttitudeLoop, attitude_of
 from controller_fmu.cascaded.position_loop import PositionLoop
-from controller_fmu.cascaded.rate_loop import RateLoop, control_rate, rate_state_at
+from controller_fmu.cascaded.rate_loop import RateLoop, control_rate, initial_rate_state
 from controller_fmu.cascaded.slave import CascadedController
-from controller_fmu.cascaded.velocity_loop import VelocityLoop, control_velocity, velocity_state_at
+from controller_fmu.cascaded.velocity_loop import VelocityLoop, control_velocity, initial_velocity_state
 from controller_fmu.vehicle import Model
 from fmu_kit.algebra import Quaternion, Vec3
 from fmu_kit.trajectory import Trajectory
@@ -67,7 +67,7 @@ def fly(slave: CascadedController, steps: range, h: float = 0.01) -> list[list[f
 def one_rate(count: int, h: float = 0.01) -> list[list[float]]:
     """The loops one after the other, at every sample, with no turns."""
     frame, model = Airframe(), Model()
-    velocity_state, rate_state = velocity_state_at(motion(0)[1]), rate_state_at(motion(0)[3])
+    velocity_state, rate_state = initial_velocity_state(motion(0)[1]), initial_rate_state(motion(0)[3])
     rows = []
     for k in range(count):
         P, V, Q, omega = motion(k)

@@ -11,8 +11,8 @@ from controller_fmu.cascaded.velocity_loop import (
     VelocityLoop,
     VelocityState,
     control_velocity,
+    initial_velocity_state,
     limited_force,
-    velocity_state_at,
 )
 from controller_fmu.vehicle import Model
 from fmu_kit.algebra import ZERO, Vec3
@@ -23,7 +23,7 @@ ACCELERATIONS = st.builds(Vec3, *[st.floats(-50.0, 50.0, allow_subnormal=False)]
 
 def flown(loop: VelocityLoop, velocity: Vec3, desired: Vec3, count: int) -> tuple[list[Vec3], VelocityState]:
     """Velocities of a vehicle that exerts the force at once, sample by sample, and what is kept in the end."""
-    state, velocities = velocity_state_at(velocity), [velocity]
+    state, velocities = initial_velocity_state(velocity), [velocity]
     for k in range(count):
         force, state = control_velocity(loop, state, velocities[-1], desired, ZERO, T if k else 0.0, MODEL, FULL)
         velocities.append(velocities[-1] + T * (force / MODEL.mass + Vec3(0.0, 0.0, MODEL.gravity)))
@@ -49,42 +49,42 @@ def test_a_step_is_answered_as_the_sampled_pid_loop_does(axis: str) -> None:
 
 
 def test_the_reference_acceleration_is_fed_forward() -> None:
-    force, _ = control_velocity(LOOP, velocity_state_at(ZERO), ZERO, ZERO, Vec3(1.0, -2.0, 0.0), T, MODEL, FULL)
+    force, _ = control_velocity(LOOP, initial_velocity_state(ZERO), ZERO, ZERO, Vec3(1.0, -2.0, 0.0), T, MODEL, FULL)
     assert [*force] == pytest.approx([1.3, -2.6, -1.3 * 9.81])
 
 
 @given(ACCELERATIONS)
 def test_the_force_is_tilted_no_further_than_allowed_and_no_larger_than_there_is(acceleration: Vec3) -> None:
-    wanted, given_ = limited_force(LOOP, acceleration, MODEL, FULL)
-    for force in (wanted, given_):
+    desired, limited = limited_force(LOOP, acceleration, MODEL, FULL)
+    for force in (desired, limited):
         assert math.hypot(force.x, force.y) <= -force.z * (1.0 + 1e-9)  # 45 degrees
         assert force.x * acceleration.y == pytest.approx(force.y * acceleration.x, abs=1e-6)
         assert force.x * acceleration.x + force.y * acceleration.y >= 0.0
-    assert 0.12 * FULL * math.cos(math.radians(45.0)) * (1.0 - 1e-9) <= given_.norm() <= FULL * (1.0 + 1e-9)
+    assert 0.12 * FULL * math.cos(math.radians(45.0)) * (1.0 - 1e-9) <= limited.norm() <= FULL * (1.0 + 1e-9)
 
 
 @given(ACCELERATIONS)
 def test_within_the_limits_the_vertical_acceleration_is_exact_and_the_direction_that_of_the_horizontal_one(
     acceleration: Vec3,
 ) -> None:
-    force = limited_force(LOOP, acceleration, MODEL, 1e6).given
+    force = limited_force(LOOP, acceleration, MODEL, 1e6).limited
     if math.hypot(acceleration.x, acceleration.y) < 9.81 and 9.81 - acceleration.z > 0.12 * 1e6 / 1.3:
         assert force.z / 1.3 + 9.81 == pytest.approx(acceleration.z)
         assert force.x / force.z == pytest.approx(-acceleration.x / 9.81, abs=1e-9)
 
 
 def test_the_vertical_comes_first_but_for_the_margin_of_the_horizontal() -> None:
-    climb = limited_force(LOOP, Vec3(5.0, 0.0, -100.0), MODEL, FULL).given
+    climb = limited_force(LOOP, Vec3(5.0, 0.0, -100.0), MODEL, FULL).limited
     assert climb.x == pytest.approx(0.3 * FULL)
     assert climb.z == pytest.approx(-FULL * math.sqrt(1.0 - 0.3**2))
-    level = limited_force(LOOP, Vec3(9.0, 0.0, -6.0), MODEL, FULL).given
-    assert level.z == pytest.approx(-1.3 * 15.81)  # as wanted
+    level = limited_force(LOOP, Vec3(9.0, 0.0, -6.0), MODEL, FULL).limited
+    assert level.z == pytest.approx(-1.3 * 15.81)  # as desired
     assert level.norm() == pytest.approx(FULL)
 
 
 def test_the_integral_does_not_grow_where_the_vertical_thrust_is_at_a_limit() -> None:
     for error in (-20.0, 20.0):  # full and least thrust
-        state = velocity_state_at(ZERO)
+        state = initial_velocity_state(ZERO)
         for _ in range(100):
             _, state = control_velocity(LOOP, state, ZERO, Vec3(0.0, 0.0, error), ZERO, T, MODEL, FULL)
         assert state.integral.z == 0.0
@@ -93,8 +93,8 @@ def test_the_integral_does_not_grow_where_the_vertical_thrust_is_at_a_limit() ->
 
 
 def test_the_horizontal_integral_is_brought_back_to_where_half_of_the_error_is_left_to_it() -> None:
-    """Tracking anti-windup rests where the error is 2/P (wanted - given): I = given - P e / 2."""
-    state = velocity_state_at(ZERO)
+    """Tracking anti-windup rests where the error is 2/P (desired - limited): I = limited - P e / 2."""
+    state = initial_velocity_state(ZERO)
     for _ in range(4000):
         force, state = control_velocity(LOOP, state, ZERO, Vec3(30.0, 0.0, 0.0), ZERO, T, MODEL, FULL)
     assert state.integral.x == pytest.approx(force.x / 1.3 - 1.8 * 30.0 / 2.0)

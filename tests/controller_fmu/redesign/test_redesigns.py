@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controller_fmu.redesign.matching import matched, misses, rotation_vector, solved
-from controller_fmu.redesign.nominal import closed_loop, held
-from controller_fmu.redesign.prediction import MOST_ON_THEIR_WAY, at_rest, predicted, with_newest
-from controller_fmu.sliding_mode.law import Gains, evaluate, settled
+from controller_fmu.redesign.matching import matched_command, residuals, rotation_vector, solve
+from controller_fmu.redesign.nominal import closed_loop, under_command
+from controller_fmu.redesign.prediction import MOST_PENDING, all_sent, predicted_state, with_command
+from controller_fmu.sliding_mode.law import Gains, evaluate, implicit_sliding
 from controller_fmu.vehicle import Measurement, Model
 from fmu_kit.algebra import Inertia, Quaternion, Vec3
 from fmu_kit.rigid_body import RigidState, Wrench
@@ -51,7 +51,7 @@ def midpoint(T: float) -> Wrench:
 
 def match(T: float, weight: float = 1.0) -> Wrench:
     target = closed_loop(law, MODEL, 1.0, START, T / 3.0, 3).state
-    return matched(lambda u: held(MODEL, START, u, T / 3.0, 3), MODEL, target, mean(T), weight / T)
+    return matched_command(lambda u: under_command(MODEL, START, u, T / 3.0, 3), MODEL, target, mean(T), weight / T)
 
 
 def order(difference: Callable[[float], float], T: float) -> float:
@@ -80,7 +80,7 @@ def test_mean_is_the_area_under_the_continuous_command_to_fourth_order() -> None
 
 @given(st.floats(-40.0, 40.0), st.floats(1e-3, 5.0), st.floats(0.1, 20.0))
 def test_settled_solves_its_equation_to_rounding(s: float, time: float, k: float) -> None:
-    sigma = settled(Vec3(s, -s, 0.0), time, Vec3(k, k, k))
+    sigma = implicit_sliding(Vec3(s, -s, 0.0), time, Vec3(k, k, k))
     slope = 1.0 + time * k / math.cosh(sigma.x) ** 2
     assert abs(sigma.x + time * k * math.tanh(sigma.x) - s) <= 1e-14 * slope * max(abs(s), 1e-300) + 1e-300
     assert sigma.y == -sigma.x
@@ -93,7 +93,7 @@ def test_semi_implicit_law_is_the_law_where_the_sliding_variable_is_settled() ->
     implicit = evaluate(measured, reference, Gains(), MODEL, implicit=0.05)
     k = Gains().k_t + Vec3(Gains().beta, Gains().beta, Gains().beta)
     s = evaluate(measured, reference, Gains(), MODEL).sliding
-    sigma = settled(s, 0.05, k)
+    sigma = implicit_sliding(s, 0.05, k)
     assert implicit.sliding == sigma
     expected = reference.acceleration - k * sigma.map(math.tanh)
     assert list(implicit.virtual_control) == list(expected)
@@ -105,7 +105,7 @@ def test_match_is_the_minimum_that_an_optimiser_finds() -> None:
     target = closed_loop(law, MODEL, 1.0, START, T / 3.0, 3).state
 
     def missed(u: np.ndarray) -> list[float]:
-        return list(misses(held(MODEL, START, Wrench(u[0], Vec3(*u[1:])), T / 3.0, 3), target, weight / T))
+        return list(residuals(under_command(MODEL, START, Wrench(u[0], Vec3(*u[1:])), T / 3.0, 3), target, weight / T))
 
     best = optimize.least_squares(missed, flat(law(1.0, START)), xtol=1e-14, ftol=1e-14, gtol=1e-14).x
     np.testing.assert_allclose(flat(match(T, weight)), best, rtol=0.0, atol=1e-6)
@@ -113,8 +113,10 @@ def test_match_is_the_minimum_that_an_optimiser_finds() -> None:
 
 def test_match_reaches_a_target_that_one_command_leads_to() -> None:
     command = Wrench(11.0, Vec3(0.3, -0.2, 0.1))
-    target = held(MODEL, START, command, 0.05, 3)
-    found = matched(lambda u: held(MODEL, START, u, 0.05, 3), MODEL, target, Wrench(12.0, Vec3(0.0, 0.0, 0.0)), 5.0)
+    target = under_command(MODEL, START, command, 0.05, 3)
+    found = matched_command(
+        lambda u: under_command(MODEL, START, u, 0.05, 3), MODEL, target, Wrench(12.0, Vec3(0.0, 0.0, 0.0)), 5.0
+    )
     np.testing.assert_allclose(flat(found), flat(command), rtol=0.0, atol=1e-9)
 
 
@@ -131,23 +133,23 @@ def test_rotation_vector_is_axis_times_angle(x: float, y: float, z: float) -> No
 def test_elimination_solves_what_is_positive_definite() -> None:
     factor = np.random.default_rng(4).normal(size=(4, 9))
     matrix, right = factor @ factor.T, np.array([1.0, -2.0, 0.5, 3.0])
-    found = solved(matrix.tolist(), right.tolist())
+    found = solve(matrix.tolist(), right.tolist())
     np.testing.assert_allclose(found, np.linalg.solve(matrix, right), rtol=1e-11)
 
 
 def test_predictor_flies_the_commands_in_the_order_in_which_they_act() -> None:
     commands = [Wrench(10.0 + k, Vec3(0.1 * k, 0.0, -0.1)) for k in range(4)]
-    pending = at_rest(-1.0, commands[0])
+    pending = all_sent(-1.0, commands[0])
     for k, command in enumerate(commands[1:]):
-        pending = with_newest(pending, 0.1 * k, command)
+        pending = with_command(pending, 0.1 * k, command)
     flown: list[tuple[float, float]] = []
 
     def advanced(x: RigidState, command: Wrench, time: float) -> RigidState:
         flown.append((command.thrust, time))
         return x
 
-    assert predicted(advanced, START, 0.25, 0.2, pending) is START
+    assert predicted_state(advanced, START, 0.25, 0.2, pending) is START
     legs = [leg for leg in flown if leg[1] > 1e-12]
     assert [thrust for thrust, _ in legs] == [11.0, 12.0, 13.0]  # that of t = 0 acts from 0.2 on
     assert [time for _, time in legs] == pytest.approx([0.05, 0.1, 0.05])
-    assert len(pending) == MOST_ON_THEIR_WAY
+    assert len(pending) == MOST_PENDING
