@@ -1,9 +1,8 @@
-"""What flights cost as lanes of a batch: `python -m benchmarks.batch`.
+"""The cost of flights in the SIMD lanes of a batch: `python -m benchmarks.batch`.
 
-CPU time of one core, the smallest of several repetitions in turns; under other load it grows, and the ratios within one
-run of this program are what can be compared. The bare kernels are plant and controller alone, called in turns with
-nothing around them. End to end is a sweep into its store, coordinator, worker process and the sample flown by FMUs
-included.
+CPU time of one core, the smallest of several interleaved repetitions; it grows under other load, so that only ratios
+within one run of this program can be compared. The bare kernels are plant and controller alone, called in turns. End to
+end is a sweep into its store, with coordinator, worker process and the sample run by FMUs.
 """
 
 import ctypes
@@ -41,13 +40,13 @@ CASES = {"1 kHz both": (0.001, 20.0), "10 ms / 1 ms": (0.01, 20.0), "20 ms / 1 m
 """Period and stop time [s]"""
 RUNS = 2048
 """of the sweeps"""
-FEW = 256
-"""of those that tell what a sweep costs once from what each of its runs does"""
+FEWER_RUNS = 256
+"""of the sweeps that separate the fixed cost of a sweep from the cost of each run"""
 X = "components.plant.parameters.initial.position.x"
 
 
 def systems(period: float, stop_time: float) -> tuple[Shape, list[System]]:
-    """The paper's flight from as many places as there are lanes."""
+    """The paper's flight from as many initial positions as there are lanes."""
     one = fmus.native_twins(Scenario(timing=Timing(period=period), stop_time=stop_time).as_system())
     models = {name: read_model(path) for name, path in fmus.of_components(one.fmus).items()}
     one = check_against_fmus(one, models).system
@@ -55,8 +54,8 @@ def systems(period: float, stop_time: float) -> tuple[Shape, list[System]]:
     return Shape(system=one, models=models, lanes=preferred_lanes()), [changed(one, {X: place}) for place in places]
 
 
-def bare(shape: Shape, batch: Batch, period: float, stop_time: float) -> float:
-    """CPU time of a step of the plant [s], with the law where it is due, and nothing else; after a flight."""
+def bare_step(shape: Shape, batch: Batch, period: float, stop_time: float) -> float:
+    """CPU time of a step of the plant [s], with the law where it is due, and nothing else; call it after a run."""
     plant, law = (shape.kernels[name] for name in ("plant", "controller"))
     memory = dict(zip(shape.names, batch.memories))
     lanes, steps, each = shape.lanes, round(stop_time / 0.001), round(period / 0.001)
@@ -82,16 +81,16 @@ def bare(shape: Shape, batch: Batch, period: float, stop_time: float) -> float:
     return (called - (time.process_time() - begin)) / (steps * lanes)
 
 
-def flown(batch: Batch, runs: list[System]) -> float:
-    """CPU time of a step of the plant [s], events and objectives on."""
+def batch_step(batch: Batch, runs: list[System]) -> float:
+    """CPU time of a step of the plant [s], with events and objectives."""
     group = Group(systems=runs, timings=[timing(system) for system in runs])
     begin = time.process_time()
     result = batch.run(group)
     return (time.process_time() - begin) / float(result.steps.sum())
 
 
-def compiled(system: System) -> float:
-    """The same by the compiled loop."""
+def compiled_step(system: System) -> float:
+    """CPU time of a step of the plant [s] in the compiled loop."""
     with prepared(system, engine="compiled") as flight:
         flight.master.initialise()
         begin = time.process_time()
@@ -100,7 +99,7 @@ def compiled(system: System) -> float:
 
 
 def end_to_end(period: float, runs: int) -> float:
-    """CPU time of a study of so many runs [s], each 20 s long."""
+    """CPU time of a study of `runs` runs [s], each 20 s long."""
     axis = Axis(name="x", targets=("plant.initial.position.x",), low=0.0, high=1.0)
     base = Scenario(timing=Timing(period=period), stop_time=20.0)
     study = Study(name="bench", base=base, axes=(axis,), method="random", samples=runs)
@@ -111,35 +110,35 @@ def end_to_end(period: float, runs: int) -> float:
 
 
 def from_arrays(period: float, runs: int) -> tuple[float, float]:
-    """CPU time of so many flights of 20 s as lanes, their systems given, and of `fly` with the same as an array [s]."""
+    """CPU time of `runs` flights of 20 s in lanes from their systems, and of `fly` with the same as an array [s]."""
     flight = Scenario(timing=Timing(period=period), stop_time=20.0)
     system, places = located(flight.as_system()), np.linspace(0.0, 1.0, runs)
-    given, batches = [changed(system, {X: place}) for place in places.tolist()], Batches()
-    batches.run(given[: preferred_lanes()])
+    systems, batches = [changed(system, {X: place}) for place in places.tolist()], Batches()
+    batches.run(systems[: preferred_lanes()])
     begin = time.process_time()
-    batches.run(given)
+    batches.run(systems)
     between = time.process_time()
     run_many(flight, {"plant.initial.position.x": places})
     return between - begin, time.process_time() - between
 
 
 def _cpu() -> float:
-    """Of this process and of those that it has waited for [s]."""
-    whose = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
-    return sum(used.ru_utime + used.ru_stime for used in map(resource.getrusage, whose))
+    """CPU time of this process and of those that it has waited for [s]."""
+    processes = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    return sum(used.ru_utime + used.ru_stime for used in map(resource.getrusage, processes))
 
 
 def main() -> None:
     """Print steps a second and ratios, then runs a second of sweeps into their stores."""
     found: dict[tuple[str, str], list[float]] = defaultdict(list)
-    made = {case: systems(*times) for case, times in CASES.items()}
-    batches = {case: Batch(shape, ScheduleCache()) for case, (shape, _) in made.items()}
+    cases = {case: systems(*times) for case, times in CASES.items()}
+    batches = {case: Batch(shape, ScheduleCache()) for case, (shape, _) in cases.items()}
     for _ in range(REPETITIONS):
         for case, (period, stop_time) in CASES.items():
-            shape, runs = made[case]
-            found[case, "batch"].append(flown(batches[case], runs))
-            found[case, "bare"].append(bare(shape, batches[case], period, stop_time))
-            found[case, "compiled"].append(compiled(replace(runs[0], stop_time=5.0)))
+            shape, runs = cases[case]
+            found[case, "batch"].append(batch_step(batches[case], runs))
+            found[case, "bare"].append(bare_step(shape, batches[case], period, stop_time))
+            found[case, "compiled"].append(compiled_step(replace(runs[0], stop_time=5.0)))
     print(f"load {os.getloadavg()[0]:.1f}; {preferred_lanes()} lanes; the smallest of {REPETITIONS}, in turns")
     for case in CASES:
         batch, kernels, loop = (min(found[case, what]) for what in ("batch", "bare", "compiled"))
@@ -154,8 +153,8 @@ def main() -> None:
             f"time, {100 * (arrays / lanes - 1):+.0f} % against the same lanes with a system for each"
         )
     for case, period in (("20 ms / 1 ms", 0.02), ("10 ms / 1 ms", 0.01)):
-        all_runs, few_runs = (min(end_to_end(period, runs) for _ in range(2)) for runs in (RUNS, FEW))
-        once = few_runs - FEW * (all_runs - few_runs) / (RUNS - FEW)
+        all_runs, few_runs = (min(end_to_end(period, runs) for _ in range(2)) for runs in (RUNS, FEWER_RUNS))
+        once = few_runs - FEWER_RUNS * (all_runs - few_runs) / (RUNS - FEWER_RUNS)
         steps = RUNS * 20_000 * min(found[case, "batch"])
         shares = f"{100 * steps / all_runs:.0f} % are steps, {100 * once / all_runs:.0f} % a sweep costs once"
         print(

@@ -1,4 +1,4 @@
-"""What a step costs, and where: run as `make bench`. One process, one run, medians of several CPU times."""
+"""The cost of a step and of its parts: run as `make bench`. One process, one run, medians of several CPU times."""
 
 import itertools
 import math
@@ -127,12 +127,12 @@ def bare(scenario: Scenario) -> float:
 
 
 def outputs(board: Board, component: str) -> Floats:
-    """The part of the row that holds what is read of a component."""
+    """The part of the row with the values read from a component."""
     return board.of([f"{component}.{name}" for name in board.outputs[component]])
 
 
 def clock(timing: Timing) -> float:
-    """One instant of the timing alone, no FMU."""
+    """One instant of the timing alone, without FMUs."""
 
     system = Scenario(timing=timing, stop_time=STEPS * MILLISECOND).as_system()
 
@@ -145,7 +145,7 @@ def clock(timing: Timing) -> float:
 def main() -> None:
     """Print the figures and their ratios."""
     plain = Timing(period=MILLISECOND)
-    # Everything that adds no instant of its own, so that the number of FMI calls stays the same.
+    # All causes that add no instants, so that the number of FMI calls stays the same.
     on = Timing(
         period=MILLISECOND, delay=MILLISECOND, measurement_loss=1e-9, command_loss=1e-9,
         noise={"position": 1e-9, "quaternion": 1e-9}, quantisation={"position": 1e-9}, clock_ratio=1.0,
@@ -155,7 +155,7 @@ def main() -> None:
         for name in ("EmptyPlant", "EmptyController"):
             packaging.build(Target("benchmarks.empty", name), Path(folder))
 
-        def hollow(timing: Timing) -> Scenario:
+        def empty(timing: Timing) -> Scenario:
             return Scenario(
                 stop_time=STEPS * MILLISECOND,
                 timing=timing,
@@ -165,7 +165,7 @@ def main() -> None:
 
         law_us, plant_us = law(), plant()
         loop_us = loop(Scenario(stop_time=STEPS * MILLISECOND, timing=plain))
-        floor_us, bare_us, on_us = loop(hollow(plain)), bare(hollow(plain)), loop(hollow(on))
+        floor_us, bare_us, on_us = loop(empty(plain)), bare(empty(plain)), loop(empty(on))
     clock_us, irregular_us = clock(plain), clock(irregular)
     rows = [
         ("law, called directly", law_us, "aim: under 40"),

@@ -1,4 +1,4 @@
-"""What a study costs beside its flights: run as part of `make bench`. Takes some minutes."""
+"""The overhead of a study beside its flights: run as part of `make bench`. Takes some minutes."""
 
 import dataclasses
 import statistics
@@ -14,13 +14,13 @@ from orchestration.studies.sweep import sweep
 from orchestration.workers.task import Runner, RunTask
 
 RUNS, SECONDS = 200, 10.0
-"""of the study that two workers are compared on"""
+"""of the study with which two workers are compared"""
 MANY = 2000
-"""runs over which memory is watched"""
+"""runs over which memory is measured"""
 
 
 def runs_per_second(workers: int) -> float:
-    """Of a study of `RUNS` runs of `SECONDS` seconds."""
+    """Runs per second of a study of `RUNS` runs of `SECONDS` seconds."""
     axis = Axis(name="period", targets=("timing.period",), low=0.005, high=0.03)
     study = Study(name="bench", base=Scenario(stop_time=SECONDS), axes=(axis,), method="random", samples=RUNS)
     with tempfile.TemporaryDirectory() as folder:

@@ -1,8 +1,8 @@
-"""What a dask cluster costs beside worker processes on one machine: `python -m benchmarks.cluster [RUNS]`.
+"""The cost of a dask cluster compared with worker processes on one machine: `python -m benchmarks.cluster [RUNS]`.
 
-The same study in turns, by two processes of this machine and by two workers of a dask cluster over TCP that are on this
-machine too, so that the cores are the same and what differs is the cluster. Native FMUs; both ways through the runs one
-by one, and as chunks of lanes. Wall time, the smaller of two: there is no CPU time of processes elsewhere.
+The same study in turns by two processes and by two workers of a dask cluster over TCP, on the same cores of this
+machine, so that only the cluster differs. Native FMUs, run one by one and in chunks of SIMD lanes. Wall time, the
+smaller of two: CPU time of other processes is not available.
 """
 
 import subprocess
@@ -28,7 +28,7 @@ STOP_TIME = 10.0
 
 
 def study(runs: int) -> Study:
-    """Flights from so many places at 100 Hz."""
+    """Flights from `runs` initial positions at 100 Hz."""
     axis = Axis(name="x", targets=("plant.initial.position.x",), low=-1.0, high=1.0)
     return Study(
         name="cluster", base=Scenario(stop_time=STOP_TIME), axes=(axis,), method="random", samples=runs, native=True
@@ -61,7 +61,7 @@ def cluster() -> Iterator[str]:
 
 
 def seconds(chosen: Study, engine: EngineChoice, dask: str | None) -> float:
-    """Wall time of a sweep [s], the smaller of two, each into a store of its own."""
+    """Wall time of a sweep [s], the smaller of two, each into its own store."""
     found = []
     for _ in range(2):
         with tempfile.TemporaryDirectory() as folder:

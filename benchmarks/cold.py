@@ -1,10 +1,9 @@
-"""What commands cost from a cold start, as a user types them: `python -m benchmarks.cold`.
+"""The cost of commands from a cold start, as a user runs them: `python -m benchmarks.cold`.
 
-CPU time, user and system, of a new process and of all that it starts, the smallest of several in turns; under other
-load it grows. FMUs are built before, but for `build` itself. The sweep is typed without a flag, into an empty
-store: flights of 20 s at 50 Hz, the plant at 1 ms, each with jitter of its own. With an empty cache what it needs
-is compiled too. What a run costs and what a sweep costs once follow from two sizes, and so does the coordinator's
-part of both.
+CPU time, user and system, of a new process and of all that it starts, the smallest of several interleaved repetitions;
+it grows under other load. FMUs are built before, except for `build` itself. The sweep runs without flags into an empty
+store: flights of 20 s at 50 Hz, the plant at 1 ms, each with its own jitter. With an empty cache it also compiles.
+The cost of a run and the fixed cost of a sweep follow from two sizes, and so does the coordinator's part of both.
 """
 
 import os
@@ -17,7 +16,7 @@ from pathlib import Path
 from orchestration.processes import subprocesses
 
 REPETITIONS = 3
-RUNS, FEW = 2048, 256
+RUNS, FEWER_RUNS = 2048, 256
 STUDY = """name = "cold"
 [base]
 stop_time = 20.0
@@ -51,7 +50,7 @@ main()"""
 def cost(*arguments: str, **environment: str) -> tuple[float, float]:
     """CPU time of a command [s], of all its processes and of the first one alone, in an empty folder."""
     with tempfile.TemporaryDirectory() as folder:
-        for runs in (RUNS, FEW):
+        for runs in (RUNS, FEWER_RUNS):
             (Path(folder) / f"{runs}.toml").write_text(STUDY.format(runs=runs), encoding="utf-8")
         before = _used()
         subprocess.run(
@@ -69,9 +68,9 @@ def _used() -> float:
 
 def main() -> None:
     """Print a line for each."""
-    sweeps: dict[int, list[tuple[float, float]]] = {RUNS: [], FEW: []}
+    sweeps: dict[int, list[tuple[float, float]]] = {RUNS: [], FEWER_RUNS: []}
     commands: dict[str, list[float]] = {name: [] for name in COMMANDS}
-    cost("sweep", f"{FEW}.toml")  # builds FMUs and compiles
+    cost("sweep", f"{FEWER_RUNS}.toml")  # builds FMUs and compiles
     for _ in range(REPETITIONS):
         for runs, costs in sweeps.items():
             costs.append(cost("sweep", f"{runs}.toml"))
@@ -82,11 +81,11 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as cache:
         building = cost("build", "--native", "--out", "fmus", XDG_CACHE_HOME=cache)[0]
     print(f"load {os.getloadavg()[0]:.1f}; the smallest of {REPETITIONS}, in turns")
-    (many, own), (few, own_few) = (tuple(map(min, zip(*costs))) for costs in (sweeps[RUNS], sweeps[FEW]))
+    (many, own), (few, own_few) = (tuple(map(min, zip(*costs))) for costs in (sweeps[RUNS], sweeps[FEWER_RUNS]))
     print(f"sweep of {RUNS} runs: {many:.2f} s, {RUNS / many:.0f} runs/s; with an empty cache {RUNS / compiling:.0f}")
     for what, all_runs, few_runs in (("a run", many, few), ("the coordinator's part of it", own, own_few)):
-        each = (all_runs - few_runs) / (RUNS - FEW)
-        print(f"  {what}: {1e3 * each:.2f} ms, and once {few_runs - FEW * each:.2f} s")
+        each = (all_runs - few_runs) / (RUNS - FEWER_RUNS)
+        print(f"  {what}: {1e3 * each:.2f} ms, and once {few_runs - FEWER_RUNS * each:.2f} s")
     for name, taken in commands.items():
         print(f"{name}: {min(taken):.2f} s")
     print(f"build --native with an empty cache: {building:.1f} s")

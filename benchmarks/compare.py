@@ -1,7 +1,7 @@
-"""What a step costs here and in another checkout of this project: `python -m benchmarks.compare CHECKOUT`.
+"""The cost of a step here and in another checkout of this project: `python -m benchmarks.compare CHECKOUT`.
 
-Both fly the same FMUs, those built here, each in a process of its own, in turn; what counts is the ratio of two
-flights that follow each other, since a machine that others use has no other speed that stays.
+Both run the same FMUs, those built here, each in a separate process, in turn; the ratio of two consecutive flights is
+compared, since the speed of a shared machine is not constant.
 """
 
 import argparse
@@ -23,7 +23,7 @@ PAIRS = 9
 
 
 class Side:
-    """A process that flies with the master of one checkout."""
+    """A process that runs flights with the master of one checkout."""
 
     def __init__(self, checkout: Path, folder: Path) -> None:
         self._process = subprocess.Popen(

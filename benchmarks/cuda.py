@@ -1,9 +1,9 @@
-"""What flights take of a GPU, and cost in its threads: `python -m benchmarks.cuda`; without one only the former.
+"""The resources and the cost of flights on a GPU: `python -m benchmarks.cuda`; without a GPU only the former.
 
-First what NVRTC says of the straight lines of plant and law, with and without the numbers of the paper's flight, and
-how long it takes for all of it. Then wall time of the GPU, the smallest of several repetitions, from the start of a
-kernel to its end: the flights are ready before, and what that takes of one core is told beside. The smaller crowd is
-flown in lanes too: its flights have to be the same to the bit.
+First the resources that NVRTC reports for the straight-line code of plant and law, with and without the numbers of the
+paper's flight, and the time of compiling. Then wall time of the GPU, the smallest of several repetitions, from the
+start of a kernel to its end; preparing the flights, on one core, is reported separately. The smaller number of flights
+is also run in lanes: the results must be the same to the bit.
 """
 
 import time
@@ -23,16 +23,16 @@ from orchestration.system.model import System
 from orchestration.system.paths import changed
 
 REPETITIONS = 3
-CROWDS = (2**12, 2**15)
+COUNTS = (2**12, 2**15)
 """Flights at once"""
 ARCHITECTURE = "sm_90"
-"""Of which registers are told"""
+"""whose registers are reported"""
 STOP_TIME = 2.0
 """[s]"""
 
 
 def groups(one: System, count: int, lanes: int) -> list[Group]:
-    """The flight from so many places."""
+    """The flight from `count` initial positions, in groups."""
     crowd = [changed(one, {X: place}) for place in np.linspace(0.0, 1.0, count).tolist()]
     some = (crowd[i : i + lanes] for i in range(0, count, lanes))
     return [Group(systems=each, timings=[timing(system) for system in each]) for each in some]
@@ -46,8 +46,8 @@ def expect_same(by_threads: Sequence[BatchResult], in_lanes: Sequence[BatchResul
             assert one.reductions[call].tobytes() == values.tobytes(), call
 
 
-def taken(architecture: str) -> None:
-    """Print what straight lines take of a processor."""
+def print_resources(architecture: str) -> None:
+    """Print the resources of straight-line code on a processor."""
     shape, (one, *_) = systems(0.01, STOP_TIME)
     batch = Batch(shape, ScheduleCache())
     next(batch.going(Group(systems=[one], timings=[timing(one)])))
@@ -72,7 +72,7 @@ def taken(architecture: str) -> None:
 def main() -> None:
     """Print registers, then steps a second, by timing and number of flights."""
     try:
-        taken(ARCHITECTURE)
+        print_resources(ARCHITECTURE)
     except QuadcosimError as error:
         print(error)
     try:
@@ -85,15 +85,15 @@ def main() -> None:
     for case, (period, _) in CASES.items():
         shape, (one, *_) = systems(period, STOP_TIME)
         fleet = Fleet(shape, ScheduleCache(), gpu)
-        for count in CROWDS:
-            asked = groups(one, count, shape.lanes)
-            found = [result for _, result in fleet.run(asked)]
-            if count == CROWDS[0]:
-                expect_same(found, [result for _, result in Batch(shape, ScheduleCache()).each(asked, None)])
+        for count in COUNTS:
+            flights = groups(one, count, shape.lanes)
+            found = [result for _, result in fleet.run(flights)]
+            if count == COUNTS[0]:
+                expect_same(found, [result for _, result in Batch(shape, ScheduleCache()).each(flights, None)])
             took = []
             for _ in range(REPETITIONS):
                 begin, before = time.perf_counter(), gpu.busy
-                fleet.run(asked)
+                fleet.run(flights)
                 took.append((gpu.busy - before, time.perf_counter() - begin))
             kernel, whole = min(took)
             steps = sum(int(result.steps.sum()) for result in found)

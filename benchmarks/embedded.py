@@ -1,8 +1,7 @@
-"""What the controller takes on a microcontroller: `python -m benchmarks.embedded [--page PAGE]`.
+"""The resources of the controller on a microcontroller: `python -m benchmarks.embedded [--page PAGE]`.
 
-Sizes are those of the compiler's object, and so is the stack: its frames along the deepest path of calls. Instructions
-are counted under QEMU, in a flight of 10 s against the plant: instructions, not cycles. With `--page` the table is put
-there.
+Sizes are those of the compiled object; the stack is the frames along the deepest path of calls. Instructions, not
+cycles, are counted under QEMU, in a flight of 10 s with the plant. With `--page` the table is written there.
 """
 
 import argparse
@@ -40,49 +39,53 @@ FIXED: dict[str, dict[str, Value]] = {
     "no redesign, no prediction": OFF,
     "`discretisation = mean`, `hold_period = 0.02`": {**OFF, "discretisation": "mean", "hold_period": 0.02},
 }
-"""Values of the controller, in words."""
+"""Fixed values of the controller, by description."""
 MACHINES = {"M4F": M4F, "M7": M7}
 
 
-def compiled(source: Path, folder: Path, *flags: str) -> tuple[int, int]:
-    """Of a source, the code and constants, and the stack of the deepest of its calls [bytes]."""
-    made = folder / "size.o"
-    subprocess.run([ARM, *OPTIONS, *stack.OPTIONS, *flags, "-c", str(source), "-o", str(made)], check=True)
-    done = subprocess.run(["arm-none-eabi-size", str(made)], check=True, capture_output=True, text=True)
-    return int(done.stdout.splitlines()[1].split()[0]), max(stack.deepest(made.with_suffix(".ci").read_text()).values())
+def size_of(source: Path, folder: Path, *flags: str) -> tuple[int, int]:
+    """The size of code and constants of a source, and its deepest stack [bytes]."""
+    compiled = folder / "size.o"
+    subprocess.run([ARM, *OPTIONS, *stack.OPTIONS, *flags, "-c", str(source), "-o", str(compiled)], check=True)
+    done = subprocess.run(["arm-none-eabi-size", str(compiled)], check=True, capture_output=True, text=True)
+    return int(done.stdout.splitlines()[1].split()[0]), max(
+        stack.deepest(compiled.with_suffix(".ci").read_text()).values()
+    )
 
 
-def with_values_fixed(folder: Path) -> str:
-    """Text and stack of the controller on an M4F at -O2, by what is fixed in it."""
+def variants_table(folder: Path) -> str:
+    """The table of text and stack of the controller on an M4F at -O2, by fixed values."""
     rows = []
     for words, values in FIXED.items():
         for precision in ("double", "single"):
             fixed = replace(Target.parse(MODELS["UnifiedController"]), variant=Variant.of("Law", values))
             source = write(fixed, folder / precision, single=precision == "single")
-            text, depth = compiled(source, folder, *M4F, "-O2")
-            bare, _ = compiled(source, folder, *M4F, "-O2", "-DLAW_NO_TEXTS")
+            text, depth = size_of(source, folder, *M4F, "-O2")
+            bare, _ = size_of(source, folder, *M4F, "-O2", "-DLAW_NO_TEXTS")
             rows.append([words, precision, *(f"{n:,}" for n in (text, bare, depth))])
     return table(["fixed", "precision", "text [B]", "without words [B]", "stack [B]"], rows)
 
 
-def flown(sources: list[Path], folder: Path, machine: tuple[str, ...], *flags: str) -> tuple[int, list[int]]:
-    """Bytes of the instance, and the instructions of each step of a flight against the plant.
+def count_instructions(
+    sources: list[Path], folder: Path, machine: tuple[str, ...], *flags: str
+) -> tuple[int, list[int]]:
+    """Bytes of the instance, and the instructions of each step of a flight with the plant.
 
     `sources` are of the controller and of the plant; raises `subprocess.CalledProcessError` where a step fails.
     """
     board_files = [str(BOARD_FILES / "cortex_m.c"), "-T", str(BOARD_FILES / "cortex_m.ld"), "--specs=rdimon.specs"]
     places = [f"-I{source.parent}" for source in sources]
-    program = [str(HERE / "embedded.c"), *map(str, sources), "-lm", "-o", str(folder / "flown")]
+    program = [str(HERE / "embedded.c"), *map(str, sources), "-lm", "-o", str(folder / "run")]
     subprocess.run([ARM, *OPTIONS, *machine, *flags, *places, *board_files, *program], check=True)
     qemu = [QEMU, "-M", BOARDS[machine], "-display", "none", "-icount", "shift=6"]
-    given = ["-semihosting-config", "enable=on,target=native", "-kernel", str(folder / "flown")]
-    done = subprocess.run([*qemu, *given], check=True, stdout=subprocess.PIPE, text=True, timeout=300)
+    options = ["-semihosting-config", "enable=on,target=native", "-kernel", str(folder / "run")]
+    done = subprocess.run([*qemu, *options], check=True, stdout=subprocess.PIPE, text=True, timeout=300)
     size, *counts = (int(word) for word in done.stdout.split())
     return size, counts
 
 
 def differences(double: Path, single: Path, plant: Path) -> str:
-    """How far apart flights of both precisions are, over 30 s of the built-in trajectory at 100 Hz."""
+    """The table of differences between flights of both precisions, over 30 s of the built-in trajectory at 100 Hz."""
     names = to_note(double, plant, plant.parent)
     double_rows, single_rows = (
         rows_of(on_cortex_m(M4F, "embedded_flight.c", [source, plant], plant.parent, *FLIGHT))
@@ -109,14 +112,14 @@ def main() -> None:
             source = write(controller, folder / precision, single=precision == "single")
             for machine, flags in MACHINES.items():
                 for optimised in ("-O2", "-Os"):
-                    size, counts = flown([source, plant_source], folder, flags, optimised)
-                    text, depth = compiled(source, folder, *flags, optimised)
-                    bare, _ = compiled(source, folder, *flags, optimised, WITHOUT_TEXTS)
+                    size, counts = count_instructions([source, plant_source], folder, flags, optimised)
+                    text, depth = size_of(source, folder, *flags, optimised)
+                    bare, _ = size_of(source, folder, *flags, optimised, WITHOUT_TEXTS)
                     numbers = (text, bare, size, depth, round(statistics.mean(counts)), max(counts))
                     rows.append([precision, machine, f"`{optimised}`", *(f"{n:,}" for n in numbers)])
         double, single = (folder / precision / "UnifiedController.c" for precision in ("double", "single"))
         far = differences(double, single, plant_source)
-        fixed = with_values_fixed(folder)
+        fixed = variants_table(folder)
     heads = ["precision", "machine", "", "text [B]", "without words [B]", "instance [B]", "stack [B]"]
     found = table([*heads, "instructions a step", "most"], rows)
     version = subprocess.run([ARM, "--version"], check=True, capture_output=True, text=True).stdout.splitlines()[0]

@@ -1,4 +1,4 @@
-"""Slaves with the variables of the real ones that compute nothing: the floor that pythonfmu and fmpy set."""
+"""Slaves with the variables of the real ones that compute nothing, which measure the overhead of pythonfmu and fmpy."""
 
 from controller_fmu.sliding_mode.slave import UnifiedController
 from fmu_kit.saved_state import State

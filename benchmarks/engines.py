@@ -1,7 +1,7 @@
-"""What a step of the closed loop costs by each engine, everything recorded: `python -m benchmarks.engines`.
+"""The cost of a step of the closed loop in each engine, with everything recorded: `python -m benchmarks.engines`.
 
-CPU time of the run alone, from after initialisation on, the smallest of several repetitions in turns; under other load
-it grows, and ratios within one run of this program are what can be compared.
+CPU time of the run alone, after initialisation, the smallest of several interleaved repetitions; it grows under other
+load, so that only ratios within one run of this program can be compared.
 """
 
 import os
@@ -25,20 +25,20 @@ CASES = {
 
 
 def scenario(period: float, stop_time: float, *, native: bool) -> Scenario:
-    """The paper's flight, sampled so."""
-    asked = Scenario(timing=Timing(period=period), stop_time=stop_time)
+    """The paper's flight with this sample period."""
+    flight = Scenario(timing=Timing(period=period), stop_time=stop_time)
     if not native:
-        return asked
-    return asked.with_fmus(plant=native_twin(asked.plant.fmu), controller=native_twin(asked.controller.fmu))
+        return flight
+    return flight.with_fmus(plant=native_twin(flight.plant.fmu), controller=native_twin(flight.controller.fmu))
 
 
-def step(asked: Scenario, engine: Engine) -> float:
+def step(flight: Scenario, engine: Engine) -> float:
     """CPU time of a step of the plant [us]."""
-    with prepared(asked, engine=engine) as flight:
-        flight.master.initialise()
+    with prepared(flight, engine=engine) as run:
+        run.master.initialise()
         start = time.process_time()
-        flight.master.run()
-        return (time.process_time() - start) / flight.master.steps * 1e6
+        run.master.run()
+        return (time.process_time() - start) / run.master.steps * 1e6
 
 
 def main() -> None:

@@ -1,9 +1,9 @@
-"""How long a controller computes on a flight controller's processor: `python -m benchmarks.execution [--out FOLDER]`.
+"""Execution times of the laws on a flight controller's processor: `python -m benchmarks.execution [--out FOLDER]`.
 
 For each law and each redesign the instructions of every step of a flight of 10 s at 100 Hz are counted under QEMU, in
-the C that `export-c` writes, at -O2: the same numbers each time. As seconds, at CYCLES cycles an instruction and the
-processor's clock, they are traces for `execution` of a task: a CSV file for each processor, a column for each law. That
-model knows no caches, no wait states of the flash and no interrupts.
+the C that `export-c` writes, at -O2: the counts are reproducible. In seconds, at CYCLES cycles per instruction and the
+processor's clock, they are traces for `execution` of a task: a CSV file for each processor, a column for each
+law. The model has no caches, no wait states of the flash and no interrupts.
 """
 
 import argparse
@@ -12,7 +12,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.embedded import flown
+from benchmarks.embedded import count_instructions
 from benchmarks.mathematics import table
 from fmu_kit.bundle import Target
 from fmu_kit.compiler.pack.embedded import write
@@ -21,12 +21,12 @@ from tests.fmu_kit.compiler.embedded import M4F, M7
 
 FOLDER = Path(__file__).parents[1] / "examples" / "autopilot" / "execution"
 CYCLES = 1.0
-"""An instruction; the M7 does up to two in one, and waits for its memory"""
+"""per instruction; the M7 executes up to two per cycle, and waits for its memory"""
 
 
 @dataclass(frozen=True)
 class Processor:
-    """One that flight controllers have."""
+    """A processor of flight controllers."""
 
     flags: tuple[str, ...]
     clock: float
@@ -46,18 +46,18 @@ LAWS = {
     "geometric_mean": ("GeometricController", 4),
     "cascaded": ("CascadedController", 0),
 }
-"""By the name of the column: the controller, and its discretisation, if it has any"""
+"""The controller and its discretisation, if it has any, by name of the column"""
 
 
-def counted(model: str, discretisation: int, processor: Processor, folder: Path) -> list[int]:
+def step_counts(model: str, discretisation: int, processor: Processor, folder: Path) -> list[int]:
     """Instructions of each step; raises `subprocess.CalledProcessError` where one fails."""
     sources = [
         write(Target.parse(MODELS[name]), folder / name, single=processor.single and name == model)
         for name in (model, "QuadrotorPlant")
     ]
     prepared = f"c.par.discretisation = {discretisation};" if discretisation else ""
-    given = (f"-DCONTROLLER={model}", f"-DPREPARED={prepared}", "-O2")
-    return flown(sources, folder, processor.flags, *given)[1]
+    flags = (f"-DCONTROLLER={model}", f"-DPREPARED={prepared}", "-O2")
+    return count_instructions(sources, folder, processor.flags, *flags)[1]
 
 
 def main() -> None:
@@ -70,7 +70,7 @@ def main() -> None:
         traces = {}
         for name, (model, discretisation) in LAWS.items():
             with tempfile.TemporaryDirectory() as temporary:
-                counts = counted(model, discretisation, processor, Path(temporary))
+                counts = step_counts(model, discretisation, processor, Path(temporary))
             traces[name] = [count * CYCLES / processor.clock for count in counts]
             numbers = (f"{round(statistics.median(counts)):,}", f"{max(counts):,}", f"{max(traces[name]) * 1e6:.1f}")
             rows.append([machine, name, *numbers])

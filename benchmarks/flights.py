@@ -1,4 +1,4 @@
-"""Flies what `compare` asks for, with the master of the checkout that is on the path; knows its public names only."""
+"""Runs the flights of `compare` with the master of the checkout on the path, through its public names only."""
 
 import gc
 import sys
@@ -21,10 +21,12 @@ CASES: dict[str, tuple[tuple[str, str], dict[str, Any]]] = {
 
 
 def microseconds(case: str, folder: str) -> float:
-    """CPU time of one plant step and what belongs to it [µs]."""
+    """CPU time of one plant step and all that belongs to it [µs]."""
     import quadcosim
 
-    prepared = vars(sys.modules[quadcosim.run.__module__])["prepared"]  # whatever that module is called
+    prepared = vars(sys.modules[quadcosim.run.__module__])[
+        "prepared"
+    ]  # the name of that module may differ between checkouts
     (plant, controller), timing = CASES[case]
     scenario = quadcosim.Scenario(
         stop_time=STEPS * MILLISECOND,

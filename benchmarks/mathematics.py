@@ -1,7 +1,7 @@
-"""How exact and how fast the functions of native slaves are: `python -m benchmarks.mathematics [--page PAGE]`.
+"""The accuracy and speed of the functions of native slaves: `python -m benchmarks.mathematics [--page PAGE]`.
 
-Errors are the largest of many samples, found with numbers of 150 bits; times are CPU time for each number of an array
-that stays in the cache, the smallest of several repetitions, all in one run. With `--page` the tables are put there.
+Errors are the largest of many samples, computed with 150 bits; times are CPU time per number of an array that stays in
+the cache, the smallest of several repetitions, all in one run. With `--page` the tables are written there.
 """
 
 import argparse
@@ -45,7 +45,7 @@ def table(heads: list[str], rows: list[list[str]]) -> str:
 
 
 def errors(folder: Path) -> str:
-    """The largest errors, beside those of this machine's libm."""
+    """The table of the largest errors, with those of this machine's libm."""
     own, libm = library("loops.c", folder), library("loops.c", folder, *BUILDS["libm"])
     rows = []
     for name, stated in STATED.items():
@@ -56,8 +56,8 @@ def errors(folder: Path) -> str:
 
 
 def speeds(folder: Path) -> str:
-    """Time a number by build, of those builds whose instructions the processor has."""
-    able = {
+    """The table of times per number, for the builds whose instructions the processor has."""
+    builds = {
         name: library("loops.c", folder, *flags)
         for name, flags in BUILDS.items()
         if all(flag[2:] in processor() for flag in flags if flag.startswith("-mavx"))
@@ -67,14 +67,14 @@ def speeds(folder: Path) -> str:
     rows = []
     for name in NAMES:
         arguments = (x, y) if name in ("pow", "atan2", "hypot") else (x,) if name == "asin" else (4.0 * x,)
-        rows.append([f"`{name}`", *(f"{nanoseconds(loops, name, arguments):.1f}" for loops in able.values())])
-    return table(["ns a number", *able], rows)
+        rows.append([f"`{name}`", *(f"{nanoseconds(loops, name, arguments):.1f}" for loops in builds.values())])
+    return table(["ns a number", *builds], rows)
 
 
 def main() -> None:
-    """Print both tables, or put them into a page."""
+    """Print both tables, or write them into a page."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--page", type=Path, help="put the tables there")
+    parser.add_argument("--page", type=Path, help="write the tables there")
     page = parser.parse_args().page
     with tempfile.TemporaryDirectory() as scratch:
         tables = {"errors": errors(Path(scratch)), "speeds": speeds(Path(scratch))}

@@ -1,8 +1,8 @@
-"""What a checker of MISRA C:2012 finds in the C of the controller: `python -m benchmarks.misra [--page PAGE]`.
+"""Violations of MISRA C:2012 in the C of the controller: `python -m benchmarks.misra [--page PAGE]`.
 
-Needs cppcheck with its addon, which knows most rules that can be decided, and none of their texts. The controller is
-the law without redesign and prediction, in both precisions: with them cppcheck takes longer than ten minutes. With
-`--page` the table is put there.
+Needs cppcheck with its addon, which checks most decidable rules, without their texts. The controller is the law without
+redesign and prediction, in both precisions: with them cppcheck takes more than ten minutes. With `--page` the table is
+written there.
 """
 
 import argparse
@@ -27,7 +27,7 @@ _FINDING = re.compile(r"\[misra-c2012-([\d.]+)\]")
 
 
 def findings(source: Path) -> Counter[str]:
-    """How often each rule is found broken in a file of C."""
+    """The number of violations of each rule in a file of C."""
     subprocess.run(
         [CPPCHECK, "--dump", "--max-configs=1", "--std=c99", "--quiet", source.name], cwd=source.parent, check=True
     )
@@ -37,7 +37,7 @@ def findings(source: Path) -> Counter[str]:
 
 
 def _addon() -> Path:
-    """The addon beside the checker; raises `FileNotFoundError` where there is none."""
+    """The path of the checker's addon; raises `FileNotFoundError` if there is none."""
     for folder in (
         Path("/usr/share/cppcheck"),
         *Path("/usr/lib").glob("*/cppcheck"),

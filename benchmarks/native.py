@@ -1,8 +1,8 @@
-"""How long a step takes inside a native FMU, without any master: `python -m benchmarks.native`.
+"""The time of a step inside a native FMU, without a master: `python -m benchmarks.native`.
 
 CPU time of fmi2DoStep, called from C, the smallest of nine repetitions: of the controller with a sample in every step,
-of the plant with one internal step in every step, each with both mathematics. Then a step in each of several lanes,
-compiled for this processor from the sources in the FMU.
+of the plant with one internal step in every step, each with both mathematics. Then a step in SIMD lanes, compiled for
+this processor from the sources in the FMU.
 """
 
 import shutil
@@ -22,7 +22,7 @@ LANES = (1, 4, 8, 16)
 CASES = {"UnifiedController": ("law, 10 ms", 0.01), "QuadrotorPlant": ("plant, one internal step of 1 ms", 0.001)}
 
 
-def built(folder: Path, mathematics: str) -> dict[str, Path]:
+def build_fmus(folder: Path, mathematics: str) -> dict[str, Path]:
     """The FMUs with this mathematics, unpacked."""
     script = Path(__file__).parents[1] / "tests" / "fmus" / "scripts" / "build_native.py"
     subprocess.run(
@@ -40,7 +40,7 @@ def program(name: str, folder: Path) -> Path:
     return path
 
 
-def printed(*command: str | Path) -> str:
+def output_of(*command: str | Path) -> str:
     """What a program prints."""
     return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
 
@@ -51,18 +51,18 @@ def main() -> None:
         folder = Path(temporary)
         alone, in_lanes = program("steps", folder), program("lane_steps", folder)
         for mathematics in ("own", "libm"):
-            folders = built(folder / mathematics, mathematics)
+            folders = build_fmus(folder / mathematics, mathematics)
             for name, (what, h) in CASES.items():
                 description = fmpy.read_model_description(str(folders[name]))
                 library = folders[name] / "binaries" / fmpy.platform / f"{name}.so"
-                taken = printed(alone, library, description.guid, repr(h), str(STEPS))
+                taken = output_of(alone, library, description.guid, repr(h), str(STEPS))
                 print(f"{what}, {mathematics} mathematics: {taken} us a step")
         for name, (what, h) in CASES.items():
             sources = {file.name: file.read_bytes() for file in (folder / "own" / name / "sources").iterdir()}
             for lanes in LANES:
                 library = folder / f"{name}_{lanes}.so"
                 library.write_bytes(compiled_lanes(sources, lanes))
-                taken = printed(in_lanes, library, repr(h), str(STEPS // lanes))
+                taken = output_of(in_lanes, library, repr(h), str(STEPS // lanes))
                 print(f"{what}, {lanes} lanes: {taken} ns a step and lane")
 
 

@@ -1,8 +1,8 @@
-"""What a step of the closed loop costs in other people's masters: `python -m benchmarks.peers`.
+"""The cost of a step of the closed loop in third-party masters: `python -m benchmarks.peers`.
 
-The same native FMUs of FMI 2.0, both stepped every 10 ms, in each tool that is installed and in this project's engines;
-each notes all signals that are connected. CPU time, of two flights of different length, so that what a tool takes to
-begin is not in a step. In turns, the smallest of several; ratios within one run of this program can be compared.
+The same native FMUs of FMI 2.0, both stepped every 10 ms, in each installed tool and in this project's engines; each
+records all connected signals. CPU time, from two flights of different length, so that the start of a tool does not
+count. Interleaved, the smallest of several; only ratios within one run of this program can be compared.
 """
 
 import os
@@ -26,12 +26,12 @@ STEP = 0.01
 STOPS = (5.0, 25.0)
 """[s]"""
 REPETITIONS = 3
-NOT_FLOWN = {
+LEFT_OUT = {
     "PyFMI, OMSimulator": "pip found neither where this was measured; OMSimulator reads the SSP",
-    "FMPy's simulate_fmu": "flies one FMU, not two: in the table as plant or controller alone",
-    "crazyflow, rotorpy": "fly their own vehicle and controller, no FMUs",
+    "FMPy's simulate_fmu": "runs one FMU, not two: in the table as plant or controller alone",
+    "crazyflow, rotorpy": "simulate their own vehicle and controller, no FMUs",
 }
-"""Whom one may look for, and why they are not in the table"""
+"""Other simulators, and why they are not in the table"""
 OWN = ("python", "compiled")
 
 
@@ -41,7 +41,7 @@ def scenario(stop: float) -> System:
 
 
 def by_tool(tool: Tool, stop: float) -> float:
-    """CPU time of a flight in a tool's process, its start included [s]."""
+    """CPU time of a flight in a tool's process, including its start [s]."""
     with tempfile.TemporaryDirectory() as folder, Flights(scenario(stop), Path(folder), None) as flights:
         before = _of_children()
         flights.flown(tool)
@@ -49,7 +49,7 @@ def by_tool(tool: Tool, stop: float) -> float:
 
 
 def by_engine(name: str, stop: float) -> float:
-    """The same by an engine of this project, in this process [s]."""
+    """CPU time of a flight by an engine of this project, in this process [s]."""
     with prepared(scenario(stop), engine=name) as flight:  # type: ignore[arg-type]
         flight.master.initialise()
         before = _of_this_process()
@@ -86,8 +86,8 @@ def main() -> None:
     ]
     print(f"load {os.getloadavg()[0]:.1f}; the smallest of {REPETITIONS}, in turns")
     print(table(["master", "version", "us a step", "times the compiled loop"], rows))
-    for name, why in NOT_FLOWN.items():
-        print(f"not flown: {name}: {why}")
+    for name, why in LEFT_OUT.items():
+        print(f"not run: {name}: {why}")
 
 
 def _of_children() -> float:

@@ -1,10 +1,10 @@
-"""Random loops under random timing: what runs print on average against `expect --as-simulated`, loop by loop.
+"""Random loops under random timing: the means of simulated runs compared with `expect --as-simulated`, loop by loop.
 
     python -m benchmarks.random_loops --count 30
 
 Loops of one or two rates around an integrator or a servo, of the examples, with delays beyond a period, jitter, losses
-in bursts, both holds and orders, and noise. Of each with a fourth-moment radius below 0.95 as many runs as
-are asked for give a mean and its standard error; z is how many of these it is from what is expected.
+in bursts, both holds and orders, and noise. For each with a fourth-moment radius below 0.95, a number of runs gives a
+mean and its standard error; z is its distance from the expected value in standard errors.
 """
 
 import argparse
@@ -32,11 +32,11 @@ STEPS = 8
 PERIODS = 500
 """of a run"""
 SETTLED = 0.3
-"""of it, from where on it counts: runs begin at rest"""
+"""fraction of a run that is left out, since runs begin at rest"""
 
 
 def random_loop(number: int) -> System:
-    """One of them."""
+    """The random loop of this number."""
     draw = np.random.default_rng(number)
     return (integrator_of, servo_of)[int(draw.integers(2))](draw)
 
@@ -72,7 +72,7 @@ def integrator_of(draw: np.random.Generator) -> System:
 
 
 def servo_of(draw: np.random.Generator) -> System:
-    """The servo under PID, driven by the noise of what is measured."""
+    """The servo under PID, driven by measurement noise."""
     servo = load_system(EXAMPLES / "dc_servo/system.toml")
     period = 0.006
     law = dataclasses.replace(
@@ -99,14 +99,14 @@ def servo_of(draw: np.random.Generator) -> System:
 
 
 def sampling(draw: np.random.Generator, period: float) -> Sampling:
-    """Punctual, or not."""
+    """Sampling with or without jitter."""
     jitter = float(draw.choice([0.0, 0.3])) * period
     normal = draw.random() < 0.3
     return Sampling(period=period, jitter=jitter, jitter_distribution="normal" if normal else "uniform")
 
 
 def timing(draw: np.random.Generator, period: float) -> dict[str, Any]:
-    """Delays up to more than a period, in one order or the other, under one hold or the other."""
+    """Delays up to more than a period, with either order and either hold."""
     found: dict[str, Any] = {"delay": float(draw.choice([0.0, 0.2, 0.7, 1.1])) * period}
     found["delay_jitter"] = float(draw.choice([0.0, 0.25, 0.6])) * period
     found["jitter_distribution"] = str(draw.choice(["uniform", "normal"]))
@@ -116,32 +116,32 @@ def timing(draw: np.random.Generator, period: float) -> dict[str, Any]:
 
 
 def losses(draw: np.random.Generator) -> dict[str, Any]:
-    """None, independent ones, or bursts."""
+    """No losses, independent ones, or bursts."""
     kind = int(draw.integers(3))
     loss = float(draw.uniform(0.02, 0.2))
     return ({}, {"loss": loss}, {"loss": loss, "burst_length": float(draw.uniform(1.3, 3.0))})[kind]
 
 
-def apart(system: System, found: Expected, runs: int) -> dict[str, tuple[float, float, float]]:
-    """By objective the mean over runs, its standard error, and what was expected."""
+def compare_means(system: System, found: Expected, runs: int) -> dict[str, tuple[float, float, float]]:
+    """By objective: the mean over runs, its standard error, and the expected value."""
     later = f"(time > {SETTLED} * stop_time) / (1 - {SETTLED})"
     counted = {name: f"mean(({_averaged(text)}) * {later})" for name, text in system.objectives.items()}
-    flown = run_many(
+    simulated = run_many(
         fmus.native_twins(dataclasses.replace(system, objectives=counted)),
         {"seed": np.arange(runs)},
         outputs=list(found.objectives),
     )
-    told = {}
+    compared = {}
     for name, expected in found.objectives.items():
-        values = flown[name]
+        values = simulated[name]
         assert expected is not None
         exact = expected**2 if "rms" in system.objectives[name] else expected
-        told[name] = float(values.mean()), float(values.std(ddof=1) / np.sqrt(runs)), exact
-    return told
+        compared[name] = float(values.mean()), float(values.std(ddof=1) / np.sqrt(runs)), exact
+    return compared
 
 
 def _averaged(objective: str) -> str:
-    """What an objective is the mean of."""
+    """The expression of which an objective is the mean."""
     inner = objective.partition("(")[2].removesuffix(")")
     return f"({inner}) ** 2" if objective.startswith("rms") else inner
 
@@ -152,9 +152,9 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=30)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--runs", type=int, default=128)
-    given = parser.parse_args()
-    number, done, worst = given.first, 0, 0.0
-    while done < given.count:
+    options = parser.parse_args()
+    number, done, worst = options.first, 0, 0.0
+    while done < options.count:
         system = random_loop(number)
         number += 1
         try:
@@ -165,7 +165,7 @@ def main() -> None:
         if found.fourth_moment_radius is None or found.fourth_moment_radius >= LARGEST_FOURTH:
             continue
         done += 1
-        for name, (mean, error, exact) in apart(system, found, given.runs).items():
+        for name, (mean, error, exact) in compare_means(system, found, options.runs).items():
             z = (mean - exact) / error
             worst = max(worst, abs(z))
             print(f"{number - 1:4} {name:<9} {mean:12.6g} ± {error:8.2g}  {exact:12.6g}  z {z:6.2f}", flush=True)

@@ -1,6 +1,6 @@
-"""What the report of a large study weighs, and how long a browser takes to open it.
+"""The size of the report of a large study, and the time in which a browser opens it.
 
-python -m benchmarks.report            10,000 runs, as lanes of native FMUs; it wants Chromium
+python -m benchmarks.report            10,000 runs, in SIMD lanes of native FMUs; needs Chromium
 """
 
 import argparse
@@ -38,31 +38,29 @@ TIMES = """({
     parsed: performance.getEntriesByType("navigation")[0].domContentLoadedEventEnd,
     drawn: performance.getEntriesByName("first plot")[0].startTime,
 })"""
-OPENED = 7
+OPENINGS = 7
 
 
-def written(side: int, folder: Path) -> Path:
-    """The report of a study of side x side runs, with what it took on the way."""
+def write_report(side: int, folder: Path) -> Path:
+    """Write the report of a study of side x side runs, and print how long it took."""
     file = folder / "study.toml"
     file.write_text(STUDY.format(side=side), encoding="utf-8")
     started = time.perf_counter()
     summary = sweep(load_study(file), folder=folder, engine="batch")
-    flown = time.perf_counter()
+    swept = time.perf_counter()
     out = report(file, out=folder)
-    print(
-        f"{summary.total} runs flown in {flown - started:.1f} s, report written in {time.perf_counter() - flown:.1f} s"
-    )
+    print(f"{summary.total} runs in {swept - started:.1f} s, report written in {time.perf_counter() - swept:.1f} s")
     return out
 
 
-def opened(file: Path, browser: str) -> list[dict[str, float]]:
-    """Times from the start of loading to the parsed page and to the first plot [ms], each in a page of its own."""
+def opening_times(file: Path, browser: str) -> list[dict[str, float]]:
+    """Times from the start of loading to the parsed page and to the first plot [ms], each in a new page."""
     from playwright.sync_api import sync_playwright
 
     found = []
     with sync_playwright() as started:
         window: Any = started.chromium.launch(executable_path=browser, args=["--no-sandbox"])
-        for _ in range(OPENED):
+        for _ in range(OPENINGS):
             page = window.new_page(viewport={"width": 1400, "height": 900})
             page.goto(file.as_uri())
             page.wait_for_selector("body[data-drawn]")
@@ -78,10 +76,10 @@ def main() -> None:
     parser.add_argument("--side", type=int, default=100, help="runs along each of two axes")
     parser.add_argument("--file", type=Path, help="open this report instead of making one")
     parser.add_argument("--browser", default=shutil.which("chromium") or "chromium")
-    given = parser.parse_args()
+    options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        file = given.file or written(given.side, Path(folder))
-        times = opened(file.resolve(), given.browser)
+        file = options.file or write_report(options.side, Path(folder))
+        times = opening_times(file.resolve(), options.browser)
         print(f"size {file.stat().st_size / 1e6:.1f} MB")
     for name, text in (("parsed", "DOMContentLoaded"), ("drawn", "first plot drawn")):
         values = [each[name] / 1e3 for each in times]

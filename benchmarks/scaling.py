@@ -1,7 +1,7 @@
-"""What an instant costs the master over how much there is: `python -m benchmarks.scaling [--figure FILE]`.
+"""The master's cost of an instant by number of components and connections.
 
-Simulators that do nothing, so that the time is the master's alone; in one run, the smallest CPU time of several
-repetitions.
+`python -m benchmarks.scaling [--figure FILE]`. The simulators do nothing, so that the time is the master's alone; in
+one run, the smallest CPU time of several repetitions.
 """
 
 import argparse
@@ -82,9 +82,9 @@ def messages(connections: int) -> System:
 
 
 def costs(systems: Sequence[System]) -> list[float]:
-    """Of one instant at which every component steps and every connection carries a message, in each system [µs].
+    """The cost of an instant at which every component steps and every connection carries a message, by system [µs].
 
-    The systems take turns, so that what else the machine does is the same for all.
+    The systems take turns, so that other load of the machine affects all of them equally.
     """
     rounds = [[seconds(system) for system in systems] for _ in range(REPETITIONS)]
     return [min(times) / INSTANTS * 1e6 for times in zip(*rounds)]

@@ -1,20 +1,20 @@
-"""How deep the stack of compiled C may become: the frames along the deepest path of calls, as gcc tells of both."""
+"""The deepest stack of compiled C: the frames along the deepest path of calls, both as reported by gcc."""
 
 import re
 from collections.abc import Mapping
 from functools import cache
 
 OPTIONS = ("-fstack-usage", "-fcallgraph-info=su")
-"""of gcc from 10 on: with them it writes, beside an object NAME.o, the graph NAME.ci"""
+"""options of gcc 10 and newer that write the graph NAME.ci beside an object NAME.o"""
 _NODE = re.compile(r'node: \{ title: "([^"]*)" label: "([^"]*)"')
 _FRAME = re.compile(r"(\d+) bytes \(([^)]*)\)")
 _EDGE = re.compile(r'edge: \{ sourcename: "([^"]*)" targetname: "([^"]*)"')
 
 
 def deepest(graph: str) -> dict[str, int]:
-    """The most stack [bytes] that a call of each function of a graph takes; functions of libraries count nothing.
+    """The largest stack [bytes] of a call of each function of a graph, without library functions.
 
-    Raises `ValueError` where it has no bound that is known: recursion, calls by address, arrays of variable length.
+    Raises `ValueError` if it has no known bound: recursion, calls by address, arrays of variable length.
     """
     frames = {name: _frame(name, label) for name, label in _NODE.findall(graph)}
     called: dict[str, set[str]] = {name: set() for name in frames}

@@ -1,7 +1,7 @@
-"""What a store of a million rows costs to write, open, read, draw and export: `python -m benchmarks.stores [ROWS]`.
+"""The cost of writing, opening, reading, drawing and exporting a store of a million rows.
 
-CPU time. The rows were never flown: they have the columns of a study of the quadrotor over three sampled axes, and
-random numbers in them.
+`python -m benchmarks.stores [ROWS]`. CPU time. The rows are not simulated: they have the columns of a study of the
+quadrotor over three sampled axes, with random numbers.
 """
 
 import json
@@ -25,7 +25,7 @@ from orchestration.workers.row import Row
 
 ROWS = 1_000_000
 TOGETHER = 1000
-"""rows that are written in one transaction"""
+"""rows written in one transaction"""
 OBJECTIVES = tuple(Scenario().as_system().objectives)
 AXES = tuple(
     Axis(name=name, targets=(name,), low=0.0, high=1.0) for name in ("timing.delay", "timing.jitter", "timing.loss")
@@ -35,7 +35,7 @@ Result = TypeVar("Result")
 
 
 def rows(number: int) -> Iterator[Row]:
-    """Rows of which every tenth diverged."""
+    """Rows, every tenth of a diverged run."""
     draw = random.Random(0)
     for index in range(number):
         diverged = index % 10 == 0
@@ -49,17 +49,17 @@ def rows(number: int) -> Iterator[Row]:
 
 
 def write(path: Path, number: int) -> None:
-    """A store of so many rows."""
+    """Write a store of `number` rows."""
     about: dict[str, object] = {"axes": [axis.name for axis in AXES], "grid": None, "guids": {}, "versions": {}}
     with open_for_writing(path, OBJECTIVES) as store:
         store.describe({name: json.dumps(value) for name, value in about.items()})
-        made = rows(number)
-        while some := list(islice(made, TOGETHER)):
+        remaining = rows(number)
+        while some := list(islice(remaining, TOGETHER)):
             store.add(some)
 
 
-def told(what: str, do: Callable[[], Result]) -> Result:
-    """Print the CPU time that something takes."""
+def timed(what: str, do: Callable[[], Result]) -> Result:
+    """Print the CPU time of a call, and return its result."""
     start = time.process_time()
     result = do()
     print(f"{what:<28} {time.process_time() - start:8.1f} s", flush=True)
@@ -71,18 +71,18 @@ def main(number: int) -> None:
     print(f"a store of {number} rows")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "study.sqlite"
-        told("written", lambda: write(path, number))
+        timed("written", lambda: write(path, number))
         print(f"{'size':<28} {path.stat().st_size / 1e6:8.0f} MB")
 
         def count(read: Callable[[Store], object]) -> object:
             with open_for_reading(path) as store:
                 return read(store)
 
-        told("opened", lambda: count(lambda store: store.about()))
-        told("counted, every row checked", lambda: count(lambda store: store.counts()))
-        told("read as a pandas DataFrame", lambda: frame(path))
-        told("drawn, reading included", lambda: draw_study(STUDY, Path(folder)))
-        told("exported, reading included", lambda: export(path, path.parent))
+        timed("opened", lambda: count(lambda store: store.about()))
+        timed("counted, every row checked", lambda: count(lambda store: store.counts()))
+        timed("read as a pandas DataFrame", lambda: frame(path))
+        timed("drawn, reading included", lambda: draw_study(STUDY, Path(folder)))
+        timed("exported, reading included", lambda: export(path, path.parent))
     print(f"{'most memory':<28} {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3:8.0f} MB")
 
 

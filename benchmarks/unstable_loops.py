@@ -1,8 +1,8 @@
-"""Certificates asked for where there can be none, and altered: `python -m benchmarks.unstable_loops`.
+"""Searches for certificates that cannot exist, and altered certificates: `python -m benchmarks.unstable_loops`.
 
-A hundred loops, each made a thousandth more than a periodic sequence of it stands: fifty pairs of random matrices, and
-fifty random plants under a quadratic regulator whose commands are late. Of the same loops, a little less far, as many
-as are certified; and of one certificate what becomes of it where one number is another one.
+A hundred loops, each a thousandth beyond the value at which a periodic sequence breaks it: fifty pairs of random
+matrices, and fifty random plants under a quadratic regulator whose commands are late. The same loops below that value,
+and how many of them are certified; and the checks of one certificate after single numbers were altered.
 """
 
 import json
@@ -24,13 +24,13 @@ from tests.orchestration.certificates.loops import HOVER_A, HOVER_B, HOVER_F, la
 EACH = 50
 """loops of either kind"""
 BEYOND, BELOW = 1.001, 0.9
-"""of what breaks a loop"""
+"""relative to the value that breaks a loop"""
 ALTERED = 80
-"""numbers that are made 10 % larger"""
+"""numbers that are increased by 10 %"""
 
 
 def main() -> None:
-    """Print how many are certified beyond what breaks them, and below."""
+    """Print how many are certified beyond the breaking value, and below it."""
     for name, loops in (("two matrices in any order", _switched()), ("late commands", _late())):
         beyond, below = 0, 0
         for too_much, less in loops:
@@ -77,7 +77,7 @@ def _late() -> Iterator[tuple[Family, Family]]:
 
 
 def _rejected(certificate: Certificate) -> int:
-    """How often the checker rejects a certificate of which one number, of matrices or forms, is 10 % larger."""
+    """How often the checker rejects a certificate with one number, of matrices or forms, increased by 10 %."""
     random, rejected = np.random.default_rng(0), 0
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "altered.json"

@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks.random_loops import apart, random_loop
+from benchmarks.random_loops import compare_means, random_loop
 from orchestration.exact.expect import expect
 
 
@@ -13,6 +13,6 @@ def test_means_over_runs_are_within_three_standard_errors_of_what_is_expected(nu
     found = expect(system, as_simulated=True)
     assert found.fourth_moment_radius is not None
     assert found.fourth_moment_radius < 0.95
-    for mean, error, exact in apart(system, found, runs=48).values():
+    for mean, error, exact in compare_means(system, found, runs=48).values():
         assert 0.0 < error < 0.2 * exact
         assert abs(mean - exact) < 3.0 * error
