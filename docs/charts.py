@@ -1,4 +1,4 @@
-"""Figures of `findings/` that no command draws."""
+"""Figures of `findings/` that are drawn by no command."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -17,7 +17,7 @@ Array = Any
 
 
 def gain_limits(factors: Array, ends: Mapping[str, Mapping[str, Array]], local: Array) -> Figure:
-    """Up to which period flights survive, and settle, over the gain factor; a line for each thing held."""
+    """The largest periods at which flights survive and settle, over the gain factor; a line for each way of scaling."""
     figure = DOCS.figure(32.0)
     panels = figure.subplots(1, 2, sharey=True)
     for panel, fate in zip(panels, ("survive", "settle"), strict=True):
@@ -32,7 +32,7 @@ def gain_limits(factors: Array, ends: Mapping[str, Mapping[str, Array]], local: 
 
 
 def decay(curves: Mapping[float, tuple[Array, Array]], medians: Array) -> Figure:
-    """Left the error over time by exponent; right median rates, shape (exponents, decades)."""
+    """Left: the error over time by exponent; right: median rates, shape (exponents, decades)."""
     figure = DOCS.figure(32.0)
     left, right = figure.subplots(1, 2)
     colors = matplotlib.colormaps[SHADES](np.linspace(0.0, 0.9, len(curves)))
@@ -55,7 +55,7 @@ def decay(curves: Mapping[float, tuple[Array, Array]], medians: Array) -> Figure
 
 
 def loop_gains(found: Mapping[str, Array]) -> Figure:
-    """Local limits over the factor on a gain or a loop's gains, and the attitude loop's by itself."""
+    """Local limits over the factor on a gain or a loop's gains, and those of the attitude loop alone."""
     figure = DOCS.figure(32.0)
     panels = figure.subplots(1, 2, sharey=True)
     for panel, names in zip(panels, (tuple(theory.GAINS), ("attitude", "translation")), strict=True):
@@ -72,7 +72,7 @@ def loop_gains(found: Mapping[str, Array]) -> Figure:
 
 
 def margins(constant: Array, certain: Array, breaking: Array) -> Figure:
-    """Over the period: what delay is tolerated constantly, how much jitter certainly, how much not."""
+    """Over the period: the tolerated constant delay, the jitter certainly tolerated, and the jitter that is not."""
     figure = DOCS.figure(32.0)
     panel, periods = figure.add_subplot(), 1e3 * np.array(theory.MARGIN_PERIODS)
     panel.fill_between(periods, 1e3 * certain, 1e3 * breaking, color=GREY, alpha=0.15, linewidth=0.0)
@@ -85,7 +85,7 @@ def margins(constant: Array, certain: Array, breaking: Array) -> Figure:
 
 
 def wind(costs: Mapping[str, Array]) -> Figure:
-    """Over period and delay what a white force makes of position and torque, up to where neither has an end."""
+    """Rms of position and torque under a white force, over period and delay, up to where they are not finite."""
     figure = DOCS.figure(36.0)
     panels = figure.subplots(1, 2, sharey=True)
     periods, delays = 1e3 * np.array(theory.WIND_PERIODS), 1e3 * np.array(theory.WIND_DELAYS)

@@ -1,7 +1,7 @@
-"""Flies the comparisons of `findings.md` and keeps what their cells come to beside the page: `docs/data/NAME.json`.
+"""Runs the comparisons of `findings.md`, and stores the results of their cells beside the page: `docs/data/NAME.json`.
 
-`python -m docs.comparisons NAME …` flies what `quadcosim compare studies/comparisons/NAME.toml` does, in
-a store in `results/comparisons/NAME`, and goes on where it was stopped.
+`python -m docs.comparisons NAME …` runs the same flights as `quadcosim compare studies/comparisons/NAME.toml`, with the
+store in `results/comparisons/NAME`, and continues where it was stopped.
 """
 
 import json
@@ -46,12 +46,12 @@ NAMES = (
     "positions", "negative_thrust",
 )  # fmt: skip
 RATES = 20.0
-"""Periods of the outer loops by those of the inner ones, where these are fast"""
+"""Ratio of the periods of outer and inner loops, where the inner ones are fast"""
 WIDE = replace(DOCS, width=254.0)
-TOLD = ("settling_time", "residual", "position_rmse", "torque_max", "total_variation.torque")
+REPORTED = ("settling_time", "residual", "position_rmse", "torque_max", "total_variation.torque")
 WORKERS = 2
 HORIZONS = (20.0, 30.0, 40.0, 60.0)
-"""[s] by which runs are counted, to see whether the shares still move"""
+"""[s], times up to which runs are counted, to see whether the shares still change"""
 COLORS = {
     "unified": RED,
     "unified, no coupling": BLUE,
@@ -78,30 +78,30 @@ COLORS = {
     "cascade, one rate, tuned for 10 ms": "#b0b0b0",
     "cascade, one rate, tuned for its period": GREY,
 }
-"""Of controllers, the same in every figure"""
+"""Colours of controllers, the same in every figure"""
 
 
 @cache
-def loaded(name: str) -> Comparison:
+def load(name: str) -> Comparison:
     """The comparison of a file."""
     return load_comparison(FILES / f"{name}.toml")
 
 
-def kept(name: str) -> Any:
-    """What the page has of a comparison: its cells, limits and fronts."""
+def read_data(name: str) -> Any:
+    """The stored results of a comparison: its cells, limits and fronts."""
     return json.loads((DATA / f"{name}.json").read_text(encoding="utf-8"))
 
 
-def fly_all(name: str) -> Any:
-    """Fly what is missing of a comparison, and keep what comes of it."""
-    began, comparison, steady = time.perf_counter(), loaded(name), on_path(loaded(name))
-    flown = compare(comparison, folder=RESULTS / name, workers=WORKERS, engine="batch", figures=False)
+def run_missing(name: str) -> Any:
+    """Run the missing flights of a comparison, and store its results."""
+    began, comparison, steady = time.perf_counter(), load(name), on_path(load(name))
+    outcome = compare(comparison, folder=RESULTS / name, workers=WORKERS, engine="batch", figures=False)
     pushed = sweep(steady.study, folder=RESULTS / steady.name, workers=WORKERS, engine="batch").to_pandas()[RESIDUAL]
-    found, table = as_json(comparison, flown.outcome, flown.bandwidths), flown.table
+    found, table = as_json(comparison, outcome.outcome, outcome.bandwidths), outcome.table
     minutes = round((time.perf_counter() - began) / 60.0, 1)
     content = {
         "flights": len(table),
-        "minutes": minutes if flown.summary.flown else kept(name)["minutes"],
+        "minutes": minutes if outcome.summary.flown else read_data(name)["minutes"],
         "cells": [{**_short(cell, table[table["design_index"].isin(comparison.runs_of(comparison.cell(cell["cell"])))],
                             comparison), "on_path": _known(pushed[cell["cell"]])} for cell in found["cells"]],
         "limits": found["limits"],
@@ -109,17 +109,17 @@ def fly_all(name: str) -> Any:
     }  # fmt: skip
     DATA.mkdir(exist_ok=True)
     (DATA / f"{name}.json").write_text(_compact(content), encoding="utf-8")
-    return kept(name)
+    return read_data(name)
 
 
 def on_path(comparison: Comparison) -> Comparison:
-    """The same from the path itself, once: its residual is that of wind and path, without an initial error."""
+    """The same comparison from one start on the path: its residual is that of wind and path, without initial error."""
     once = Starts(count=1, position=0.0, velocity=0.0, angle=0.0, rate=0.0)
     return replace(comparison, name=f"{comparison.name}_on_path", starts=once)
 
 
 def by_horizon(rows: Any) -> dict[str, dict[str, int]]:
-    """How many of some runs have diverged, and how many settled, by each of `HORIZONS`."""
+    """The numbers of runs that have diverged, and that have settled, by each of `HORIZONS`."""
     alive, settling, end = survived(rows), rows[SETTLING].to_numpy(float), rows["divergence_time"].astype(float)
     return {
         "diverged_by": {f"{t:g}": int((~alive & (end <= t)).sum()) for t in HORIZONS},
@@ -128,12 +128,12 @@ def by_horizon(rows: Any) -> dict[str, dict[str, int]]:
 
 
 def _short(cell: dict[str, Any], rows: Any, comparison: Comparison) -> dict[str, Any]:
-    """A cell as it is kept: counts, medians with their intervals, and counts by the size of the initial error."""
+    """A cell as stored: counts, medians with their intervals, and counts by the size of the initial error."""
     bins = (sizes(comparison, rows) * BINS).astype(int).clip(upper=BINS - 1)
     counts = ("cell", "vehicle", "condition", "controller", "value", "count", "survives", "settles", "diverged")
     return {
         **{key: cell[key] for key in (*counts, "diverged_late")},
-        **{name: [cell[f"{name}{end}"] for end in ("", ".low", ".high")] for name in TOLD},
+        **{name: [cell[f"{name}{end}"] for end in ("", ".low", ".high")] for name in REPORTED},
         **by_horizon(rows),
         "by_size": {
             fate: [[int((has(rows) & (bins == i)).sum()), int((bins == i).sum())] for i in range(BINS)]
@@ -171,8 +171,10 @@ def _compact(content: dict[str, Any]) -> str:
 
 
 def from_the_path() -> str:
-    """In how many cells a residual is that of a flight from the path, and in how many that flight comes to rest."""
-    cells = [cell for name in NAMES if name != "losses" for cell in kept(name)["cells"]]  # one flight tells no chance
+    """In how many cells the residual is that of a flight from the path, and in how many that flight comes to rest."""
+    cells = [
+        cell for name in NAMES if name != "losses" for cell in read_data(name)["cells"]
+    ]  # one flight says nothing about random losses
     settled = [cell for cell in cells if cell["settles"] == cell["count"]]
     alike = [one for one in settled if math.isclose(one["residual"][0], one["on_path"] or 0.0, rel_tol=0.02)]
     restless = [cell for cell in cells if cell["settles"] == 0 and 2 * cell["survives"] > cell["count"]]
@@ -183,11 +185,11 @@ def from_the_path() -> str:
     )
 
 
-# -- what is printed and drawn ----------------------------------------------------------------------------
+# -- printed lines and figures ----------------------------------------------------------------------------
 
 
 def lines(name: str, content: Any) -> Iterator[str]:
-    """What the page tells of a comparison."""
+    """The results of a comparison as printed lines."""
     yield f"{name}: {content['flights']} flights in {content['minutes']} min"
     for one in content["limits"]:
         where = ", ".join(one[key] for key in ("vehicle", "condition", "controller"))
@@ -197,21 +199,21 @@ def lines(name: str, content: Any) -> Iterator[str]:
     for cell in content["cells"]:
         shares = (wilson(cell[key], cell["count"]) for key in ("survives", "settles"))
         (low, high), (least, most) = shares
-        told = ", ".join(f"{key} {_numbers(cell[key])}" for key in TOLD)
+        values = ", ".join(f"{key} {_numbers(cell[key])}" for key in REPORTED)
         where = ", ".join(cell[key] for key in ("vehicle", "condition", "controller"))
         by = "/".join(str(count) for count in cell["settled_by"].values())
         yield (f"  cell {cell['cell']}: {where}, {cell['value']:g}: of {cell['count']} {cell['survives']} survive "
                f"({low:.1%} to {high:.1%}, {cell['diverged_late']} lost late), {cell['settles']} settle "
-               f"({least:.1%} to {most:.1%}; by 20/30/40/60 s {by}); {told}; from the path {_number(cell['on_path'])}"
+               f"({least:.1%} to {most:.1%}; by 20/30/40/60 s {by}); {values}; from the path {_number(cell['on_path'])}"
                )  # fmt: skip
     for key, fate, by_size in _ends_by_size(name):
         yield f"  {', '.join(key)}: by size of the initial error half {fate} up to {', '.join(by_size)}"
 
 
 def _ends_by_size(name: str) -> Iterator[tuple[tuple[str, ...], str, list[str]]]:
-    """Of each controller on each vehicle under each condition, for each bin: up to which value half have a fate."""
+    """By controller, vehicle and condition, for each bin: the value up to which half of the runs have a fate."""
     where = ("vehicle", "condition", "controller")
-    for key, group in groupby(kept(name)["cells"], lambda cell: tuple(cell[one] for one in where)):
+    for key, group in groupby(read_data(name)["cells"], lambda cell: tuple(cell[one] for one in where)):
         cells = [*group]
         for fate in FATES:
             counts = np.array([cell["by_size"][fate] for cell in cells])
@@ -229,7 +231,7 @@ def _number(value: float | None) -> str:
 
 
 def figures() -> Iterator[tuple[str, Figure]]:
-    """All figures of the comparisons that were flown, by their names."""
+    """All figures of the comparisons, by name."""
     outer = Quantity(name="period", unit="ms", factor=1e3)  # of the outer loops
     by_size = dict([*_by_size("periods"), *_by_size("fast_inner", RATES)])
     tall = replace(DOCS, width=280.0, height=260.0)
@@ -254,7 +256,7 @@ def figures() -> Iterator[tuple[str, Figure]]:
 
 def _axis(name: str) -> Quantity:
     known = {"inertias": "inertia, times the one believed", "losses": "share of messages lost"}
-    return Quantity(name=known[name], unit="1") if name in known else quantity_of(loaded(name).axis, {})
+    return Quantity(name=known[name], unit="1") if name in known else quantity_of(load(name).axis, {})
 
 
 def _shares(found: Mapping[str, Sequence[CellSummary]], name: str) -> Figure:
@@ -262,13 +264,13 @@ def _shares(found: Mapping[str, Sequence[CellSummary]], name: str) -> Figure:
 
 
 def _fronts(name: str, values: Sequence[float]) -> Figure:
-    front, points = loaded(name).front, [*map(_read_point, kept(name)["fronts"])]
+    front, points = load(name).front, [*map(_read_point, read_data(name)["fronts"])]
     metrics = (labels.metric_with_unit(front.effort, "N.m"), labels.metric_with_unit(front.error, "m"))
     return plots.fronts_of(points, values, _axis(name), metrics, COLORS, "paper's body", WIDE)
 
 
 def _cells(name: str) -> list[CellSummary]:
-    """As they are kept, without medians."""
+    """The stored cells, without medians."""
     return [
         CellSummary(
             **{key: cell[key] for key in ("cell", "vehicle", "condition", "controller", "value", "count")},
@@ -277,23 +279,23 @@ def _cells(name: str) -> list[CellSummary]:
             settles=Share.of(cell["settles"], cell["count"]),
             medians={},
         )
-        for cell in kept(name)["cells"]
+        for cell in read_data(name)["cells"]
     ]
 
 
 def _by_size(name: str, factor: float = 1.0) -> Iterator[tuple[str, plots.BySize]]:
-    """Of each controller under each condition values of the axis, with a factor, and the shares that survive."""
-    several = len(loaded(name).conditions) > 1
-    for key, group in groupby(kept(name)["cells"], lambda cell: (cell["controller"], cell["condition"])):
+    """By controller and condition: values of the axis, times a factor, and the shares that survive."""
+    several = len(load(name).conditions) > 1
+    for key, group in groupby(read_data(name)["cells"], lambda cell: (cell["controller"], cell["condition"])):
         cells, controller = [*group], ", ".join(key[: 1 + several])
         share = np.array([[alive / count for alive, count in cell["by_size"]["survive"]] for cell in cells])
         yield controller, ([factor * cell["value"] for cell in cells], share.T)
 
 
 def _reaches(name: str, factor: float = 1.0) -> Iterator[Reach]:
-    """How far each controller goes, with a factor on the axis, which is none on the attitude loop's period."""
-    last = factor * float(loaded(name).values[-1])
-    for controller, group in groupby(kept(name)["limits"], lambda one: one["controller"]):
+    """The limits of each controller; `factor` scales the axis, but not the period of the attitude loop."""
+    last = factor * float(load(name).values[-1])
+    for controller, group in groupby(read_data(name)["limits"], lambda one: one["controller"]):
         limits = [Limit(**{**one, **{key: one[key] and factor * one[key] for key in ("value", "low", "high")},
                            "bandwidth": one["bandwidth"] if factor == 1.0 else None}) for one in group]  # fmt: skip
         yield Reach(name=controller, limits=limits, last=last)
@@ -305,5 +307,5 @@ def _read_point(point: dict[str, Any]) -> Point:
 
 
 if __name__ == "__main__":
-    for asked in sys.argv[1:]:
-        fly_all(asked)
+    for chosen in sys.argv[1:]:
+        run_missing(chosen)

@@ -1,6 +1,6 @@
-"""The series of fmu_kit/compiler/runtime/mathematics.h, put into it: python -m docs.make_coefficients.
+"""Writes the series into fmu_kit/compiler/runtime/mathematics.h: python -m docs.make_coefficients.
 
-Each is the polynomial through a function at Chebyshev points, in 40 digits, its coefficients rounded to doubles.
+Each is the polynomial through a function at Chebyshev points, with 40 digits, its coefficients rounded to doubles.
 """
 
 import re
@@ -30,7 +30,7 @@ SERIES: dict[str, tuple[str, str, Callable[[int], mpf], tuple[float, float], int
 
 
 def coefficients(taylor: Callable[[int], mpf], interval: tuple[float, float], count: int) -> list[float]:
-    """The polynomial's coefficients, that of the lowest power first."""
+    """The polynomial's coefficients, lowest power first."""
     terms = [taylor(k) for k in reversed(range(90))]
     return [float(c) for c in reversed(chebyfit(lambda z: mp.polyval(terms, z), interval, count))]
 
@@ -63,7 +63,7 @@ def wrapped(statement: str) -> str:
 
 
 def main() -> None:
-    """Put the series between the two marks of the header."""
+    """Write the series between the two marks of the header."""
     mp.dps = 40
     text = HEADER.read_text(encoding="ascii")
     series = "\n".join(function(name) for name in SERIES)

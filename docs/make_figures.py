@@ -1,4 +1,4 @@
-"""Draws the figures of README.md and of the pages beside this file: run as `make figures`."""
+"""Draws the figures of README.md and of the pages in this folder: run as `make figures`."""
 
 from pathlib import Path
 
@@ -23,7 +23,7 @@ MILLISECONDS = 1e-6
 
 
 def main() -> None:
-    """Fly what the figures show and write them, small enough for a repository; fill in what the page says of them."""
+    """Run the flights, write the figures, small enough for a repository, and fill in the statements of the page."""
     flight = run()
     slow = run(Scenario(timing=Timing(period=0.07)))
     limited = run(Scenario(stop_time=4.0).with_changes(parameters={"plant.torque_max": 20.0}))
@@ -46,7 +46,7 @@ def main() -> None:
 
 
 def timing_diagram() -> Figure:
-    """When each sample is taken and its command applied, as the timetable of a run says."""
+    """The times of samples and of their commands, from the timetable of a run."""
     cases = (
         ("Gauss-Seidel", Timing(period=0.01)),
         ("Jacobi", Timing(period=0.01, order="jacobi")),

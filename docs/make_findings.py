@@ -1,7 +1,7 @@
-"""Flies what is behind `docs/findings`, draws its figures and prints its numbers: run as `make findings`.
+"""Runs the flights of `docs/findings`, draws its figures and prints its numbers: run as `make findings`.
 
-`python -m docs.make_findings NAME …` does some sections only, by the names of their functions. It continues where it
-was if it is stopped: the stores of what it has flown are in `results/findings`.
+`python -m docs.make_findings NAME …` does only some sections, by the names of their functions. It continues where it
+was stopped: its stores are in `results/findings`.
 """
 
 import dataclasses
@@ -43,15 +43,15 @@ GAINS = {
     "gains_period_uncoupled": "κ = 0",
 }
 RANDOM = {"loss": 0.25, "jitter": 0.0095, "position_noise": 0.0017, "inertia_factor": 1.0}
-"""The axes of the Monte Carlo study, and the middle of each"""
+"""The axes of the Monte Carlo study, each with its middle"""
 CONTINUOUS = (0.00005, 0.0001)
-"""[s], periods that stand for continuous time, if both have the same outcomes"""
+"""[s], periods that approximate continuous time, if both have the same outcomes"""
 DESIGNS = 4
 """of Sobol indices"""
 
 
 def main() -> None:
-    """Everything, in the order of the page."""
+    """All sections, in the order of the page."""
     began = time.perf_counter()
     sections = (
         compared, pictures, period, limits, continuous, delay, bounds, certificates, wind, gains, bandwidth,
@@ -67,7 +67,7 @@ def main() -> None:
 
 
 def _processor_time() -> float:
-    """[s], of this process and of those that it has started and that have ended."""
+    """CPU time [s] of this process and of its ended child processes."""
     return sum(sum(resource.getrusage(who)[:2]) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
 
 
@@ -75,21 +75,21 @@ def _processor_time() -> float:
 
 
 def compared() -> list[str]:
-    """Controllers from the same starts: limits and cells of every comparison."""
-    found = {name: comparisons.fly_all(name) for name in comparisons.NAMES}
+    """Controllers from the same initial conditions: limits and cells of every comparison."""
+    found = {name: comparisons.run_missing(name) for name in comparisons.NAMES}
     return [line for name, content in found.items() for line in comparisons.lines(name, content)]
 
 
 def pictures() -> list[str]:
-    """Figures of the comparisons from what docs/data keeps of them, without a flight."""
+    """Figures of the comparisons from docs/data, without running flights."""
     with DOCS.applied():
-        made = dict(comparisons.figures())
-    return [*map(str, save(made, FIGURES, DOCS)), comparisons.from_the_path()]
+        drawn = dict(comparisons.figures())
+    return [*map(str, save(drawn, FIGURES, DOCS)), comparisons.from_the_path()]
 
 
 def period() -> list[str]:
-    """Tracking error at a few periods, and what does not settle."""
-    table = fly("period")
+    """Tracking error at a few periods, and the periods that do not settle."""
+    table = run_study_file("period")
     draw("period", "total_variation.torque")
     shown = table[table["period"].isin([0.001, 0.01, 0.02, 0.05, 0.07])]
     columns = ["period", "position_rmse", "settling_time", "ultimate_bound", "total_variation.torque"]
@@ -118,8 +118,8 @@ def limits() -> list[str]:
 
 
 def continuous() -> list[str]:
-    """What the same flights do near continuous time, and when those with much coupling settle."""
-    table = fly("continuous")
+    """The same flights near continuous time, and the settling of those with much coupling."""
+    table = run_study_file("continuous")
     lines = [
         f"kappa {flight.coupling:<4g} at {_ms(flight.period)}: {flight.outcome}, within 5 cm from "
         f"{flight.settling_time:.5g} s, residual {flight.ultimate_bound:.4g} m"
@@ -129,18 +129,18 @@ def continuous() -> list[str]:
 
 
 def delay() -> list[str]:
-    """How far the loop goes with a delay, and with another kappa."""
+    """Limits of the loop with a delay, and with another kappa."""
     lines = []
     for name, by, axis in (("period_delay", "period", "delay"), ("period_coupling", "coupling", "period")):
-        table = fly(name)
+        table = run_study_file(name)
         draw(name, "position_rmse")
         lines += [name, fates(table), *up_to(table, by, axis)]
     return lines
 
 
 def gains() -> list[str]:
-    """How far the period goes over the gain factor, kappa held in three ways."""
-    tables = {label: fly(name) for name, label in GAINS.items()}
+    """Limits of the period over the gain factor, for three ways of scaling kappa."""
+    tables = {label: run_study_file(name) for name, label in GAINS.items()}
     ends = {label: first_ends(table, "gain_factor", "period") for label, table in tables.items()}
     factors = np.array(sorted(set(next(iter(tables.values()))["gain_factor"])))
     local = np.array([about_hover(_uncoupled(factor), "period").limit for factor in factors])
@@ -152,8 +152,8 @@ def gains() -> list[str]:
 
 
 def finite_time() -> list[str]:
-    """How error and energy decay over the exponent, inside and outside of the boundary layer."""
-    table = flown(theory.decay_study())
+    """Decay of error and energy over the exponent, inside and outside of the boundary layer."""
+    table = run_study(theory.decay_study())
     lines, medians = [], []
     for (exponent, period), group in table.groupby(["exponent", "period"], sort=False):
         times = theory.since(group)
@@ -179,7 +179,7 @@ def finite_time() -> list[str]:
 
 
 def bandwidth() -> list[str]:
-    """Which gains set the local limit of the period: exponents, one gain and one loop at a time."""
+    """The gains that set the local limit of the period: exponents, one gain and one loop at a time."""
     lines = []
     for kappa in (0.0, 1.0):
         found = theory.limits_over_gains(kappa)
@@ -206,7 +206,7 @@ def bounds() -> list[str]:
 
 
 def certificates() -> list[str]:
-    """Late samples and late commands at once: what is proved, and what breaks hover."""
+    """Late samples and late commands together: certified values, and values that break hover."""
     slow = PAPER.with_changes(timing={"period": 0.04})
     found = quadcosim.margin_region(slow, "components.controller.sampling.jitter", "connections.command.delay_jitter")
     _save(lambda: found.figure(DOCS), "margin_region")
@@ -217,7 +217,7 @@ def certificates() -> list[str]:
 
 
 def wind() -> list[str]:
-    """What a white force costs about hover, exactly, over period and delay; and runs of some of it."""
+    """The exact costs of a white force about hover over period and delay, compared with runs."""
     costs = theory.costs_of_wind()
     _save(lambda: charts.wind(costs), "wind")
     finite = costs["radius"] < 1.0
@@ -225,18 +225,18 @@ def wind() -> list[str]:
     for name in theory.WIND_COSTS:
         values = costs[name][finite]
         lines.append(f"{name}: {values.min():.6g} to {values.max():.6g}")
-    for period, delay in theory.WIND_FLOWN:
-        for name, squares in theory.flown_in_wind(period, delay).items():
+    for period, delay in theory.WIND_RUNS:
+        for name, squares in theory.squares_in_wind(period, delay).items():
             exact = costs[name][theory.WIND_DELAYS.index(delay), theory.WIND_PERIODS.index(period)]
             found, width = np.sqrt(squares.mean()), 2.13 * squares.std(ddof=1) / np.sqrt(len(squares))
-            flown = f"{len(squares)} runs {found:.4g} +- {width / (2.0 * found):.2g}"
-            lines.append(f"{_ms(period)}, {_ms(delay)}: {name} {exact:.6g}; {flown}")
+            simulated = f"{len(squares)} runs {found:.4g} +- {width / (2.0 * found):.2g}"
+            lines.append(f"{_ms(period)}, {_ms(delay)}: {name} {exact:.6g}; {simulated}")
     return lines
 
 
 def monte_carlo() -> list[str]:
-    """How many survive, and stay within 5 cm, and rank correlations of how well the survivors fly with each axis."""
-    table = fly("monte_carlo")
+    """How many survive and stay within 5 cm, and rank correlations of the survivors' errors with each axis."""
+    table = run_study_file("monte_carlo")
     draw("monte_carlo", "ultimate_bound")
     lines, alive, kinds = [fates(table)], survived(table), {"survive": survived, "stay within 5 cm": figures.flew}
     groups = {"all": table}
@@ -256,13 +256,13 @@ def monte_carlo() -> list[str]:
 
 
 def sensitivity() -> list[str]:
-    """Sobol indices of several designs: of what survives, of what settles, and of what settles soon."""
+    """Sobol indices of several designs: of surviving, of settling, and of settling soon."""
     study = load_study(ROOT / "studies" / "sensitivity.toml")
-    asked: Mapping[str, Callable[[Any], Any]] = {**FATES, "settle by 6.7 s": lambda table: table[SETTLING] <= 6.7}
-    tables = {seed: flown(_design(study, seed)) for seed in range(DESIGNS)}
+    questions: Mapping[str, Callable[[Any], Any]] = {**FATES, "settle by 6.7 s": lambda table: table[SETTLING] <= 6.7}
+    tables = {seed: run_study(_design(study, seed)) for seed in range(DESIGNS)}
     draw("sensitivity", "good")
     lines = [fates(pd.concat(tables.values()))]
-    for name, has in asked.items():
+    for name, has in questions.items():
         designs = [drawing.indices_of(_design(study, seed), has(table).to_numpy(float), "outcome")
                    for seed, table in tables.items()]  # fmt: skip
         lines.append(f"{name}: shares {[round(float(has(table).mean()), 3) for table in tables.values()]}")
@@ -277,7 +277,7 @@ def sensitivity() -> list[str]:
 
 
 def agreement() -> list[str]:
-    """How flights in lanes compare with the same flights by FMUs, store by store."""
+    """The agreement of flights in SIMD lanes with the same flights by FMUs, store by store."""
     lines = []
     for path in sorted(RESULTS.glob("*/study.sqlite")):
         with open_for_reading(path) as opened:
@@ -285,37 +285,37 @@ def agreement() -> list[str]:
     return lines
 
 
-# -- flying and drawing -----------------------------------------------------------------------------------
+# -- running and drawing ----------------------------------------------------------------------------------
 
 
 def processor() -> list[str]:
-    """What each design takes of a processor beside what it is good for."""
+    """The processor share of each design, compared with its performance."""
     _save(processors.figure, "processor")
     return processors.equal_share()
 
 
 def stalls() -> list[str]:
-    """How long the law may be kept from the processor."""
+    """For how long the law may be blocked from the processor."""
     found = processors.stalls()
     _save(lambda: processors.errors(found), "stalls")
-    return processors.told(found)
+    return processors.stall_table(found)
 
 
-def fly(name: str) -> pd.DataFrame:
-    """The table of a study file, flown as far as it is missing."""
-    return flown(load_study(ROOT / "studies" / f"{name}.toml"))
+def run_study_file(name: str) -> pd.DataFrame:
+    """The table of a study file, after running the missing flights."""
+    return run_study(load_study(ROOT / "studies" / f"{name}.toml"))
 
 
-def flown(study: Study) -> pd.DataFrame:
-    """The table of a study, flown in lanes as far as it is missing."""
+def run_study(study: Study) -> pd.DataFrame:
+    """The table of a study, after running the missing flights in lanes."""
     return sweep(study, folder=RESULTS / study.name, workers=comparisons.WORKERS, engine="batch").to_pandas()
 
 
 def draw(name: str, metric: str) -> None:
-    """The figure of a study that its command draws, into the docs; of two axes, the map."""
+    """Write the figure of a study, as its command draws it, into the docs; for two axes, the map."""
     study = load_study(ROOT / "studies" / f"{name}.toml")
-    made, _ = drawing.study_figures(study, store_path(name, RESULTS / name), metric, DOCS)
-    save({f"study_{name}": [*made.values()][-1]}, FIGURES, DOCS)
+    drawn, _ = drawing.study_figures(study, store_path(name, RESULTS / name), metric, DOCS)
+    save({f"study_{name}": [*drawn.values()][-1]}, FIGURES, DOCS)
 
 
 def _save(make: Callable[[], Any], name: str) -> None:
@@ -331,11 +331,11 @@ def _uncoupled(factor: float) -> Any:
     return theory.scaled(theory.ATTITUDE, factor, PAPER.with_changes(parameters={"controller.coupling": 0.0}))
 
 
-# -- words ------------------------------------------------------------------------------------------------
+# -- texts ------------------------------------------------------------------------------------------------
 
 
 def fates(table: pd.DataFrame) -> str:
-    """How many survive and settle, and by when: whether another horizon would say something else."""
+    """How many survive and settle, and by when: whether another horizon would change the result."""
     by = {name: "/".join(map(str, counts.values())) for name, counts in comparisons.by_horizon(table).items()}
     alive = survived(table)
     return (
@@ -345,15 +345,15 @@ def fates(table: pd.DataFrame) -> str:
 
 
 def up_to(table: pd.DataFrame, by: str, axis: str) -> list[str]:
-    """For each value of one axis, up to which value of the other flights survive, and settle, and what does beyond."""
+    """For each value of one axis: the value of the other up to which flights survive and settle, and those beyond."""
     ends, lines = first_ends(table, by, axis), []
     for i, (value, group) in enumerate(table.sort_values(axis).groupby(by, sort=True)):
-        told = []
+        texts = []
         for fate, has in FATES.items():
             end = ends[fate][i]
             again = group[has(group) & ~(group[axis] <= end)][axis]
-            told.append(f"{fate} up to {end:g}, again at {_listed(again)}")
-        lines.append(f"{by} {value:g}: {'; '.join(told)}")
+            texts.append(f"{fate} up to {end:g}, again at {_listed(again)}")
+        lines.append(f"{by} {value:g}: {'; '.join(texts)}")
     return lines
 
 
@@ -366,7 +366,7 @@ def first_ends(table: pd.DataFrame, by: str, axis: str) -> dict[str, Any]:
 
 
 def _halving(table: pd.DataFrame, by: str) -> str:
-    """Which outcomes change where the period that stands for continuous time is halved."""
+    """The outcomes that change when the period that approximates continuous time is halved."""
     fine, coarse = (table[table["period"] == period].set_index(by) for period in CONTINUOUS)
     changed = [f"{value:g}" for value in fine.index if fine["outcome"][value] != coarse["outcome"][value]]
     settled = fine.index[FATES["settle"](fine)]
@@ -374,13 +374,13 @@ def _halving(table: pd.DataFrame, by: str) -> str:
 
 
 def _share(has: pd.Series) -> str:
-    """How many of some runs have a fate, as a share with its Wilson interval."""
+    """The number of runs that have a fate, and the share with its Wilson interval."""
     low, high = wilson(int(has.sum()), len(has))
     return f"{int(has.sum())} of {len(has)}, {has.mean():.0%} [{low:.0%}, {high:.0%}]"
 
 
 def _rank_correlation(x: pd.Series, y: pd.Series) -> str:
-    """Spearman's, with its 95 % interval by the bootstrap."""
+    """Spearman's rank correlation, with its 95 % interval by the bootstrap."""
     from scipy.stats import bootstrap, spearmanr
 
     def of(x: Any, y: Any) -> float:

@@ -1,4 +1,4 @@
-"""Draws the icons that the FMUs carry as model.png, beside their slaves: run as `make figures`."""
+"""Draws the icons of the FMUs, model.png, beside their slaves: run as `make figures`."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ PALE, DARK = "#f3f7fa", "#33414d"
 
 
 def main() -> None:
-    """Draw each."""
+    """Draw all icons."""
     for place, draw in (
         ("controller_fmu/sliding_mode/UnifiedController", controller),
         ("controller_fmu/geometric/GeometricController", geometric),
@@ -38,7 +38,7 @@ def main() -> None:
 
 
 def controller(axes: Axes) -> None:
-    """A signal, and what a controller with a clock makes of it: samples, held."""
+    """A signal, and its held samples, as of a sampled controller."""
     _tile(axes, BLUE)
     t = np.linspace(-0.74, 0.74, 200)
     samples = np.linspace(-0.74, 0.74, 6)
@@ -53,7 +53,7 @@ def controller(axes: Axes) -> None:
 
 
 def geometric(axes: Axes) -> None:
-    """The axes of the body, and the great circle by which they are to be turned to others."""
+    """The axes of the body, and the great circle to the desired axes."""
     _tile(axes, BLUE)
     angles = np.linspace(0.0, 2.0 * np.pi, 100)
     axes.plot(0.66 * np.cos(angles), 0.66 * np.sin(angles), color="white", linewidth=1.0, alpha=0.6)
@@ -67,7 +67,7 @@ def geometric(axes: Axes) -> None:
 
 
 def cascade(axes: Axes) -> None:
-    """Loops one above the other, each sampled oftener than the one above it."""
+    """Loops one above the other, each sampled more often than the one above it."""
     _tile(axes, BLUE)
     t = np.linspace(-0.74, 0.74, 200)
     for height, count in ((0.5, 3), (0.0, 6), (-0.5, 14)):
@@ -92,7 +92,7 @@ def plant(axes: Axes) -> None:
 
 
 def _tile(axes: Axes, colour: str) -> None:
-    """The ground that the icon stands on, of its own colour so that it shows on light and dark."""
+    """The background of the icon, in its own colour so that it is visible on light and dark."""
     tile = (-0.76, -0.76), 1.52, 1.52
     axes.add_patch(FancyBboxPatch(*tile, boxstyle="round,pad=0.2", facecolor=colour, edgecolor=BLUE, linewidth=1.2))
 

@@ -1,6 +1,6 @@
 """Fills `docs/interop.md` and `docs/validation.md`, and draws the agreement chart: run as `make interop`.
 
-Flies the paper's flight in other people's masters, and damages FMUs in every way that the tests know. Some minutes on
+Runs the paper's flight in third-party masters, and damages FMUs in all ways that the tests know. Takes some minutes on
 two cores.
 """
 
@@ -22,20 +22,20 @@ from tests.fmus.verdicts import Verdict, as_markdown
 
 DOCS = Path(__file__).parent
 INTERVALS = ("0.01", "0.001")
-"""Communication steps, as the page names them [s]."""
+"""Communication steps [s], as named in the page"""
 
 
 def main() -> None:
-    """Both pages."""
+    """Fill both pages."""
     interop()
     validation()
 
 
 def interop() -> None:
-    """Fly, put the tables into the page, draw the chart of the first."""
+    """Run the flights, write the tables into the page, and draw the chart of the first."""
     tables = {}
     for interval in INTERVALS:
-        print(f"flying with a step of {interval} s", file=sys.stderr)
+        print(f"running with a step of {interval} s", file=sys.stderr)
         found = agreements(
             Scenario(timing=Timing(plant_interval=float(interval))), chosen(None, ("controller", "plant"))
         )
@@ -48,7 +48,7 @@ def interop() -> None:
 
 
 def validation() -> None:
-    """The rules in their own words, and who finds which damage."""
+    """Write the rules, and the damage that each tool finds."""
     print(f"damaging FMUs in {len(mutants.MUTANTS)} ways", file=sys.stderr)
     found = mutants.tables()
     fill(
@@ -64,7 +64,7 @@ def validation() -> None:
 
 def _count(version: int, table: list[Verdict]) -> str:
     quadcosim, fmpy, fmutool = (
-        sum(map(bool, said)) for said in zip(*((v.quadcosim, v.fmpy, v.fmutool) for v in table))
+        sum(map(bool, found)) for found in zip(*((v.quadcosim, v.fmpy, v.fmutool) for v in table))
     )
     return (
         f"Of {len(table)} damaged FMUs of FMI {version}.0 quadcosim finds {quadcosim}, fmpy {fmpy}, fmutool {fmutool}."

@@ -1,4 +1,4 @@
-"""Makes what a release consists of, in dist/: run as `make release`.
+"""Makes the files of a release in dist/: run as `make release`.
 
 The wheel and the sources; the FMUs without Python inside, for every system that zig compiles for, an archive for each
 version of FMI; the two FMUs of the paper's flight with their wiring as an SSP; and the SHA-256 of each. The same commit
@@ -22,7 +22,7 @@ SUMS = "SHA256SUMS"
 
 
 def main(folder: Path) -> None:
-    """Fill `folder`, which must hold nothing yet."""
+    """Fill `folder`, which must be empty."""
     if folder.exists() and any(folder.iterdir()):
         raise SystemExit(f"{folder}: expected an empty folder, since all that is in it is released")
     os.environ["SOURCE_DATE_EPOCH"] = time = time_of_commit()
@@ -35,7 +35,7 @@ def main(folder: Path) -> None:
         fmus = {version: Path(temporary) / f"fmi{version}" for version in (2, 3)}
         for version, built in fmus.items():
             quadcosim("build", "--native", "--target", "all", "--fmi", str(version), "--out", str(built))
-            together(built, folder / f"{name}-fmi{version}.zip")
+            write_fmu_archive(built, folder / f"{name}-fmi{version}.zip")
         plant, controller = (str(fmus[2] / f"{model}.fmu") for model in ("QuadrotorPlant", "UnifiedController"))
         ssp = folder / f"{name}.ssp"
         quadcosim("ssp", "--plant", plant, "--controller", controller, "--out", str(ssp))
@@ -44,12 +44,12 @@ def main(folder: Path) -> None:
 
 
 def time_of_commit() -> str:
-    """When the commit that is checked out was made [s since 1970], unless SOURCE_DATE_EPOCH says another time."""
+    """The time of the checked-out commit [s since 1970], or SOURCE_DATE_EPOCH if set."""
     return os.environ.get("SOURCE_DATE_EPOCH") or run("git", "log", "-1", "--format=%ct").strip()
 
 
 def normalise(archive: Path, time: int) -> None:
-    """Give every file of a .tar.gz one time and owner, in the order of their names."""
+    """Give every file of a .tar.gz the same time and owner, in the order of their names."""
     with tarfile.open(archive) as tar:
         files = [(entry, tar.extractfile(entry)) for entry in sorted(tar.getmembers(), key=lambda entry: entry.name)]
         contents = [(entry, None if file is None else file.read()) for entry, file in files]
@@ -70,14 +70,14 @@ def normalise(archive: Path, time: int) -> None:
     partial.replace(archive)
 
 
-def together(folder: Path, archive: Path) -> None:
-    """The FMUs of a folder in one archive, the same bytes for the same FMUs."""
+def write_fmu_archive(folder: Path, archive: Path) -> None:
+    """Write the FMUs of a folder into one archive; the same FMUs give the same bytes."""
     files = {path.name: path.read_bytes() for path in folder.glob("*.fmu")}
     write_archive(archive, files, first=min(files))
 
 
 def sums(folder: Path) -> str:
-    """The SHA-256 of every file of a folder, as `sha256sum --check` reads them."""
+    """The SHA-256 of every file of a folder, in the format of `sha256sum --check`."""
     paths = sorted(path for path in folder.iterdir() if path.name != SUMS)
     return "".join(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in paths)
 
@@ -88,7 +88,7 @@ def quadcosim(*arguments: str) -> None:
 
 
 def run(*command: str) -> str:
-    """Run a command in the project's folder; ends the program with its exit code where it fails."""
+    """Run a command in the project's folder; ends the program with its exit code if it fails."""
     print("+", *command, file=sys.stderr)
     done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False)
     if done.returncode != 0:

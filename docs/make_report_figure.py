@@ -1,4 +1,4 @@
-"""Takes the picture of a report that its page shows: docs/figures/report.png. It wants Chromium."""
+"""Takes the screenshot of a report for its page, docs/figures/report.png. Needs Chromium."""
 
 import io
 import shutil
@@ -12,8 +12,8 @@ FIGURE = Path(__file__).parent / "figures" / "report.png"
 COLORS = 128
 
 
-def taken(report: Path) -> bytes:
-    """The first screen of a report, the run of the largest delay at 50 ms open and on its way, as PNG."""
+def screenshot(report: Path) -> bytes:
+    """The first screen of a report, with the run of the largest delay at 50 ms open at 7 s, as PNG."""
     browser = shutil.which("chromium") or "chromium"
     with sync_playwright() as started:
         window = started.chromium.launch(executable_path=browser, args=["--no-sandbox"])
@@ -32,8 +32,8 @@ def taken(report: Path) -> bytes:
 
 
 def main() -> None:
-    """Write the picture of the report at the path that is given."""
-    image = Image.open(io.BytesIO(taken(Path(sys.argv[1]))))
+    """Write the screenshot of the report at the given path."""
+    image = Image.open(io.BytesIO(screenshot(Path(sys.argv[1]))))
     image.convert("P", palette=Image.Palette.ADAPTIVE, colors=COLORS).save(FIGURE, optimize=True)
     print(FIGURE)
 

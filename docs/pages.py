@@ -1,11 +1,11 @@
-"""What the scripts beside this file share: text that is computed, put into a page."""
+"""Writing computed text into pages, for the scripts in this folder."""
 
 import re
 from pathlib import Path
 
 
 def fill(page: Path, blocks: dict[str, str]) -> None:
-    """Put each text between `<!-- NAME -->` and `<!-- end -->` of `page`; raises `ValueError` where they are not."""
+    """Write each text between `<!-- NAME -->` and `<!-- end -->` of `page`; raises `ValueError` if they are missing."""
     content = page.read_text(encoding="utf-8")
     for name, text in blocks.items():
         start = f"<!-- {name} -->"

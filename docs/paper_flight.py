@@ -1,4 +1,4 @@
-"""The paper's flight beside what the paper says of it: its Fig. 3 drawn anew, and a table of statements."""
+"""The paper's flight compared with the paper: its Fig. 3 redrawn, and a table of statements."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -21,7 +21,7 @@ BELOW = (0.05, 0.01)
 
 
 def figure_3(result: Result, style: Style) -> Figure:
-    """Arranged as the caption of Fig. 3 says: the path at the left, the four errors at the right."""
+    """The figure arranged as in the caption of Fig. 3: the path at the left, the four errors at the right."""
     (run,) = runs_of([result], [""], None, None)
     figure = style.figure(44.0)
     halves: Any = figure.subfigures(1, 2, width_ratios=(1.2, 1.0))
@@ -40,7 +40,7 @@ def figure_3(result: Result, style: Style) -> Figure:
 
 
 def statements(result: Result) -> str:
-    """What the paper says, word for word, and what is flown here, as a table."""
+    """A table of statements of the paper, word for word, and of the results here."""
     (run,) = runs_of([result], [""], None, None)
     e, t = position_error(result.signals), result.signals["time"]
     position, velocity, attitude, turning = (_values(run, error.name) for error in ERRORS)
@@ -69,11 +69,13 @@ def statements(result: Result) -> str:
             f"{bound:.1f} s with β_t = {exponent:g}; the time until the surface is reached comes on top",
         ),
     )  # fmt: skip
-    return "\n".join(["| the paper | flown here |", "|---|---|", *(f"| {said} | {flown} |" for said, flown in rows)])
+    return "\n".join(
+        ["| the paper | flown here |", "|---|---|", *(f"| {statement} | {here} |" for statement, here in rows)]
+    )
 
 
 def _as_printed() -> Sequence[Error]:
-    """In the order of the text: attitude, angular velocity, position, velocity."""
+    """The errors in the order of the text: attitude, angular velocity, position, velocity."""
     position, velocity, attitude, turning = ERRORS
     return attitude, turning, position, velocity
 

@@ -1,4 +1,4 @@
-"""What a law takes of a processor, and what it is good for: the flights of the comparisons beside counted costs."""
+"""The processor time of the laws compared with their performance in the flights of the comparisons."""
 
 import csv
 import json
@@ -23,31 +23,31 @@ NINE_IN_TEN = 0.9
 
 
 def steps_of(trace: str) -> list[float]:
-    """How long each step of a law takes [s]."""
+    """The execution time of each step of a law [s]."""
     with (AUTOPILOT / "execution" / f"{PROCESSOR}.csv").open(encoding="utf-8") as file:
         return [float(row[trace]) for row in csv.DictReader(file)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Design:
-    """A controller of a comparison, and what a sample of it takes."""
+    """A controller of a comparison, and the processor time of a sample."""
 
     comparison: str
     controller: str
     trace: str
     cost_of: Callable[[Sequence[float]], float]
-    """of the traces' steps [s]: of a cascade at one rate every step is one with all loops"""
+    """the cost of a sample from the steps of the trace [s]: for a cascade at one rate, every step runs all loops"""
     color: str
 
     @property
     def cost(self) -> float:
-        """A sample of it [s]."""
+        """The processor time of a sample [s]."""
         return self.cost_of(steps_of(self.trace))
 
     def cells(self) -> list[dict[str, Any]]:
-        """Those of the comparison, by period."""
-        kept = json.loads((ROOT / "docs" / "data" / f"{self.comparison}.json").read_text("utf-8"))["cells"]
-        return [cell for cell in kept if cell["controller"] == self.controller]
+        """The cells of the comparison, by period."""
+        cells = json.loads((ROOT / "docs" / "data" / f"{self.comparison}.json").read_text("utf-8"))["cells"]
+        return [cell for cell in cells if cell["controller"] == self.controller]
 
 
 DESIGNS = {
@@ -84,7 +84,7 @@ DESIGNS = {
 
 
 def equal_share() -> list[str]:
-    """The least share of the processor at which nine in ten settle, and survive, design by design."""
+    """The least share of the processor at which nine in ten flights settle and survive, by design."""
     lines = [
         "| design | a sample [µs] | settle: period | share | survive: period | share |",
         "|---|---|---|---|---|---|",
@@ -101,7 +101,7 @@ def equal_share() -> list[str]:
 
 
 def _longest(design: Design, fate: str) -> float | None:
-    """The longest period up to which nine in ten do so at each period of the grid."""
+    """The longest period up to which nine in ten flights have a fate at each period of the grid."""
     found = None
     for cell in design.cells():
         if cell[fate] < NINE_IN_TEN * cell["count"]:
@@ -141,21 +141,28 @@ LAWS: dict[str, tuple[str, dict[str, Any], str]] = {
     "geometric": ("GeometricController", {}, "geometric"),
     "cascade, all loops at one rate": ("CascadedController", {"velocity_ratio": 1, "attitude_ratio": 1}, "cascaded"),
 }
-"""What flies the example of an autopilot: its FMU, its parameters, and its execution times"""
+"""Laws for the example of an autopilot: FMU, parameters, and trace of execution times"""
 
 
 def stalls() -> dict[str, quadcosim.Limit]:
-    """For how long the memory card may hold the processor, once a second, in the example of an autopilot: by law."""
+    """By law: for how long the memory card may occupy the processor, once a second, in the example of an autopilot."""
     return {
         name: quadcosim.limit(
-            certain(*flown), STALLED, first=0.01, last=0.6, scan=0.02, tolerance=0.001, progress=None, announce=None
+            without_chance(*law),
+            STALLED,
+            first=0.01,
+            last=0.6,
+            scan=0.02,
+            tolerance=0.001,
+            progress=None,
+            announce=None,
         )
-        for name, flown in LAWS.items()
+        for name, law in LAWS.items()
     }
 
 
-def told(found: Mapping[str, quadcosim.Limit]) -> list[str]:
-    """A row of a table for each law."""
+def stall_table(found: Mapping[str, quadcosim.Limit]) -> list[str]:
+    """A table with a row for each law."""
     rows = [
         f"| {name} | {1e3 * (one.large_signal_limit or 0.0):.0f} ms | {one.note.partition(';')[0]} |"
         for name, one in found.items()
@@ -164,7 +171,7 @@ def told(found: Mapping[str, quadcosim.Limit]) -> list[str]:
 
 
 def errors(found: Mapping[str, quadcosim.Limit]) -> Figure:
-    """How far off the flight ends over the stall; what diverges has no point."""
+    """The error at the end of the flight over the stall; diverged flights have no point."""
     made = DOCS.figure(32.0)
     panel = made.add_subplot()
     for (name, one), marker in zip(found.items(), "os^vx", strict=True):
@@ -176,12 +183,12 @@ def errors(found: Mapping[str, quadcosim.Limit]) -> Figure:
     return made
 
 
-def certain(fmu: str, parameters: dict[str, Any], trace: str) -> dict[str, Any]:
-    """The example with a law, and nothing left to chance: the mean in place of what is drawn."""
-    told = tables_in((AUTOPILOT / "flight.toml").read_text("utf-8"))
-    told["components"]["controller"] |= {"fmu": f"native/{fmu}", "parameters": parameters}
-    tasks, network = told["computers"]["autopilot"]["tasks"], told["networks"]["bus"]
+def without_chance(fmu: str, parameters: dict[str, Any], trace: str) -> dict[str, Any]:
+    """The example with a law, and with means in place of all random values."""
+    tables = tables_in((AUTOPILOT / "flight.toml").read_text("utf-8"))
+    tables["components"]["controller"] |= {"fmu": f"native/{fmu}", "parameters": parameters}
+    tasks, network = tables["computers"]["autopilot"]["tasks"], tables["networks"]["bus"]
     tasks["radio"] |= {"jitter": 0.0, "execution": 0.001}
     tasks["control"]["execution"] = round(statistics.mean(steps_of(trace)), 9)
     network["error"], network["messages"]["airspeed"]["jitter"] = 0.0, 0.0
-    return told
+    return tables

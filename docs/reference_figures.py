@@ -1,4 +1,4 @@
-"""Figures of `references.md`: motions and way-points, gusts and their spectra, a payload let go."""
+"""Figures of `references.md`: motions and way-points, gusts and their spectra, a dropped payload."""
 
 import math
 from pathlib import Path
@@ -18,12 +18,12 @@ from quadcosim import load_scenario, run
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "references"
 SPEED, ACCELERATION = 2.0, 1.5
-"""Limits of the way-points there"""
+"""Limits of the way-points of the example"""
 AXES = (("north", BLUE), ("east", ORANGE), ("down", GREEN))
 
 
 def references(style: Style) -> Figure:
-    """Motions by name from above, the way-points of the example in space and time."""
+    """Named motions from above, and the way-points of the example in space and time."""
     figure = style.figure(30.0)
     halves: Any = figure.subfigures(1, 2, width_ratios=(1.0, 1.15))
     left, right = halves
@@ -59,7 +59,7 @@ def references(style: Style) -> Figure:
 
 
 def wind(style: Style) -> Figure:
-    """Gusts over time, and the mean of the spectra of many stretches of them on those of the formulas."""
+    """Gusts over time, and the mean of their spectra over many intervals, compared with the formulas."""
     air, figure = Dryden(wind_speed=8.0, airspeed=8.0), style.figure(40.0)
     above, below = figure.subplots(2, 1)
     table = gusts(air, 20.0, np.random.default_rng(7))
@@ -83,7 +83,7 @@ def wind(style: Style) -> Figure:
 
 
 def spectrum(air: Dryden, axis: int, omega: Floats) -> Floats:
-    """One-sided, over the angular frequency: Φ(ω/V)/V of the component along, across or down."""
+    """The one-sided spectrum over the angular frequency: Φ(ω/V)/V of the component along, across or down."""
     sigma, length = air.intensities()[axis], air.lengths()[axis]
     x2 = (length * omega / air.airspeed) ** 2
     shape: Floats = 2.0 / (1.0 + x2) if axis == 0 else (1.0 + 3.0 * x2) / (1.0 + x2) ** 2
@@ -91,7 +91,7 @@ def spectrum(air: Dryden, axis: int, omega: Floats) -> Floats:
 
 
 def payload(style: Style) -> Figure:
-    """The flight of the example: what jumps and what goes on, and what the controller makes of it."""
+    """The flight of the example with a dropped payload: continuous and discontinuous signals, and the command."""
     flight = run(load_scenario(EXAMPLES / "payload.toml"))
     t, figure = flight.signals["time"], style.figure(27.0)
     halves: Any = figure.subfigures(1, 2)

@@ -1,4 +1,4 @@
-"""What the findings set beside theory: how an error decays, what sets the limit of the period, which delays."""
+"""Theory for the findings: the decay of errors, the limit of the period, tolerated delays, the cost of wind."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -34,7 +34,7 @@ PAPER = Scenario(
 CALM: Mapping[str, Parameter] = {f"plant.wind.amplitude.{axis}": 0.0 for axis in "xyz"}
 """No wind"""
 
-# -- how an error decays ---------------------------------------------------------------------------------------------
+# -- decay of errors -------------------------------------------------------------------------------------------------
 
 LAYER = 1e-3
 """ε [m]"""
@@ -43,16 +43,16 @@ EXPONENTS = (1.0, 0.99, 0.95, 0.9, 0.85, 0.8, 0.7, 0.5)
 DECAY_PERIODS = (0.001, 0.01, 0.05)
 """[s]"""
 BOUNDS = (0.1, 0.01, LAYER, 1e-4, 1e-5)
-"""[m], of the largest position error of the three axes; the first two decades lie outside of the boundary layer"""
+"""[m], bounds of the largest position error of the axes; the first two decades are outside of the boundary layer"""
 STAYS = 2.0
-"""[s], for how long an error has to be below a bound, lest a swing through zero at the end counts"""
+"""[s], for which an error must stay below a bound, so that a zero crossing at the end does not count"""
 DECAY_STARTS = 20
-"""1 m from the path in random directions, beside the paper's initial condition"""
+"""initial conditions 1 m from the path in random directions, beside the paper's"""
 _ERROR = "max({})".format(", ".join(f"abs(plant.position.{axis} - reference.position.{axis})" for axis in "xyz"))
 
 
 def decaying(exponent: float = 0.99) -> Scenario:
-    """The flight of which the decay is measured."""
+    """The flight whose decay is measured."""
     own: dict[str, Parameter] = {"controller.surface_exponent": exponent, "controller.boundary_layer": LAYER}
     return PAPER.with_changes(parameters={**CALM, **own})
 
@@ -74,18 +74,20 @@ def decay_study() -> Study:
             Axis(name="period", targets=("components.controller.sampling.period",), values=DECAY_PERIODS),
             Axis(name="start", targets=(), values=tuple(range(len(places)))),
         ),
-        together=(LinkedSettings(axes=("start",), sets={(i,): _begins_at(place) for i, place in enumerate(places)}),),
+        together=(
+            LinkedSettings(axes=("start",), sets={(i,): _initial_position(place) for i, place in enumerate(places)}),
+        ),
     )
 
 
 def since(table: Any) -> Array:
-    """From when on each flight's error stays below each of `BOUNDS` [s], shape (flights, bounds); nan: it does not."""
+    """The time from which each flight's error stays below each of `BOUNDS` [s], shape (flights, bounds); nan: never."""
     found = table[[_within(bound) for bound in BOUNDS]].to_numpy(float)
     return np.where(found <= PAPER.stop_time - STAYS, found, np.nan)
 
 
 def rates_of(times: Array) -> Array:
-    """At what rate the error falls from each bound to the next [1/s], of what `since` gives."""
+    """The rates at which the error falls from each bound to the next [1/s], from the result of `since`."""
     spans = np.diff(times, axis=1)
     return np.log(np.divide(BOUNDS[:-1], BOUNDS[1:])) / np.where(spans > 0.0, spans, np.nan)
 
@@ -98,17 +100,17 @@ def error_over_time(exponent: float) -> tuple[Array, Array, Array]:
 
 
 def energy_rates() -> list[float]:
-    """At what rate L_κ falls while the error falls from each bound to the next, β_t = 1 [1/s]."""
+    """The rates at which L_κ falls while the error falls from each bound to the next, β_t = 1 [1/s]."""
     time, error, energy = error_over_time(1.0)
     ends = [int(np.flatnonzero(error > bound)[-1]) for bound in BOUNDS]
     return [-float(np.polyfit(time[a:b], np.log(energy[a:b]), 1)[0]) for a, b in pairwise(ends)]
 
 
 def expected_rate(exponent: float, gain: float = 2.99) -> float:
-    """Of the error [1/s] under an attitude that follows at once: 2k/(3 + β_t), inside or outside of any layer.
+    """The decay rate of the error [1/s] with an ideal attitude loop: 2k/(3 + β_t), inside and outside of any layer.
 
     Near the surface ds = γ' ev - k s leaves ë + k ė + k k_s |e|^β_t sgn e = 0: a spring of power β_t under linear
-    damping. Over a swing ⟨ė²⟩ = 2 (1 + β_t)/(3 + β_t) of the energy, which goes as |e|^(1 + β_t) and falls by k ⟨ė²⟩.
+    damping. Over a period ⟨ė²⟩ = 2 (1 + β_t)/(3 + β_t) of the energy, which goes as |e|^(1 + β_t) and falls by k ⟨ė²⟩.
     """
     return 2.0 * gain / (3.0 + exponent)
 
@@ -117,11 +119,11 @@ def _within(bound: float) -> str:
     return f"within_{round(bound * 1e6)}_um"
 
 
-def _begins_at(place: Array) -> dict[str, float]:
+def _initial_position(place: Array) -> dict[str, float]:
     return {f"components.plant.parameters.initial.position.{axis}": float(x) for axis, x in zip("xyz", place)}
 
 
-# -- what sets the limit ---------------------------------------------------------------------------------------------
+# -- the limit of the period -----------------------------------------------------------------------------------------
 
 FACTORS = tuple(float(factor) for factor in np.geomspace(0.25, 4.0, 9))
 GAINS = {
@@ -136,13 +138,13 @@ LOOPS = {**{name: (name,) for name in GAINS}, "attitude": ATTITUDE, "translation
 
 
 def scaled(names: tuple[str, ...], factor: float, scenario: Scenario) -> Scenario:
-    """`scenario` with these gains of the paper times a factor."""
+    """`scenario` with these of the paper's gains times a factor."""
     values = {f"controller.{gain}": factor * value for name in names for gain, value in GAINS[name].items()}
     return scenario.with_changes(parameters=values)
 
 
 def limits_over_gains(kappa: float) -> dict[str, Array]:
-    """Local limits of the period [s] by what is scaled, for each of `FACTORS`."""
+    """Local limits of the period [s] for each of `FACTORS`, by scaled gains."""
     base = PAPER.with_changes(parameters={"controller.coupling": kappa})
     plant = HoverLoop.of(base)
     return {
@@ -153,7 +155,7 @@ def limits_over_gains(kappa: float) -> dict[str, Array]:
 
 
 def of_attitude_alone(k_theta: float, k_eta: float, k_q: float) -> float:
-    """The largest period [s] of the attitude loop about hover by itself, J = 1 kg·m².
+    """The largest period [s] of the attitude loop alone about hover, J = 1 kg·m².
 
     It is a double integrator under -k_p θ - k_d ω, k_d = k_θ + k_η/2, k_p = (k_θ k_η + k_q)/2: min(2/k_d, 2 k_d/k_p).
     """
@@ -170,21 +172,21 @@ def exponent_of(factors: Array, values: Array) -> tuple[float, float, float]:
     return float(fit.slope), float(fit.slope - half), float(fit.slope + half)
 
 
-# -- which delays ----------------------------------------------------------------------------------------------------
+# -- tolerated delays -----------------------------------------------------------------------------------------------
 
 MARGIN_PERIODS = (0.005, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07)
 """[s]"""
 
 
-# -- what wind costs about hover, exactly ----------------------------------------------------------------------------
+# -- the exact cost of wind about hover -----------------------------------------------------------------------------
 
 WIND = 1e-6
-"""Intensity of a white force along each axis [N² s]: the error stays well within the boundary layer of 1 mm"""
+"""Intensity of a white force along each axis [N² s], so that the error stays within the boundary layer of 1 mm"""
 WIND_PERIODS = tuple(0.005 * k for k in range(1, 21))
 WIND_DELAYS = tuple(0.0025 * k for k in range(21))
 """[s]"""
-WIND_FLOWN = ((0.01, 0.0), (0.06, 0.02))
-"""Periods and delays of runs beside [s]"""
+WIND_RUNS = ((0.01, 0.0), (0.06, 0.02))
+"""Periods and delays of runs for comparison [s]"""
 WIND_COSTS = ("position_rmse", "torque_rms")
 
 
@@ -193,15 +195,15 @@ def in_wind(period: float = 0.01, delay: float = 0.0) -> System:
     hover = at_hover(PAPER)
     to = tuple(f"plant.{name}" for name in wiring.EXTERNAL_FORCE)
     force = Source(noise=WIND, period=PAPER.timing.plant_interval, to=to)
-    asked = {**hover.objectives, "torque_rms": "rms(norm(plant.torque))"}
+    objectives = {**hover.objectives, "torque_rms": "rms(norm(plant.torque))"}
     return quadcosim.changed(
-        replace(hover, sources={**hover.sources, "wind": force}, objectives=asked),
+        replace(hover, sources={**hover.sources, "wind": force}, objectives=objectives),
         {"components.controller.sampling.period": period, "connections.command.delay": delay},
     )
 
 
 def costs_of_wind() -> dict[str, Array]:
-    """By objective its exact value, shape (delays, periods), nan where it has no end; and the mean-square `radius`."""
+    """By objective: its exact value, shape (delays, periods), nan where not finite; and the mean-square `radius`."""
     loops = Loops(files_of(in_wind()).models)
     found = [[expected_of(in_wind(T, d), loops) for T in WIND_PERIODS] for d in WIND_DELAYS]
     costs = {name: [[each.objectives[name] for each in row] for row in found] for name in WIND_COSTS}
@@ -209,7 +211,7 @@ def costs_of_wind() -> dict[str, Array]:
     return {**{name: np.array(each, float) for name, each in costs.items()}, "radius": radius}
 
 
-def flown_in_wind(period: float, delay: float) -> dict[str, Array]:
-    """The squares of the same of 16 runs of 60 s."""
+def squares_in_wind(period: float, delay: float) -> dict[str, Array]:
+    """The squares of the same objectives in 16 runs of 60 s."""
     runs = [quadcosim.run(replace(in_wind(period, delay), seed=seed)).metrics for seed in range(16)]
     return {name: np.array([run[name] for run in runs]) ** 2 for name in WIND_COSTS}

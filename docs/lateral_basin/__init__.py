@@ -1,1 +1,1 @@
-"""A proved basin of the quadrotor in its lateral plane: `python -m docs.lateral_basin 0.01`."""
+"""A proved basin of attraction of the quadrotor in its lateral plane: `python -m docs.lateral_basin 0.01`."""

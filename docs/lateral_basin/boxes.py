@@ -1,4 +1,4 @@
-"""Boxes, many at once."""
+"""Arrays of boxes."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 from orchestration.basics.simulator import Floats
 
 ALL = 1.001
-"""No coordinate of a y with |y| ≤ 1 is larger, whatever rounding adds to it."""
+"""Bound of every coordinate of a y with |y| ≤ 1, rounding included."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Boxes:
-    """Both arrays have the shape (coordinates, boxes)."""
+    """Boxes by centre and radius, both of shape (coordinates, boxes)."""
 
     centre: Floats
     radius: Floats
@@ -25,14 +25,14 @@ class Boxes:
     def __getitem__(self, which: object) -> Boxes:
         return Boxes(centre=self.centre[:, which], radius=self.radius[:, which])  # type: ignore[index]
 
-    def and_(self, *others: Boxes) -> Boxes:
-        """All of them."""
+    def joined_with(self, *others: Boxes) -> Boxes:
+        """These boxes and all others."""
         every = (self, *others)
         centre, radius = ([getattr(each, name) for each in every] for name in ("centre", "radius"))
         return Boxes(centre=np.concatenate(centre, axis=1), radius=np.concatenate(radius, axis=1))
 
     def halved(self, along: Floats) -> tuple[Boxes, Boxes]:
-        """Both halves of each, along one coordinate of each."""
+        """Both halves of each box, along one coordinate for each."""
         which = (along, np.arange(len(self)))
         radius, below, above = self.radius.copy(), self.centre.copy(), self.centre.copy()
         radius[which] /= 2
@@ -51,4 +51,4 @@ def outside(inner: float, size: int) -> Boxes:
         centre = centre[:, np.abs(centre).max(axis=0) > edge / 2]
         layers.append(Boxes(centre=centre, radius=np.full_like(centre, radius)))
         edge /= 2
-    return layers[-1].and_(*layers[-2::-1])
+    return layers[-1].joined_with(*layers[-2::-1])

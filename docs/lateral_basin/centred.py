@@ -1,10 +1,10 @@
 """Numbers over boxes: over a box about c, f(x) = f(c) + slopes · (x - c), all three known within intervals.
 
-Laws and dynamics of this project are evaluated on them as they are on floats: a `Centred` has the operators, `OPS` has
-the functions. What is uncertain of f(c) stays so in a small box; what is of the slopes vanishes with the square of the
-box. Many boxes go through one evaluation. A float is the same in every box, and 0.0 costs nothing.
+Laws and dynamics of this project are evaluated on them like on floats: a `Centred` has the operators, `OPS` has the
+functions. The uncertainty of f(c) remains in a small box; that of the slopes vanishes with the square of the box. Many
+boxes are evaluated together. A float is the same in every box, and 0.0 costs nothing.
 
-Where a condition holds in a part of a box only, the number is any of both branches: an f(c) as wide as that, no slopes.
+Where a condition holds only in a part of a box, the number is the union of both branches: a wide f(c), no slopes.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from orchestration.basics.simulator import Floats
 
 
 class Condition(NamedTuple):
-    """In which boxes it holds everywhere, and in which somewhere."""
+    """A condition: the boxes in which it holds everywhere, and those in which it holds somewhere."""
 
     surely: Any
     possibly: Any
@@ -29,12 +29,12 @@ class Condition(NamedTuple):
 
 
 class Centred:
-    """One number over each of many boxes."""
+    """A number over each of many boxes."""
 
     __slots__ = ("_values", "radius", "rows")
 
     def __init__(self, rows: Intervals, radius: Floats) -> None:
-        """Rows: what it is anywhere in the box, what it is at the centre, a slope along each coordinate.
+        """Rows: the value anywhere in the box, the value at the centre, a slope along each coordinate.
 
         `radius` is that of the boxes, shape (coordinates, boxes).
         """
@@ -43,7 +43,7 @@ class Centred:
 
     @classmethod
     def linear(cls, weights: Floats, centre: Floats, radius: Floats) -> Centred:
-        """Of the coordinates the sum with these weights; `centre` as `radius`, those of the boxes."""
+        """The weighted sum of the coordinates; `centre` and `radius` are those of the boxes."""
         at_centre = (Intervals.of(centre) * Intervals.of(weights[:, None])).sum()[None]
         anywhere = at_centre + Intervals.symmetric((np.abs(weights)[:, None] * radius).sum(axis=0) * (1.0 + 1e-14))
         slopes = Intervals.of(np.broadcast_to(weights[:, None], radius.shape))
@@ -51,16 +51,16 @@ class Centred:
 
     @classmethod
     def any_of(cls, values: Intervals, radius: Floats) -> Centred:
-        """What may be any of these anywhere, whatever the coordinates are."""
+        """A number that may be any of these values anywhere in the box."""
         none = Intervals.of(np.zeros_like(radius))
         return cls(Intervals.joined(values[None], values[None], none), radius)
 
     @property
     def values(self) -> Intervals:
-        """What it is anywhere in the box, and what it is at the centre, shape (2, boxes)."""
+        """The value anywhere in the box, and at the centre, shape (2, boxes)."""
         if self._values is None:
             by_slopes = self.rows[1] + Intervals.symmetric(Intervals.of(self.slopes.size * self.radius).sum().high)
-            self._values = Intervals.joined(self.rows[0].both(by_slopes)[None], self.rows[1:2])
+            self._values = Intervals.joined(self.rows[0].intersection(by_slopes)[None], self.rows[1:2])
         return self._values
 
     @property
@@ -70,7 +70,7 @@ class Centred:
 
     @property
     def anywhere(self) -> Intervals:
-        """What it is anywhere in the box."""
+        """The value anywhere in the box."""
         return self.values[0]
 
     def like(self, values: Intervals, slopes: Intervals) -> Centred:
@@ -100,7 +100,7 @@ class Centred:
             slopes = self.slopes * other.anywhere + other.slopes * self.values[1]
             return self.like(self.values * other.values, slopes)
         if not isinstance(other, float):
-            return NotImplemented  # what is made of scalars multiplies each of its own
+            return NotImplemented  # vectors multiply each of their components
         return 0.0 if other == 0.0 else Centred(self.rows * other, self.radius)
 
     __rmul__ = __mul__
@@ -128,12 +128,12 @@ class Centred:
         return Condition(self.anywhere.low >= bound, self.anywhere.high >= bound)
 
     def _hull(self) -> Intervals:
-        """Of what lies between its values in the box and at the centre."""
+        """The hull of its values in the box and at the centre."""
         return self.values[0].hull(self.values[1])
 
 
 def _sign(values: Intervals) -> Intervals:
-    """The slope of |x|: also the sign, that of 0 being any number within ±1."""
+    """The slope of |x|, which is its sign; for 0, any number within ±1."""
     return Intervals(np.where(values.low > 0.0, 1.0, -1.0), np.where(values.high < 0.0, -1.0, 1.0))
 
 
@@ -145,7 +145,7 @@ def _sqrt(x: Any) -> Any:
 
 
 def _tanh(x: Any) -> Any:
-    """Its slopes lie between its derivatives where it is flattest and steepest."""
+    """The hyperbolic tangent; its slopes lie between its smallest and largest derivatives."""
     if not isinstance(x, Centred):
         return FLOAT.tanh(x)
     between = x._hull()
@@ -198,7 +198,7 @@ def _surely(condition: Any) -> bool:
 
 
 def _unknown(*arguments: Any) -> Any:
-    raise NotImplementedError("atan2 over boxes: expected a law that does without")
+    raise NotImplementedError("atan2 over boxes: expected a law without it")
 
 
 OPS = ScalarOps(

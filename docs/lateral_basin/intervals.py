@@ -1,8 +1,8 @@
-"""Intervals, many at once: a result holds whatever the exact operation makes of what its arguments hold.
+"""Arrays of intervals: a result contains the exact results for all values in its arguments.
 
-Sums, products, quotients and roots of floats are right to half a unit in the last place; every bound is then moved
-outward by at least one. Of tanh, sine, cosine and powers numpy promises no such thing: they are taken to be right to
-`FUNCTIONS`, 64 units in the last place.
+Sums, products, quotients and roots of floats are exact to half a unit in the last place; every bound is then moved
+outward by at least one unit. For tanh, sine, cosine and powers numpy gives no such guarantee: they are assumed to be
+exact to `FUNCTIONS`, 64 units in the last place.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from orchestration.basics.simulator import Floats
 ROUNDING = 2.0**-52
 """relative: a unit in the last place or more"""
 TINY = 1e-300
-"""what is added to that: products may be too small to have all their digits"""
+"""absolute, added to it: small products may have fewer digits"""
 FUNCTIONS = 2.0**-46
 """relative, of tanh, sine, cosine and powers"""
 
@@ -32,17 +32,17 @@ class Intervals:
 
     @classmethod
     def of(cls, numbers: Floats) -> Intervals:
-        """Floats, which are what they are."""
+        """Intervals of single numbers."""
         return cls(numbers, numbers)
 
     @classmethod
     def joined(cls, *parts: Intervals) -> Intervals:
-        """One after the other along the first axis."""
+        """The parts concatenated along the first axis."""
         return cls(np.concatenate([part.low for part in parts]), np.concatenate([part.high for part in parts]))
 
     @classmethod
     def symmetric(cls, size: Floats) -> Intervals:
-        """All that is no larger than `size`."""
+        """The numbers no larger than `size`."""
         return cls(-size, size)
 
     @property
@@ -82,7 +82,7 @@ class Intervals:
         return _outward(a, b) if other >= 0.0 else _outward(b, a)
 
     def reciprocal(self) -> Intervals:
-        """1 over each; none may hold 0."""
+        """The reciprocals; no interval may contain 0."""
         _expect((self.low > 0.0) | (self.high < 0.0), self, "a divisor that is not 0")
         return _outward(1.0 / self.high, 1.0 / self.low)
 
@@ -112,22 +112,22 @@ class Intervals:
         return _outward(np.cos(self.size), np.cos(self.least_size), FUNCTIONS)
 
     def hull(self, other: Intervals) -> Intervals:
-        """What lies in either, and between them."""
+        """The smallest intervals that contain both."""
         return Intervals(_least(self.low, other.low), _most(self.high, other.high))
 
-    def both(self, other: Intervals) -> Intervals:
-        """What lies in both."""
+    def intersection(self, other: Intervals) -> Intervals:
+        """The intersections."""
         return Intervals(_most(self.low, other.low), _least(self.high, other.high))
 
     def sum(self) -> Intervals:
-        """Along the first axis."""
+        """The sums along the first axis."""
         slack = ROUNDING * len(self.low)
         below, above = np.abs(self.low).sum(axis=0) * slack, np.abs(self.high).sum(axis=0) * slack
         return Intervals(self.low.sum(axis=0) - (below + TINY), self.high.sum(axis=0) + (above + TINY))
 
 
 class OutOfReachError(ArithmeticError):
-    """An operation that intervals as wide as these do not allow."""
+    """An operation that is undefined for intervals this wide."""
 
 
 _least: Callable[[Floats, Floats], Floats] = np.minimum
@@ -135,7 +135,7 @@ _most: Callable[[Floats, Floats], Floats] = np.maximum
 
 
 def _outward(low: Floats, high: Floats, by: float = ROUNDING) -> Intervals:
-    """Between bounds that were just computed, and are moved where they are."""
+    """Intervals with these bounds moved outward, in place."""
     for bound, move in ((low, np.subtract), (high, np.add)):
         slack = np.abs(bound)
         slack *= by

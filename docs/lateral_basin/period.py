@@ -1,8 +1,8 @@
-"""One period of the quadrotor in its lateral plane, over boxes of what is measured at its beginning.
+"""One period of the quadrotor in its lateral plane, over boxes of the measurement at its beginning.
 
 The state is [y, vy, φ, p, z, vz] [m, m/s, rad, rad/s, m, m/s]: a roll φ about the x axis at the rate p, and altitude,
-which a tilted thrust does not hold. Wanted is rest at 0. The plane is left by nothing: what the law commands about the
-other axes is 0 to the bit. The law is the project's own, explicit, its command held for the period.
+which a tilted thrust does not hold. The reference is rest at 0. The state stays in the plane: the law's command about
+the other axes is 0 to the bit. The law is the project's own, explicit, with its command held for the period.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ REST = Reference(position=ZERO)
 
 @dataclass(frozen=True, kw_only=True)
 class Loop:
-    """The law and the body that it believes in, which is the one that flies."""
+    """The law and the vehicle, which is also its nominal model."""
 
     period: float
     """h [s]"""
@@ -40,15 +40,15 @@ class Loop:
     body: Model = Model()
 
     def command(self, state: Sequence[Scalar], ops: ScalarOps) -> tuple[Scalar, Scalar]:
-        """What the law commands: thrust per mass n [m/s²] and roll acceleration α [rad/s²]."""
+        """The command of the law: thrust per mass n [m/s²] and roll acceleration α [rad/s²]."""
         y, vy, phi, p, z, vz = state
         half = 0.5 * phi
         attitude = Quaternion(Vec3(ops.sin(half), 0.0, 0.0), ops.cos(half))
-        told = Measurement(Vec3(0.0, y, z), Vec3(0.0, vy, vz), attitude, Vec3(p, 0.0, 0.0))
-        found = evaluate(told, REST, self.gains, self.body, ops)
-        if isinstance(phi, Centred) and not found.torque.y == found.torque.z == 0.0:
+        measurement = Measurement(Vec3(0.0, y, z), Vec3(0.0, vy, vz), attitude, Vec3(p, 0.0, 0.0))
+        result = evaluate(measurement, REST, self.gains, self.body, ops)
+        if isinstance(phi, Centred) and not result.torque.y == result.torque.z == 0.0:
             raise ArithmeticError("the law leaves the plane")
-        return found.thrust / self.body.mass, found.torque.x / self.body.inertia.xx
+        return result.thrust / self.body.mass, result.torque.x / self.body.inertia.xx
 
     def after(self, states: Floats, longest: float = 0.01) -> Floats:
         """The states a period later, shape (6, points), by the plant's equations and Runge-Kutta steps of `longest`."""
@@ -64,7 +64,7 @@ class Loop:
         return np.array([x.position.y, x.velocity.y, roll_angle, x.angular_velocity.x, x.position.z, x.velocity.z])
 
     def change(self, state: Sequence[Centred]) -> list[Centred]:
-        """By how much each coordinate of the state changes in a period, (4) and (5) with the command held.
+        """The change of each coordinate of the state in a period, (4) and (5) with the command held.
 
         The roll is a parabola in time; velocity and position are integrals of n sin φ and g - n cos φ.
         """
@@ -83,10 +83,10 @@ class Loop:
 
 
 def _integrals(phi: Centred, p: Centred, alpha: Centred, h: float) -> list[tuple[Centred, Centred]]:
-    """Of sin φ and of cos φ, over the period: ∫ f dt and ∫ (h - t) f dt.
+    """∫ f dt and ∫ (h - t) f dt over the period, for f = sin φ and f = cos φ.
 
     With τ from the middle of the period, φ = φ_m + ψ, ψ = ω τ + α τ²/2, and f(φ) = f + f' ψ - f ψ²/2 - f'(ξ) ψ³/6,
-    f and f' being those at φ_m. All but the last term is integrated exactly; of the last, |f'(ξ) ψ²/6| ≤ Ψ²/6.
+    with f and f' at φ_m. All terms but the last are integrated exactly; for the last, |f'(ξ) ψ²/6| ≤ Ψ²/6.
     """
     middle, omega = phi + p * (h / 2) + alpha * (h**2 / 8), p + alpha * (h / 2)
     sine, cosine = OPS.sin(middle), OPS.cos(middle)

@@ -1,13 +1,12 @@
-"""That every start in an ellipsoid comes to rest: V(x) = |R x|² falls in each period from everywhere in V ≤ 1.
+"""The proof that every state in an ellipsoid comes to rest: V(x) = |R x|² decreases in each period everywhere in V ≤ 1.
 
 Boxes are of y, with x = T y and T nearly the inverse of R, so that V is nearly |y|². Two things are proved:
 
-- In the inner box, where no coordinate of y is larger than some number, the change of V is yᵀ Q y, with Q within an
-  interval matrix, all of which is negative definite: V falls there by a share of itself.
-- In the rest of the ellipsoid V falls by more than `FALL`. Boxes of which that is not seen are halved.
+- In the inner box, where no coordinate of y exceeds some number, the change of V is yᵀ Q y, with Q within a negative
+  definite interval matrix: V decreases there by a share of itself.
+- In the rest of the ellipsoid V decreases by more than `FALL`. Boxes for which this is not shown are halved.
 
-So V falls to 0, whatever jumps the law has. Motions to the left are those to the right seen in a mirror, so half of the
-boxes do.
+So V tends to 0, even if the law is discontinuous. By mirror symmetry, half of the boxes suffice.
 """
 
 from __future__ import annotations
@@ -28,27 +27,27 @@ from orchestration.basics.simulator import Floats
 from orchestration.certificates.checker import is_positive
 
 HALVINGS = 9
-"""of the box about the ellipsoid, until the inner box is given up"""
+"""of the box around the ellipsoid, before the inner box is given up"""
 FALL = 1e-9
-"""of V in a period, at least: more than all that the constants of the equations are rounded by"""
+"""least decrease of V in a period: more than the rounding of all constants of the equations"""
 SMALLEST = 1e-5
-"""of y: boxes that are smaller are not halved any more"""
+"""of y: smaller boxes are not halved"""
 AT_ONCE = 2048
 """boxes in one evaluation"""
 SHORT = 0.1
-"""of the distance from 0: boxes that are as short along y or z are not halved for what the law does there"""
+"""relative to the distance from 0: boxes this short along y or z are not halved because of jumps of the law"""
 LARGER = 2.0
-"""times as large an ellipsoid is looked at beside one that is proved"""
+"""largest factor on a proved ellipsoid that is tried"""
 JUMPING = (0, 4)
-"""the coordinates of y along which the law jumps: those of y and z"""
+"""the coordinates along which the law is discontinuous: those of y and z"""
 
 
 class NotProven(QuadcosimError):
-    """The form does not fall, or not so that it is seen."""
+    """V does not decrease, or this is not shown."""
 
 
-class Fall:
-    """Of V = |R x|² in a period of a loop."""
+class Decrease:
+    """The decrease of V = |R x|² in a period of a loop."""
 
     def __init__(self, loop: Loop, R: Floats) -> None:
         self._loop, self._R, self._T = loop, R, np.linalg.inv(R)
@@ -59,17 +58,17 @@ class Fall:
         self.edges: Floats = loop.gains.epsilon * np.diag(R)[list(JUMPING)]
 
     def form(self, boxes: Boxes) -> Centred:
-        """V itself."""
+        """V over boxes."""
         state = self._state(boxes)
         return _sum([v * v for v in (_weighted(row, state) for row in self._R)])
 
     def over(self, boxes: Boxes) -> Centred:
-        """By how much V changes."""
+        """The change of V over boxes."""
         v, dv = self._both(boxes)
         return _sum([d * (2.0 * x + d) for x, d in zip(v, dv)])
 
     def matrix(self, inner: float) -> arb_mat:
-        """Q: by how much V changes is yᵀ Q y, where no coordinate of y is larger than `inner`."""
+        """Q such that the change of V is yᵀ Q y, where no coordinate of y exceeds `inner`."""
         around_zero = Boxes(centre=np.zeros((len(self._R), 1)), radius=np.full((len(self._R), 1), inner))
         v, dv = (arb_mat([_balls(x.slopes) for x in numbers]) for numbers in self._both(around_zero))
         return v.transpose() * dv + dv.transpose() * v + dv.transpose() * dv
@@ -84,15 +83,15 @@ class Fall:
 
 
 def prove(loop: Loop, R: Floats, most: int) -> int:
-    """How many boxes it takes; raises `NotProven` where V rises, or where `most` boxes do not show that it falls."""
-    fall = Fall(loop, R)
+    """Prove the decrease; returns the number of boxes. Raises `NotProven` if V rises or `most` boxes do not suffice."""
+    fall = Decrease(loop, R)
     _expect_no_rise_from_the_edge(fall, len(R))
     inner = _inner(fall)
-    return shown(fall, outside(inner, len(R)), inner, most)
+    return prove_boxes(fall, outside(inner, len(R)), inner, most)
 
 
-def shown(fall: Fall, left: Boxes, inner: float, most: int) -> int:
-    """As `prove`, of what is in these boxes, in the ellipsoid and outside of the inner box."""
+def prove_boxes(fall: Decrease, left: Boxes, inner: float, most: int) -> int:
+    """As `prove`, for the part of these boxes in the ellipsoid and outside of the inner box."""
     count = 0
     while len(left):
         boxes, left = left[-AT_ONCE:], left[:-AT_ONCE]
@@ -100,24 +99,24 @@ def shown(fall: Fall, left: Boxes, inner: float, most: int) -> int:
         boxes = boxes[fall.form(boxes).anywhere.low <= 1.0]
         boxes = boxes[(np.abs(boxes.centre) + boxes.radius).max(axis=0) > inner]
         if len(boxes):
-            left = left.and_(*_open(fall, boxes))
+            left = left.joined_with(*_open(fall, boxes))
         if count + len(left) > most:
             raise NotProven(f"{most} boxes do not show that the form falls")
     return count
 
 
-def refused_from(loop: Loop, R: Floats) -> float:
-    """How many times as large, in steps of a twentieth, the ellipsoid is refused at once; inf: not up to `LARGER`."""
+def refuted_factor(loop: Loop, R: Floats) -> float:
+    """The least factor, in steps of 1/20, on the ellipsoid at which V rises at its edge; inf: none up to `LARGER`."""
     for times in np.arange(1.05, LARGER, 0.05).tolist():
         try:
-            _expect_no_rise_from_the_edge(Fall(loop, R / times), len(R))
+            _expect_no_rise_from_the_edge(Decrease(loop, R / times), len(R))
         except NotProven:
             return float(times)
     return math.inf
 
 
-def _expect_no_rise_from_the_edge(fall: Fall, size: int) -> None:
-    """From some points just inside of it: where the form rises at all, it mostly does there."""
+def _expect_no_rise_from_the_edge(fall: Decrease, size: int) -> None:
+    """Raise `NotProven` if V rises from one of some points just inside of the edge, where it rises first."""
     at = np.random.default_rng(1).standard_normal((size, AT_ONCE))
     edge = Boxes(centre=0.999 * at / np.linalg.norm(at, axis=0), radius=np.zeros_like(at))
     try:
@@ -126,8 +125,8 @@ def _expect_no_rise_from_the_edge(fall: Fall, size: int) -> None:
         raise NotProven(f"the ellipsoid is too large: {error}") from None
 
 
-def _inner(fall: Fall) -> float:
-    """How large the inner box may be."""
+def _inner(fall: Decrease) -> float:
+    """The size of the inner box."""
     for inner in (ALL * 0.5**i for i in range(HALVINGS)):
         with suppress(OutOfReachError):
             Q = fall.matrix(inner)
@@ -136,8 +135,8 @@ def _inner(fall: Fall) -> float:
     raise NotProven(f"about rest, |y| ≤ {inner:.3g}, the form does not fall for all that the law may be there")
 
 
-def _open(fall: Fall, boxes: Boxes) -> Sequence[Boxes]:
-    """What is left to be shown, in smaller boxes."""
+def _open(fall: Decrease, boxes: Boxes) -> Sequence[Boxes]:
+    """The boxes that remain to be proved, halved."""
     try:
         change = fall.over(boxes)
     except OutOfReachError:
@@ -150,17 +149,18 @@ def _open(fall: Fall, boxes: Boxes) -> Sequence[Boxes]:
     return boxes.halved(_longest(change.slopes[:, wide], change.values[1][wide], boxes, fall.edges))
 
 
-def _expect_no_rise(fall: Fall, boxes: Boxes, change: Centred) -> None:
-    """At the centres of boxes, if these are in the ellipsoid."""
+def _expect_no_rise(fall: Decrease, boxes: Boxes, change: Centred) -> None:
+    """Raise `NotProven` if V rises at the centre of a box in the ellipsoid."""
     rises = (change.values[1].low > 0.0) & (fall.form(boxes).values[1].high <= 1.0)
     if rises.any():
         raise NotProven(f"the form rises from y = {boxes.centre[:, rises][:, 0].round(3).tolist()}")
 
 
 def _longest(slopes: Intervals, centre: Intervals, boxes: Boxes, edges: Floats) -> Floats:
-    """Along which coordinate to halve: what the change of V varies most with.
+    """The coordinate along which to halve each box: that with which the change of V varies most.
 
-    If that is not what makes it uncertain, where the law jumps or bends sharply, unless boxes are short there already.
+    If its uncertainty has another cause, the one along which the law jumps or bends sharply, unless the box is already
+    short there.
     """
     shares = slopes.size * boxes.radius
     jumps = np.array(JUMPING)
@@ -182,5 +182,5 @@ def _sum(numbers: Sequence[Centred]) -> Centred:
 
 
 def _balls(slopes: Intervals) -> list[arb]:
-    """Of the only box."""
+    """The slopes of the only box as balls."""
     return [arb(low).union(arb(high)) for low, high in zip(slopes.low[:, 0].tolist(), slopes.high[:, 0].tolist())]

@@ -1,8 +1,8 @@
-"""Looks for a large ellipsoid in which V falls at points. What it finds is a guess: `proof` decides.
+"""Searches a large ellipsoid in which V decreases at points: a candidate for the proof.
 
-The form is of two parts, of (y, vy, φ, p) and of (z, vz), which hover decouples. The first solves a Lyapunov equation
-of the linear loop, by weights that are looked for; the second is that in whose coordinates the vertical loop is a turn
-that shrinks. Sizes of both are looked for by flying a period from points.
+The form has two parts, for (y, vy, φ, p) and for (z, vz), which are decoupled about hover. The first solves a Lyapunov
+equation of the linear loop, with weights from the search; in the coordinates of the second, the vertical loop is a
+shrinking rotation. The sizes of both are searched by simulating a period from points.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from orchestration.basics.simulator import Floats
 POINTS = 3000
 """directions"""
 DEPTHS = np.array([0.03, 0.06, 0.12, 0.25, 0.4, 0.55, 0.7, 0.8, 0.9, 1.0])
-"""of the points along each, as shares of the ellipsoid's"""
+"""of the points along each direction, as shares of the ellipsoid"""
 STEEPEST = 1.0
-"""[rad], of roll in an ellipsoid that is looked at"""
+"""[rad], largest roll in an ellipsoid that is considered"""
 RATE = 0.5
-"""[1/s], at which V falls at least at every point"""
+"""[1/s], least rate at which V decreases at every point"""
 WEIGHTS = np.log([1.0, 0.1, 0.1, 0.001])
-"""of y, vy, φ and p in the equation: where the search begins"""
+"""of y, vy, φ and p in the equation, at the start of the search"""
 VERTICAL = np.log(0.5)
-"""size of the vertical part beside the lateral one: where the search begins"""
+"""size of the vertical part relative to the lateral one, at the start of the search"""
 
 
-def found(loop: Loop, evaluations: int) -> Floats:
-    """R of the ellipsoid |R x| ≤ 1 of largest volume that was found."""
+def largest_ellipsoid(loop: Loop, evaluations: int) -> Floats:
+    """R of the ellipsoid |R x| ≤ 1 of largest volume that the search finds."""
     directions = np.random.default_rng(1).standard_normal((6, POINTS))
     directions /= np.linalg.norm(directions, axis=0)
     jacobian = _jacobian(loop)
@@ -51,7 +51,7 @@ def found(loop: Loop, evaluations: int) -> Floats:
 
 
 def _jacobian(loop: Loop) -> Floats:
-    """At hover, with k_s in the middle of what γ is from ε to 1 m."""
+    """The Jacobian at hover, with k_s in the middle of the values of γ from ε to 1 m."""
     gains = loop.gains
     middle = replace(gains, k_s=gains.k_s * (1.0 + gains.epsilon ** (gains.beta_t - 1.0)) / 2.0)
     near = 1e-3 * gains.epsilon * np.eye(6)
@@ -70,14 +70,14 @@ def _shape(jacobian: Floats, choice: Floats) -> Floats:
 
 
 def _factor(P: Floats) -> Floats:
-    """Lower triangular R with Rᵀ R = P, but for its size, so that a box is as wide along y or z as its coordinate."""
+    """Lower triangular R with Rᵀ R = P up to its size, so that a box is as wide along y or z as its coordinate."""
     R: Floats = np.linalg.cholesky(P[::-1, ::-1]).T[::-1, ::-1]
     R = R / R[0, 0]
     return R
 
 
 def _level(loop: Loop, R: Floats, directions: Floats) -> float:
-    """Up to which |R x| V falls at every point, by halving."""
+    """The largest |R x| up to which V decreases at every point, by bisection."""
     T, low = np.linalg.inv(R), 0.0
     high = STEEPEST / float(np.linalg.norm(T[STATES.index("φ")]))
     for _ in range(9):

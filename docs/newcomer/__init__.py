@@ -1,1 +1,1 @@
-"""A newcomer: follows the documentation from an empty folder on, word by word, and stops where it does not work."""
+"""A simulated newcomer, who follows the documentation literally from an empty folder, and stops where it fails."""

@@ -1,6 +1,6 @@
-"""The code blocks of a page, and what the comments before them say of running them.
+"""The code blocks of a page, and the comments before them about running them.
 
-A comment stands before the block that it is about, and readers of the page's source see it:
+A comment stands before its block, and is visible in the source of the page:
 
     <!-- not run: needs MATLAB -->                                            the whole block
     <!-- not run: `make test`: takes ten minutes -->                          the lines that begin so
@@ -14,25 +14,25 @@ from pathlib import Path
 from markdown_it import MarkdownIt
 
 SHELL = ("", "sh", "bash")
-"""Languages of lines for a shell, an indented block among them"""
+"""Languages of lines for a shell, an indented block included"""
 SHOWN, OUTPUT = "text", "output"
-"""Language of what is to be looked at, drawings and formulas; with the name: of what the lines before it print"""
+"""Language of drawings and formulas; with the name OUTPUT, of the output of the lines before it"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Note:
-    """What is not run as it stands, and why."""
+    """A line or block that is not run as written, and the reason."""
 
     command: str | None
-    """that the lines begin with; None: all of the block"""
+    """prefix of the lines; None: the whole block"""
     instead: str | None
-    """what is run in their place"""
+    """the line that is run instead"""
     reason: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class Block:
-    """A code block; `name` is the file that it is the text of, empty if it is of none."""
+    """A code block; `name` is the file of which it is the text, or empty."""
 
     page: Path
     line: int
@@ -43,7 +43,7 @@ class Block:
 
     @property
     def place(self) -> str:
-        """Where it begins."""
+        """Page and line where it begins."""
         return f"{self.page}:{self.line}"
 
     @property
@@ -53,26 +53,26 @@ class Block:
 
     @property
     def is_shown(self) -> bool:
-        """Whether it is only to be looked at."""
+        """Whether it is only shown to the reader."""
         return self.language == SHOWN and self.name != OUTPUT
 
     @property
     def skipped(self) -> str | None:
-        """Why none of it is run; None if some is."""
+        """The reason why none of it is run; None if some of it is."""
         return next((note.reason for note in self.notes if note.command is None), None)
 
     @property
     def lines(self) -> list[str]:
-        """The lines for a shell, those that go on joined."""
+        """The lines for a shell, with continued lines joined."""
         return [line for line in self.text.replace("\\\n", "").splitlines() if line.split("#")[0].strip()]
 
     def note_on(self, line: str) -> Note | None:
-        """What is said of one line."""
+        """The note on a line, if any."""
         return next((n for n in self.notes if n.command is not None and line.startswith(n.command)), None)
 
 
 def blocks_of(page: Path, root: Path) -> list[Block]:
-    """The code blocks of a page in order; raises `ValueError` for a comment that is about none of its lines."""
+    """The code blocks of a page in order; raises `ValueError` for a comment that matches no line."""
     found, notes = [], []
     for token in MarkdownIt("commonmark").enable("table").parse((root / page).read_text(encoding="utf-8")):
         line = 1 + (token.map or [0])[0]
@@ -112,4 +112,4 @@ def _note(text: str, place: str) -> Note:
 def _expect_fitting(block: Block) -> None:
     for note in block.notes:
         if note.command is not None and not any(line.startswith(note.command) for line in block.lines):
-            raise ValueError(f"{block.place}: no line begins with {note.command}, of which a comment says it does")
+            raise ValueError(f"{block.place}: no line begins with {note.command}, as the comment before it states")

@@ -1,4 +1,4 @@
-"""Does what a page says, block by block, and raises `NotAsSaid` where that does not work."""
+"""Follows a page block by block, and raises `BlockFailed` where one does not work."""
 
 import json
 import os
@@ -13,22 +13,22 @@ from typing import IO
 from docs.newcomer.blocks import OUTPUT, Block
 
 LONGEST = 1800.0
-"""[s] that a line may take"""
+"""[s], timeout of a line"""
 SHOWN = 3000
-"""Characters of the output of what failed"""
+"""Number of characters shown of the output of a failed block"""
 KEPT = ("HOME", "LANG", "TMPDIR", "http_proxy", "https_proxy", "no_proxy", "PIP_INDEX_URL", "PIP_CONFIG_FILE")
-"""Of the variables of who starts this, those that a newcomer has too: without them nothing can be installed"""
+"""Environment variables that are passed on: without them nothing can be installed"""
 
-Tell = Callable[[str], None]
+Report = Callable[[str], None]
 
 
-class NotAsSaid(Exception):
+class BlockFailed(Exception):
     """A block does not do what the page says."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Skipped:
-    """What was not run, or not as it stands, and why."""
+    """A part that was not run, or not as written, and the reason."""
 
     place: str
     what: str
@@ -36,41 +36,41 @@ class Skipped:
 
 
 class Newcomer:
-    """Somebody in `folder`, a copy of the repository and nothing else; `tell` hears of every step."""
+    """Follows pages in `folder`, a copy of the repository and nothing else; `report` receives a line for each step."""
 
-    def __init__(self, folder: Path, tell: Tell) -> None:
-        self._folder, self._tell = folder, tell
+    def __init__(self, folder: Path, report: Report) -> None:
+        self._folder, self._report = folder, report
         self._here = folder
         self._printed = ""
         self._python: _Python | None = None
         self.skipped: list[Skipped] = []
         self.done = 0
-        """Blocks that did what is said"""
+        """number of blocks that worked"""
 
     @property
     def environment(self) -> dict[str, str]:
-        """Of the processes: that of the page's `.venv`, once it is there."""
+        """The environment of the processes, with that of the page's `.venv`."""
         own = self._folder / ".venv" / "bin"
-        given = {name: os.environ[name] for name in KEPT if name in os.environ}
-        return {**given, "PATH": f"{own}:/usr/local/bin:/usr/bin:/bin", "MPLBACKEND": "Agg", "COLUMNS": "120"}
+        inherited = {name: os.environ[name] for name in KEPT if name in os.environ}
+        return {**inherited, "PATH": f"{own}:/usr/local/bin:/usr/bin:/bin", "MPLBACKEND": "Agg", "COLUMNS": "120"}
 
     def _own(self, program: str) -> str:
-        """Of the environment that the pages set up."""
+        """The path of a program in the environment that the pages set up."""
         return str(self._folder / ".venv" / "bin" / program)
 
-    def opens_a_page(self) -> None:
-        """A page begins in the top folder, with no Python open."""
+    def start_page(self) -> None:
+        """Begin a page, in the top folder and without an open Python session."""
         self._here = self._folder
-        self.closes()
+        self.close()
 
-    def closes(self) -> None:
-        """No Python is open any more."""
+    def close(self) -> None:
+        """Close the Python session, if open."""
         if self._python is not None:
             self._python.close()
             self._python = None
 
-    def follows(self, block: Block) -> None:
-        """Do what one block says; raises `NotAsSaid`."""
+    def follow(self, block: Block) -> None:
+        """Follow one block; raises `BlockFailed`."""
         if block.skipped is not None:
             self.skipped.append(Skipped(place=block.place, what="the block", reason=block.skipped))
             return
@@ -86,7 +86,7 @@ class Newcomer:
         elif block.name == OUTPUT:
             self._expect_printed(block)
         elif not block.name and not block.is_shown:
-            raise NotAsSaid(f"{block.place}: expected a name for the file, or a comment that says why it is not run")
+            raise BlockFailed(f"{block.place}: expected a name for the file, or a comment that says why it is not run")
         self.done += 1
 
     def _line(self, block: Block, line: str) -> None:
@@ -103,10 +103,10 @@ class Newcomer:
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, encoding="utf-8",
             errors="replace", timeout=LONGEST, check=False,
         )  # fmt: skip
-        self._tell(f"{block.place}: {line}  [{time.monotonic() - began:.1f} s]")
+        self._report(f"{block.place}: {line}  [{time.monotonic() - began:.1f} s]")
         self._printed = done.stdout
         if done.returncode != 0:
-            raise NotAsSaid(f"{block.place}: {line}\nended with {done.returncode}:\n{done.stdout[-SHOWN:]}")
+            raise BlockFailed(f"{block.place}: {line}\nended with {done.returncode}:\n{done.stdout[-SHOWN:]}")
         self._here = Path(where.read_text(encoding="utf-8").strip())
         where.unlink()
 
@@ -117,13 +117,13 @@ class Newcomer:
                 [self._own("python"), block.name], cwd=self._here, env=self.environment, capture_output=True, text=True,
                 check=False,
             )  # fmt: skip
-            said, self._printed = done.stdout + done.stderr if done.returncode else None, done.stdout
+            failure, self._printed = done.stdout + done.stderr if done.returncode else None, done.stdout
         else:
             self._python = self._python or _Python(self._own("python"), self._here, self.environment)
-            said = self._python.run(block.text)
-        self._tell(f"{block.place}: {block.name or 'Python'}  [{time.monotonic() - began:.1f} s]")
-        if said is not None:
-            raise NotAsSaid(f"{block.place}: {block.name or 'Python'}\n{said[-SHOWN:]}")
+            failure = self._python.run(block.text)
+        self._report(f"{block.place}: {block.name or 'Python'}  [{time.monotonic() - began:.1f} s]")
+        if failure is not None:
+            raise BlockFailed(f"{block.place}: {block.name or 'Python'}\n{failure[-SHOWN:]}")
 
     def _read(self, block: Block) -> None:
         path = self._here / (block.name or "block.toml")
@@ -132,22 +132,22 @@ class Newcomer:
         done = subprocess.run(
             command, cwd=self._folder, env=self.environment, capture_output=True, text=True, check=False
         )  # fmt: skip
-        self._tell(f"{block.place}: TOML, {done.stdout.strip()}")
+        self._report(f"{block.place}: TOML, {done.stdout.strip()}")
         if done.returncode != 0:
-            raise NotAsSaid(f"{block.place}: cannot be read:\n{done.stderr[-SHOWN:]}")
+            raise BlockFailed(f"{block.place}: cannot be read:\n{done.stderr[-SHOWN:]}")
         if not block.name:
             path.unlink()
 
     def _expect_printed(self, block: Block) -> None:
         for line in map(str.strip, block.text.splitlines()):
             if not all(part in self._printed for part in line.split("…")):
-                raise NotAsSaid(
+                raise BlockFailed(
                     f"{block.place}: expected the output before it to have {line}:\n{self._printed[-SHOWN:]}"
                 )
 
 
 class _Python:
-    """A Python that stays open."""
+    """A Python session that stays open."""
 
     def __init__(self, python: str, folder: Path, environment: dict[str, str]) -> None:
         reading, writing = os.pipe()
@@ -160,16 +160,16 @@ class _Python:
         self._answers: IO[str] = os.fdopen(reading)
 
     def run(self, code: str) -> str | None:
-        """The traceback; None if there was none."""
+        """Run code; returns the traceback, or None if there was none."""
         assert self._process.stdin is not None
         self._process.stdin.write(json.dumps(code) + "\n")
         self._process.stdin.flush()
         answer = self._answers.readline()
-        said: str | None = json.loads(answer) if answer else "Python ended"
-        return said
+        failure: str | None = json.loads(answer) if answer else "Python ended"
+        return failure
 
     def close(self) -> None:
-        """It ends."""
+        """End the session."""
         assert self._process.stdin is not None
         self._process.stdin.close()
         self._process.wait()
@@ -177,6 +177,6 @@ class _Python:
 
 
 def print_now(text: str) -> None:
-    """A line on standard output, at once."""
+    """Print a line on standard output, without buffering."""
     print(text, flush=True)
     sys.stdout.flush()

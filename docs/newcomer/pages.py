@@ -6,11 +6,11 @@ from pathlib import Path
 FIRST = ("README.md",)
 PLACES = ("docs/**/*.md", "examples/**/*.md", "fmus/*.md", "tests/reference/*.md", "*.md")
 NOT_TO_FOLLOW = ("CHANGELOG.md",)
-"""What was, not what to do"""
+"""Pages about the past, without instructions"""
 
 
 def pages(root: Path) -> list[Path]:
-    """All of them, relative to `root`: the README, then as the site has them, then those that it does not have."""
+    """All pages, relative to `root`: the README, then those of the site in its order, then the others."""
     listed = re.findall(r"^ +- (?:[^:\n]+: )?(\S+\.md)$", (root / "mkdocs.yml").read_text(encoding="utf-8"), re.M)
     of_site = [place for name in listed for place in (Path("docs", name), Path(name)) if (root / place).is_file()]
     others = [path.relative_to(root) for pattern in PLACES for path in sorted(root.glob(pattern))]

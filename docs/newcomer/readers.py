@@ -1,4 +1,4 @@
-"""Reads a TOML block of a page as the program would: python -m docs.newcomer.readers FILE; says what it is."""
+"""Reads a TOML block of a page as the program does, and prints its kind: python -m docs.newcomer.readers FILE."""
 
 import sys
 from collections.abc import Callable
@@ -11,7 +11,7 @@ Tables = dict[str, Any]
 
 
 def reader_of(tables: Tables) -> tuple[str, Callable[[Path], object]]:
-    """What a file with these tables is, and what reads it."""
+    """The kind of a file with these tables, and its reader."""
     from orchestration.comparison.file import load_comparison
     from orchestration.expressions.syntax import parse
     from orchestration.quadrotor.vehicle import load_vehicle

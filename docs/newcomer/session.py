@@ -1,6 +1,6 @@
-"""Python as somebody has it open beside a page: each line of standard input is a block in JSON, run in one namespace.
+"""An interactive Python session: each line of standard input is a block in JSON, run in one namespace.
 
-Each is answered by a line on the descriptor given: null, or the traceback as a text. Run as a file, not as a module.
+Each is answered by a line on the given descriptor: null, or the traceback as a text. Run as a file, not as a module.
 """
 
 import json
@@ -15,13 +15,13 @@ def main() -> None:
     sys.path.insert(0, "")
     namespace: dict[str, object] = {"__name__": "__main__"}
     for line in sys.stdin:
-        said = None
+        failure = None
         try:
             exec(compile(json.loads(line), "<page>", "exec"), namespace)
-        except BaseException:  # also one that would end the process
-            said = traceback.format_exc()
+        except BaseException:  # including those that would end the process
+            failure = traceback.format_exc()
         sys.stdout.flush()
-        answers.write(json.dumps(said) + "\n")
+        answers.write(json.dumps(failure) + "\n")
         answers.flush()
 
 

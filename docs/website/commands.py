@@ -1,11 +1,11 @@
-"""The page of the command line: every command and every flag with its help, as the program has them."""
+"""The page of the command line: every command and every flag with its help, from the program."""
 
 from html import escape
 from typing import Any
 
 import typer.main
 
-from docs.website.tables import table, words
+from docs.website.tables import inline_html, table
 from orchestration.command.cli import app
 
 INTRODUCTION = """\
@@ -35,13 +35,13 @@ def _section(name: str, command: Any) -> str:
         if parameter.name == "help" or getattr(parameter, "hidden", False):
             continue
         kind = "Arguments" if parameter.param_type_name == "argument" else "Options"
-        names, said = parameter.get_help_record(context)
+        names, text = parameter.get_help_record(context)
         panel = panels.setdefault(getattr(parameter, "rich_help_panel", None) or kind, [])
-        panel.append((f"<code>{escape(names)}</code>", words(said)))
+        panel.append((f"<code>{escape(names)}</code>", inline_html(text)))
     tables = "".join(table(rows, heading=title) for title, rows in panels.items() if rows)
     return f"\n## {name}\n\n```text\n{usage}\n```\n\n{escape(command.help or '', quote=False)}\n\n{tables}"
 
 
 def _first(text: str | None) -> str:
-    """The first sentence of a help, which is what the list of commands has."""
-    return words((text or "").split("\n\n")[0].split(". ")[0].rstrip("."))
+    """The first sentence of a help text, for the list of commands."""
+    return inline_html((text or "").split("\n\n")[0].split(". ")[0].rstrip("."))

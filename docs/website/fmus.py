@@ -1,4 +1,4 @@
-"""The pages of this project's FMUs: the documentation that is in their archives."""
+"""The pages of this project's FMUs: the documentation in their archives."""
 
 import re
 from html import unescape
@@ -25,13 +25,13 @@ holds for each of them; several starts are theirs in order. A *fixed* parameter 
 
 def page(slave: type[Slave]) -> str:
     """The Markdown of the page of an FMU; its links start at the folder of the slave's module."""
-    written = fragment_of(Target.parse(f"{slave.__module__}:{slave.__name__}"))
+    fragment = fragment_of(Target.parse(f"{slave.__module__}:{slave.__name__}"))
     tables = "\n".join(variable_tables(slave.variables))
-    return f"# {slave.__name__}\n\n{slave.description}.\n\n{_headed(written)}\n\n{VARIABLES}{_headed(tables)}\n"
+    return f"# {slave.__name__}\n\n{slave.description}.\n\n{_headed(fragment)}\n\n{VARIABLES}{_headed(tables)}\n"
 
 
 def _headed(html: str) -> str:
-    """HTML with headings and programs in Markdown: so they are in the contents, and coloured."""
+    """HTML with headings and programs in Markdown, so that they are in the contents, and highlighted."""
     html = re.sub(r'<h2 id="([^"]+)">(.*?)</h2>', r"\n## \2 {#\1}\n", html)
     html = re.sub(r"<h3>(.*?)</h3>", r"\n### \1\n", html)
     return re.sub(

@@ -1,4 +1,4 @@
-"""What MkDocs asks while it builds the site: which pages there are beside those in `docs/`, and where links lead."""
+"""Hooks of MkDocs that add pages beside those in `docs/`, and rewrite links."""
 
 from collections.abc import Callable
 from functools import partial
@@ -15,13 +15,13 @@ GENERATED: dict[str, Callable[[], str]] = {
     "keys.md": keys.page,
     **{f"fmus/{slave.__name__}.md": partial(fmus.page, slave) for slave in fmus.SLAVES},
 }
-"""Pages that are made of the code, by their addresses."""
+"""Pages generated from the code, by address."""
 BEHIND = 1e-6
-"""What a hit in a source counts beside one in a page, a thousandfold if it is in its title: pages are found first"""
+"""Search weight of sources relative to pages, so that pages are found first even if the title of a source matches"""
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Add the pages that lie beside what they describe, those made of the code, and what pages link to."""
+    """Add the pages outside of `docs/`, those generated from the code, and linked files."""
     links = Links(repo_url=config.repo_url)
     for address, path in pages_elsewhere().items():
         files.append(File.generated(config, address, abs_src_path=str(ROOT / path)))
@@ -35,7 +35,7 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:
-    """The page as a code host shows it, with its links and code blocks as the site has them."""
+    """The Markdown of a page, with links and code blocks converted for the site."""
     address = page.file.src_uri
     if page.file.inclusion.is_not_in_nav():
         page.meta["search"] = {"boost": BEHIND}
@@ -44,6 +44,6 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
 
 
 def on_page_content(html: str, page: Any, config: Any, files: Files) -> str:
-    """A page that was a notebook, with its links as the site has them."""
+    """The HTML of a notebook's page, with links converted for the site."""
     address = page.file.src_uri
     return Links(repo_url=config.repo_url).rewritten_html(html, address) if address.endswith(".ipynb") else html

@@ -1,4 +1,4 @@
-"""The page of the keys of files: every table of every kind of file, as the program reads it."""
+"""The page of the keys of files: every table of every kind of file that the program reads."""
 
 import types
 import typing
@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from typing import Any, NamedTuple
 
-from docs.website.tables import table, words
+from docs.website.tables import inline_html, table
 from orchestration.basics.records import Scalar
 from orchestration.basics.typed_tables import docs_of_keys, fields_of
 from orchestration.comparison.file import ComparisonFile
@@ -24,7 +24,7 @@ FILES = {
     "Tuning file": (TuningFile, "What `quadcosim tune` searches; [how to write one](tuning.md)."),
 }
 OF_THE_BASE = {"Comparison file": {"[starts]": Starts}, "Tuning file": {"[starts]": Starts}}
-"""Tables that are read by what a file builds on, here a scenario"""
+"""Tables read by the base of a file, here a scenario"""
 INTRODUCTION = """\
 # Keys of files
 
@@ -55,25 +55,25 @@ def page() -> str:
     return INTRODUCTION + "".join(_file(title, *about) for title, about in FILES.items())
 
 
-def _file(title: str, shape: Any, said: str) -> str:
+def _file(title: str, shape: Any, description: str) -> str:
     tables = {"": shape, **dict(_tables_in(shape, "")), **OF_THE_BASE.get(title, {})}
     places: dict[Any, list[str]] = {}
     for place, each in tables.items():
         places.setdefault(each, []).append(place)
     sections = "".join(_section(of, each, title) for each, of in places.items())
-    return f"## {title}\n\n{said}\n\n{sections}"
+    return f"## {title}\n\n{description}\n\n{sections}"
 
 
 def _section(places: Sequence[str], shape: Any, file: str) -> str:
-    """Of a table that may stand in one place of a file, or in several."""
+    """The section of a table that occurs in one or several places of a file."""
     named = ", ".join(f"`{place}`" for place in places)
     heading = f"### {named} of a {file.lower()}\n\n{_summary(shape)}\n\n" if named != "``" else ""
-    rows = [(f"<code>{key.name}</code>", _kind(key.kind), key.default, words(key.said)) for key in _keys(shape)]
+    rows = [(f"<code>{key.name}</code>", _kind(key.kind), key.default, inline_html(key.said)) for key in _keys(shape)]
     return heading + table(rows, columns=("Key", "Value", "Without it", "Meaning"))
 
 
 def _tables_in(shape: Any, place: str) -> Iterator[tuple[str, Any]]:
-    """The tables within a table, by how they are headed in a file."""
+    """The tables within a table, by their headings in a file."""
     for key in _keys(shape):
         for within, many in _shapes(key.kind):
             path = f"{place}.{key.name}" if place else key.name
@@ -83,7 +83,7 @@ def _tables_in(shape: Any, place: str) -> Iterator[tuple[str, Any]]:
 
 
 def _shapes(kind: Any) -> Iterator[tuple[Any, Any]]:
-    """The tables that a value may be, each with what holds several of them."""
+    """The types of tables that a value may have, each with its container."""
     if fields_of(kind):
         yield kind, None
     holder = {list: list, tuple: list, dict: dict, Mapping: dict}.get(typing.get_origin(kind))
@@ -92,7 +92,7 @@ def _shapes(kind: Any) -> Iterator[tuple[Any, Any]]:
 
 
 def _keys(shape: Any) -> list[_Key]:
-    """The keys of a table in their order, with what is said of them."""
+    """The keys of a table in order, with their descriptions."""
     said = docs_of_keys(shape)
     return [_Key(key, field.annotation, _default(field), said.get(key, "")) for key, field in fields_of(shape).items()]
 
@@ -115,7 +115,7 @@ def _default(field: Any) -> str:
 
 
 def _kind(kind: Any) -> str:
-    """What values a key has, in words."""
+    """The description of a key's values."""
     origin, parts = typing.get_origin(kind), typing.get_args(kind)
     if origin is typing.Literal:
         return " or ".join(f"<code>{part}</code>" for part in parts)

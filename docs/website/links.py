@@ -1,4 +1,4 @@
-"""Where the links of the pages lead on the site: a page is written with the links that hold in the repository."""
+"""Links of the pages, which are valid in the repository, converted for the site."""
 
 import posixpath
 import re
@@ -12,20 +12,20 @@ ELSEWHERE = (
     "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "fmus/README.md", "tests/reference/README.md", "examples/README.md",
     "examples/*/README.md",
 )  # fmt: skip
-"""Pages that lie beside what they describe."""
+"""Pages outside of `docs/`, beside what they describe."""
 LINK = re.compile(r"(\]\(|^\[(?!\^)[^\]\n]+\]: +)(?![a-z]+:|#|//)([^)\s#]+)", re.MULTILINE)
-"""What leads to another file, inline or by reference: what is before its address, and that."""
+"""A link to another file, inline or by reference: the text before the address, and the address."""
 HREF = re.compile(r'(href=")(?![a-z]+:|#)([^"#]+)')
-"""The same in HTML."""
+"""A link in HTML."""
 DOCUMENTATION = ("plant_fmu/*.html", "controller_fmu/*/*.html")
-"""What FMUs carry as their documentation, written beside their slaves."""
+"""The documentation of the FMUs, beside their slaves."""
 CODE = re.compile(r"^```.*?^```|`[^`\n]*`", re.MULTILINE | re.DOTALL)
 OF_PICTURES = (".png", ".svg")
 OF_PAGES = (".md", ".ipynb", ".html")
 
 
 def address_of(path: str) -> str:
-    """The address that a file of the repository has on the site: `docs/` is its top, and README.md its first page."""
+    """The address of a repository's file on the site: `docs/` is its root, and README.md its first page."""
     if path == "README.md":
         return "index.md"
     if path.endswith(".html"):
@@ -36,28 +36,28 @@ def address_of(path: str) -> str:
 
 
 def pages_elsewhere() -> dict[str, str]:
-    """Paths in the repository of the pages outside `docs/`, by their addresses."""
+    """Paths in the repository of the pages outside `docs/`, by address."""
     return {address_of(path): path for path in _found(ELSEWHERE)}
 
 
 def documentation() -> dict[str, str]:
-    """Paths of the documentation that FMUs carry, by their addresses."""
+    """Paths of the documentation of FMUs, by address."""
     return {address_of(path): path for path in _found(DOCUMENTATION)}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Links:
-    """Links as the site has them; sources are linked at `repo_url`, or shown by pages where that is not known."""
+    """Conversion of links; sources are linked at `repo_url`, or shown on pages if there is none."""
 
     repo_url: str | None
 
     def rewritten(self, markdown: str, address: str) -> str:
-        """The text of the page at `address` with its links as they are on the site."""
+        """The text of the page at `address` with its links converted."""
         led = self._leading(address)
         return _outside_of_code(LINK, led, self.rewritten_html(markdown, address))
 
     def rewritten_html(self, html: str, address: str) -> str:
-        """The same of links in HTML, to the pages as they are in the end."""
+        """The HTML of the page at `address` with its links converted."""
         led = self._leading(address)
         return HREF.sub(lambda match: re.sub(r"\.(md|ipynb)$", ".html", led(match)), html)
 
@@ -66,11 +66,11 @@ class Links:
         return lambda match: match[1] + self._to(_target(path, match[2]), posixpath.dirname(address))
 
     def pictures(self) -> dict[str, Path]:
-        """The pictures outside `docs/` that pages show, by their addresses."""
+        """The pictures outside `docs/` that pages show, by address."""
         return {address_of(path): ROOT / path for path in _linked() if path.endswith(OF_PICTURES)}
 
     def sources(self) -> dict[str, str]:
-        """The pages that show the files and folders that are linked to and are no pages, by their addresses."""
+        """The pages that show linked files and folders of sources, by address."""
         if self.repo_url:
             return {}
         shown = [path for path in _linked() if not path.endswith((*OF_PICTURES, *OF_PAGES))]
@@ -86,7 +86,7 @@ class Links:
 
 
 def _linked() -> list[str]:
-    """What the pages link to outside `docs/`."""
+    """The targets of links outside `docs/`."""
     targets = {
         _target(page, link)
         for page in _pages()
@@ -109,7 +109,7 @@ def _found(patterns: Iterable[str]) -> Iterator[str]:
 
 
 def _target(page: str, link: str) -> str:
-    """The path in the repository to which a link of the page at a path leads."""
+    """The path in the repository of a link's target, from the page at a path."""
     return posixpath.normpath(posixpath.join(posixpath.dirname(page), link))
 
 

@@ -1,17 +1,17 @@
-"""The Markdown of the pages, which code hosts read, as the generator of the site reads it."""
+"""The Markdown of the pages, converted from that of code hosts to that of the site generator."""
 
 import re
 import textwrap
 
 TITLED = re.compile(r"^```(\w+) (\S+)$", re.MULTILINE)
-"""The beginning of a code block with the name of its file."""
+"""The first line of a code block with the name of its file."""
 INDENTED = re.compile(r"(?<=\n\n)(?:    .*(?:\n|\Z))+")
 COMMAND = re.compile(r"(?:quadcosim|make|pip|python3?|\.venv/\S+|\.|cc|dask|git) ")
-"""How a block of commands begins."""
+"""The start of a block of commands."""
 
 
 def for_the_site(markdown: str) -> str:
-    """`markdown` with the names of files above their code blocks, and with blocks of commands coloured."""
+    """`markdown` with file names as titles of code blocks, and with highlighted blocks of commands."""
     return INDENTED.sub(_coloured, TITLED.sub(r'```\1 title="\2"', markdown))
 
 

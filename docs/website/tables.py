@@ -1,4 +1,4 @@
-"""Tables of the pages that are made of the code."""
+"""Tables of the generated pages."""
 
 import re
 from collections.abc import Sequence
@@ -6,7 +6,7 @@ from html import escape
 
 
 def table(rows: Sequence[Sequence[str]], heading: str = "", columns: Sequence[str] = ()) -> str:
-    """Rows of cells that are HTML already; `heading` stands above all columns, `columns` above each."""
+    """A table of cells in HTML; `heading` is above all columns, `columns` are their headings."""
     lines = ["".join(f"<td>{cell}</td>" for cell in row) for row in rows]
     if columns:
         lines.insert(0, "".join(f"<th>{column}</th>" for column in columns))
@@ -16,6 +16,6 @@ def table(rows: Sequence[Sequence[str]], heading: str = "", columns: Sequence[st
     return f"<table data-made>\n{body}\n</table>\n\n"
 
 
-def words(text: str) -> str:
-    """A text of the code as HTML; what it has in backticks is code there too."""
+def inline_html(text: str) -> str:
+    """A text of the code as HTML; parts in backticks become code."""
     return re.sub(r"`([^`]+)`", r"<code>\1</code>", escape(text, quote=False))

@@ -29,9 +29,9 @@ def test_every_picture_of_a_comparison_is_drawn_from_what_is_kept() -> None:
 def test_every_cell_of_a_map_is_one_of_its_file(name: str) -> None:
     expected = [
         (cell.index, cell.vehicle, cell.condition, cell.controller, cell.value)
-        for cell in comparisons.loaded(name).cells()
+        for cell in comparisons.load(name).cells()
     ]
-    kept = comparisons.kept(name)["cells"]
+    kept = comparisons.read_data(name)["cells"]
     keys = ("cell", "vehicle", "condition", "controller", "value")
     assert [tuple(cell[key] for key in keys) for cell in kept] == expected
 
@@ -39,17 +39,15 @@ def test_every_cell_of_a_map_is_one_of_its_file(name: str) -> None:
 @pytest.mark.parametrize("name", FLOWN)
 def test_one_cell_in_a_hundred_is_what_is_flown_again(name: str) -> None:
     """What `quadcosim compare studies/comparisons/NAME.toml --cell K` flies, here in lanes."""
-    kept = comparisons.kept(name)["cells"]
+    kept = comparisons.read_data(name)["cells"]
     chosen = sorted(random.Random(name).sample(kept, math.ceil(len(kept) / 100)), key=lambda cell: cell["cell"])
-    flown = rerun_cells(comparisons.loaded(name), [cell["cell"] for cell in chosen], engine="batch")
-    steady = rerun_cells(
-        comparisons.on_path(comparisons.loaded(name)), [cell["cell"] for cell in chosen], engine="batch"
-    )
+    flown = rerun_cells(comparisons.load(name), [cell["cell"] for cell in chosen], engine="batch")
+    steady = rerun_cells(comparisons.on_path(comparisons.load(name)), [cell["cell"] for cell in chosen], engine="batch")
     for cell, summary, alone in zip(chosen, flown, steady, strict=True):
         row = summary.row("value")
         for key in ("count", "survives", "settles", "diverged", "diverged_late"):
             assert row[key] == cell[key], key
-        for key in comparisons.TOLD:
+        for key in comparisons.REPORTED:
             again = [math.nan if row[f"{key}{end}"] is None else row[f"{key}{end}"] for end in ("", ".low", ".high")]
             before = [math.nan if one is None else one for one in cell[key]]
             assert again == pytest.approx(before, rel=1e-4, nan_ok=True), key

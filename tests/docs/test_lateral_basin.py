@@ -9,14 +9,14 @@ import pytest
 from flint import arb, ctx
 
 from controller_fmu.sliding_mode.law import Gains
-from docs.lateral_basin.__main__ import flown, main, reach
+from docs.lateral_basin.__main__ import extents, first_losses, main
 from docs.lateral_basin.boxes import ALL, Boxes, outside
 from docs.lateral_basin.centred import OPS, Centred
+from docs.lateral_basin.ellipsoids import read_ellipsoid, write_ellipsoid
 from docs.lateral_basin.intervals import Intervals, OutOfReachError
-from docs.lateral_basin.kept import keep, kept
 from docs.lateral_basin.period import STATES, Loop
-from docs.lateral_basin.proof import Fall, NotProven, prove, refused_from, shown
-from docs.lateral_basin.search import found
+from docs.lateral_basin.proof import Decrease, NotProven, prove, prove_boxes, refuted_factor
+from docs.lateral_basin.search import largest_ellipsoid
 from fmu_kit.scalar import FLOAT
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
@@ -118,7 +118,7 @@ def test_a_mirrored_motion_is_the_mirror_of_the_motion() -> None:
 @pytest.mark.parametrize("period", PERIODS)
 def test_the_form_that_is_kept_falls_over_boxes_here_and_there(period: float) -> None:
     """Some of those of which the proof is made; about rest, for all that the law may be there."""
-    fall, generator = Fall(Loop(period=period), kept(period)), np.random.default_rng(5)
+    fall, generator = Decrease(Loop(period=period), read_ellipsoid(period)), np.random.default_rng(5)
     direction = generator.standard_normal((6, 1500))
     size = generator.uniform(0.02, 0.97, 1500)
     centre = size * direction / np.linalg.norm(direction, axis=0)
@@ -128,7 +128,7 @@ def test_the_form_that_is_kept_falls_over_boxes_here_and_there(period: float) ->
 
 @pytest.mark.parametrize("period", PERIODS)
 def test_flights_from_its_edge_come_to_rest_and_stay_in_it(period: float) -> None:
-    loop, R, direction = Loop(period=period), kept(period), np.random.default_rng(6).standard_normal((6, 500))
+    loop, R, direction = Loop(period=period), read_ellipsoid(period), np.random.default_rng(6).standard_normal((6, 500))
     state = np.linalg.solve(R, direction / np.linalg.norm(direction, axis=0))
     before = np.ones(500)
     for _ in range(round(6.0 / period)):
@@ -141,23 +141,23 @@ def test_flights_from_its_edge_come_to_rest_and_stay_in_it(period: float) -> Non
 
 def test_a_small_ellipsoid_is_proved_at_once() -> None:
     """There the law is nearly linear."""
-    assert prove(Loop(period=0.01), kept(0.01) / 0.003, 1) == 0
+    assert prove(Loop(period=0.01), read_ellipsoid(0.01) / 0.003, 1) == 0
 
 
 @pytest.mark.parametrize("size", [0.3, 0.9])
 def test_boxes_are_halved_until_the_form_is_seen_to_fall(size: float) -> None:
     """The law jumps in both of them."""
-    fall = Fall(Loop(period=0.01), kept(0.01))
+    fall = Decrease(Loop(period=0.01), read_ellipsoid(0.01))
     box = Boxes(centre=size * np.array([[0.05, 0.4, 0.4, 0.4, 0.05, 0.4]]).T, radius=np.full((6, 1), 0.05 * size))
     assert fall.over(box).anywhere.high > 0.0
-    assert 1 < shown(fall, box, 0.0, 20_000) < 20_000
+    assert 1 < prove_boxes(fall, box, 0.0, 20_000) < 20_000
 
 
 def test_what_is_not_so_is_not_proved() -> None:
-    loop, R = Loop(period=0.01), kept(0.01)
+    loop, R = Loop(period=0.01), read_ellipsoid(0.01)
     with pytest.raises(NotProven, match="the form rises from y = "):
         prove(loop, R / 1.5, 100_000)
-    assert 1.0 < refused_from(loop, R) < 1.5
+    assert 1.0 < refuted_factor(loop, R) < 1.5
     with pytest.raises(NotProven, match="the ellipsoid is too large: "):
         prove(loop, R / 4.0, 100_000)
     with pytest.raises(NotProven, match="1000 boxes do not show"):
@@ -190,7 +190,7 @@ def test_halves_are_the_whole() -> None:
 def test_the_page_says_how_far_what_is_kept_goes() -> None:
     page = (Path(__file__).parents[2] / "docs" / "certificates.md").read_text(encoding="utf-8")
     for period in PERIODS:
-        y, vy, phi, p, z, vz = reach(kept(period))
+        y, vy, phi, p, z, vz = extents(read_ellipsoid(period))
         row = f"| {1e3 * period:g} ms | {1e2 * y:.1f} cm | {vy:.2f} m/s | {np.degrees(phi):.1f}° | {p:.1f} rad/s | "
         assert f"{row}{1e2 * z:.1f} cm | {vz:.2f} m/s |" in page
 
@@ -198,11 +198,11 @@ def test_the_page_says_how_far_what_is_kept_goes() -> None:
 def test_the_command_proves_what_was_kept(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    small = kept(0.01) / 0.001
+    small = read_ellipsoid(0.01) / 0.001
     monkeypatch.setattr("docs.lateral_basin.proof.LARGER", 1.1)
-    monkeypatch.setattr("docs.lateral_basin.kept.FILE", tmp_path / "ellipsoids.json")
-    keep(0.01, small)
-    assert (kept(0.01) == small).all()
+    monkeypatch.setattr("docs.lateral_basin.ellipsoids.FILE", tmp_path / "ellipsoids.json")
+    write_ellipsoid(0.01, small)
+    assert (read_ellipsoid(0.01) == small).all()
     main(["0.01"])
     assert capsys.readouterr().out.startswith("0.01 s: y ")
     with pytest.raises(UsageError, match="others are looked for"):
@@ -212,13 +212,13 @@ def test_the_command_proves_what_was_kept(
 def test_flights_show_where_the_basin_ends_if_they_find_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("docs.lateral_basin.__main__.STARTS", 4)
     monkeypatch.setattr("docs.lateral_basin.__main__.FLIGHT", 10.0)
-    assert np.isnan(flown(Loop(period=0.04))[STATES.index("φ")])
-    assert not np.isnan(flown(Loop(period=0.1))).any()
+    assert np.isnan(first_losses(Loop(period=0.04))[STATES.index("φ")])
+    assert not np.isnan(first_losses(Loop(period=0.1))).any()
 
 
 def test_the_search_finds_an_ellipsoid_in_which_points_fall(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("docs.lateral_basin.search.POINTS", 200)
     loop = Loop(period=0.01)
-    R = found(loop, 2)
+    R = largest_ellipsoid(loop, 2)
     at: Floats = np.linalg.inv(R) @ np.random.default_rng(8).standard_normal((6, 100)) / 6.0
     assert (np.linalg.norm(R @ loop.after(at), axis=0) < np.linalg.norm(R @ at, axis=0)).all()

@@ -12,7 +12,7 @@ import pytest
 import typer.main
 
 from docs.newcomer.blocks import Block, blocks_of
-from docs.newcomer.following import Newcomer, NotAsSaid
+from docs.newcomer.following import BlockFailed, Newcomer
 from docs.newcomer.pages import pages
 from docs.newcomer.readers import reader_of
 from orchestration.basics.documents import read_toml
@@ -38,9 +38,9 @@ def page(folder: Path, text: str) -> list[Block]:
 def followed(text: str, folder: Path) -> Newcomer:
     """Somebody who has done what a page with this text says."""
     newcomer = Newcomer(folder, lambda line: None)
-    newcomer.opens_a_page()
+    newcomer.start_page()
     for block in page(folder, text):
-        newcomer.follows(block)
+        newcomer.follow(block)
     return newcomer
 
 
@@ -125,7 +125,7 @@ def test_flights_of_the_pages_begin(words: list[str], main: Main) -> None:
     ],
 )
 def test_a_newcomer_ends_where_a_page_is_wrong(text: str, said: str, tmp_path: Path) -> None:
-    with pytest.raises(NotAsSaid, match=said):
+    with pytest.raises(BlockFailed, match=said):
         followed(text, tmp_path)
 
 

@@ -57,7 +57,7 @@ def test_each_law_stands_the_stall_of_the_page_and_not_a_millisecond_more(law: s
     told = re.search(rf"\| {re.escape(law)} \| (\d+) ms \|", FINDING)
     assert told is not None
     for more, good in ((0.0, True), (1.0, False)):
-        file = processor.certain(*processor.LAWS[law])
+        file = processor.without_chance(*processor.LAWS[law])
         file["computers"]["autopilot"]["tasks"]["storage"]["execution"] = (float(told[1]) + more) / 1e3
         assert quadcosim.run(file, engine="compiled").metrics["good"] == good
 
