@@ -27,8 +27,8 @@ SMALL = (7.0, 3.2)
 """[inch]"""
 
 
-def flown(name: str, **changes: Any) -> Result:
-    """A run of an example; changes go by path, with `__` for the dots of it."""
+def simulate(name: str, **changes: Any) -> Result:
+    """Run an example; changes are by path, with `__` for dots."""
     system = load_system(HERE / name / "system.toml")
     return run(changed(system, {path.replace("__", "."): value for path, value in changes.items()}))
 
@@ -44,11 +44,11 @@ def held(axes: Axes, result: Result, signal: str, color: str, label: str) -> Non
 
 
 def water_tank() -> Figure:
-    """The level with a prompt valve and a late one, and what the bound says."""
+    """The level with a prompt and with late valves, and the bound."""
     figure = Figure(figsize=SMALL)
     axes = figure.subplots()
     for delay, color in ((0.0, GREEN), (0.25, BLUE), (0.6, ORANGE)):
-        result = flown("water_tank", stop_time=10.0, connections__valve__delay=delay)
+        result = simulate("water_tank", stop_time=10.0, connections__valve__delay=delay)
         line(axes, result, "tank.level", color, f"valve {delay:g} s late: peak {result.metrics['peak']:.2f} m")
         axes.axhline(2.0 + 0.1 + delay, color=color, linestyle=":", linewidth=1.0)
     axes.axhspan(1.0, 2.0, color=GREY, alpha=0.12, label="where the valve is left as it is")
@@ -62,7 +62,7 @@ def double_integrator() -> Figure:
     figure = Figure(figsize=SMALL)
     axes = figure.subplots()
     for period, color in ((0.5, GREEN), (1.8, BLUE), (2.1, RED)):
-        result = flown("double_integrator", stop_time=25.0, components__controller__sampling__period=period)
+        result = simulate("double_integrator", stop_time=25.0, components__controller__sampling__period=period)
         line(axes, result, "plant.x", color, f"period {period:g} s")
     axes.set(xlabel="time [s]", ylabel="x [m]", ylim=(-8.0, 8.0), title="by theory it dies out below a period of 2 s")
     axes.legend(loc="lower left", ncols=3, frameon=True, framealpha=0.9)
@@ -80,7 +80,7 @@ def dc_servo() -> Figure:
         ("and up to 4 ms more, a tenth lost", 0.012, 0.004, 0.1, RED),
     )
     for label, delay, jitter, loss, color in wires:
-        result = flown(
+        result = simulate(
             "dc_servo", stop_time=0.6, connections__command__delay=delay,
             connections__command__delay_jitter=jitter, connections__command__loss=loss,
         )  # fmt: skip
@@ -99,7 +99,7 @@ def minimum_variance() -> Figure:
     axes.plot(gains, variance * (1.0 - gains + gains**2 / 3.0) + 0.5, color=BLUE, label="x², theory")
     axes.plot(gains, variance * (1.0 - gains + 4.0 * gains**2 / 3.0) + 0.5, color=ORANGE, label="x² + u², theory")
     for gain in (0.4, 0.65, 3.0 - math.sqrt(3.0), 1.6):
-        runs = [flown("minimum_variance", seed=s, components__controller__parameters__gain=gain) for s in range(8)]
+        runs = [simulate("minimum_variance", seed=s, components__controller__parameters__gain=gain) for s in range(8)]
         variances, efforts = (np.array([r.metrics[name] for r in runs], float) for name in ("variance", "effort"))
         for costs, color in ((variances, BLUE), (variances + efforts, ORANGE)):
             axes.plot([gain] * len(costs), costs, ".", color=color, markersize=4)
@@ -110,10 +110,10 @@ def minimum_variance() -> Figure:
 
 
 def four_components() -> Figure:
-    """Speed and forces on the way."""
+    """Speed and forces over time."""
     figure = Figure(figsize=(7.0, 5.0))
     speeds, forces = figure.subplots(2, 1, sharex=True)
-    result = flown("four_components")
+    result = simulate("four_components")
     speeds.axhline(25.0, color=GREY, linestyle=":", label="set speed")
     held(speeds, result, "sensor.filtered", ORANGE, "sensor, every 10 ms")
     line(speeds, result, "car.speed", BLUE, "car")
@@ -127,11 +127,11 @@ def four_components() -> Figure:
 
 
 def three_servos() -> Figure:
-    """The angles, with the processor given by rates and by deadlines."""
+    """The angles, with the processor scheduled by rates and by deadlines."""
     figure = Figure(figsize=SMALL)
     both = figure.subplots(1, 2, sharey=True)
     for axes, how in zip(both, ("fixed-priority", "earliest-deadline-first")):
-        result = flown("three_servos", stop_time=0.6, computers__node__scheduling=how)
+        result = simulate("three_servos", stop_time=0.6, computers__node__scheduling=how)
         for name, period, color in (("slow", 6, RED), ("middle", 5, BLUE), ("fast", 4, GREEN)):
             line(axes, result, f"{name}_servo.angle", color, f"every {period} ms")
         axes.set(xlabel="time [s]", ylim=(-3.0, 3.0), title=how.replace("-", " "))
@@ -141,13 +141,13 @@ def three_servos() -> Figure:
 
 
 def autopilot() -> Figure:
-    """Who has the processor and the bus at the beginning."""
+    """The schedule of processor and bus at the beginning."""
     found = schedule(HERE / "autopilot" / "flight.toml", until=0.2)
     return gantt.draw(found.timeline, DOCS, (0.0, 0.05))
 
 
 def distributed_servo() -> Figure:
-    """The exact cost over period and delay, with the line from which on there is none."""
+    """The exact cost over period and delay, with the line beyond which it is not finite."""
     system = load_system(HERE / "distributed_servo" / "system.toml")
     periods, delays = np.linspace(0.001, 0.016, 31), np.linspace(0.0, 0.016, 33)
     cost, radius = (np.full((len(delays), len(periods)), np.nan) for _ in range(2))
@@ -176,9 +176,9 @@ def distributed_servo() -> Figure:
 
 
 NO_END = 1e9
-"""in place of a cost that is not finite, for what is drawn beside it"""
+"""replaces a cost that is not finite, for the contours beside it"""
 PERIOD = ("sampling.period", "parameters.period")
-"""of the PD controller: when it samples, and for which it is programmed"""
+"""of the PD controller: that of its samples, and that for which it is programmed"""
 
 
 FIGURES: dict[str, Callable[[], Figure]] = {

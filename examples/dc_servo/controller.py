@@ -1,4 +1,4 @@
-"""A PID controller as it is programmed."""
+"""A discrete PID controller."""
 
 from fmu_kit.interface import Input, Local, Output, Parameter
 from fmu_kit.slave import Slave
@@ -25,11 +25,11 @@ class PidController(Slave):
     initial_outputs_depend_on_inputs = False
 
     def initialise(self, t: float) -> None:
-        """At rest until the first sample."""
+        """The controller is at rest until the first sample."""
         self.last_angle = self.angle
 
     def step(self, t: float, h: float) -> None:
-        """Sample: command first, then what the next one needs."""
+        """Sample: the command first, then the state for the next sample."""
         K, Td, N, period = self.K, self.Td, self.N, self.period
         angle, error = self.angle, self.reference - self.angle
         self.derivative = (Td * self.derivative - K * Td * N * (angle - self.last_angle)) / (Td + N * period)

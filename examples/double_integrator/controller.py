@@ -18,5 +18,5 @@ class StateFeedback(Slave):
         self.step(t, 0.0)
 
     def step(self, t: float, h: float) -> None:
-        """The command for the state that was measured."""
+        """The command for the measured state."""
         self.u = -self.k_p * self.x - self.k_d * self.v

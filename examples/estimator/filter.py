@@ -1,4 +1,4 @@
-"""An extended Kalman filter for position, velocity and attitude, about the error of its own estimate."""
+"""An extended Kalman filter for position, velocity and attitude, in terms of the error of its estimate."""
 
 from fmu_kit.algebra import ZERO, Quaternion, Vec3
 from fmu_kit.interface import Input, Local, Parameter, State
@@ -7,7 +7,7 @@ from fmu_kit.slave import Slave
 
 Matrix = list[list[float]]
 SIZE = 9
-"""errors: of position and velocity, inertial, and of the attitude, as a small rotation about the body's axes"""
+"""errors of position and velocity, inertial, and of the attitude, as a small rotation about the body's axes"""
 
 
 class KalmanFilter(Slave):
@@ -39,7 +39,7 @@ class KalmanFilter(Slave):
     initial_outputs_depend_on_inputs = False
 
     def initialise(self, t: float) -> None:
-        """How little is known at the start."""
+        """Set the initial covariance."""
         deviations = (self.position_deviation, self.velocity_deviation, self.attitude_deviation)
         self._P = [[deviations[i // 3] ** 2 if i == j else 0.0 for j in range(SIZE)] for i in range(SIZE)]
 
@@ -48,29 +48,29 @@ class KalmanFilter(Slave):
         return {"covariance": self._P}
 
     def restore(self, state: Saved) -> None:
-        """Put it back."""
+        """Restore the covariance."""
         self._P = [[float(each) for each in row] for row in state["covariance"]]
 
     def step(self, t: float, h: float) -> None:
-        """Sample: what has happened since the last one, then what the compass and a new fix say of it."""
+        """Sample: predict from the last one, then correct by the compass and by a new fix."""
         if t > 0.0:
             self._predict(0.5 * (self.angular_velocity + self.rate), h)
         self.angular_velocity = self.rate
-        seen = self.quaternion.to_body(Vec3(1.0, 0.0, 0.0))
-        compass = [[*_NONE, *_NONE, *row] for row in _cross(seen)]
-        error = self._corrected([0.0] * SIZE, compass, self.north - seen, self.north_noise)
+        expected = self.quaternion.to_body(Vec3(1.0, 0.0, 0.0))
+        compass = [[*_NONE, *_NONE, *row] for row in _cross(expected)]
+        error = self._corrected([0.0] * SIZE, compass, self.north - expected, self.north_noise)
         if self.fix > self.last_fix:
-            told = self.fix_position - self.position
-            error = self._corrected(error, [[*row, *_NONE, *_NONE] for row in _AXES], told, self.position_noise)
-            told = self.fix_velocity - self.velocity
-            error = self._corrected(error, [[*_NONE, *row, *_NONE] for row in _AXES], told, self.velocity_noise)
+            residual = self.fix_position - self.position
+            error = self._corrected(error, [[*row, *_NONE, *_NONE] for row in _AXES], residual, self.position_noise)
+            residual = self.fix_velocity - self.velocity
+            error = self._corrected(error, [[*_NONE, *row, *_NONE] for row in _AXES], residual, self.velocity_noise)
             self.last_fix = self.fix
         self.position = self.position + Vec3(*error[0:3])
         self.velocity = self.velocity + Vec3(*error[3:6])
         self.quaternion = (self.quaternion * Quaternion(0.5 * Vec3(*error[6:9]), 1.0)).unit()
 
     def _predict(self, rate: Vec3, h: float) -> None:
-        """Strapdown integration over `h` [s], and what becomes of the covariance by its derivatives."""
+        """Strapdown integration over `h` [s], and propagation of the covariance."""
         turn = Quaternion(0.5 * h * rate, 1.0).unit()
         half = (self.quaternion * Quaternion(0.25 * h * rate, 1.0)).unit()
         acceleration = half.to_inertial(self.specific_force) + Vec3(0.0, 0.0, self.gravity)
@@ -93,13 +93,13 @@ class KalmanFilter(Slave):
             self._P[6 + i][6 + i] += (h * self.rate_noise) ** 2
 
     def _corrected(self, error: list[float], rows: Matrix, residual: Vec3, noise: float) -> list[float]:
-        """The errors by three scalars more, one after the other, which are `rows` times them, and noise."""
-        for row, told in zip(rows, residual):
+        """The estimated errors after three scalar measurements in turn: `rows` times the errors, with noise."""
+        for row, measured in zip(rows, residual):
             gain = [sum(row[j] * self._P[i][j] for j in range(SIZE)) for i in range(SIZE)]
-            spread = sum(row[j] * gain[j] for j in range(SIZE)) + noise**2
-            surprise = (told - sum(row[j] * error[j] for j in range(SIZE))) / spread
-            error = [error[i] + gain[i] * surprise for i in range(SIZE)]
-            self._P = [[self._P[i][j] - gain[i] * gain[j] / spread for j in range(SIZE)] for i in range(SIZE)]
+            variance = sum(row[j] * gain[j] for j in range(SIZE)) + noise**2
+            innovation = (measured - sum(row[j] * error[j] for j in range(SIZE))) / variance
+            error = [error[i] + gain[i] * innovation for i in range(SIZE)]
+            self._P = [[self._P[i][j] - gain[i] * gain[j] / variance for j in range(SIZE)] for i in range(SIZE)]
         return error
 
 
@@ -108,5 +108,5 @@ _AXES = (Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
 
 
 def _cross(a: Vec3) -> Matrix:
-    """[a]×."""
+    """The matrix [a]×."""
     return [[0.0, -a.z, a.y], [a.z, 0.0, -a.x], [-a.y, a.x, 0.0]]

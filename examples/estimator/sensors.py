@@ -1,4 +1,4 @@
-"""An inertial unit with a compass, and a receiver of satellites: what they measure, without noise."""
+"""An inertial unit with a compass, and a satellite receiver: their measurements without noise."""
 
 from fmu_kit.algebra import ZERO, Quaternion, Vec3
 from fmu_kit.interface import Input, Local, Output, Parameter
@@ -26,18 +26,18 @@ class InertialUnit(Slave):
     last_quaternion = Local("at the last sample", "1", Quaternion(ZERO, 1.0))
 
     def initialise(self, t: float) -> None:
-        """At rest until the first sample."""
+        """Measure at rest until the first sample."""
         self._measure(ZERO, self.quaternion.unit())
 
     def step(self, t: float, h: float) -> None:
-        """Sample: what has been felt since the last one."""
+        """Sample: the mean specific force since the last one."""
         attitude, last = self.quaternion.unit(), self.last_quaternion.unit()
         middle = Quaternion(attitude.vector + last.vector, attitude.scalar + last.scalar).unit()
         self._measure((self.velocity - self.last_velocity) / h if t > 0.0 else ZERO, middle)
 
     def _measure(self, acceleration: Vec3, attitude: Quaternion) -> None:
-        felt = attitude.to_body(acceleration - Vec3(0.0, 0.0, self.gravity))
-        self.specific_force = felt + self.force_bias
+        force = attitude.to_body(acceleration - Vec3(0.0, 0.0, self.gravity))
+        self.specific_force = force + self.force_bias
         self.angular_velocity = self.rate + self.rate_bias
         self.north = self.quaternion.unit().to_body(Vec3(1.0, 0.0, 0.0))
         self.last_velocity, self.last_quaternion = self.velocity, self.quaternion

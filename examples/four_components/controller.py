@@ -22,13 +22,13 @@ class CruiseController(Slave):
     initial_outputs_depend_on_inputs = False
 
     def initialise(self, t: float) -> None:
-        """Ask for the initial force."""
+        """Command the initial force."""
         self.force = self.integral = self.first_force
 
     def step(self, t: float, h: float) -> None:
         """Sample; `h` is the time until the next one."""
         error = self.set_speed - self.speed
-        wanted = self.k_p * error + self.integral
-        self.force = min(max(wanted, 0.0), self.force_max)
-        if self.force == wanted:
+        demand = self.k_p * error + self.integral
+        self.force = min(max(demand, 0.0), self.force_max)
+        if self.force == demand:
             self.integral = self.integral + self.k_i * h * error

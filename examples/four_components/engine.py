@@ -1,4 +1,4 @@
-"""An engine, which follows what is asked of it."""
+"""An engine with a limited rate of change."""
 
 from fmu_kit.interface import Input, Parameter, State
 from fmu_kit.slave import Slave

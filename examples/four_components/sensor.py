@@ -17,7 +17,7 @@ class SpeedSensor(Slave):
     time_constant = Parameter("of the filter", "s", 0.05, above=0.0)
 
     def initialise(self, t: float) -> None:
-        """Start at what is measured."""
+        """Start at the measured speed."""
         self.filtered = self.speed
 
     def step(self, t: float, h: float) -> None:

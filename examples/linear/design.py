@@ -1,4 +1,4 @@
-"""Gains of LQR, LQI and PID from the plant's FMU, and what margins they have: `python examples/linear/design.py`.
+"""Gains of LQR, LQI and PID from the plant's FMU, with their margins: `python examples/linear/design.py`.
 
 Writes lqr.toml, lqi.toml and pid.toml beside this file, and figure.png. It needs the extra `control`, and a C compiler.
 """
@@ -21,29 +21,29 @@ from quadcosim import FmuChoice, Linearised, Scenario, StateSpace, Timing
 
 HERE = Path(__file__).resolve().parent
 PERIOD = 0.01
-"""[s]; gains are for this one, which is that of a scenario without another word"""
+"""[s] of the design, the default of scenarios"""
 GRAVITY = 9.81
 LARGEST = {"position": 0.5, "velocity": 1.0, "quaternion": 0.1, "angular_velocity": 2.0}
-"""What may be at once, by which errors are weighed against commands (Bryson)"""
+"""Acceptable sizes, by which errors are weighed against commands (Bryson's rule)"""
 COMMANDS = {"thrust": 4.0, "torque": 6.0}
 INTEGRAL = 0.5
-"""[m.s], likewise"""
+"""[m.s], acceptable size of the integral"""
 ATTITUDE, POSITION = (12.0, 60.0), (2.5, 45.0)
-"""Of the PID: the crossovers of its loops [rad/s], and their phase margins [degrees]"""
+"""Crossover [rad/s] and phase margin [degrees] of the PID's loops"""
 SLOW = POSITION[0] / 5.0
-"""[1/s], of its integral"""
+"""[1/s], corner of its integral"""
 PULLED_BY = {"x": ("torque.y", -1.0 / GRAVITY), "y": ("torque.x", 1.0 / GRAVITY), "z": ("thrust", -1.0)}
-"""What moves the vehicle along an axis, and how much of it is told, an attitude or a thrust, for 1 m/s² (of 1 kg)"""
+"""The command that moves the vehicle along an axis, and the attitude or thrust commanded for 1 m/s² (of 1 kg)"""
 
 FREQUENCIES = np.geomspace(0.3, 0.99 * np.pi / PERIOD, 400)
-"""[rad/s]; those of pictures and margins"""
+"""[rad/s], of figures and margins"""
 
 Matrix = npt.NDArray[np.float64]
 Gains = dict[str, list[float]]
 
 
 def loop_of(gains: Mapping[str, list[float]] | None = None, delay: float = 0.0) -> Linearised:
-    """The loop about hover, with these gains."""
+    """The loop about hover with these gains."""
     parameters: dict[str, Parameter] = {
         f"{name}.{axis}": value for name, each in (gains or {}).items() for axis, value in zip("xyz", each)
     }
@@ -56,13 +56,13 @@ def loop_of(gains: Mapping[str, list[float]] | None = None, delay: float = 0.0) 
 
 
 def lqr(plant: StateSpace) -> Gains:
-    """Least sum of squares of errors and commands, each by what may be of it."""
+    """LQR: the least weighted sum of squares of errors and commands."""
     feedback, _, _ = control.dlqr(plant.A, plant.B, *_weights(plant))
     return _as_gains(plant, feedback @ np.linalg.pinv(plant.C))
 
 
 def lqi(plant: StateSpace) -> Gains:
-    """The same with the integral of the position, as the law sums it up: z(k+1) = z(k) + T position(k)."""
+    """LQI: LQR with the integral of the position, as in the law: z(k+1) = z(k) + T position(k)."""
     places = [plant.outputs.index(f"position.{axis}") for axis in "xyz"]
     n, m = plant.B.shape
     A = np.block([[plant.A, np.zeros((n, 3))], [PERIOD * plant.C[places], np.eye(3)]])
@@ -74,14 +74,14 @@ def lqi(plant: StateSpace) -> Gains:
 
 
 def pid(plant: StateSpace) -> Gains:
-    """By crossover and phase margin: of the attitude first, then of the position over it, each on the sampled loop."""
+    """PID by crossover and phase margin: first of the attitude, then of the position over it, on the sampled loops."""
     at = plant.to_control()
 
     def response(z: complex, command: str, measured: str) -> complex:
         return complex(at(z)[plant.outputs.index(measured), plant.inputs.index(command)])
 
     def attitude(z: complex, axis: str) -> tuple[complex, complex]:
-        """What k_tilt and k_rate are times in the loop of a torque."""
+        """The factors of k_tilt and k_rate in the loop of a torque."""
         return 2.0 * response(z, f"torque.{axis}", f"quaternion.{axis}"), response(
             z, f"torque.{axis}", f"angular_velocity.{axis}"
         )
@@ -89,7 +89,7 @@ def pid(plant: StateSpace) -> Gains:
     tilt, rate = np.transpose([_crossing(partial(attitude, axis=axis), *ATTITUDE) for axis in "xyz"]).tolist()
 
     def pulled(z: complex, axis: str) -> tuple[complex, complex]:
-        """What k_p, with its integral, and k_d are times in the loop of what errors ask for."""
+        """The factors of k_p, with its integral, and of k_d in the loop of the position."""
         command, factor = PULLED_BY[axis]
         if command != "thrust":
             i = "xyz".index(command[-1])
@@ -104,7 +104,7 @@ def pid(plant: StateSpace) -> Gains:
 
 
 def _crossing(parts: Callable[[complex], tuple[complex, complex]], frequency: float, margin: float) -> list[float]:
-    """The two gains with which the sum of the parts of a loop has the size one at a frequency, and a phase margin."""
+    """The two gains for which the sum of the parts of a loop has magnitude one at a frequency, and a phase margin."""
     of, loop = parts(complex(np.exp(1j * frequency * PERIOD))), -np.exp(1j * np.radians(margin))
     found: list[float] = np.linalg.solve([np.real(of), np.imag(of)], [loop.real, loop.imag]).tolist()
     return found
@@ -114,14 +114,14 @@ def _crossing(parts: Callable[[complex], tuple[complex, complex]], frequency: fl
 
 
 def _weights(plant: StateSpace) -> tuple[Matrix, Matrix]:
-    """Of states and commands."""
+    """The weights of states and commands."""
     errors = np.array([1.0 / LARGEST[name.partition(".")[0]] for name in plant.outputs])
     commands = np.array([1.0 / COMMANDS[name.partition(".")[0]] for name in plant.inputs])
     return plant.C.T @ np.diag(errors**2) @ plant.C, np.diag(commands**2)
 
 
 def _as_gains(plant: StateSpace, by_measured: Matrix, by_integral: Matrix | None = None) -> Gains:
-    """The law's gains of a feedback u = -K y; that of a tilt is a factor of those of the position along its axis."""
+    """The law's gains for a feedback u = -K y; that of the tilt is a factor of those of the position along its axis."""
 
     def gain(command: str, measured: str) -> float:
         return float(by_measured[plant.inputs.index(command), plant.outputs.index(measured)])
@@ -130,11 +130,11 @@ def _as_gains(plant: StateSpace, by_measured: Matrix, by_integral: Matrix | None
         return 0.0 if by_integral is None else float(by_integral[plant.inputs.index(command), axis])
 
     tilt = [gain(f"torque.{axis}", f"quaternion.{axis}") / 2.0 for axis in "xyz"]
-    told = {
+    factors = {
         command: factor * (1.0 if command == "thrust" else tilt["xyz".index(command[-1])])
         for command, factor in PULLED_BY.values()
     }
-    by_axis = [(axis, command, told[command]) for axis, (command, _) in PULLED_BY.items()]
+    by_axis = [(axis, command, factors[command]) for axis, (command, _) in PULLED_BY.items()]
     return {
         "k_p": [gain(command, f"position.{axis}") / factor for axis, command, factor in by_axis],
         "k_d": [gain(command, f"velocity.{axis}") / factor for axis, command, factor in by_axis],
@@ -144,11 +144,11 @@ def _as_gains(plant: StateSpace, by_measured: Matrix, by_integral: Matrix | None
     }
 
 
-# -- what they come to -----------------------------------------------------------------------------------------------
+# -- margins ---------------------------------------------------------------------------------------------------------
 
 
 def broken_at(loop: Linearised, command: str) -> Any:
-    """The frequency response of the loop of one command: of a vehicle whose axes do not know each other."""
+    """The frequency response of the loop of one command, for a vehicle with decoupled axes."""
     i = loop.rest.inputs.index(command)
     law, rest = loop.component.to_control(), loop.rest.to_control()
     points = np.exp(1j * FREQUENCIES * loop.rest.dt)
@@ -156,13 +156,13 @@ def broken_at(loop: Linearised, command: str) -> Any:
 
 
 def margins(loop: Linearised, command: str) -> tuple[float, float]:
-    """The phase margin [degrees] and the frequency [rad/s] where that is."""
+    """The phase margin [degrees] and its frequency [rad/s]."""
     _, phase, _, _, crossover, _ = control.stability_margins(broken_at(loop, command))
     return float(phase), float(crossover)
 
 
 def bode(sets: Mapping[str, Gains]) -> Figure:
-    """Of the loop of the torque about y, in which the position is too."""
+    """The Bode plot of the loop of the torque about y, which includes the position."""
     figure = Figure(figsize=(7.0, 5.0))
     sizes, phases = figure.subplots(2, 1, sharex=True)
     for (name, gains), color in zip(sets.items(), (GREY, BLUE, GREEN, ORANGE)):
@@ -180,7 +180,7 @@ def bode(sets: Mapping[str, Gains]) -> Figure:
 
 
 def main() -> None:
-    """Design, write, and say the margins."""
+    """Design and write the gains, and print the margins."""
     plant = loop_of().rest
     found = {"lqr": lqr(plant), "lqi": lqi(plant), "pid": pid(plant)}
     for name, gains in found.items():

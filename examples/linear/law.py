@@ -1,4 +1,4 @@
-"""PID on the position over PD on the attitude: which is what LQR, LQI and PID of a hovering quadrotor all are."""
+"""PID on the position over PD on the attitude: the form of LQR, LQI and PID of a hovering quadrotor."""
 
 from fmu_kit.algebra import ZERO, Inertia, Quaternion, Vec3
 from fmu_kit.interface import Input, Local, Output, Parameter
@@ -31,21 +31,21 @@ class LinearFeedback(Slave):
     gravity = Parameter("of the place", "m/s2", 9.81, above=0.0)
 
     def step(self, t: float, h: float) -> None:
-        """Sample: command first, then the integral, which waits while the pull is at its bound."""
+        """Sample: the command first, then the integral, which stops while the pull is at its bound."""
         if not any(self.quaternion):
-            return  # nothing is measured yet: some masters begin so
+            return  # no measurement yet, as with some masters
         error = self.target - self.position
-        wanted = self.k_p * error + self.k_d * (self.target_velocity - self.velocity) + self.k_i * self.integral
-        pull = wanted.map(self._bounded)
+        demand = self.k_p * error + self.k_d * (self.target_velocity - self.velocity) + self.k_i * self.integral
+        pull = demand.map(self._bounded)
         acceleration, q = self.target_acceleration + pull, self.quaternion
         self.thrust = max(0.0, self.mass * (self.gravity - acceleration.z))
         tilt = Vec3(acceleration.y / self.gravity, -acceleration.x / self.gravity, 0.0)
-        lag = tilt - 2.0 * q.scalar * q.vector  # about level, the angles by which the body is turned
+        lag = tilt - 2.0 * q.scalar * q.vector  # near level, the angles of the body
         self.torque = self.inertia @ (self.k_tilt * lag - self.k_rate * self.angular_velocity)
         self.integral = self.integral + h * Vec3(
-            error.x if pull.x == wanted.x else 0.0,
-            error.y if pull.y == wanted.y else 0.0,
-            error.z if pull.z == wanted.z else 0.0,
+            error.x if pull.x == demand.x else 0.0,
+            error.y if pull.y == demand.y else 0.0,
+            error.z if pull.z == demand.z else 0.0,
         )
 
     def _bounded(self, pull: float) -> float:

@@ -1,4 +1,4 @@
-"""An LQG controller: a Kalman filter that knows the plant, its command and how late that is, and a gain."""
+"""An LQG controller: a Kalman filter that knows the plant, the command and its delay, and a gain."""
 
 import math
 
@@ -31,21 +31,21 @@ class LqgController(Slave):
     initial_outputs_depend_on_inputs = False
 
     def initialise(self, t: float) -> None:
-        """Upright and at rest, as far as it knows."""
+        """The estimate is upright and at rest."""
 
     def step(self, t: float, h: float) -> None:
         """Sample: predict, correct, command."""
         angle, rate = self._held(self.angle, self.rate, self.last_u, self.delay)
         angle, rate = self._held(angle, rate, self.u, self.period - self.delay)
-        surprise = self.y - angle
-        self.angle = angle + self.l_angle * surprise
-        self.rate = rate + self.l_rate * surprise
+        innovation = self.y - angle
+        self.angle = angle + self.l_angle * innovation
+        self.rate = rate + self.l_rate * innovation
         self.last_u = self.u
         self.u = self.k_angle * self.angle + self.k_rate * self.rate + self.k_u * self.last_u
 
     def _held(self, angle: float, rate: float, u: float, time: float) -> tuple[float, float]:
-        """Angle and rate `time` later, the command held."""
+        """Angle and rate `time` later, under a held command."""
         omega = self.omega
         growing = 0.5 * (angle - u + rate / omega) * math.exp(omega * time)
-        dying = 0.5 * (angle - u - rate / omega) * math.exp(-omega * time)
-        return u + growing + dying, omega * (growing - dying)
+        decaying = 0.5 * (angle - u - rate / omega) * math.exp(-omega * time)
+        return u + growing + decaying, omega * (growing - decaying)

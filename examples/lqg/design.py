@@ -1,6 +1,6 @@
-"""The gains of LQG for the loop of system.toml, and what it costs: `python examples/lqg/design.py`.
+"""The gains of LQG for the loop of system.toml, and its cost: `python examples/lqg/design.py`.
 
-In discrete time, by Riccati equations of scipy: what is in between samples is put into matrices at these. Prints the
+In discrete time, by scipy's Riccati equations: the time between samples is integrated into the matrices. Prints the
 gains for some delays, and draws figure.png.
 """
 
@@ -26,7 +26,7 @@ HERE = Path(__file__).resolve().parent
 OMEGA, PERIOD = 3.0, 0.1
 """of the pendulum [1/s], and of the controller [s]"""
 PRICE = 0.1
-"""of u², beside the square of the angle"""
+"""weight of u² relative to the square of the angle"""
 DISTURBANCE, NOISE = 0.01, 0.01
 """its intensity [rad²/s³]; standard deviation of a measurement [rad]"""
 GAINS = ("k_angle", "k_rate", "k_u", "l_angle", "l_rate")
@@ -38,16 +38,16 @@ RUNS = (0.0, 0.04, 0.08)
 Matrix = npt.NDArray[np.float64]
 
 A = np.array([[0.0, 1.0, 0.0, 0.0], [OMEGA**2, 0.0, -(OMEGA**2), 0.0], [0.0] * 4, [0.0] * 4])
-"""of angle, rate, the command that is held, and the one that is on its way"""
+"""of angle, rate, the held command, and the pending one"""
 ARRIVES = np.eye(4)[[0, 1, 3, 3]]
 W = np.diag([0.0, DISTURBANCE, 0.0, 0.0])
 Q = np.diag([1.0, 0.0, PRICE, 0.0])
-SEEN = np.array([[1.0, 0.0, 0.0]])
+MEASURED = np.array([[1.0, 0.0, 0.0]])
 
 
 @dataclass(frozen=True, kw_only=True)
 class Design:
-    """What is best under a delay."""
+    """The optimal design for a delay."""
 
     gains: dict[str, float]
     """by the parameters of the controller"""
@@ -56,7 +56,7 @@ class Design:
 
 
 def lqg(delay: float = 0.0) -> Design:
-    """The gains that cost least where every command arrives `delay` [s] after its sample, up to a period."""
+    """The optimal gains if every command arrives `delay` [s], up to a period, after its sample."""
     late, soon = _over(delay), _over(PERIOD - delay)
     change = soon[0] @ ARRIVES @ late[0]
     weights = late[1] + late[0].T @ ARRIVES.T @ soon[1] @ ARRIVES @ late[0]
@@ -69,18 +69,18 @@ def lqg(delay: float = 0.0) -> Design:
     K = np.linalg.solve(price, G.T @ S @ F + weights[u, x])
     plant = F[:2, :2]
     predicted = np.zeros((3, 3))
-    predicted[:2, :2] = solve_discrete_are(plant.T, SEEN[:, :2].T, spread[:2, :2], np.array([[NOISE**2]]))
-    L = predicted @ SEEN.T / (SEEN @ predicted @ SEEN.T + NOISE**2)
-    corrected = predicted - L @ SEEN @ predicted
+    predicted[:2, :2] = solve_discrete_are(plant.T, MEASURED[:, :2].T, spread[:2, :2], np.array([[NOISE**2]]))
+    L = predicted @ MEASURED.T / (MEASURED @ predicted @ MEASURED.T + NOISE**2)
+    corrected = predicted - L @ MEASURED @ predicted
     cost = (np.trace(S @ spread) + np.trace(K.T @ price @ K @ corrected) + between) / PERIOD
     gains = [*(0.0 - K[0]).tolist(), *L[:2, 0].tolist()]
     return Design(gains=dict(zip(GAINS, gains)), cost=float(cost))
 
 
 def _over(time: float) -> tuple[Matrix, Matrix, Matrix, float]:
-    """Of a time: e^(At), what a state costs in it as a matrix, the covariance of its noise, and what that costs.
+    """Over a time: e^(At), the cost of the state as a matrix, the covariance of the noise, and its cost.
 
-    All of it is linear in the second moments: moments' = A moments + moments A' + W, cost' = the sum of Q * moments.
+    All are linear in the second moments: moments' = A moments + moments A' + W, cost' = the sum of Q * moments.
     """
     n = len(A)
     moments = np.kron(A, np.eye(n)) + np.kron(np.eye(n), A)
@@ -94,14 +94,14 @@ def _over(time: float) -> tuple[Matrix, Matrix, Matrix, float]:
 
 
 def at(delay: float, *, gain_knows: bool, filter_knows: bool) -> System:
-    """The loop of system.toml under a delay [s]: for which it is designed, or for none."""
-    found = {f"{PARAMETERS}.{name}": gain for name, gain in lqg(delay if gain_knows else 0.0).gains.items()}
-    told = {f"{PARAMETERS}.delay": delay if filter_knows else 0.0, "connections.command.delay": delay}
-    return quadcosim.changed(quadcosim.load_system(HERE / "system.toml"), {**found, **told})
+    """The loop of system.toml under a delay [s], with gain and filter designed for it or for none."""
+    gains = {f"{PARAMETERS}.{name}": gain for name, gain in lqg(delay if gain_knows else 0.0).gains.items()}
+    delays = {f"{PARAMETERS}.delay": delay if filter_knows else 0.0, "connections.command.delay": delay}
+    return quadcosim.changed(quadcosim.load_system(HERE / "system.toml"), {**gains, **delays})
 
 
 def over_delays() -> Figure:
-    """The exact cost over the delay of the command, by who knows of it, and runs."""
+    """The exact cost over the delay of the command, by design, compared with runs."""
     figure = Figure(figsize=(7.0, 3.2))
     axes = figure.subplots()
     delays = np.linspace(0.0, PERIOD, 41)
@@ -111,11 +111,11 @@ def over_delays() -> Figure:
         ("the filter does", ORANGE, False, True),
         ("both do: LQG", BLUE, True, True),
     ):
-        knowing = functools.partial(at, gain_knows=gain_knows, filter_knows=filter_knows)
-        costs = np.array([expected_of(knowing(d), loops).objectives["J"] for d in delays.tolist()], float)
+        system = functools.partial(at, gain_knows=gain_knows, filter_knows=filter_knows)
+        costs = np.array([expected_of(system(d), loops).objectives["J"] for d in delays.tolist()], float)
         axes.plot(1e3 * delays, 1e4 * costs, color=color, label=label)
         for late in RUNS:
-            runs = [quadcosim.run(dataclasses.replace(knowing(late), seed=seed)).metrics["J"] for seed in range(4)]
+            runs = [quadcosim.run(dataclasses.replace(system(late), seed=seed)).metrics["J"] for seed in range(4)]
             axes.plot([1e3 * late] * len(runs), 1e4 * np.array(runs, float), ".", color=color, markersize=4)
     axes.set(xlabel="delay of the command [ms]", ylabel="J [1e-4 rad²]", ylim=(0.0, 50.0))
     axes.set_title("lines: exact; dots: runs of 300 s")
@@ -124,11 +124,11 @@ def over_delays() -> Figure:
 
 
 def main() -> None:
-    """Say the gains for some delays, and draw."""
+    """Print the gains for some delays, and draw the figure."""
     for delay in (0.0, 0.5 * PERIOD, PERIOD):
-        found = lqg(delay)
-        said = ", ".join(f"{name} {value:.6g}" for name, value in found.gains.items())
-        print(f"{1e3 * delay:g} ms late: J = {1e4 * found.cost:.6f}e-4 rad²; {said}")
+        design = lqg(delay)
+        gains = ", ".join(f"{name} {value:.6g}" for name, value in design.gains.items())
+        print(f"{1e3 * delay:g} ms late: J = {1e4 * design.cost:.6f}e-4 rad²; {gains}")
     with DOCS.applied():
         print(*save({"figure": over_delays()}, HERE, DOCS))
 

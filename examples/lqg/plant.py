@@ -1,4 +1,4 @@
-"""An inverted pendulum about upright, which a disturbance drives, solved exactly over each step."""
+"""An inverted pendulum about upright, driven by a disturbance, solved exactly over each step."""
 
 import math
 
@@ -19,11 +19,11 @@ class Pendulum(Slave):
     omega = Parameter("how fast it falls: sqrt(gravity / length)", "1/s", 3.0, above=0.0)
 
     def step(self, t: float, h: float) -> None:
-        """Advance by what grows and what dies out, about the angle at which u and w leave it."""
+        """Advance by the growing and the decaying mode, about the equilibrium angle under u and w."""
         omega = self.omega
         balanced = self.u - self.w / (omega * omega)
         off = self.angle - balanced
         growing = 0.5 * (off + self.rate / omega) * math.exp(omega * h)
-        dying = 0.5 * (off - self.rate / omega) * math.exp(-omega * h)
-        self.angle = balanced + growing + dying
-        self.rate = omega * (growing - dying)
+        decaying = 0.5 * (off - self.rate / omega) * math.exp(-omega * h)
+        self.angle = balanced + growing + decaying
+        self.rate = omega * (growing - decaying)

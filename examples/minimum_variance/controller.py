@@ -16,5 +16,5 @@ class Feedback(Slave):
         self.step(t, 0.0)
 
     def step(self, t: float, h: float) -> None:
-        """The command for the state that was measured."""
+        """The command for the measured state."""
         self.u = -self.gain * self.x

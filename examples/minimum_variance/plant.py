@@ -1,4 +1,4 @@
-"""An integrator that noise drives, solved exactly over each step."""
+"""An integrator driven by noise, solved exactly over each step."""
 
 from fmu_kit.interface import Input, State
 from fmu_kit.slave import Slave

@@ -1,4 +1,4 @@
-"""A PD controller as it is programmed."""
+"""A discrete PD controller."""
 
 from fmu_kit.interface import Input, Local, Output, Parameter
 from fmu_kit.slave import Slave
@@ -17,7 +17,7 @@ class PdController(Slave):
     initial_outputs_depend_on_inputs = False
 
     def initialise(self, t: float) -> None:
-        """At rest until the first sample."""
+        """The controller is at rest until the first sample."""
         self.last_angle = self.angle
 
     def step(self, t: float, h: float) -> None:

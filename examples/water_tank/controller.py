@@ -16,7 +16,7 @@ class TankController(Slave):
     valve = Output("whether the valve is to be open", start=False)
 
     def initialise(self, t: float) -> None:
-        """The command for the initial level; between the two the valve is closed."""
+        """The command for the initial level; the valve is closed between the two levels."""
         self.valve = False
         self.step(t, 0.0)
 

@@ -1,4 +1,4 @@
-"""A tank that water flows into all the time, and out of while its valve is open."""
+"""A tank with a constant inflow, and an outflow while its valve is open."""
 
 from fmu_kit.interface import Input, Parameter, State
 from fmu_kit.slave import Slave
@@ -13,6 +13,6 @@ class Tank(Slave):
     outflow = Parameter("fall of the level by the open valve", "m/s", 2.0, minimum=0.0)
 
     def step(self, t: float, h: float) -> None:
-        """Advance level' = inflow - outflow · valve_control exactly; a tank does not get emptier than empty."""
+        """Advance level' = inflow - outflow · valve_control exactly, with level at least 0."""
         flow = self.inflow - self.outflow * self.valve_control
         self.level = max(0.0, self.level + flow * h)
