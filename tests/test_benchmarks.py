@@ -1,4 +1,4 @@
-"""What the benchmarks work out by themselves."""
+"""Computations of the benchmarks."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Gains per unit inertia: one set of them flies every vehicle on one path."""
+"""Gains per unit inertia: one set gives every vehicle the same path."""
 
 from dataclasses import replace
 from typing import Any

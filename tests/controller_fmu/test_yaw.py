@@ -1,4 +1,4 @@
-"""The nose goes where a yaw says, on a path and in either convention for axes."""
+"""The nose follows the desired yaw, on a path and in either axes convention."""
 
 import math
 

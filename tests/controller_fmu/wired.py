@@ -16,8 +16,8 @@ H = 0.01
 Rows = Iterator[dict[str, list[float]]]
 
 
-def made(slave: type[Slave], frame: Frame, values: dict[str, Any]) -> Any:
-    """One that is told, in the axes of a frame, what `values` say in those of the equations."""
+def created(slave: type[Slave], frame: Frame, values: dict[str, Any]) -> Any:
+    """A slave in the axes convention of `frame`, with `values` given in that of the equations."""
     instance = slave(instance_name="it")
     instance.set_integer([slave._index["frame"]], [frame])
     for attribute, value in values.items():
@@ -25,7 +25,7 @@ def made(slave: type[Slave], frame: Frame, values: dict[str, Any]) -> Any:
     return instance
 
 
-def told(slave: Any) -> dict[str, list[float]]:
+def values_of(slave: Any) -> dict[str, list[float]]:
     """All that a slave shows, turned to the axes of the equations, by attribute."""
     return {name: list(as_vector(getattr(slave, name))) for name in type(slave)._own}
 
@@ -44,7 +44,7 @@ def flight(
 ) -> Rows:
     """Rows of all that plant and controller show, which exchange what they say in a frame as it is."""
     body = {"inertia": Inertia(xx=1.0, yy=1.2, zz=1.5, xy=0.1, xz=-0.15, yz=0.05)}
-    plant = made(
+    plant = created(
         QuadrotorPlant,
         frame,
         {
@@ -56,7 +56,7 @@ def flight(
             "wind_amplitude": Vec3(0.3, -0.2, 0.1),
         },
     )
-    law = made(controller, frame, {**body, **values})
+    law = created(controller, frame, {**body, **values})
     law.set_boolean([controller._index["use_reference_inputs"]], [reference is not None])
     for each in (plant, law):
         each.setup_experiment(0.0)
@@ -68,7 +68,7 @@ def flight(
         if reference is not None:
             now = reference(t).turned(frame == Frame.ENU)
             for each in fields(now):
-                tell(law, f"reference.{each.name}", getattr(now, each.name))
+                set_value(law, f"reference.{each.name}", getattr(now, each.name))
 
     measure(0.0)
     plant.exit_initialization_mode()
@@ -79,7 +79,10 @@ def flight(
         for name in ("thrust", "torque.x", "torque.y", "torque.z"):
             plant.set_real([QuadrotorPlant._index[name]], law.get_real([controller._index[name]]))
         plant.do_step(k * H, H)
-        yield {**{f"plant {k}": v for k, v in told(plant).items()}, **{f"law {k}": v for k, v in told(law).items()}}
+        yield {
+            **{f"plant {k}": v for k, v in values_of(plant).items()},
+            **{f"law {k}": v for k, v in values_of(law).items()},
+        }
 
 
 def names(*vectors: str) -> Iterator[str]:
@@ -87,6 +90,6 @@ def names(*vectors: str) -> Iterator[str]:
         yield from (f"{vector}.{axis}" for axis in ("xyzw" if vector == "quaternion" else "xyz"))
 
 
-def tell(slave: Any, name: str, value: Any) -> None:
+def set_value(slave: Any, name: str, value: Any) -> None:
     for scalar, number in zip([name] if isinstance(value, float) else names(name), as_vector(value)):
         slave.set_real([slave._index[scalar]], [number])

@@ -1,4 +1,4 @@
-"""The maps of the findings are what their commands fly: one cell in a hundred of each is flown again."""
+"""The maps of the findings are the results of their commands: one cell in a hundred of each is simulated again."""
 
 import math
 import random
@@ -38,12 +38,12 @@ def test_every_cell_of_a_map_is_one_of_its_file(name: str) -> None:
 
 @pytest.mark.parametrize("name", FLOWN)
 def test_one_cell_in_a_hundred_is_what_is_flown_again(name: str) -> None:
-    """What `quadcosim compare studies/comparisons/NAME.toml --cell K` flies, here in lanes."""
+    """The runs of `quadcosim compare studies/comparisons/NAME.toml --cell K`, here in lanes."""
     kept = comparisons.read_data(name)["cells"]
     chosen = sorted(random.Random(name).sample(kept, math.ceil(len(kept) / 100)), key=lambda cell: cell["cell"])
-    flown = rerun_cells(comparisons.load(name), [cell["cell"] for cell in chosen], engine="batch")
+    simulated = rerun_cells(comparisons.load(name), [cell["cell"] for cell in chosen], engine="batch")
     steady = rerun_cells(comparisons.on_path(comparisons.load(name)), [cell["cell"] for cell in chosen], engine="batch")
-    for cell, summary, alone in zip(chosen, flown, steady, strict=True):
+    for cell, summary, alone in zip(chosen, simulated, steady, strict=True):
         row = summary.row("value")
         for key in ("count", "survives", "settles", "diverged", "diverged_late"):
             assert row[key] == cell[key], key

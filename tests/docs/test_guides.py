@@ -83,7 +83,7 @@ def native_folder(tmp_path: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def environment(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """Of somebody who has the tools but not this project."""
+    """An environment with the tools but without this project."""
     site = tmp_path_factory.mktemp("site")
     (site / "sitecustomize.py").write_text(BLOCKER.format(packages=HIDDEN), encoding="utf-8")
     path = os.pathsep.join([sysconfig.get_path("scripts"), os.environ["PATH"]])
@@ -91,7 +91,7 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 
 def follow(page: str, folder: Path, environment: dict[str, str]) -> dict[str, str]:
-    """Do what the page says, in its order; the output of each program and command."""
+    """Follow the page in order; returns the output of each program and command."""
     printed = {}
     for block in blocks(page):
         if block.name:
@@ -156,7 +156,7 @@ def test_the_ssp_guide_flies_the_same_file_in_three_tools_and_the_container(
         assert np.abs(container[name.removeprefix("plant.")] - at_once[name]).max() < 1e-9, name
 
 
-def flown_by_the_c_guide(folder: Path, environment: dict[str, str]) -> list[float]:
+def run_c_guide(folder: Path, environment: dict[str, str]) -> list[float]:
     """What its script prints, with the controller that is in the folder."""
     if shutil.which("cc") is None:
         pytest.skip("no C compiler: install one that is called cc (Debian and Ubuntu: apt install gcc libc6-dev)")
@@ -170,7 +170,7 @@ def flown_by_the_c_guide(folder: Path, environment: dict[str, str]) -> list[floa
 
 
 def commanded() -> list[float]:
-    """What the law says at the end of that flight."""
+    """The command of the law at the end of that flight."""
     measurement = {"position.z": 2.0, "velocity.x": 0.6, "quaternion.w": 1.0}
     return law_command(0.99, {name: measurement.get(name, 0.0) for name in MEASUREMENT})
 
@@ -179,7 +179,7 @@ def test_the_c_guide_compiles_and_flies_the_native_controller_without_any_python
     environment: dict[str, str], tmp_path: Path
 ) -> None:
     shutil.copy(fmus.locate("native/UnifiedController"), tmp_path)
-    assert flown_by_the_c_guide(tmp_path, environment) == pytest.approx(commanded(), rel=1e-12)
+    assert run_c_guide(tmp_path, environment) == pytest.approx(commanded(), rel=1e-12)
 
 
 def test_the_c_guide_flies_the_controller_with_python_inside(folder: Path, environment: dict[str, str]) -> None:
@@ -189,7 +189,7 @@ def test_the_c_guide_flies_the_controller_with_python_inside(folder: Path, envir
     host = {**environment, "LIBPYTHON": str(library.path)}
     if library.home is not None:
         host["PYTHONHOME"] = str(library.home)
-    assert flown_by_the_c_guide(folder, host) == pytest.approx(commanded(), rel=1e-12)
+    assert run_c_guide(folder, host) == pytest.approx(commanded(), rel=1e-12)
 
 
 # -- tools that are not to be had here --------------------------------------------------------------------

@@ -205,7 +205,7 @@ def test_the_command_proves_what_was_kept(
     assert (read_ellipsoid(0.01) == small).all()
     main(["0.01"])
     assert capsys.readouterr().out.startswith("0.01 s: y ")
-    with pytest.raises(UsageError, match="others are looked for"):
+    with pytest.raises(UsageError, match="others are searched"):
         main(["0.5"])
 
 

@@ -35,8 +35,8 @@ def page(folder: Path, text: str) -> list[Block]:
     return blocks_of(Path("page.md"), folder)
 
 
-def followed(text: str, folder: Path) -> Newcomer:
-    """Somebody who has done what a page with this text says."""
+def follow_page(text: str, folder: Path) -> Newcomer:
+    """A newcomer who has followed a page with this text."""
     newcomer = Newcomer(folder, lambda line: None)
     newcomer.start_page()
     for block in page(folder, text):
@@ -126,7 +126,7 @@ def test_flights_of_the_pages_begin(words: list[str], main: Main) -> None:
 )
 def test_a_newcomer_ends_where_a_page_is_wrong(text: str, said: str, tmp_path: Path) -> None:
     with pytest.raises(BlockFailed, match=said):
-        followed(text, tmp_path)
+        follow_page(text, tmp_path)
 
 
 def test_a_newcomer_writes_files_stays_where_it_went_and_looks_at_what_was_printed(tmp_path: Path) -> None:
@@ -134,7 +134,7 @@ def test_a_newcomer_writes_files_stays_where_it_went_and_looks_at_what_was_print
         "```csv a.csv\n1,2\n```\n\n    mkdir deep && cp a.csv deep && cd deep\n    cat a.csv\n\n"
         "```text output\n1,…\n```\n"
     )
-    newcomer = followed(text, tmp_path)
+    newcomer = follow_page(text, tmp_path)
     assert newcomer.done == 3
 
 
@@ -144,7 +144,7 @@ def test_what_is_not_run_is_counted_with_its_reason_and_another_line_run_instead
         "<!-- instead of `false`: `touch done`: takes hours -->\n<!-- not run: `exit`: ends it -->\n\n"
         "    false # now\n    exit 3\n"
     )
-    newcomer = followed(text, tmp_path)
+    newcomer = follow_page(text, tmp_path)
     assert [one.reason for one in newcomer.skipped] == ["needs a board", "takes hours", "ends it"]
     assert (tmp_path / "done").is_file()
 

@@ -1,4 +1,4 @@
-"""The page on vehicles: its file loads, its commands end as it says, its figures are those of the files."""
+"""The page on vehicles: its file loads, its commands end as stated, its numbers are those of the files."""
 
 import json
 import re
@@ -65,9 +65,9 @@ def test_the_table_of_vehicles_has_the_figures_of_their_files(name: str) -> None
     assert [float(x) for x in lags.split(", ")] == [1e3 * of[f"motor.time_constant.{way}"] for way in ("up", "down")]
 
 
-@pytest.mark.parametrize("meant", [False, True])
-def test_flag_says_that_the_mismatch_is_meant(meant: bool, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("intended", [False, True])
+def test_flag_says_that_the_mismatch_is_meant(intended: bool, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
-        main(["run", "--set", "plant.mass=1.2", "--stop-time", "0.1", *(["--model-mismatch"] if meant else [])])
+        main(["run", "--set", "plant.mass=1.2", "--stop-time", "0.1", *(["--model-mismatch"] if intended else [])])
     warned = "warning: the controller's nominal model is not the plant: controller.mass = 1 where plant.mass = 1.2."
-    assert (warned in capsys.readouterr().err) is not meant
+    assert (warned in capsys.readouterr().err) is not intended

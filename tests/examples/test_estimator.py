@@ -1,4 +1,4 @@
-"""Sensors and a Kalman filter in the loop: the filter's derivatives, and what is flown by its estimate."""
+"""Sensors and a Kalman filter in the loop: the filter's derivatives, and flights with its estimate."""
 
 import re
 import sys
@@ -97,8 +97,8 @@ def test_the_page_has_what_its_commands_print(system: System) -> None:
     assert len(rows) == 5
     for *numbers, added in rows:
         changes = dict(setting.split("=") for setting in re.findall(r"--set (\S+?=[\d.]+)", added))
-        flown = quadcosim.changed(system, {path: float(value) for path, value in changes.items()})
-        found: dict[str, Any] = quadcosim.run(flown).metrics
+        simulated = quadcosim.changed(system, {path: float(value) for path, value in changes.items()})
+        found: dict[str, Any] = quadcosim.run(simulated).metrics
         names = ("position_rmse", "ultimate_bound", "estimate_rmse")
         assert [f"{found[name]:.3f}" for name in names] == numbers[:3]
         assert f"{found['torque_variation']:.0f}" == numbers[3]

@@ -9,5 +9,5 @@ from tests.examples.common import EXAMPLES
 
 @pytest.mark.parametrize("name", ["water_tank/TankController", "dc_servo/PidController", "four_components/Car"])
 def test_validation_finds_nothing_of_an_example(name: str) -> None:
-    """One with a threshold and a Boolean, one with a state of its own, one with several inputs."""
+    """One with a threshold and a Boolean, one with an internal state, one with several inputs."""
     assert [finding for finding in validate(fmus.locate(str(EXAMPLES / f"{name}.fmu"))) if not finding.note] == []

@@ -1,4 +1,4 @@
-"""The examples give the numbers that are known of their problems, each to the accuracy that is said.
+"""The examples give the known answers of their problems, each to the stated accuracy.
 
 Their slaves are written out as C, which `test_native` shows to make the runs that they make in Python.
 """
@@ -26,7 +26,7 @@ COMMAND_DELAY = "connections.command.delay"
 
 
 def limits(system: System, of: str, near: float, **options: Any) -> tuple[float, float]:
-    """What `quadcosim limit` says of a range around a value: the limit by runs, and the local one."""
+    """The results of `quadcosim limit` for a range around a value: the limit by runs, and the local one."""
     found = limit.find(system, of, first=0.97 * near, last=1.03 * near, scan=0.03 * near, **options)
     assert found.large_signal_limit is not None
     assert found.local_limit is not None

@@ -1,4 +1,4 @@
-"""What the pages of the examples tell their readers to type works as it stands there."""
+"""The commands on the pages of the examples work as written."""
 
 import re
 import shlex

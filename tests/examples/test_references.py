@@ -1,4 +1,4 @@
-"""The scenario files with references and disturbances are flown, and come to what their page says."""
+"""The scenario files with references and disturbances give the results of their page."""
 
 from pathlib import Path
 
@@ -16,13 +16,13 @@ pytestmark = needs_compiler
 FOLDER = EXAMPLES / "references"
 
 
-def flown(scenario: Scenario) -> Result:
+def simulated(scenario: Scenario) -> Result:
     return run(located(scenario.as_system()))
 
 
 @pytest.mark.parametrize("name", ["lemniscate", "waypoints"])
 def test_a_reference_is_followed_within_a_millimetre_in_the_end(name: str) -> None:
-    result = flown(load_scenario(FOLDER / f"{name}.toml"))
+    result = simulated(load_scenario(FOLDER / f"{name}.toml"))
     assert result.metrics["outcome"] == "settled"
     assert result.metrics["ultimate_bound"] < 1e-3
 
@@ -41,14 +41,14 @@ def test_the_way_points_are_reached_and_their_limits_kept() -> None:
 
 def test_gusts_move_the_vehicle_and_a_seed_repeats_them() -> None:
     scenario = load_scenario(FOLDER / "gusts.toml").with_changes(stop_time=4.0)
-    once, again, other = (flown(scenario.with_changes(seed=seed)) for seed in (7, 7, 8))
+    once, again, other = (simulated(scenario.with_changes(seed=seed)) for seed in (7, 7, 8))
     assert once.rows.tobytes() == again.rows.tobytes()
     assert once.metrics["ultimate_bound"] != other.metrics["ultimate_bound"]
     assert once.metrics["ultimate_bound"] > 0.01
 
 
 def test_the_payload_lets_the_acceleration_jump_between_two_rows_and_the_velocity_go_on() -> None:
-    result = flown(load_scenario(FOLDER / "payload.toml").with_changes(stop_time=5.1))
+    result = simulated(load_scenario(FOLDER / "payload.toml").with_changes(stop_time=5.1))
     t, a = result.signals["time"], result.signals["plant.acceleration.z"]
     before, after = np.searchsorted(t, [5.0 - 1e-9, 5.001 - 1e-9])
     lift = 1.2 * (a[before] - 9.81)
@@ -59,7 +59,7 @@ def test_the_payload_lets_the_acceleration_jump_between_two_rows_and_the_velocit
 
 def test_files_of_points_with_times_and_of_one_gust_are_flown_together() -> None:
     logged, gust = (Path(FOLDER / name) for name in ("logged.csv", "gust.csv"))
-    result = flown(
+    result = simulated(
         Scenario(
             stop_time=5.0,
             reference=ReferenceChoice(file=logged),

@@ -1,4 +1,4 @@
-"""Conventions for axes: what is told in one, and told back, is the same; and what holds in one holds in the other."""
+"""Axes conventions: converting twice gives the same value, and relations hold in both conventions."""
 
 import math
 from collections.abc import Callable

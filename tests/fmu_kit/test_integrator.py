@@ -59,16 +59,16 @@ def test_halving_the_step_of_the_rigid_body_divides_the_error_by_16() -> None:
         wrench = Wrench(10.0 + math.sin(5.0 * t), Vec3(math.cos(4.0 * t), 0.5, -1.0))
         return derivative(x, wrench, Vec3(0.0, 0.1 * t, 0.0), body)
 
-    def flown(steps: int) -> RigidState:
+    def simulated(steps: int) -> RigidState:
         state = start
         for i in range(steps):
             state = rk4_step(f, i / steps, state, 1.0 / steps).normalised()
         return state
 
-    exact = flown(2560)
+    exact = simulated(2560)
 
     def error(steps: int) -> float:
-        state = flown(steps)
+        state = simulated(steps)
         differences = (
             (state.position - exact.position).norm(),
             (state.velocity - exact.velocity).norm(),

@@ -126,7 +126,7 @@ class Weighed(Slave):
 
 
 class Turned(Weighed):
-    """A group of its own."""
+    """A separate group."""
 
     inertia = FixedParameter("of it", "kg.m2", Inertia(xx=1.0, yy=2.0, zz=3.0, xy=0.5), name="body.inertia")
 
@@ -314,8 +314,8 @@ def test_a_start_that_no_variable_can_have_is_refused_where_it_is_written(start)
 def test_without_author_and_licence_an_fmu_says_nothing_of_them():
     assert not {"author", "license", "copyright"} & Law.to_xml(Law()).attrib.keys()
     theirs: Any = type("Theirs", (Law,), {"author": "Ada", "license": "MIT", "copyright": "Ada, 2026"})
-    said = theirs.to_xml(theirs()).attrib
-    assert (said["author"], said["license"], said["copyright"]) == ("Ada", "MIT", "Ada, 2026")
+    attributes = theirs.to_xml(theirs()).attrib
+    assert (attributes["author"], attributes["license"], attributes["copyright"]) == ("Ada", "MIT", "Ada, 2026")
 
 
 def test_a_state_is_whole_without_a_word_of_the_law():

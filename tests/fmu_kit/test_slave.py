@@ -1,4 +1,4 @@
-"""A slave of a few lines has all that FMI asks of it: only its variables and its step must be said."""
+"""A slave of a few lines fulfils FMI: it needs only its variables and a step."""
 
 from typing import Any
 

@@ -14,7 +14,7 @@ from tests.fmus.archive import files_of
 
 
 class Foreign:
-    """A slave that says nothing of its version."""
+    """A slave without a version."""
 
 
 class Versioned(Foreign):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from plant_fmu.payload import Payload
-from tests.plant_fmu.test_slave import LEVEL, MOTION, MOVING, NO_WIND, VELOCITY, close, fly, started
+from tests.plant_fmu.test_slave import LEVEL, MOTION, MOVING, NO_WIND, VELOCITY, close, run_steps, started
 from tests.slaves import get, put
 
 ACCELERATION = ("acceleration.x", "acceleration.y", "acceleration.z")
@@ -28,18 +28,18 @@ def test_a_step_is_split_where_the_drop_is_inside_of_it_only() -> None:
 
 
 def test_without_a_payload_its_time_changes_no_bit() -> None:
-    flown = []
+    simulated = []
     for load in ({}, {"payload.drop_time": 0.1037}):
         slave = started({**MOVING, **PUSHED, **load})
-        fly(slave, 0.01, 20)
-        flown.append(get(slave, *MOTION, *ACCELERATION))
-    assert flown[0] == flown[1]
+        run_steps(slave, 0.01, 20)
+        simulated.append(get(slave, *MOTION, *ACCELERATION))
+    assert simulated[0] == simulated[1]
 
 
 @pytest.mark.parametrize("h", [0.001, 0.01, 0.03, 0.3])
 def test_along_a_line_the_velocity_is_the_sum_of_both_parts(h: float) -> None:
     slave = started({**LEVEL, **NO_WIND, **LOAD, "thrust": 12.0})
-    fly(slave, h, round(0.3 / h))
+    run_steps(slave, h, round(0.3 / h))
     (speed,) = get(slave, "velocity.z")
     expected = (9.81 - 12.0 / 1.5) * 0.1037 + (9.81 - 12.0) * (0.3 - 0.1037)
     assert speed == pytest.approx(expected, rel=0.0, abs=1e-13)
@@ -47,7 +47,7 @@ def test_along_a_line_the_velocity_is_the_sum_of_both_parts(h: float) -> None:
 
 def test_a_step_over_the_drop_is_a_step_to_it_and_one_from_it() -> None:
     whole, parts = (started({**MOVING, **PUSHED, **LOAD}) for _ in range(2))
-    fly(whole, 0.11, 1)
+    run_steps(whole, 0.11, 1)
     assert parts.do_step(0.0, 0.1037)
     assert parts.do_step(0.1037, 0.11 - 0.1037)
     assert get(whole, *MOTION, *ACCELERATION) == close(get(parts, *MOTION, *ACCELERATION), 1e-14)
@@ -67,14 +67,14 @@ def test_at_the_drop_the_velocity_goes_on_and_the_acceleration_jumps_by_the_form
 def test_it_adds_to_the_mass_and_not_to_the_inertia() -> None:
     heavy, loaded = (started({**MOVING, **PUSHED, **load}) for load in ({"mass": 1.5}, {"payload.mass": 0.5}))
     for slave in (heavy, loaded):
-        fly(slave, 0.01, 20)
+        run_steps(slave, 0.01, 20)
     assert get(heavy, *MOTION) == get(loaded, *MOTION)
 
 
 def test_it_can_be_let_go_between_two_steps() -> None:
     slave = started({**LEVEL, **NO_WIND, "payload.mass": 0.5, "thrust": 15.0 * 0.981})
-    fly(slave, 0.1, 1)
+    run_steps(slave, 0.1, 1)
     assert get(slave, "velocity.z") == close([0.0])
     put(slave, {"payload.mass": 0.0})
-    fly(slave, 0.1, 1, start=0.1)
+    run_steps(slave, 0.1, 1, start=0.1)
     assert get(slave, "velocity.z") == close([-0.1 * 0.5 * 9.81])

@@ -72,7 +72,7 @@ def started(values: Mapping[str, float] | None = None, *, start: float = 0.0) ->
     return slave
 
 
-def fly(slave: QuadrotorPlant, h: float, count: int, start: float = 0.0) -> None:
+def run_steps(slave: QuadrotorPlant, h: float, count: int, start: float = 0.0) -> None:
     for k in range(count):
         assert slave.do_step(start + k * h, h) is True
 
@@ -105,18 +105,18 @@ def test_initial_quaternion_is_normalised(length: float) -> None:
 
 def test_hover_stays_for_half_a_minute() -> None:
     slave = started({**BODY, **LEVEL, **NO_WIND, "initial.position.z": -2.0, "thrust": 1.3 * 9.7})
-    fly(slave, 0.01, 3000)
+    run_steps(slave, 0.01, 3000)
     assert get(slave, *MOTION) == close([0.0, 0.0, -2.0, *[0.0] * 6, 1.0, 0.0, 0.0, 0.0])
 
 
 def test_free_fall_is_exact() -> None:
     slave = started({**NO_WIND, "thrust": 0.0})
-    fly(slave, 0.01, 200)
+    run_steps(slave, 0.01, 200)
     assert get(slave, *POSITION, *VELOCITY) == close([0.0, 0.0, 0.5 * 9.81 * 4.0, 0.0, 0.0, 9.81 * 2.0], 1e-11)
 
 
 def independent_motion(seconds: float, command: list[float]) -> Any:
-    """Where BODY flies from MOVING in wind and an external force, by adaptive integration."""
+    """The motion of BODY from MOVING in wind and an external force, by adaptive integration."""
     p = Parameters(m=1.3, g=9.7, J=np.array([[0.8, 0.05, -0.02], [0.05, 0.9, 0.03], [-0.02, 0.03, 1.4]]))
     Q = Q0 / np.linalg.norm(Q0)
     start = np.concatenate([[1.0, -2.0, 3.0, 0.1, 0.2, -0.3], rotation(Q).ravel(), [0.4, -0.5, 0.6]])
@@ -130,7 +130,7 @@ def distance_from_it(internal_step: float) -> float:
     wind = {"wind.amplitude.x": 0.5, "wind.amplitude.y": -0.2, "wind.amplitude.z": 0.1, "wind.frequency": 2.0}
     slave = started({**BODY, **MOVING, **wind, "max_internal_step": internal_step})
     put(slave, {"thrust": 12.0, "torque.x": 1.0, "torque.y": -2.0, "torque.z": 3.0, "external_force.y": 0.4})
-    fly(slave, 0.1, 10)
+    run_steps(slave, 0.1, 10)
     expected = independent_motion(1.0, [12.0, 1.0, -2.0, 3.0])
     return float(np.max(np.abs(np.array(get(slave, *MOTION)) - expected)))
 
@@ -147,7 +147,7 @@ def test_halving_the_internal_step_divides_the_distance_from_an_independent_mode
 
 def test_quaternion_keeps_its_length() -> None:
     slave = started({**MOVING, "torque.x": 1.0})
-    fly(slave, 0.05, 200)
+    run_steps(slave, 0.05, 200)
     assert sum(x * x for x in get(slave, *QUATERNION)) == pytest.approx(1.0, abs=1e-15)
 
 
@@ -164,7 +164,7 @@ def test_wind_pushes_as_its_integral_says() -> None:
             "wind.frequency": 2.0,
         }
     )
-    fly(slave, 0.01, 300)
+    run_steps(slave, 0.01, 300)
     factor = math.sin(6.0) / (1.3 * 2.0)
     assert get(slave, *VELOCITY) == close([0.5 * factor, -0.2 * factor, 0.1 * factor], 1e-11)
     assert get(slave, "wind.force.x", "wind.force.y") == close([0.5 * math.cos(6.0), -0.2 * math.cos(6.0)])
@@ -179,16 +179,16 @@ def test_external_force_adds_to_the_wind() -> None:
     slave = started({**LEVEL, "external_force.x": 0.3, "external_force.z": -0.1, "wind.frequency": 0.0})
     assert get(slave, "acceleration.x", "acceleration.y", "acceleration.z") == close([0.31, 0.01, -0.09])
     assert get(slave, "wind.force.x", "wind.force.y", "wind.force.z") == [0.01] * 3
-    fly(slave, 0.01, 100)
+    run_steps(slave, 0.01, 100)
     assert get(slave, *VELOCITY) == close([0.31, 0.01, -0.09])
 
 
 def test_tunable_wind_takes_effect_at_the_next_step() -> None:
     slave = started({**LEVEL, **NO_WIND})
-    fly(slave, 0.01, 100)
+    run_steps(slave, 0.01, 100)
     put(slave, {"wind.amplitude.x": 1.0, "wind.frequency": 0.0})
     assert get(slave, *VELOCITY, "wind.force.x") == close([0.0] * 4)
-    fly(slave, 0.01, 100, start=1.0)
+    run_steps(slave, 0.01, 100, start=1.0)
     assert get(slave, "velocity.x", "position.x", "wind.force.x") == close([1.0, 0.5, 1.0])
 
 
@@ -200,7 +200,7 @@ def test_tilt_is_that_of_the_attitude() -> None:
 
 def test_no_output_moves_with_an_input_without_a_step() -> None:
     slave = started()
-    fly(slave, 0.01, 3)
+    run_steps(slave, 0.01, 3)
     before = list(slave._reals)
     put(slave, {"thrust": 20.0, "torque.x": 3.0, "external_force.z": -1.0})
     get(slave, *MOTION)
@@ -222,8 +222,8 @@ def test_step_of_20_ms_is_ten_steps_of_2_ms() -> None:
     whole, parts = started(values), started(values)
     for slave in (whole, parts):
         put(slave, {"thrust": 15.0, "torque.x": 0.5, "torque.z": -0.1})
-    fly(whole, 0.02, 50)
-    fly(parts, 0.002, 500)
+    run_steps(whole, 0.02, 50)
+    run_steps(parts, 0.002, 500)
     assert get(whole, *MOTION) == close(get(parts, *MOTION), 1e-13)
 
 
@@ -286,7 +286,7 @@ def test_torques_lag_as_the_thrust_does() -> None:
     """With J = 1 and a spin about one axis only, angular velocity is the integral of the torque."""
     slave = started({**LEVEL, "actuator_time_constant": 0.05, "torque.x": 1.0})
     put(slave, {"torque.x": -1.0})
-    fly(slave, 0.01, 20)
+    run_steps(slave, 0.01, 20)
     expected = -0.2 + 2.0 * 0.05 * (1.0 - math.exp(-4.0))
     assert get(slave, "angular_velocity.x") == close([expected], 1e-8)
 
@@ -319,12 +319,12 @@ def test_motors_lag_as_all_actuators_do_unless_they_have_a_lag_of_their_own() ->
 
 
 def test_motors_that_nothing_limits_fly_the_same_path_as_without_them() -> None:
-    flown = []
+    simulated = []
     for motors in ({}, {**MOTORS, "motor.thrust_max": 1e3, "motor.thrust_min": -1e3}):
         slave = started({**BODY, **MOVING, **motors, "thrust": 14.0, "torque.x": 0.5, "torque.z": -0.2})
-        fly(slave, 0.01, 100)
-        flown.append(get(slave, *MOTION))
-    assert flown[0] == close(flown[1], 1e-11)
+        run_steps(slave, 0.01, 100)
+        simulated.append(get(slave, *MOTION))
+    assert simulated[0] == close(simulated[1], 1e-11)
 
 
 def test_limits_act_before_the_lag() -> None:
@@ -339,11 +339,11 @@ def test_limits_act_before_the_lag() -> None:
 def test_time_constant_much_smaller_than_the_step_stays_stable(time_constant: float) -> None:
     slave = started({**LEVEL, **NO_WIND, "actuator_time_constant": time_constant, "thrust": 0.0})
     put(slave, {"thrust": 9.81})
-    fly(slave, 0.02, 100)
+    run_steps(slave, 0.02, 100)
     assert thrust_of(slave) == pytest.approx(9.81, abs=1e-13)
     assert 0.0 <= get(slave, "velocity.z")[0] < 0.01
     put(slave, {"thrust": 9.81, "torque.x": 1.0})
-    fly(slave, 0.02, 50, start=2.0)
+    run_steps(slave, 0.02, 50, start=2.0)
     assert get(slave, "angular_velocity.x")[0] == pytest.approx(1.0, abs=1e-3)
 
 
@@ -405,7 +405,7 @@ def test_parameters_may_be_set_in_any_order(order: list[str]) -> None:
     slave, sorted_slave = started({name: values[name] for name in order}), started(values)
     for plant in (slave, sorted_slave):
         put(plant, {"thrust": 10.0, "torque.x": 1.0})
-        fly(plant, 0.01, 2)
+        run_steps(plant, 0.01, 2)
     assert slave._reals == sorted_slave._reals
 
 
@@ -433,7 +433,7 @@ def test_communication_step_that_is_not_positive_is_refused(h: float) -> None:
 )
 def test_state_that_stops_being_finite_is_named_as_a_divergence(values: dict[str, float], name: str) -> None:
     slave = started({**values, "max_internal_step": 2.0, **NO_WIND})
-    assert_fails(lambda: fly(slave, 2.0, 3), name, "expected")
+    assert_fails(lambda: run_steps(slave, 2.0, 3), name, "expected")
     assert [message.category for message in slave.log_queue] == ["divergence"]
 
 
@@ -481,7 +481,7 @@ def test_wind_that_was_set_but_not_used_is_part_of_the_state() -> None:
     put(slave, {"wind.amplitude.x": 1.0, "wind.frequency": 0.0})
     other = QuadrotorPlant(instance_name="other")
     other._set_fmu_state(json.loads(json.dumps(slave._get_fmu_state())))
-    fly(other, 0.01, 100)
+    run_steps(other, 0.01, 100)
     assert get(other, "velocity.x") == close([1.0])
 
 
@@ -489,10 +489,10 @@ def test_saved_state_does_not_follow_the_instance() -> None:
     slave = started(MOVING)
     state = slave._get_fmu_state()
     before = json.dumps(state)
-    fly(slave, 0.01, 3)
+    run_steps(slave, 0.01, 3)
     assert json.dumps(state) == before
     slave._set_fmu_state(state)
-    fly(slave, 0.01, 3)
+    run_steps(slave, 0.01, 3)
     assert json.dumps(state) == before
 
 
@@ -503,5 +503,5 @@ def test_state_of_a_controller_is_refused() -> None:
 
 def test_instances_do_not_share_values() -> None:
     first, second = started(LEVEL), started(LEVEL)
-    fly(first, 0.01, 5)
+    run_steps(first, 0.01, 5)
     assert get(second, *POSITION, *VELOCITY, *SPIN) == [*ZERO, *ZERO, *ZERO]

@@ -19,19 +19,19 @@ NAME, PLANT = "CascadedController", "QuadrotorPlant"
 ONE_RATE: dict[str, float] = {"controller.velocity_ratio": 1, "controller.attitude_ratio": 1}
 
 
-def flown(controller: Path | str, parameters: dict[str, float], timing: Timing, stop_time: float = 30.0) -> Result:
+def simulated(controller: Path | str, parameters: dict[str, float], timing: Timing, stop_time: float = 30.0) -> Result:
     scenario = Scenario(stop_time=stop_time, timing=timing).with_changes(parameters=parameters)
     return quadcosim.run(scenario.with_fmus(plant=f"native/{PLANT}", controller=controller))
 
 
 def test_the_papers_flight_settles_at_the_rates_of_px4() -> None:
-    metrics = flown(f"native/{NAME}", {}, Timing(period=0.001)).metrics
+    metrics = simulated(f"native/{NAME}", {}, Timing(period=0.001)).metrics
     assert metrics["settling_time"] == pytest.approx(5.609, abs=0.01)
     assert metrics["ultimate_bound"] == pytest.approx(0.0177, abs=1e-4)
 
 
 def test_with_all_loops_at_one_period_it_flies_at_85_ms_and_not_at_95() -> None:
-    found = [flown(f"native/{NAME}", ONE_RATE, Timing(period=period)).metrics["good"] for period in (0.085, 0.095)]
+    found = [simulated(f"native/{NAME}", ONE_RATE, Timing(period=period)).metrics["good"] for period in (0.085, 0.095)]
     assert found == [True, False]
 
 
@@ -59,4 +59,4 @@ def test_in_c_it_flies_as_in_python_to_the_byte(built: dict[str, Path], tmp_path
     fmu = natives([Target.parse(MODELS[NAME])], tmp_path, "libm")[NAME]
     timing = Timing(period=0.004, jitter=0.001, measurement_loss=0.05)
     changed = {"controller.velocity_ratio": 5, "controller.attitude_ratio": 2, "controller.motor.arm.x": 0.5}
-    assert_the_same(flown(fmu, changed, timing, 1.0), flown(built[NAME], changed, timing, 1.0))
+    assert_the_same(simulated(fmu, changed, timing, 1.0), simulated(built[NAME], changed, timing, 1.0))

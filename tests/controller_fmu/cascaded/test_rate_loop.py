@@ -47,8 +47,8 @@ def test_the_yaw_command_goes_through_a_low_pass() -> None:
     for _ in range(50):
         torque, state = run(state, ZERO, Vec3(0.0, 0.0, 0.1), loop=loop)
         found.append(torque.z)
-    wanted = 0.9 * loop.proportional.z * 0.1
-    assert found == pytest.approx([wanted * (1.0 - (tau / (tau + T)) ** (k + 1)) for k in range(50)])
+    demand = 0.9 * loop.proportional.z * 0.1
+    assert found == pytest.approx([demand * (1.0 - (tau / (tau + T)) ** (k + 1)) for k in range(50)])
 
 
 def test_the_desired_rate_is_fed_forward() -> None:

@@ -53,7 +53,7 @@ def started(k: int, **ratios: int) -> CascadedController:
     return slave
 
 
-def fly(slave: CascadedController, steps: range, h: float = 0.01) -> list[list[float]]:
+def run_steps(slave: CascadedController, steps: range, h: float = 0.01) -> list[list[float]]:
     rows = []
     for k in steps:
         put(slave, measured(k))
@@ -84,14 +84,14 @@ def one_rate(count: int, h: float = 0.01) -> list[list[float]]:
 
 
 def test_with_ratios_of_one_it_is_the_cascade_of_one_rate_to_the_bit() -> None:
-    assert fly(started(0, **ONE_RATE), range(50)) == one_rate(50)
+    assert run_steps(started(0, **ONE_RATE), range(50)) == one_rate(50)
 
 
 def test_each_loop_runs_when_its_turn_is_and_its_results_are_held() -> None:
     slave = started(0, velocity_ratio=6, attitude_ratio=2)
     found: dict[str, list[object]] = {"desired_velocity": [], "desired_angular_velocity": [], "torque": []}
     for k in range(24):
-        fly(slave, range(k, k + 1))
+        run_steps(slave, range(k, k + 1))
         for name, values in found.items():
             values.append(get(slave, *(f"{name}.{a}" for a in "xyz")))
     changes = {name: [k for k in range(1, 24) if values[k] != values[k - 1]] for name, values in found.items()}
@@ -123,7 +123,7 @@ def test_the_outputs_after_initialisation_are_those_of_the_first_sample_and_noth
     slave.do_step(0.0, 0.01)
     assert get(slave, *COMMAND) == initial
     other = started(5)
-    assert fly(other, range(3, 6)) == fly(started(3), range(3, 6))
+    assert run_steps(other, range(3, 6)) == run_steps(started(3), range(3, 6))
 
 
 def test_a_sample_without_measurement_is_no_run() -> None:
@@ -131,32 +131,32 @@ def test_a_sample_without_measurement_is_no_run() -> None:
     put(slave, dict.fromkeys((f"quaternion.{a}" for a in "xyzw"), 0.0))
     slave.do_step(0.0, 0.01)
     assert get(slave, *COMMAND) == [9.81, 0.0, 0.0, 0.0]
-    assert fly(slave, range(1, 5)) == fly(started(1, **ONE_RATE), range(1, 5))
+    assert run_steps(slave, range(1, 5)) == run_steps(started(1, **ONE_RATE), range(1, 5))
 
 
 @pytest.mark.parametrize("k", [0, 1, 7])
 def test_a_saved_state_goes_on_to_the_same_bits_in_another_instance(k: int) -> None:
     ratios = {"velocity_ratio": 5, "attitude_ratio": 2}
     slave = started(0, **ratios)
-    fly(slave, range(k))
+    run_steps(slave, range(k))
     state = json.loads(json.dumps(slave._get_fmu_state()))
-    expected = fly(slave, range(k, k + 12))
+    expected = run_steps(slave, range(k, k + 12))
     other = CascadedController(instance_name="other")
     other._set_fmu_state(state)
-    assert fly(other, range(k, k + 12)) == expected
+    assert run_steps(other, range(k, k + 12)) == expected
     slave._set_fmu_state(state)
-    assert fly(slave, range(k, k + 12)) == expected
+    assert run_steps(slave, range(k, k + 12)) == expected
 
 
 def test_a_run_that_is_initialised_anew_remembers_nothing_of_the_one_before() -> None:
     slave = started(0)
-    expected = fly(started(0), range(30))
+    expected = run_steps(started(0), range(30))
     begun = slave._get_fmu_state()
-    fly(slave, range(25))
+    run_steps(slave, range(25))
     slave._set_fmu_state(begun)
     slave.initialise(0.0)
     slave._clock.next_index = 0
-    assert fly(slave, range(30)) == expected
+    assert run_steps(slave, range(30)) == expected
 
 
 def test_parameters_that_make_no_cascade_are_refused() -> None:

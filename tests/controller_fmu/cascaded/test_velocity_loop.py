@@ -21,7 +21,7 @@ LOOP, MODEL, FULL, T = VelocityLoop(derivative=Vec3(0.2, 0.2, 0.1)), Model(mass=
 ACCELERATIONS = st.builds(Vec3, *[st.floats(-50.0, 50.0, allow_subnormal=False)] * 3)
 
 
-def flown(loop: VelocityLoop, velocity: Vec3, desired: Vec3, count: int) -> tuple[list[Vec3], VelocityState]:
+def simulated(loop: VelocityLoop, velocity: Vec3, desired: Vec3, count: int) -> tuple[list[Vec3], VelocityState]:
     """Velocities of a vehicle that exerts the force at once, sample by sample, and what is kept in the end."""
     state, velocities = initial_velocity_state(velocity), [velocity]
     for k in range(count):
@@ -41,7 +41,7 @@ def test_a_step_is_answered_as_the_sampled_pid_loop_does(axis: str) -> None:
         [np.array([1.0, 0.0, 0.0, 0.0]) + T * answer, [-T * integral, 1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], slope]
     )
     unit = Vec3(*(float(name == axis) for name in "xyz"))
-    velocities, _ = flown(LOOP, ZERO, 0.1 * unit, 60)
+    velocities, _ = simulated(LOOP, ZERO, 0.1 * unit, 60)
     # The first run has no time before it: the loop begins where it left the vehicle.
     first = -0.1 + T * P * 0.1
     errors = [(np.linalg.matrix_power(matrix, k) @ [first, 0.0, -0.1, 0.0])[0] for k in range(60)]

@@ -110,7 +110,7 @@ def test_with_prediction_and_no_measurement_it_hovers_and_warns_once() -> None:
 
 
 def test_the_predictor_takes_samples_that_are_late_when_they_are() -> None:
-    """The command of 1.013 acts from 1.043 on, whatever the period says."""
+    """The command of 1.013 acts from 1.043 on, independent of the period."""
     values = {**AT, "prediction": 0.03, "sample_period": 0.0}
     on_time, late = (begun(UnifiedController, values, Discretisation.EXPLICIT) for _ in range(2))
     commands = [stepped(slave, [1.0, t, 1.02]) for slave, t in ((on_time, 1.01), (late, 1.013))]

@@ -142,14 +142,14 @@ def test_predictor_flies_the_commands_in_the_order_in_which_they_act() -> None:
     pending = all_sent(-1.0, commands[0])
     for k, command in enumerate(commands[1:]):
         pending = with_command(pending, 0.1 * k, command)
-    flown: list[tuple[float, float]] = []
+    simulated: list[tuple[float, float]] = []
 
     def advanced(x: RigidState, command: Wrench, time: float) -> RigidState:
-        flown.append((command.thrust, time))
+        simulated.append((command.thrust, time))
         return x
 
     assert predicted_state(advanced, START, 0.25, 0.2, pending) is START
-    legs = [leg for leg in flown if leg[1] > 1e-12]
+    legs = [leg for leg in simulated if leg[1] > 1e-12]
     assert [thrust for thrust, _ in legs] == [11.0, 12.0, 13.0]  # that of t = 0 acts from 0.2 on
     assert [time for _, time in legs] == pytest.approx([0.05, 0.1, 0.05])
     assert len(pending) == MOST_PENDING

@@ -1,4 +1,4 @@
-"""The law against reference data, against its own derivatives, and against what it promises."""
+"""The law against reference data, its own derivatives, and its proved properties."""
 
 import csv
 import functools

@@ -547,7 +547,7 @@ def test_an_error_of_python_is_reported_with_its_place_in_the_first_line(monkeyp
 # -- state ----------------------------------------------------------------------------------------------------
 
 
-def fly(slave: UnifiedController, steps: range) -> list[list[float]]:
+def run_steps(slave: UnifiedController, steps: range) -> list[list[float]]:
     """All Reals after each of the steps of 4 ms, with other inputs for each."""
     history = []
     for k in steps:
@@ -567,32 +567,32 @@ def as_bytes(slave: UnifiedController) -> bytes:
 def test_restored_controller_flies_on_bit_by_bit(saved_after: int) -> None:
     """The period of 10 ms is no multiple of the step: there is always a sample pending."""
     slave = started({**measured(0), **PARAMETERS, "sample_offset": 0.003})
-    fly(slave, range(saved_after))
+    run_steps(slave, range(saved_after))
     saved, state = as_bytes(slave), slave._get_fmu_state()
-    expected = fly(slave, range(saved_after, 40))
+    expected = run_steps(slave, range(saved_after, 40))
     assert slave._fmu_state_from_bytes(saved) == state
 
     slave._set_fmu_state(slave._fmu_state_from_bytes(saved))
-    assert fly(slave, range(saved_after, 40)) == expected
+    assert run_steps(slave, range(saved_after, 40)) == expected
 
     other = UnifiedController(instance_name="other")
     other._set_fmu_state(other._fmu_state_from_bytes(saved))
-    assert fly(other, range(saved_after, 40)) == expected
+    assert run_steps(other, range(saved_after, 40)) == expected
 
 
 def test_saved_state_does_not_follow_the_instance() -> None:
     slave = started(measured(0))
     state = slave._get_fmu_state()
     before = json.dumps(state)
-    fly(slave, range(5))
+    run_steps(slave, range(5))
     slave._set_fmu_state(state)
-    fly(slave, range(5))
+    run_steps(slave, range(5))
     assert json.dumps(state) == before
 
 
 def test_restored_state_is_the_saved_state() -> None:
     slave = started({**measured(0), **PARAMETERS})
-    fly(slave, range(7))
+    run_steps(slave, range(7))
     other = UnifiedController(instance_name="other")
     other._set_fmu_state(json.loads(as_bytes(slave)))
     assert as_bytes(other) == as_bytes(slave)

@@ -50,6 +50,6 @@ def results(loops: ctypes.CDLL, name: str, *arguments: Floats) -> Floats:
 
 
 def processor() -> set[str]:
-    """What Linux says that the processor can do; nothing elsewhere."""
+    """The instruction sets of the processor as reported by Linux; empty elsewhere."""
     listed = Path("/proc/cpuinfo")
     return set(listed.read_text().split()) if listed.exists() else set()

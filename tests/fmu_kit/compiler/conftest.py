@@ -8,7 +8,7 @@ import pytest
 
 @pytest.fixture(scope="package", autouse=True)
 def wine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Wine says nothing, and has one folder for the tests of all processes: making it takes seconds."""
+    """Wine prints nothing, and has one folder for the tests of all processes: making it takes seconds."""
     shared = tmp_path_factory.getbasetemp()
     if "PYTEST_XDIST_WORKER" in os.environ:
         shared = shared.parent

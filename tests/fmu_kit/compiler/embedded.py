@@ -37,7 +37,7 @@ def fields(header: Path) -> dict[str, str]:
 
 @functools.cache
 def made(source: Path, with_compiler: str, *flags: str) -> Path:
-    """A source on its own, without a warning; in double precision for a machine that has nothing but itself."""
+    """A source compiled alone, without warnings; in double precision for a freestanding machine."""
     path = source.with_name(f"{source.stem}_{'_'.join((with_compiler, *flags))}.o")
     alone = () if "<math.h>" in source.read_text("utf-8") else ("-ffreestanding",)
     _succeeds([compiler(with_compiler), *STRICT, *alone, *flags, "-c", str(source), "-o", str(path)])

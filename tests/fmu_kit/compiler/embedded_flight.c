@@ -1,4 +1,4 @@
-/* Both sides of the loop as quadcosim export-c writes them, flown for STEPS steps of H seconds: every hundredth row of all
+/* Both sides of the loop as quadcosim export-c writes them, run for STEPS steps of H seconds: every hundredth row of all
    variables, as the bits of doubles, and last the CRC-32 of all rows. */
 
 #include <inttypes.h>

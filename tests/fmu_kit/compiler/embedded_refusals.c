@@ -7,9 +7,9 @@
 static UnifiedController c;
 static volatile double zero;
 
-static void said(int status) { printf("%d %s\n", status != 0, UnifiedController_error(status)); }
+static void print_status(int status) { printf("%d %s\n", status != 0, UnifiedController_error(status)); }
 
-static int begun(double mass)
+static int started(double mass)
 {
     UnifiedController_init(&c);
     c.par.mass = mass;
@@ -20,33 +20,33 @@ int main(void)
 {
     double thrust;
     UnifiedController_init(&c);
-    said(UnifiedController_step(&c, 0.0, 0.01));
-    said(begun(-1.0));
-    said(UnifiedController_start(&c, 0.0)); /* the same as before */
-    said(begun(2.0));
-    said(UnifiedController_start(&c, 0.0));
-    said(begun(2.0));
-    said(UnifiedController_step(&c, 0.0, -0.01));
-    said(begun(2.0));
+    print_status(UnifiedController_step(&c, 0.0, 0.01));
+    print_status(started(-1.0));
+    print_status(UnifiedController_start(&c, 0.0)); /* the same as before */
+    print_status(started(2.0));
+    print_status(UnifiedController_start(&c, 0.0));
+    print_status(started(2.0));
+    print_status(UnifiedController_step(&c, 0.0, -0.01));
+    print_status(started(2.0));
     c.in.position_x = zero / zero;
     thrust = c.out.thrust;
-    said(UnifiedController_step(&c, 0.0, 0.01));
-    said(c.status);
+    print_status(UnifiedController_step(&c, 0.0, 0.01));
+    print_status(c.status);
     printf("%d\n", thrust == c.out.thrust);
-    said(begun(2.0));
+    print_status(started(2.0));
     c.in.velocity_x = 1e200;
-    said(UnifiedController_step(&c, 0.0, 0.01));
-    said(begun(2.0));
-    c.par.mass = -3.0; /* not looked at before it is said */
-    said(UnifiedController_step(&c, 0.0, 0.01));
+    print_status(UnifiedController_step(&c, 0.0, 0.01));
+    print_status(started(2.0));
+    c.par.mass = -3.0; /* not checked before `changed` */
+    print_status(UnifiedController_step(&c, 0.0, 0.01));
     UnifiedController_changed(&c);
-    said(UnifiedController_step(&c, 0.01, 0.01));
-    said(begun(2.0));
+    print_status(UnifiedController_step(&c, 0.01, 0.01));
+    print_status(started(2.0));
     printf("%u\n", c.warnings);
     c.in.quaternion_w = 0.0;
-    said(UnifiedController_step(&c, 0.0, 0.02));
+    print_status(UnifiedController_step(&c, 0.0, 0.02));
     printf("%d\n", c.warnings == (UNIFIEDCONTROLLER_NO_MEASUREMENT | UNIFIEDCONTROLLER_LONG_STEP));
-    said(-1);
-    said(1000);
+    print_status(-1);
+    print_status(1000);
     return 0;
 }

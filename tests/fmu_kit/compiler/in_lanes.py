@@ -15,7 +15,7 @@ from fmu_kit.compiler.pack.lanes import Lanes
 from tests.fmu_kit.compiler.twins import GUID
 
 _BEFORE_THE_MEMORY = 136
-"""Bytes of an instance's state that say whose it is."""
+"""Bytes of an instance's state that identify its FMU."""
 
 Values = Mapping[int, float | int | bool]
 """By value reference"""

@@ -114,7 +114,7 @@ class Branches(Probe):
         return (x if x > 0.0 else -x) > self.q + 0.75
 
     def _is_small(self, x: float) -> bool:
-        """A method with a truth value of its own."""
+        """A method with a separate truth value."""
         if x < 0.0:
             return self._is_small_and_positive(-x)
         return self._is_small_and_positive(x)

@@ -109,7 +109,7 @@ SOURCES = {"main.c": b'__attribute__((visibility("default"))) int answer(void) {
 def test_for_linux_on_arm_another_compiler_will_do(
     version: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It has the name of FMI 3.0 in FMI 2.0 too, which has none of its own."""
+    """It has the name of FMI 3.0 also in FMI 2.0, which defines none."""
     without_zig(monkeypatch, tmp_path, "aarch64-linux-gnu-gcc")
     found = compiled_for("linux-aarch64", SOURCES, "main.c", version)
     assert [(name, content[:4]) for name, content in found.items()] == [("aarch64-linux", b"\x7fELF")]

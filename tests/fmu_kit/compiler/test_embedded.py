@@ -1,4 +1,4 @@
-"""Slaves written out for a microcontroller fly as their native FMUs do, there and here."""
+"""Slaves exported for a microcontroller give the flights of their native FMUs, on emulated boards and here."""
 
 import functools
 import re
@@ -60,7 +60,7 @@ def native(name: str) -> Instance:
 
 
 @pytest.fixture(scope="module")
-def flown() -> dict[str, list[float]]:
+def simulated() -> dict[str, list[float]]:
     """All variables after each step of the native FMUs."""
     sides = {"c": native("UnifiedController"), "p": native("QuadrotorPlant")}
     rows: dict[str, list[float]] = {f"{side}.{name}": [] for side in sides for name in sides[side].variables}
@@ -93,26 +93,26 @@ FLAGS = (f"-DSTEPS={STEPS}", f"-DH={H}")
 
 @pytest.mark.parametrize("where", RUNS)
 def test_in_double_precision_every_variable_is_that_of_the_native_fmu_to_the_bit(
-    where: str, exported: dict[str, Path], flown: dict[str, list[float]], tmp_path: Path
+    where: str, exported: dict[str, Path], simulated: dict[str, list[float]], tmp_path: Path
 ) -> None:
     sides = [exported["UnifiedController"], exported["QuadrotorPlant"]]
     names = to_note(sides[0], sides[1], tmp_path)
     lines = RUNS[where]("embedded_flight.c", sides, tmp_path, *FLAGS, f"-DSAMPLE_PERIOD={H}")
-    expected = np.array([flown[name] for name in names]).T.copy()
-    assert sorted(names) == sorted(flown)
+    expected = np.array([simulated[name] for name in names]).T.copy()
+    assert sorted(names) == sorted(simulated)
     assert rows_of(lines).tobytes() == expected[99::100].tobytes()
     assert int(lines[-1], 16) == zlib.crc32(expected.tobytes())
 
 
 @pytest.mark.parametrize("where", ["here", "cortex_m4f"])
 def test_in_single_precision_the_flight_is_near(
-    where: str, exported: dict[str, Path], flown: dict[str, list[float]], tmp_path: Path
+    where: str, exported: dict[str, Path], simulated: dict[str, list[float]], tmp_path: Path
 ) -> None:
     sides = [exported["single"], exported["QuadrotorPlant"]]
     names = to_note(sides[0], sides[1], tmp_path)
     rows = rows_of(RUNS[where]("embedded_flight.c", sides, tmp_path, *FLAGS, "-DSAMPLE_PERIOD=0"))
     for name in (*(f"p.{name}" for name in MOTION), *(f"c.{name}" for name in COMMAND)):
-        far = np.abs(rows[:, names.index(name)] - flown[name][99::100]).max()
+        far = np.abs(rows[:, names.index(name)] - simulated[name][99::100]).max()
         assert far < TOLERANCES[name[2:].partition(".")[0]], name
     assert rows[-1, names.index("c.sample_count")] == STEPS
 
@@ -226,7 +226,7 @@ def test_a_slave_with_much_to_say_is_written_without_a_warning_of_the_compiler(n
 
 
 def test_of_values_that_are_fixed_and_what_they_turn_off_there_is_nothing_left(main: Main, tmp_path: Path) -> None:
-    """The paper's law alone: no redesign, no commands on their way; it compiles and says nothing else."""
+    """The paper's law alone: no redesign, no pending commands; it compiles without warnings."""
     off = ("discretisation=explicit", "prediction=0", "gain_scaling=absolute", "hold_period=0", "weight=1", "stages=3")
     main("export-c", "--name", "PaperLaw", *(part for each in off for part in ("--set", each)), "--out", tmp_path)
     header, source = ((tmp_path / f"PaperLaw.{ending}").read_text("utf-8") for ending in ("h", "c"))

@@ -1,4 +1,4 @@
-"""Native FMUs of FMI 3.0: they say, answer and fly what those of FMI 2.0 do."""
+"""Native FMUs of FMI 3.0 describe, answer and compute the same as those of FMI 2.0."""
 
 import ctypes
 from collections.abc import Iterator
@@ -120,7 +120,7 @@ def test_its_icon_is_where_fmi_3_has_icons(name: str) -> None:
 
 
 def terminals_file(name: str) -> bytes:
-    """What a slave's FMU says of terminals."""
+    """The terminals file of a slave's FMU."""
     return STANDARDS[3].beside(slave_class(Target.parse(MODELS[name])), STANDARDS[3].main)[TERMINALS]
 
 
@@ -130,7 +130,7 @@ def test_its_terminals_are_where_fmi_3_has_them(name: str) -> None:
 
 
 def terminals(name: str) -> dict[str, list[str]]:
-    """Members of each terminal of a slave's FMU, whose file is what the standard asks for."""
+    """Members of each terminal of a slave's FMU, whose file is valid."""
     document = etree.fromstring(terminals_file(name))
     schema = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd"
     etree.XMLSchema(etree.parse(str(schema))).assertValid(document)
@@ -199,7 +199,7 @@ def test_fmpy_finds_nothing_and_flies_it_as_it_does_the_other(name: str) -> None
 
 
 def test_a_flight_is_that_of_fmi_2_to_the_byte() -> None:
-    flown = [
+    simulated = [
         quadcosim.run(
             Scenario(stop_time=2.0).with_fmus(
                 plant=f"{folder}/QuadrotorPlant", controller=f"{folder}/UnifiedController"
@@ -207,7 +207,7 @@ def test_a_flight_is_that_of_fmi_2_to_the_byte() -> None:
         )
         for folder in ("native/fmi3", "native")
     ]
-    assert_the_same(*flown)
+    assert_the_same(*simulated)
 
 
 def test_ecos_flies_both_as_it_does_those_of_fmi_2() -> None:

@@ -1,4 +1,4 @@
-"""Whole numbers in C are those of Python, or what cannot be one is said: never another number."""
+"""Whole numbers in C are those of Python, or an error is reported: never another number."""
 
 import ctypes
 import importlib

@@ -113,7 +113,7 @@ def _fly(
     strange: float,
     starts: Sequence[float],
 ) -> list[int]:
-    """Both from initialisation on, each lane with values, times and steps of its own, until it fails.
+    """Both from initialisation on, each lane with its own values, times and steps, until it fails.
 
     A share `changed` of the parameters is not what it is at the start, a share `strange` of what is given anything.
     Lanes start at one of `starts` [s].

@@ -94,7 +94,7 @@ def test_special_arguments_give_what_annex_f_of_the_c_standard_says_as_libm_does
 
 
 def value_of(function: Callable[..., float], at: tuple[float, ...]) -> float:
-    """A function of Python, infinite where Python says that the result is too large."""
+    """A function of Python, infinite where Python raises an overflow."""
     try:
         return function(*at)
     except OverflowError:

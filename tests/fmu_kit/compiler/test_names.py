@@ -87,7 +87,7 @@ class {model}(Slave):
 
 
 def named(model: str, names: list[str]) -> str:
-    """A slave whose variables, methods, their parameters, and what it keeps, have these names."""
+    """A slave whose variables, methods, parameters and attributes have these names."""
     kinds = itertools.cycle(("Input", "Parameter", "Output"))
     lines = {
         "declared": [f'    {name} = {next(kinds)}("A number.", None, {k}.5)' for k, name in enumerate(names)],

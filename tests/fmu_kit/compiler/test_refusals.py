@@ -1,4 +1,4 @@
-"""What slaves may not do, if they are to be written out as C: one line says what, where, and what is expected."""
+"""What slaves to be compiled to C may not do: one line names it, its place, and what was expected."""
 
 import re
 from pathlib import Path
@@ -124,7 +124,7 @@ IN_INITIALISE = [
 
 
 def refusal(folder: Path, monkeypatch: pytest.MonkeyPatch, text: str) -> tuple[Path, str]:
-    """What is said of a module of this text, and its path."""
+    """The path of a module with this text, and the message that refuses it."""
     monkeypatch.syspath_prepend(folder)
     module = f"refused_{folder.name}"
     path = folder / f"{module}.py"
@@ -144,13 +144,13 @@ def test_what_a_step_may_not_do_is_said_in_a_line(
     statement: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     text = SLAVE.replace("{initialise}", "pass").replace("{step}", statement)
-    path, said = refusal(tmp_path, monkeypatch, text)
-    assert words in said
-    assert "\n" not in said
+    path, message = refusal(tmp_path, monkeypatch, text)
+    assert words in message
+    assert "\n" not in message
     if not re.match(
-        "Refused: (self.*(a step|its class)|what is kept.*a step|.*(between two paths|of its type))", said
+        "Refused: (self.*(a step|its class)|what is kept.*a step|.*(between two paths|of its type))", message
     ):  # of the slave as a whole
-        assert said.startswith(f"Refused: {path}, line {line_of(path, statement)}: ")
+        assert message.startswith(f"Refused: {path}, line {line_of(path, statement)}: ")
 
 
 @pytest.mark.parametrize(("statement", "words"), IN_INITIALISE)
@@ -158,9 +158,9 @@ def test_what_may_not_be_kept_is_said_in_a_line(
     statement: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     text = SLAVE.replace("{initialise}", statement).replace("{step}", "self.y = a")
-    _, said = refusal(tmp_path, monkeypatch, text)
-    assert words in said
-    assert "\n" not in said
+    _, message = refusal(tmp_path, monkeypatch, text)
+    assert words in message
+    assert "\n" not in message
 
 
 @pytest.mark.parametrize(
@@ -181,8 +181,8 @@ def test_errors_that_are_caught_are_refused_where_they_are(
             return 0.0
 """
     text = SLAVE.replace("{initialise}", "pass").replace("{step}", called) + method
-    path, said = refusal(tmp_path, monkeypatch, text)
-    assert said == f"Refused: {path}, line {line_of(path, where)}: {words}"
+    path, message = refusal(tmp_path, monkeypatch, text)
+    assert message == f"Refused: {path}, line {line_of(path, where)}: {words}"
 
 
 def test_a_loop_without_an_end_is_refused_where_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -194,8 +194,8 @@ def halved(x):
             return x
 """
     text = SLAVE.replace("{initialise}", "pass").replace("{step}", "self.y = halved(a)") + method
-    path, said = refusal(tmp_path, monkeypatch, text)
-    assert said.startswith(f"Refused: {path}, line {line_of(path, '# enough')}: while: more than 200 rounds")
+    path, message = refusal(tmp_path, monkeypatch, text)
+    assert message.startswith(f"Refused: {path}, line {line_of(path, '# enough')}: while: more than 200 rounds")
 
 
 @pytest.mark.parametrize("name", ["get_real", "terminate", "_initialise"])
@@ -203,13 +203,13 @@ def test_a_slave_answers_to_fmi_by_its_base_class_only(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     text = SLAVE.replace("{initialise}", "pass").replace("{step}", "pass")
-    _, said = refusal(tmp_path, monkeypatch, f"{text}\n    def {name}(self, *given):\n        pass\n")
-    assert said == (
+    _, message = refusal(tmp_path, monkeypatch, f"{text}\n    def {name}(self, *given):\n        pass\n")
+    assert message == (
         f"Refused: Refused.{name}: expected initialise, internal_state, read_parameters, restore, step, to_xml only"
     )
 
 
 def test_numpy_is_refused_where_it_is_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = "import numpy\n" + SLAVE.replace("{initialise}", "pass").replace("{step}", "pass")
-    path, said = refusal(tmp_path, monkeypatch, text)
-    assert said == f"{path}:1: imports numpy, but an FMU has the standard library only"
+    path, message = refusal(tmp_path, monkeypatch, text)
+    assert message == f"{path}:1: imports numpy, but an FMU has the standard library only"
