@@ -1,4 +1,4 @@
-"""Computers by a few numbers, as the scheduler takes them."""
+"""Computers for the scheduler, described by a few numbers."""
 
 from collections.abc import Callable, Sequence
 from typing import Any

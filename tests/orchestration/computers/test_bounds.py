@@ -1,4 +1,4 @@
-"""Bounds of theory: known ones, those that are reached, and that no job or frame of the scheduler is beyond its own.
+"""Bounds of theory: known ones, those that are reached, and that no job or frame of the scheduler exceeds its own.
 
 The scheduler is that in C where there is a compiler, of which `test_compiled_scheduler.py` shows that it is that in
 Python.
@@ -45,12 +45,12 @@ def test_responses_on_can_are_those_of_davis_and_others_and_not_the_refuted_ones
     assert fixed_priority(frames, preemptive=False, switch=0) == [2 * MS - 1, 3 * MS - 1, 3_500_000]
 
 
-def test_a_switch_costs_a_job_its_own_and_one_for_each_that_it_lets_wait() -> None:
+def test_a_job_costs_a_switch_and_another_for_each_preemption() -> None:
     assert fixed_priority(ranked((10, 100), (20, 200)), preemptive=True, switch=3) == [13, 16 + 23]
     assert fixed_priority(ranked((10, 100), (20, 200)), preemptive=False, switch=3) == [22 + 13, 13 + 23]
 
 
-def test_nothing_is_said_of_what_comes_by_chance_nor_of_those_that_wait_for_it() -> None:
+def test_there_is_no_bound_for_random_arrivals_nor_for_tasks_that_wait_for_them() -> None:
     tasks = ranked((1, 10), (1, 10), (1, 10))
     tasks[1] = replace(tasks[1], period=None)
     assert fixed_priority(tasks, preemptive=True, switch=0) == [1, None, None]
@@ -58,12 +58,12 @@ def test_nothing_is_said_of_what_comes_by_chance_nor_of_those_that_wait_for_it()
     assert earliest_deadline(tasks, preemptive=True, switch=0) == [None] * 3
 
 
-def test_a_period_that_is_no_whole_number_is_as_a_nanosecond_of_jitter() -> None:
+def test_a_period_that_is_no_whole_number_adds_a_nanosecond_of_jitter() -> None:
     thirds = [replace(task, period=Fraction(100, 3)) for task in ranked((10, 1), (10, 1))]
     assert fixed_priority(thirds, preemptive=True, switch=0) == [11, 21]
 
 
-def test_a_message_that_counts_from_when_it_is_queued_has_its_own_lateness_not_in_its_bound() -> None:
+def test_the_bound_of_a_message_that_counts_from_queueing_excludes_its_lateness() -> None:
     first, second = ranked((10, 100), (20, 200))
     late = replace(second, jitter=50)
     assert can([first, late], bit=1) == [30, 80]
@@ -106,7 +106,7 @@ def period_of(task: Periodic) -> int:
 
 
 def late(task: Periodic, random: np.random.Generator):
-    """Latenesses of releases, the largest more often than by chance."""
+    """Latenesses of releases, the largest more often than uniform."""
     drawn = np.random.default_rng(random.integers(2**32))
     return lambda count: np.where(drawn.random(count) < 0.5, drawn.integers(0, task.jitter + 1, count), task.jitter)
 
@@ -134,7 +134,7 @@ def simulated(tasks, policy, random, *, preemptive: bool, switch: int) -> Timeli
 @pytest.mark.parametrize("switch", [0, 1])
 @pytest.mark.parametrize("preemptive", [True, False])
 @pytest.mark.parametrize("policy", [FIXED_PRIORITY, EARLIEST_DEADLINE])
-def test_no_response_is_beyond_its_bound(policy, preemptive: bool, switch: int) -> None:
+def test_no_response_exceeds_its_bound(policy, preemptive: bool, switch: int) -> None:
     random, bounded, reached = np.random.default_rng(7), 0, 0
     bounds = fixed_priority if policy == FIXED_PRIORITY else earliest_deadline
     for _ in range(300):
@@ -161,7 +161,7 @@ def test_a_bound_is_reached_where_all_are_released_together_and_take_the_longest
         assert [int(jobs.responses.max()) for jobs in what.timeline(scheduler).jobs.values()] == bounds
 
 
-def test_no_frame_on_can_is_beyond_its_bound_over_a_thousand_buses() -> None:
+def test_no_frame_on_can_exceeds_its_bound_over_a_thousand_buses() -> None:
     random, reached = np.random.default_rng(13), 0
     for _ in range(1_000):
         count = int(random.integers(2, 7))

@@ -51,7 +51,7 @@ def test_many_jobs_that_wait_and_many_notes_are_the_same() -> None:
 
 
 @needs_compiler
-def test_what_goes_wrong_where_numbers_are_drawn_is_said() -> None:
+def test_an_error_while_numbers_are_drawn_is_raised() -> None:
     what = Described(stop=10_000)
     what.processor()
 
@@ -63,7 +63,7 @@ def test_what_goes_wrong_where_numbers_are_drawn_is_said() -> None:
         CompiledScheduler(what.parts()).run(LATER)
 
 
-def test_without_a_compiler_it_is_that_in_python(monkeypatch) -> None:
+def test_without_a_compiler_the_scheduler_in_python_is_used(monkeypatch) -> None:
     def missing():
         raise QuadcosimError("no C compiler")
 

@@ -1,4 +1,4 @@
-"""The scheduler against answers that are known, and against another one."""
+"""The scheduler against known answers, and against another one."""
 
 import itertools
 
@@ -30,7 +30,7 @@ def test_three_tasks_released_together_have_the_responses_of_the_textbook():
     assert [max(found) for found in responses(what).values()] == [1 * MS, 3 * MS, 10 * MS]
 
 
-def test_three_frames_on_can_come_to_the_bounds_of_the_revised_analysis():
+def test_three_frames_on_can_reach_the_bounds_of_the_revised_analysis():
     what = Described(stop=200 * MS)
     what.link()
     for rank, period in enumerate([2_500_000, 3_500_000, 3_500_000]):
@@ -64,7 +64,7 @@ def test_a_release_while_a_job_is_not_done_makes_none_where_overruns_are_skipped
     assert jobs.missed.tolist() == [True, True, False, True]
 
 
-def test_every_begin_and_every_resume_costs_a_switch_and_one_that_is_interrupted_is_made_anew():
+def test_every_start_and_every_resume_costs_a_switch_and_an_interrupted_one_is_repeated():
     what = Described(stop=100)
     what.processor(switch=10)
     what.task(5, 1000, offset=15)
@@ -82,11 +82,11 @@ def test_every_begin_and_every_resume_costs_a_switch_and_one_that_is_interrupted
     ]  # fmt: skip
     assert timeline.jobs["1"].started.tolist() == [11]
     assert timeline.jobs["1"].preemptions.tolist() == [1]
-    said = [(each.time, each.kind) for each in timeline.happenings() if each.what == "1"]
-    assert said == [(1, "released"), (11, "started"), (15, "preempted"), (58, "resumed"), (74, "finished")]
+    events = [(each.time, each.kind) for each in timeline.happenings() if each.what == "1"]
+    assert events == [(1, "released"), (11, "started"), (15, "preempted"), (58, "resumed"), (74, "finished")]
 
 
-def test_jobs_of_one_task_begin_a_nanosecond_apart():
+def test_jobs_of_one_task_start_a_nanosecond_apart():
     what = Described(stop=100)
     what.processor()
     what.task(10, 1000)
@@ -96,7 +96,7 @@ def test_jobs_of_one_task_begin_a_nanosecond_apart():
 
 
 @pytest.mark.parametrize("preemptive", [True, False])
-def test_what_comes_first_at_one_instant_is_chosen_when_all_is_released(preemptive):
+def test_a_processor_chooses_after_all_releases_of_an_instant(preemptive):
     what = Described(stop=100)
     what.processor(preemptive=preemptive)
     what.task(7, 10, priority=2)
@@ -104,7 +104,7 @@ def test_what_comes_first_at_one_instant_is_chosen_when_all_is_released(preempti
     assert what.timeline().jobs["0"].started.tolist()[:2] == [2, 12]
 
 
-def test_who_came_first_runs_to_its_end_and_earlier_deadlines_go_before_later_ones():
+def test_first_come_runs_to_its_end_and_earlier_deadlines_precede_later_ones():
     for policy, ends in ((FIRST_COME, [10, 13]), (EARLIEST_DEADLINE, [13, 4]), (FIXED_PRIORITY, [10, 13])):
         what = Described(stop=50)
         what.processor(policy)
@@ -124,7 +124,7 @@ def test_what_is_under_way_at_the_end_is_unfinished_and_nothing_is_released_ther
     assert len(jobs["0"]) == 2
 
 
-def test_a_corrupted_frame_takes_its_time_and_more_and_competes_again():
+def test_a_corrupted_frame_takes_its_time_and_more_and_is_queued_again():
     what = Described(stop=100)
     what.link()
     attempts = iter([1, 0, 0])

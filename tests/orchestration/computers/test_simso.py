@@ -1,4 +1,4 @@
-"""Responses as those of simso, a scheduler that others wrote."""
+"""Responses against those of simso, a third-party scheduler."""
 
 import numpy as np
 import pytest

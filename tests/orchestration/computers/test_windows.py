@@ -1,4 +1,4 @@
-"""Windows of samples and messages against the scheduler: nothing comes outside, whatever a system is dealt."""
+"""Windows of samples and messages against the scheduler: nothing occurs outside, for any random numbers."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -63,7 +63,7 @@ def in_ms(found: Window) -> tuple[float, ...]:
     [
         (AFTER, {}, {}, (0, 0, 2, 2, 2)),
         (AFTER, {}, {"switch": 0.1 * MS}, (0.1, 0.1, 2, 2, 2.1)),
-        (AFTER, FIRST, {}, (0, 1, 2, 3, 3)),  # it may be displaced before it begins, or after
+        (AFTER, FIRST, {}, (0, 1, 2, 3, 3)),  # it may be preempted before it starts, or after
         (AFTER, FIRST, {"preemptive": False}, (0, 1, 2, 2, 3)),
         (AFTER, LAST, {}, (0, 0, 2, 2, 2)),
         (AFTER, LAST, {"preemptive": False}, (0, 0.999999, 2, 2, 2.999999)),
@@ -102,12 +102,12 @@ def test_a_frame_is_between_a_sample_and_its_arrival() -> None:
         ({"deadline": 2 * MS, "overrun": "abort"} | AFTER, FIRST, {}, "expected 0.002 s at most"),
     ],
 )
-def test_what_may_be_later_than_anyone_knows_is_refused(control: Any, others: Any, computer: Any, message: str) -> None:
+def test_what_has_no_bound_is_rejected(control: Any, others: Any, computer: Any, message: str) -> None:
     with pytest.raises(UsageError, match=rf"^computers\.node\.tasks\.control: .*{message}"):
         window(control, others, computer)
 
 
-def test_messages_of_what_is_not_sampled_are_refused() -> None:
+def test_messages_of_components_in_continuous_time_are_rejected() -> None:
     measured = Message(connection="measurement", bytes=8, identifier=1, period=5 * MS)
     with pytest.raises(UsageError, match=r"^networks\.bus\.messages\.y: .*which plant is not"):
         window({}, messages={"y": measured})
@@ -151,7 +151,7 @@ def drawn(random: np.random.Generator) -> System:
     return system(control, load, computer, messages if chance() else {})
 
 
-def test_nothing_comes_outside_its_window() -> None:
+def test_nothing_occurs_outside_its_window() -> None:
     random, seen, edges = np.random.default_rng(5), 0, 0
     for _ in range(400):
         one = drawn(random)
@@ -160,9 +160,9 @@ def test_nothing_comes_outside_its_window() -> None:
         except UsageError:
             continue
         seen += 1
-        happened = timeline_of(one)
-        jobs, task = happened.jobs["node.control"], one.computers["node"].tasks["control"]
-        sent = happened.frames["bus.command"].ended if one.networks else jobs.written
+        timeline = timeline_of(one)
+        jobs, task = timeline.jobs["node.control"], one.computers["node"].tasks["control"]
+        sent = timeline.frames["bus.command"].ended if one.networks else jobs.written
         count = int((jobs.done & (jobs.written > 0))[: len(sent)].sum())
         nominal, arrived = jobs.nominal[:count], sent[:count]
         read = (jobs.released if task.read == "release" else jobs.started)[:count]

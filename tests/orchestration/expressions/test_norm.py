@@ -21,7 +21,7 @@ NUMBERS = st.floats(-1e3, 1e3)
 
 
 def over_rows(node: Node, values: tuple[float, ...]) -> float:
-    """As metrics have it."""
+    """As in metrics."""
     signals = {name: np.array([values[place]] * 2) for name, place in PLACES.items()}
     run = Recorded(time=np.array([0.0, 1.0]), signals=signals, ends={}, numbers={}, arrivals={}, stop_time=1.0)
     found = evaluate({"x": Call("max", (node,))}, lambda: iter([run]))["x"]
@@ -30,7 +30,7 @@ def over_rows(node: Node, values: tuple[float, ...]) -> float:
 
 
 def in_lanes(node: Node, values: tuple[float, ...]) -> float:
-    """As the C has it that is written for lanes, read as Python."""
+    """As in the C for SIMD lanes, read as Python."""
     writer = ExpressionWriter({name: Leaf(code=f"v{place}", kind="held") for name, place in PLACES.items()}, {})
     (one,) = scalars(node, VECTORS)
     section = Section("x")
@@ -54,7 +54,7 @@ def test_it_has_the_same_bits_everywhere(expression: str, values: tuple[float, .
         assert at_once == in_lanes(node, values)
 
 
-def test_a_condition_at_its_very_edge_is_decided_alike() -> None:
+def test_a_condition_at_its_edge_has_the_same_value_everywhere() -> None:
     values = (2.507, 2.044, 0.98, 0.0)
     assert math.hypot(*values) > 3.379849848735887
     assert not compiled(parse("norm(p) > 3.379849848735887"), PLACES)(values)

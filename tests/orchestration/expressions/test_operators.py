@@ -1,4 +1,4 @@
-"""An operator means one thing, at an instant and over the rows of a run."""
+"""An operator has the same value at an instant and over the rows of a run."""
 
 import math
 
@@ -17,7 +17,7 @@ PLACES = {"a": 0, "b": 1}
 SIGNS = [word for word, made in OPERATORS.items() if made.tree is not None]
 TRUTHS = [word for word in SIGNS if OPERATORS[word].gives_truth]
 EXACT = [word for word in SIGNS if word not in ("/", "**")]
-"""Those that IEEE 754 rounds, and that have a value of all numbers"""
+"""Operators that IEEE 754 rounds, and that are defined for all numbers"""
 
 
 def both(node: Node, a: float, b: float) -> tuple[float, float]:
@@ -45,7 +45,7 @@ def test_it_is_the_same_at_an_instant_and_over_a_run(word: str, a: float, b: flo
 
 @pytest.mark.parametrize("word", TRUTHS)
 @given(a=st.sampled_from([0.0, -0.0, 1.0, 2.5, -3.0, math.nan, math.inf]), b=st.sampled_from([0.0, 1.0, 2.5, math.nan]))
-def test_a_truth_is_0_or_1(word: str, a: float, b: float) -> None:
+def test_a_truth_value_is_0_or_1(word: str, a: float, b: float) -> None:
     assert set(both(of(word, Name("a"), Name("b")), a, b)) in ({0.0}, {1.0})
 
 
@@ -58,13 +58,13 @@ _trees: st.SearchStrategy[Node] = st.recursive(
 
 @example(tree=parse("-(a < b)"), a=1.0, b=0.0)
 @given(tree=_trees, a=st.floats(-3, 3), b=st.floats(-3, 3))
-def test_signs_in_one_another_have_the_same_bits(tree: Node, a: float, b: float) -> None:
+def test_nested_operators_have_the_same_bits(tree: Node, a: float, b: float) -> None:
     at_once, over_rows = both(tree, a, b)
     assert np.float64(at_once).tobytes() == np.float64(over_rows).tobytes()
 
 
 @pytest.mark.parametrize("inner", ["-", "norm(", "(a < a < ", "max(b, ", "1 / ("])
-def test_what_is_nested_deepest_has_a_value_at_an_instant(inner: str) -> None:
+def test_the_deepest_expression_has_a_value_at_an_instant(inner: str) -> None:
     depth = DEEPEST - 1
     node = parse(inner * depth + "a" + ")" * inner.count("(") * depth)
     at_once, over_rows = both(node, 0.5, 0.25)

@@ -1,4 +1,4 @@
-"""Objectives: integrals that are exact for what is held, and the same however the run is cut into spans."""
+"""Objectives: integrals are exact for held signals, and do not depend on the spans of a run."""
 
 import itertools
 import math
@@ -66,18 +66,18 @@ def value(expression: str, recorded: Recorded | None = None):
         ("max(tank.level) > 5 and not min(tank.level) > 0", 1.0),
     ],
 )
-def test_words_mean_what_they_say(expression, expected):
+def test_functions_have_known_values(expression, expected):
     assert value(expression) == pytest.approx(expected, rel=1e-14)
 
 
 @pytest.mark.parametrize(
     "expression", ["settling_time(tank.level, 0.1)", "mean(sampled(never, valve.u))", "max(log(0 * tank.level - 1))"]
 )
-def test_what_has_no_value_is_none(expression):
+def test_an_expression_without_a_value_is_none(expression):
     assert value(expression) is None
 
 
-def test_a_comparison_with_what_has_no_value_is_not_true():
+def test_a_comparison_without_a_value_is_not_true():
     assert not value("settling_time(tank.level, 0.1) < 5")
 
 
@@ -107,7 +107,7 @@ def test_along_a_first_order_hold_the_square_is_integrated_exactly():
         ("max(sampled(command, valve.u)) + sampled(command, valve.u)", "expected inside"),
     ],
 )
-def test_what_cannot_be_evaluated_is_refused_by_name(expression, complaint):
+def test_an_invalid_expression_is_rejected_by_name(expression, complaint):
     with pytest.raises(UsageError, match=complaint) as error:
         value(expression)
     assert str(error.value).startswith("x = ")
@@ -125,7 +125,7 @@ EVERYTHING = {
 
 
 @given(st.integers(2, 40), st.lists(st.integers(1, 39), max_size=4), st.integers(0, 2**31))
-def test_however_a_run_is_cut_into_spans_the_numbers_are_the_same(count, cuts, seed):
+def test_values_do_not_depend_on_the_spans_of_a_run(count, cuts, seed):
     random = np.random.default_rng(seed)
     time = np.cumsum(random.random(count) + 0.01)
     a, b, marks = random.normal(size=count), random.normal(size=count), random.random(count) < 0.5

@@ -40,24 +40,24 @@ def test_sampled_names_a_connection_not_a_signal():
         "x[0:1]", "x['a']", "await x", "x is y", "x in y", "",
     ],
 )  # fmt: skip
-def test_what_is_not_part_of_the_language_is_refused_in_one_line(source):
+def test_what_is_not_part_of_the_language_is_rejected_in_one_line(source):
     with pytest.raises(UsageError) as error:
         parse(source)
     assert "\n" not in str(error.value)
     assert "expected" in str(error.value)
 
 
-def test_a_function_that_is_misspelt_is_answered_with_the_nearest():
+def test_the_nearest_name_is_proposed_for_a_misspelt_function():
     with pytest.raises(UsageError, match=r"no function maxx; expected one of .*did you mean max"):
         parse("maxx(a.b)")
 
 
-def test_a_wrong_number_of_arguments_is_refused():
+def test_a_wrong_number_of_arguments_is_rejected():
     with pytest.raises(UsageError, match="settling_time of 1 arguments; expected 2"):
         parse("settling_time(a.b)")
 
 
-def test_what_is_nested_too_deeply_is_refused():
+def test_an_expression_that_is_nested_too_deeply_is_rejected():
     with pytest.raises(UsageError, match="nested"):
         parse("-" * 200 + "1")
     with pytest.raises(UsageError, match="expected"):
@@ -65,7 +65,7 @@ def test_what_is_nested_too_deeply_is_refused():
 
 
 @pytest.mark.parametrize("number", ["1" + "0" * 400, "1e999", "max(x) < 1e999"])
-def test_a_number_that_no_float_holds_is_refused(number):
+def test_a_number_beyond_the_range_of_floats_is_rejected(number):
     with pytest.raises(UsageError, match="float"):
         parse(number)
 
@@ -95,7 +95,7 @@ _trees = st.recursive(
 
 
 @given(_trees)
-def test_what_is_written_reads_as_what_it_was(tree):
+def test_the_text_of_an_expression_reads_as_the_same_expression(tree):
     assert _flat(parse(text(tree))) == _flat(tree)
 
 
@@ -108,7 +108,7 @@ def _flat(node):
     return node if not isinstance(node, Number) or not math.isnan(node.value) else Number(0.0)
 
 
-def test_the_hash_of_an_expression_is_not_taken_to_another_process_where_texts_have_others():
+def test_the_cached_hash_of_an_expression_is_not_pickled():
     node = parse("max(norm(a, b))")
     assert {node: 1}[parse("max(norm(a, b))")] == 1
     there = pickle.loads(pickle.dumps(node))

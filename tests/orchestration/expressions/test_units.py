@@ -1,4 +1,4 @@
-"""Units of expressions: what products, integrals and functions make of them, and what does not go together."""
+"""Units of expressions: of products, integrals and functions; incompatible units."""
 
 from fractions import Fraction
 
@@ -83,7 +83,7 @@ def test_where_one_signal_has_none_the_result_has_none(expression: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("expression", "said"),
+    ("expression", "message"),
     [
         ("p.x + p.v", "+: p.x is in m, p.v is in m/s; expected one unit, or a number as a factor"),
         ("p.x < p.torque", "<: p.x is in m, p.torque is in N.m; "),
@@ -103,13 +103,13 @@ def test_where_one_signal_has_none_the_result_has_none(expression: str) -> None:
         ("p.x ** p.ratio", "p.ratio is the exponent of p.x, which is in m; expected a number"),
     ],
 )
-def test_what_does_not_go_together_is_refused_with_both_units(expression: str, said: str) -> None:
+def test_incompatible_units_are_rejected_with_both_units(expression: str, message: str) -> None:
     with pytest.raises(UsageError) as refused:
         unit(expression)
-    assert str(refused.value).startswith(said)
+    assert str(refused.value).startswith(message)
 
 
-def test_a_number_as_a_factor_goes_with_anything_and_the_others_decide() -> None:
+def test_a_number_as_a_factor_is_compatible_with_any_unit() -> None:
     assert unit("p.x + 0.5 * p.v") == "m"
     assert unit("integral(p.x ** 2 + 0.1 * p.torque ** 2)") == "m2.s"
     assert unit("p.mm * 0.001 < p.x") == "1"
@@ -124,7 +124,7 @@ def test_rad_is_1_where_units_are_compared() -> None:
     assert unit("p.rate * p.x < p.v") == "1"
 
 
-def test_what_no_fmu_defines_goes_by_its_name_alone() -> None:
+def test_a_unit_that_no_fmu_defines_is_compared_by_name() -> None:
     assert unit("p.bits + p.bits") == "bits"
     assert unit("integral(p.bits ** 2)") == "bits2.s"
     assert unit("p.bits + p.bytes") is None
@@ -147,7 +147,7 @@ def test_a_plain_product_is_written_as_it_was(name: str) -> None:
     assert named("m/s^2", None) == named("m/s2", None)
 
 
-def test_a_deep_expression_is_gone_through_once() -> None:
+def test_the_unit_of_a_deep_expression_is_computed_once() -> None:
     text = "p.x"
     for _ in range(29):
         text = f"-({text} + 1)"

@@ -1,4 +1,4 @@
-"""What others have of computers and buses: tables of tasks, and databases of CAN buses."""
+"""Third-party files of computers and buses: tables of tasks, and CAN databases."""
 
 import sys
 from pathlib import Path
@@ -57,7 +57,7 @@ def test_a_row_is_a_task_with_times_in_the_unit_of_its_column(tmp_path: Path) ->
     }
 
 
-def test_without_a_computer_the_file_is_its_name(tmp_path: Path) -> None:
+def test_without_a_column_computer_it_is_named_after_the_file(tmp_path: Path) -> None:
     found = computers_of(table(tmp_path, "name,period,execution\na,1,0.1\n"))
     assert found == {"tasks": {"tasks": {"a": {"period": 1.0, "execution": 0.1}}}}
 
@@ -76,12 +76,12 @@ def test_without_a_computer_the_file_is_its_name(tmp_path: Path) -> None:
         ("name,period,execution\n", "expected a row for each task"),
     ],
 )
-def test_what_cannot_be_of_a_task_is_refused_by_its_line(tmp_path: Path, text: str, message: str) -> None:
+def test_invalid_tasks_are_rejected_with_their_line(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(UsageError, match=message):
         computers_of(table(tmp_path, text))
 
 
-def test_messages_of_a_database_are_load_and_what_it_does_not_say_is_said(tmp_path: Path) -> None:
+def test_messages_of_a_database_are_load_and_what_it_lacks_is_reported(tmp_path: Path) -> None:
     pytest.importorskip("cantools")
     (tmp_path / "bus.dbc").write_text(DBC)
     found = bus_of(tmp_path / "bus.dbc")
@@ -102,7 +102,7 @@ def test_messages_of_a_database_are_load_and_what_it_does_not_say_is_said(tmp_pa
     )
 
 
-def test_a_file_that_is_no_database_is_refused(tmp_path: Path) -> None:
+def test_a_file_that_is_no_database_is_rejected(tmp_path: Path) -> None:
     pytest.importorskip("cantools")
     (tmp_path / "bus.dbc").write_text("no database")
     with pytest.raises(UsageError, match=r"bus\.dbc: expected a CAN database: "):
@@ -116,7 +116,7 @@ def test_without_cantools_the_extra_is_named(tmp_path: Path, monkeypatch: pytest
         bus_of(tmp_path / "bus.dbc")
 
 
-def test_what_is_proposed_of_both_is_a_system_file(tmp_path: Path) -> None:
+def test_the_proposal_from_both_is_a_system_file(tmp_path: Path) -> None:
     pytest.importorskip("cantools")
     (tmp_path / "bus.dbc").write_text(DBC)
     resources, others = resources_of(["A.fmu", str(table(tmp_path, TASKS)), str(tmp_path / "bus.dbc")])
@@ -130,7 +130,7 @@ def test_what_is_proposed_of_both_is_a_system_file(tmp_path: Path) -> None:
     assert system.networks["bus"].messages["command"].identifier == 16
 
 
-def test_two_files_with_a_computer_of_one_name_are_refused(tmp_path: Path) -> None:
+def test_two_files_with_a_computer_of_one_name_are_rejected(tmp_path: Path) -> None:
     path = str(table(tmp_path, TASKS))
     with pytest.raises(UsageError, match=r"computers\.flight: is in a file before it already"):
         resources_of([path, path])

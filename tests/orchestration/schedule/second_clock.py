@@ -1,4 +1,4 @@
-"""The clock a second time, as `docs/timing.md` and `docs/systems.md` say it: nothing of the project is imported here.
+"""A second clock, written from `docs/timing.md` and `docs/systems.md`: nothing of the project is imported here.
 
 It makes all samples and messages of a system before it runs, where the project's clock makes each from the one before.
 """
@@ -16,7 +16,7 @@ import numpy as np
 C0, C1 = 0.0013498980316301035, 0.9986501019683699
 Values = dict[str, float]
 System = Mapping[str, Any]
-"""What the file says, as dictionaries; `start` and `end` of a connection are its `from` and `to`."""
+"""The tables of a file, as dictionaries; `start` and `end` of a connection are its `from` and `to`."""
 
 
 class Model(NamedTuple):
@@ -27,7 +27,7 @@ class Model(NamedTuple):
 
 
 class Step(NamedTuple):
-    """A step of a component, and with which inputs."""
+    """A step of a component, with its inputs."""
 
     t: float
     h: float
@@ -35,7 +35,7 @@ class Step(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """What happened in a run."""
+    """The steps, rows and events of a run."""
 
     rows: list[Values]
     steps: dict[str, list[Step]]
@@ -43,7 +43,7 @@ class Seen(NamedTuple):
 
 
 class Message(NamedTuple):
-    """Message k of a connection, everything about it drawn."""
+    """Message k of a connection, with all its random numbers."""
 
     k: int
     sent: int
@@ -88,7 +88,7 @@ def uniform(numbers: np.random.Generator) -> float:
 
 
 def drawn(numbers: np.random.Generator, given: Any, k: int) -> float | Fraction:
-    """The k-th number of what a distribution says; a span is of whole nanoseconds, all else as it stands there."""
+    """The k-th number of a distribution; a span is of whole nanoseconds, everything else as given."""
     if isinstance(given, (int, float)):
         return given
     if given["file"] is not None:
@@ -114,7 +114,7 @@ def drawn(numbers: np.random.Generator, given: Any, k: int) -> float | Fraction:
 
 
 def longest(given: Any) -> Fraction:
-    """The most that it can be, in nanoseconds."""
+    """The largest value, in nanoseconds."""
     if isinstance(given, (int, float)):
         return exactly(given)
     if given["file"] is not None:
@@ -157,11 +157,11 @@ def losses(numbers: np.random.Generator, p: Any, n: float | None, count: int) ->
     return lost
 
 
-# -- what happens when, before anything moves -----------------------------------------------------------------
+# -- the timetable, before any step ---------------------------------------------------------------------------
 
 
 class Wire:
-    """A connection: which kind it is, and what becomes of a message's values."""
+    """A connection: its kind, and the conversion of the values of a message."""
 
     def __init__(self, system: System, given: Mapping[str, Any]) -> None:
         self.given = given
@@ -185,7 +185,7 @@ class Wire:
         return list(found.values())
 
     def carried(self, outputs: Values, z: Sequence[float] | None = None, rounded: bool = True) -> list[float]:
-        """What arrives of the sender's outputs."""
+        """The received values of the outputs of the sender."""
         m = [outputs[name] for name in self.outputs]
         if z is not None and any(self.sigma):
             m = [y + s * n for y, s, n in zip(m, self.sigma, z, strict=True)]
@@ -244,7 +244,7 @@ def messages(
 
 
 def turns(names: Sequence[str], feeds: Iterable[tuple[str, str]]) -> list[str]:
-    """Who comes after whom: `feeds` in the order of the file, without those that would close a circle."""
+    """The order of components: `feeds` in the order of the file, without those that would close a cycle."""
     before: dict[str, set[str]] = {name: set() for name in names}
 
     def waits_for(name: str) -> set[str]:
@@ -263,7 +263,7 @@ def turns(names: Sequence[str], feeds: Iterable[tuple[str, str]]) -> list[str]:
 
 
 def held(t: int, applied: Sequence[tuple[int, list[float]]], hold: str) -> list[float]:
-    """What holds at t, of all that arrived."""
+    """The held value at t, from all arrivals."""
     t1, u1 = applied[-1]
     if hold == "zero" or len(applied) < 2 or t == t1:
         return u1
@@ -272,7 +272,7 @@ def held(t: int, applied: Sequence[tuple[int, list[float]]], hold: str) -> list[
 
 
 class Run:
-    """A system, everything about its times made, to be run once."""
+    """A system with its timetable, to be run once."""
 
     def __init__(self, system: System, models: Mapping[str, Model], fixed: Iterable[str] = ()) -> None:
         self.models, self.components = models, system["components"]
@@ -313,12 +313,12 @@ class Run:
         self.seen = Seen([], {name: [] for name in self.components}, [])
 
     def feeds(self, count: Callable[[Wire], bool]) -> list[tuple[str, str]]:
-        """Who feeds whom over the connections that count."""
+        """The pairs of components over the connections that determine the order."""
         tasks = self.times
         return [(w.sender, w.receiver) for w in self.wires if count(w) and (w.sender in tasks) == (w.receiver in tasks)]
 
     def halts_of(self, name: str, step: float) -> set[int]:
-        """Where a component in continuous time halts."""
+        """The communication points of a component in continuous time."""
         found = {*points(step, self.stop), self.stop}
         for wire in self.wires:
             if not wire.is_plain and wire.receiver == name:
@@ -350,18 +350,18 @@ class Run:
                 self.look(name, behind=True)
             self.record(t)
         for wire in self.wires:
-            self.seen.events.extend(e for m in self.sent.get(wire.name, ()) for e in self.happenings(wire, m))
+            self.seen.events.extend(e for m in self.sent.get(wire.name, ()) for e in self.events_of(wire, m))
         self.seen.events.sort()
         return self.seen
 
     def move(self, name: str, t: int) -> None:
-        """Step a component in continuous time from where it halted last."""
+        """Step a component in continuous time from its last communication point."""
         self.look(name, behind=False)
         start, self.halted[name] = self.halted[name], t
         self.step(name, start / 1e9, (t - start) / 1e9)
 
     def look(self, name: str, behind: bool) -> None:
-        """Take over plain connections what holds over the step to come (`behind`), or what those before have."""
+        """Take values over plain connections: those over the next step (`behind`), or of earlier components."""
         earlier = self.movers[: self.movers.index(name)]
         for wire in self.wires:
             newest = wire.sender in earlier and wire.given["order"] == "gauss-seidel"
@@ -370,12 +370,12 @@ class Run:
                 self.inputs[name] |= dict(zip(wire.inputs, values, strict=True))
 
     def step(self, name: str, t: float, h: float) -> None:
-        """Step a component with what it has."""
+        """Step a component with its inputs."""
         self.seen.steps[name].append(Step(t, h, dict(self.inputs[name])))
         self.outputs[name] = dict(self.models[name].move(t, h, self.inputs[name]))
 
     def deliver(self, t: int) -> None:
-        """What arrives now and has left."""
+        """The messages that arrive now and are sent."""
         for wire, m in self.arriving[t]:
             applied = self.applied[wire.name]
             if (wire.name, m.k) in self.content:
@@ -383,7 +383,7 @@ class Run:
                 self.applied[wire.name].append((t, self.content[wire.name, m.k]))
 
     def take(self, name: str, t: int) -> None:
-        """What a component has received becomes its inputs."""
+        """Set the inputs of a component to its received values."""
         for wire in self.wires:
             if wire.receiver == name and not wire.is_plain:
                 values = held(t, self.applied[wire.name], wire.given["hold"])
@@ -413,7 +413,7 @@ class Run:
             row |= {f"{name}.{key}": value for key, value in self.outputs[name].items()}
         self.seen.rows.append(row)
 
-    def happenings(self, wire: Wire, m: Message) -> list[tuple[int, str, str, int]]:
+    def events_of(self, wire: Wire, m: Message) -> list[tuple[int, str, str, int]]:
         """The events of one message: time, kind, connection, index."""
         if wire.is_read and m.arrival >= self.stop:
             return []
@@ -426,5 +426,5 @@ class Run:
 
 
 def run(system: System, models: Mapping[str, Model], fixed: Iterable[str] = ()) -> Seen:
-    """Run `system`, in which the components named in `fixed` take steps of one length only."""
+    """Run `system`, in which the components in `fixed` have a fixed step."""
     return Run(system, models, fixed).run()

@@ -1,4 +1,4 @@
-"""Who comes first at one instant, and before a run."""
+"""The order of components at one instant, and at initialisation."""
 
 import sys
 
@@ -7,17 +7,17 @@ from orchestration.schedule.order import ranked
 from tests.orchestration.engines.stubs import wire
 
 
-def test_the_order_of_the_file_holds_where_nothing_feeds_anything():
+def test_without_connections_the_order_is_that_of_the_file():
     assert ranked(["b", "a", "c"], []) == ("b", "a", "c")
 
 
-def test_who_feeds_another_comes_first():
+def test_a_sender_precedes_its_receiver():
     assert ranked(["plant", "filter", "controller"], [("filter", "controller"), ("controller", "plant")]) == (
         "filter", "controller", "plant",
     )  # fmt: skip
 
 
-def test_of_a_circle_the_connection_that_closes_it_gives_way():
+def test_a_connection_that_closes_a_cycle_is_ignored():
     assert ranked(["a", "b"], [("b", "a"), ("a", "b")]) == ("b", "a")
 
 

@@ -1,4 +1,4 @@
-"""What becomes of tasks and messages of a system: kinds of networks, arrivals by chance, numbers from their streams."""
+"""Timelines of systems: kinds of networks, random arrivals, numbers from their streams."""
 
 import math
 import re
@@ -47,7 +47,7 @@ def test_a_switch_stores_and_forwards_and_the_most_urgent_goes_first_on_each_lin
     assert frames["n.low"].attempts.tolist() == [2]
 
 
-def test_frames_blocked_for_all_but_a_nanosecond_come_to_the_bounds_of_can():
+def test_frames_blocked_for_all_but_a_nanosecond_reach_the_bounds_of_can():
     def responses(offsets):
         periods = (0.0025, 0.0035, 0.0035)
         messages = {
@@ -62,7 +62,7 @@ def test_frames_blocked_for_all_but_a_nanosecond_come_to_the_bounds_of_can():
     assert responses((0.0, 0.0, 0.0))[2] == 3_500_000
 
 
-def test_arrivals_by_chance_are_the_numbers_of_their_stream():
+def test_random_arrivals_are_the_numbers_of_their_stream():
     tasks = {"load": Task(arrivals=Arrivals(poisson=100.0), offset=0.5, execution=0.001)}
     system = System(stop_time=5.0, seed=3, computers={"one": Computer(tasks=tasks)})
     u = Streams(3).of("computers.one.tasks.load", "arrivals").random(1000).tolist()
@@ -115,7 +115,7 @@ JAMMED = {"all": Message(period=0.001, bytes=1, identifier=0), "none": Message(p
         ),
     ],
 )
-def test_what_waits_more_and_more_is_said_before_it_takes_all_memory(
+def test_queues_that_grow_without_end_are_reported_before_they_take_all_memory(
     monkeypatch: pytest.MonkeyPatch, system: System, line: str, in_c: bool
 ) -> None:
     if not in_c:

@@ -1,4 +1,4 @@
-"""What tasks and messages of a system come to, and that none is beyond its bound."""
+"""Statistics of tasks and messages of a system, none of which exceeds its bound."""
 
 import math
 from pathlib import Path
@@ -16,7 +16,7 @@ MS = 1e-3
 
 
 def tasks(*listed: tuple[float, float], **more: Any) -> dict[str, Any]:
-    """Of execution and period [ms] each, the first the most urgent."""
+    """Tasks of execution and period [ms], the first the most urgent."""
     return {
         f"t{i}": {"execution": c / 1e3, "period": t / 1e3, "priority": i + 1, **more} for i, (c, t) in enumerate(listed)
     }
@@ -68,7 +68,7 @@ def test_frames_of_a_millisecond_have_the_bounds_of_davis_and_others() -> None:
     assert found.messages["bus.m2"].response.max == 3.5 * MS
 
 
-def test_what_is_skipped_and_aborted_is_missed_and_has_no_response() -> None:
+def test_skipped_and_aborted_jobs_are_missed_and_have_no_response() -> None:
     for overrun, skipped, aborted in (("skip", 3, 0), ("abort", 0, 6), ("queue", 0, 0)):
         found = of(0.06, {"tasks": tasks((15, 10), overrun=overrun)}).tasks["cpu.t0"]
         assert (found.skipped, found.aborted) == (skipped, aborted)
@@ -76,7 +76,7 @@ def test_what_is_skipped_and_aborted_is_missed_and_has_no_response() -> None:
         assert (found.response is None) == (overrun == "abort")
 
 
-def test_nothing_is_bounded_that_comes_by_chance_nor_where_theory_says_nothing() -> None:
+def test_there_is_no_bound_for_random_arrivals_nor_where_theory_has_none() -> None:
     by_chance = {"t9": {"execution": 0.001, "arrivals": {"poisson": 10}, "priority": 2}}
     found = of(1.0, {"tasks": {**tasks((1, 10)), **by_chance}}, {"kind": "first-come-first-served", "bit_rate": 1e6,
         "messages": {"m": {"bytes": 8, "period": 0.01}}})  # fmt: skip
@@ -84,12 +84,12 @@ def test_nothing_is_bounded_that_comes_by_chance_nor_where_theory_says_nothing()
     assert math.isclose(found.tasks["cpu.t9"].utilisation, 0.01)
 
 
-def test_a_system_without_computers_is_refused() -> None:
+def test_a_system_without_computers_is_rejected() -> None:
     with pytest.raises(UsageError, match="computers: none, and no networks: expected at least one of them"):
         schedule({"components": {"a": {"fmu": "a.fmu", "step": 0.1}}}, 1.0)
 
 
-def test_an_end_that_is_given_takes_the_place_of_one_in_the_file() -> None:
+def test_a_given_end_overrides_that_of_the_file() -> None:
     tables = {"stop_time": 5.0, "computers": {"cpu": {"tasks": tasks((1, 10))}}}
     assert schedule(tables).until == 5.0
     assert schedule(tables, 0.1).until == 0.1
@@ -133,7 +133,7 @@ def system(random: np.random.Generator) -> dict[str, Any]:
     }
 
 
-def test_no_message_of_a_task_is_beyond_its_bound() -> None:
+def test_no_message_of_a_task_exceeds_its_bound() -> None:
     random, bounded = np.random.default_rng(3), 0
     for _ in range(40):
         tables = system(random)

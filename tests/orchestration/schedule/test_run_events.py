@@ -1,4 +1,4 @@
-"""The events of tasks and frames are told as a run goes on, the same whenever one asks."""
+"""The events of tasks and frames during a run do not depend on when they are requested."""
 
 from itertools import pairwise
 
@@ -21,7 +21,7 @@ NO_MESSAGES = np.zeros((0, 4), dtype=np.int64)
 def test_events_are_the_same_in_parts_of_any_length_and_behind_any_time(
     system: System, parts: list[tuple[float, bool]]
 ) -> None:
-    """Some parts are handed over without anybody asking for them, as on the way to where a run was paused."""
+    """Some parts are discarded unread, as before the point at which a run was paused."""
     stop, whole = round(system.stop_time * 1e9), list(timeline_of(system).happenings())
     run_events, found, expected = RunEvents(system), list[Event](), list[Event]()
     ends = [(-1, True), *sorted((round(share * stop), is_asked) for share, is_asked in parts), (stop, True)]
@@ -35,22 +35,22 @@ def test_events_are_the_same_in_parts_of_any_length_and_behind_any_time(
 
 @settings(max_examples=100, derandomize=True, deadline=None)
 @given(systems_on_computers())
-def test_what_is_told_is_what_became_of_each_job_and_frame(system: System) -> None:
+def test_events_agree_with_the_jobs_and_frames(system: System) -> None:
     timeline = timeline_of(system)
     found = {(event.kind, event.what, event.sample): event.time for event in timeline.happenings()}
 
-    def told(kind: str, what: str) -> dict[int, int]:
+    def times_of(kind: str, what: str) -> dict[int, int]:
         return {sample: time for (a, b, sample), time in found.items() if (a, b) == (kind, what)}
 
     for name, jobs in timeline.jobs.items():
-        assert told("finished", name) == {int(k): int(jobs.ended[k]) for k in np.flatnonzero(jobs.done)}
+        assert times_of("finished", name) == {int(k): int(jobs.ended[k]) for k in np.flatnonzero(jobs.done)}
         late = np.maximum(jobs.deadline, jobs.released)
-        assert told("missed", name) == {int(k): int(late[k]) for k in np.flatnonzero(jobs.missed)}
+        assert times_of("missed", name) == {int(k): int(late[k]) for k in np.flatnonzero(jobs.missed)}
         begun = dict(enumerate(jobs.released.tolist()))
-        assert told("released", name) | told("skipped", name) == begun
+        assert times_of("released", name) | times_of("skipped", name) == begun
     for name, frames in timeline.frames.items():
-        assert told("queued", name) == dict(enumerate(frames.queued.tolist()))
-        assert told("transmitted", name) == {int(k): int(frames.ended[k]) for k in np.flatnonzero(frames.done)}
+        assert times_of("queued", name) == dict(enumerate(frames.queued.tolist()))
+        assert times_of("transmitted", name) == {int(k): int(frames.ended[k]) for k in np.flatnonzero(frames.done)}
 
 
 def test_a_job_released_behind_its_deadline_is_missed_when_it_is_released() -> None:
@@ -62,7 +62,7 @@ def test_a_job_released_behind_its_deadline_is_missed_when_it_is_released() -> N
     assert len({event.time for event in events}) == 1
 
 
-def test_of_a_starved_task_only_what_is_not_late_yet_is_kept_in_mind() -> None:
+def test_of_a_starved_task_only_jobs_that_are_not_late_yet_are_kept() -> None:
     tasks = {"all": Task(period=0.001, execution=0.001), "none": Task(period=0.001, priority=2)}
     run_events = RunEvents(System(stop_time=10.0, computers={"one": Computer(tasks=tasks)}))
     found = run_events.with_messages(NO_MESSAGES, 9_999_500_000)

@@ -1,4 +1,4 @@
-"""Two people compute the same bits: the project's master against a clock that does what the documents say."""
+"""Two implementations compute the same bits: the master, and a clock written from the documentation."""
 
 import ast
 import math
@@ -36,9 +36,9 @@ PAGE = Path(__file__).parents[3] / "docs" / "timing.md"
 
 
 def moved(outputs: Mapping[str, float], t: float, h: float, inputs: Mapping[str, float]) -> dict[str, float]:
-    """Outputs that are bounded, and have in each when and with what the component was stepped."""
-    told = sum((i + 1) * value for i, (_, value) in enumerate(sorted(inputs.items())))
-    return {name: math.sin((i + 1) * (t + 2 * h) + told + start) for i, (name, start) in enumerate(outputs.items())}
+    """Bounded outputs that depend on the time, the length and the inputs of a step."""
+    weighted = sum((i + 1) * value for i, (_, value) in enumerate(sorted(inputs.items())))
+    return {name: math.sin((i + 1) * (t + 2 * h) + weighted + start) for i, (name, start) in enumerate(outputs.items())}
 
 
 class Moved(Stub):
@@ -48,11 +48,11 @@ class Moved(Stub):
         super().__init__(self.follow, **outputs, **dict.fromkeys(inputs, 0.0))
         self.outputs, self.inputs = outputs, tuple(inputs)
 
-    def told(self, values: Mapping[str, float]) -> dict[str, float]:
+    def received(self, values: Mapping[str, float]) -> dict[str, float]:
         return {name: values[name] for name in self.inputs}
 
     def follow(self, values: dict[str, float], t: float, h: float) -> None:
-        values.update(moved(self.outputs, t, h, self.told(values)))
+        values.update(moved(self.outputs, t, h, self.received(values)))
 
 
 def ends(what: System, name: str, kind: str) -> list[str]:
@@ -81,7 +81,10 @@ def both(what: System, fixed: Iterable[str] = ()) -> tuple[second_clock.Seen, se
     rows = [row for chunk in master.recorder.finish().chunks() for row in chunk.rows.tolist()]
     ours = second_clock.Seen(
         [dict(zip(master.board.columns, row, strict=True)) for row in rows],
-        {name: [second_clock.Step(t, h, stub.told(seen)) for t, h, seen in stub.steps] for name, stub in stubs.items()},
+        {
+            name: [second_clock.Step(t, h, stub.received(seen)) for t, h, seen in stub.steps]
+            for name, stub in stubs.items()
+        },
         sorted(tuple(event) for event in events(master)),
     )
     models = {name: second_clock.Model(values, partial(moved, values)) for name, values in first.items()}
@@ -89,7 +92,7 @@ def both(what: System, fixed: Iterable[str] = ()) -> tuple[second_clock.Seen, se
 
 
 def same(what: System, fixed: Iterable[str] = (), size: int = position.INSTANTS) -> second_clock.Seen:
-    """What both saw, by schedules of about so many instants."""
+    """The results of both, with schedules of about so many instants."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(position, "INSTANTS", size)
         ours, theirs = both(what, fixed)
@@ -99,7 +102,7 @@ def same(what: System, fixed: Iterable[str] = (), size: int = position.INSTANTS)
 
 
 def flight(case: Case) -> System:
-    """A timing of the quadrotor as the system that it means."""
+    """A timing of the quadrotor as its system."""
     return Scenario(timing=case.timing, stop_time=case.stop_time, seed=case.seed).as_system()
 
 
@@ -114,7 +117,7 @@ def test_steps_rows_and_events_are_the_same_over_random_systems(what: System, si
 
 @settings(max_examples=80)
 @given(systems_of_fixed_steps(), SIZES)
-def test_and_with_components_of_one_step_to_whose_points_things_move(
+def test_and_with_components_of_fixed_step_to_whose_points_instants_move(
     drawn: tuple[System, list[str]], size: int
 ) -> None:
     try:
@@ -169,7 +172,7 @@ def test_without_a_component_in_continuous_time_there_are_events_to_the_end_and_
     assert same(system({"a": sampled(0.01, offset=0.005)}, stop_time=0.01)).rows[0] == {"time": 0.0}
 
 
-def test_a_connection_with_delay_does_not_decide_whose_turn_it_is() -> None:
+def test_a_connection_with_delay_does_not_determine_the_order() -> None:
     late, prompt = wire("a.y", "b.u", "late", delay=0.015), wire("b.y", "a.u", "prompt")
     seen = same(system({"a": sampled(0.01), "b": sampled(0.01)}, [late, prompt], stop_time=0.03))
     assert [step.inputs["u"] for step in seen.steps["a"]] == [
@@ -180,7 +183,7 @@ def test_a_connection_with_delay_does_not_decide_whose_turn_it_is() -> None:
 ALL_OF_A = (0.0, 0.01, 0.02)
 
 
-def test_a_component_with_its_own_clock_has_its_turn_among_those_that_are_due() -> None:
+def test_a_component_with_its_own_clock_is_ordered_among_those_that_are_due() -> None:
     link = wire("a.y", "b.u", "link")
     seen = same(system({"b": sampled(0.01), "a": sampled(0.01, clock="fmu")}, [link], stop_time=0.03))
     assert [step.inputs["u"] for step in seen.steps["b"]] == [row["a.y"] for row in seen.rows[:-1]]
@@ -191,19 +194,19 @@ def test_noise_of_readings_at_one_instant_is_in_the_order_of_their_samples() -> 
     same(system({"a": continuous(0.01), "b": sampled(0.01)}, [level], stop_time=0.1))
 
 
-def test_who_is_read_with_a_delay_does_not_halt_at_the_sample() -> None:
+def test_a_component_that_is_read_with_a_delay_is_not_stepped_to_the_sample() -> None:
     level = wire("a.y", "b.u", "level", delay=0.005)
     seen = same(system({"a": continuous(0.1), "b": sampled(0.05)}, [level], stop_time=0.1))
     assert [round(1000 * (step.t + step.h)) for step in seen.steps["a"]] == [45, 95, 100]
 
 
-def test_a_sample_that_reads_two_of_one_step_moves_to_a_point_of_both() -> None:
+def test_a_sample_that_reads_two_components_of_fixed_step_moves_to_a_common_point() -> None:
     parts = {"a": continuous(0.03), "b": continuous(0.02), "c": sampled(0.1)}
     seen = same(system(parts, [wire("a.y", "c.u"), wire("b.y", "c.v")], stop_time=0.3), ["a", "b"])
     assert [round(1000 * step.t) for step in seen.steps["c"]] == [0, 120, 240]
 
 
-def test_of_messages_that_move_to_one_point_the_last_sent_stays() -> None:
+def test_of_messages_that_move_to_one_point_the_last_sent_remains() -> None:
     link = wire("a.y", "b.u", "link", hold="first")
     seen = same(system({"a": continuous(0.01), "b": continuous(0.02)}, [link], stop_time=0.06), ["b"])
     assert [row["b.u"] for row in seen.rows if row["time"] in (0.02, 0.04)] == [
@@ -217,7 +220,7 @@ def test_samples_that_would_move_to_one_point_are_an_error() -> None:
         both(what, ["a"])
 
 
-def test_the_end_is_a_point_of_whoever_takes_steps_of_one_length() -> None:
+def test_the_end_is_a_point_of_components_of_fixed_step() -> None:
     with pytest.raises(UsageError, match=r"stop_time = 0\.2: .* components\.a, .* expected 0\.18 or 0\.21"):
         both(system({"a": continuous(0.03)}, stop_time=0.2), ["a"])
 

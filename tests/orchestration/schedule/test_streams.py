@@ -1,4 +1,4 @@
-"""Random numbers belong to names: nothing that is added changes another's."""
+"""Random numbers belong to names: additions do not change those of others."""
 
 import hashlib
 
@@ -14,7 +14,7 @@ from tests.orchestration.engines.random_systems import systems_with_more
 from tests.orchestration.engines.stubs import Stub
 
 
-def test_a_stream_is_made_as_the_documents_say():
+def test_a_stream_is_made_as_documented():
     words = [
         int.from_bytes(hashlib.sha256(b"connections.valve.loss").digest()[4 * i : 4 * i + 4], "big") for i in range(4)
     ]
@@ -31,7 +31,7 @@ def test_a_stream_with_a_number_is_the_spawned_child_of_that_number():
 @settings(max_examples=60)
 @given(systems_with_more())
 def test_adding_a_component_and_lossy_connections_changes_no_number_of_the_others(pair):
-    """When whom samples, what becomes of whose messages, and with which noise: outputs are constant."""
+    """Samples, outcomes of messages and noise are compared: outputs are constant."""
     before, after = pair
     assert all(history(after, name) == history(before, name) for name in before.components)
     (rows, steps), (more_rows, more_steps) = noisy(before), noisy(after)
@@ -41,7 +41,7 @@ def test_adding_a_component_and_lossy_connections_changes_no_number_of_the_other
 
 
 def history(what, name):
-    """When a component samples, and what becomes of the messages that it reads and sends."""
+    """The samples of a component, and the outcomes of the messages that it reads and sends."""
     place, found = list(what.components).index(name), []
     for instant in Cursor(Timetable(what, Streams(what.seed))).instants():
         for due in (due for due in instant.samples if due.component == place):
@@ -52,7 +52,7 @@ def history(what, name):
 
 
 def posted(what, instant, name):
-    """What a component in continuous time sends."""
+    """The messages of a component in continuous time."""
     wires = what.connections
     return [(wires[i].name, *message) for i, *message in instant.posted if wires[i].sender == name]
 

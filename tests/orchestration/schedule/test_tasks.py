@@ -1,4 +1,4 @@
-"""What happens when of a system whose components are tasks of computers, and whose connections go over networks."""
+"""The timetable of a system with components on computers and connections over networks."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -40,7 +40,7 @@ def computers(tasks=NOTHING, **keys):
 
 
 def times(found, what):
-    """By the name of a part of an instant, the times [ms] at which there is any."""
+    """The times [ms] of the instants that have a part, by its name."""
     return [i.time / MS for i in found if getattr(i, what)]
 
 
@@ -53,7 +53,7 @@ LATE = st.floats(0.0, 0.03)
     delays=st.tuples(LATE, LATE, LATE, LATE), losses=st.tuples(*2 * [st.sampled_from([0.0, 0.3])]),
     burst=st.sampled_from([None, 2.0]), seed=st.integers(0, 99),
 )  # fmt: skip
-def test_one_task_alone_that_takes_no_time_happens_as_sampling_does(
+def test_a_single_task_without_execution_time_has_the_instants_of_sampling(
     period, offset, share, ratio, delays, losses, burst, seed
 ):
     jitter = share * period / ratio
@@ -76,7 +76,7 @@ def test_one_task_alone_that_takes_no_time_happens_as_sampling_does(
 
 
 def _told(found, stop=1000 * MS):
-    """Instants, all that is after the end as one."""
+    """The instants, those after the end as one."""
 
     def message(m):
         index, k, sent, arrival = m
@@ -95,7 +95,7 @@ def _told(found, stop=1000 * MS):
     ]
 
 
-def test_a_constant_time_of_execution_happens_as_a_delay_does():
+def test_a_constant_execution_time_has_the_instants_of_a_delay():
     by_delay = instants(loop(sampled(0.1), command={"delay": 0.003}))
     by_task = instants(loop(computers=computers(period=0.1, execution=0.003)))
     assert [i.time for i in by_task] == [i.time for i in by_delay]
@@ -104,7 +104,7 @@ def test_a_constant_time_of_execution_happens_as_a_delay_does():
     assert sent[0] == [3 * MS, 3 * MS]
 
 
-def test_a_job_reads_when_it_begins_or_at_its_release_and_writes_at_its_end_or_deadline():
+def test_a_job_reads_at_its_start_or_release_and_writes_at_its_end_or_deadline():
     load = {"other": Task(period=0.1, execution=0.02, priority=0)}
     for read, samples in (("start", [20, 120, 220]), ("release", [0, 100, 200])):
         for write, writes in (("end", [30, 130, 230]), ("deadline", [80, 180, 280])):
@@ -121,7 +121,7 @@ def test_a_task_that_waits_steps_to_its_next_sample_and_reads_the_newest():
     assert samples == [(150, 160), (160, 200), (200, 450), (450, 460), (460, 2**60 // MS)]
 
 
-def test_an_aborted_job_samples_and_sends_nothing_and_one_that_never_began_does_neither():
+def test_an_aborted_job_samples_and_sends_nothing_and_one_that_never_started_does_neither():
     load = {"other": Task(period=0.5, execution=0.25, priority=0, offset=0.095)}
     how = computers(period=0.1, execution=0.01, overrun="abort", tasks=load, offset=0.09)
     found = instants(loop(computers=how, stop_time=0.5))
@@ -148,7 +148,7 @@ def bus(*, kind="can", bit_rate=500e3, stuffing="none", more=NOTHING, **keys):
     }
 
 
-def test_a_message_over_a_network_arrives_when_its_last_bit_is_over_and_its_own_delay_too():
+def test_a_message_over_a_network_arrives_after_its_last_bit_and_the_delay_of_its_connection():
     found = instants(loop(sampled(0.1), command={"delay": 0.001}, networks=bus(), stop_time=0.25))
     bits = 111 * 2000
     assert [i.time for i in found if i.arrivals] == [k * 100 * MS + bits + MS for k in range(3)]
@@ -157,7 +157,7 @@ def test_a_message_over_a_network_arrives_when_its_last_bit_is_over_and_its_own_
     assert [i.time for i in found if i.arrivals] == [k * 100 * MS + 2 * bits for k in range(3)]
 
 
-def test_what_a_component_in_continuous_time_sends_over_a_network_has_instants_of_its_own():
+def test_messages_of_a_component_in_continuous_time_over_a_network_have_separate_instants():
     how = {"bus": Network(kind="first-come-first-served", bit_rate=8e3, messages={
         "measurement": Message(connection="measurement", bytes=1, period=0.04, offset=0.01)})}  # fmt: skip
     found = instants(loop(sampled(0.1), networks=how, stop_time=0.2))
@@ -196,7 +196,7 @@ def test_windows_of_any_length_are_one_schedule(monkeypatch):
 
 
 def test_while_a_task_is_starved_others_are_drawn_a_window_at_a_time():
-    """Else each window would go through all that is foreseen, which is up to the end."""
+    """Else each window would process all samples of the lookahead, which reaches to the end."""
     busy = Task(component="busy", period=0.01, execution=0.01)
     starved = Task(component="starved", period=0.01, priority=2)
     what = system(
@@ -220,12 +220,12 @@ def test_while_a_task_is_starved_others_are_drawn_a_window_at_a_time():
          r"computers\.one\.tasks\.control"),
     ],
 )  # fmt: skip
-def test_what_no_task_can_have_is_refused_by_name(change, complaint):
+def test_invalid_tasks_are_rejected_by_name(change, complaint):
     with pytest.raises(UsageError, match=complaint):
         loop(computers=computers(period=0.1), **change)
 
 
-def test_without_a_computer_too_a_component_may_run_on_arrivals():
+def test_a_component_may_run_on_arrivals_without_a_computer():
     networks = {"bus": Network(kind="can", bit_rate=500e3, stuffing="none", messages={
         "sensed": Message(connection="sensed", bytes=8, identifier=1, period=0.1)})}  # fmt: skip
     what = system(
@@ -242,7 +242,7 @@ def test_without_a_computer_too_a_component_may_run_on_arrivals():
     assert sent == [time + 10 * MS for time in samples]
 
 
-def test_a_gateway_between_two_buses_sends_on_what_arrives():
+def test_a_gateway_between_two_buses_forwards_arrivals():
     def bus(name, period=None):
         message = Message(connection=name, bytes=8, identifier=1, period=period)
         return Network(kind="can", bit_rate=500e3, stuffing="none", messages={name: message})

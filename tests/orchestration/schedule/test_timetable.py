@@ -1,4 +1,4 @@
-"""What happens when, of any system."""
+"""The timetable of any system."""
 
 from fractions import Fraction
 
@@ -39,7 +39,7 @@ def test_instants_are_points_samples_arrivals_and_the_end():
     assert [i.time // MS for i in found if i.arrivals] == [30, 280]
 
 
-def test_a_component_is_stepped_only_to_where_something_happens_to_it():
+def test_a_component_is_stepped_only_to_its_own_events():
     what = system(
         {"fast": continuous(0.1), "slow": continuous(0.5), "reader": sampled(0.25)},
         [wire("fast.y", "reader.y")],
@@ -50,7 +50,7 @@ def test_a_component_is_stepped_only_to_where_something_happens_to_it():
     assert [time for time, which in stepped.items() if 1 in which] == [0, 500, 1000]
 
 
-def test_what_is_measured_late_is_measured_before_its_sample():
+def test_a_late_measurement_is_taken_before_its_sample():
     found = instants(loop(sampled(0.2), measurement={"delay": 0.03}, stop_time=0.5))
     taken = [(i.time // MS, [arrival // MS for *_, arrival in i.measured]) for i in found if i.measured]
     assert taken == [(0, [0]), (170, [200]), (370, [400])]
@@ -92,13 +92,13 @@ def test_posted_messages_go_out_and_arrive_by_their_senders_and_then_in_the_orde
 
 
 @pytest.mark.parametrize("place", ["components.a.step", "sources.wind.period"])
-def test_a_time_that_no_run_reaches_is_refused_by_name(place):
+def test_a_time_beyond_the_limit_is_rejected_by_name(place):
     plain = system({"a": continuous(0.1)}, sources={"wind": Source(noise=1.0, period=0.1, to=("a.u",))})
     with pytest.raises(UsageError, match=rf"^{place} = 1e\+300 s: expected less than 1.153e\+09 s$"):
         instants(changed(plain, {place: 1e300}))
 
 
-def test_a_measurement_that_is_late_by_too_many_samples_is_refused_by_name():
+def test_a_measurement_that_is_late_by_too_many_samples_is_rejected_by_name():
     late = loop(sampled(0.1), measurement={"delay": 1e9})
     line = (
         r"^connections.measurement.delay: is measured 1e\+09 s before a sample of controller, every 0.1 s: expected at"
@@ -108,7 +108,7 @@ def test_a_measurement_that_is_late_by_too_many_samples_is_refused_by_name():
     assert instants(loop(sampled(0.1), command={"delay": 1e9}))
 
 
-def test_components_that_are_due_together_follow_what_feeds_what():
+def test_components_that_are_due_together_follow_the_connections():
     what = system({"controller": sampled(), "sensor": sampled()}, [wire("sensor.y", "controller.y")], stop_time=0.15)
     assert [[due.component for due in i.samples] for i in instants(what) if i.samples] == [[1, 0], [1, 0]]
 
@@ -135,19 +135,19 @@ def test_the_error_comes_when_all_instants_before_it_are_past(monkeypatch):
         assert begun.past == len(range(0, first, 100 * MS))
 
 
-def test_what_would_be_between_two_points_after_the_end_is_no_error():
+def test_an_instant_between_two_points_after_the_end_is_no_error():
     late = loop(sampled(0.5), command={"delay": 0.03, "order": "jacobi"}, stop_time=0.5)
     assert len(instants(late, fixed_plant(False))) == 6
     assert len(instants(loop(sampled(0.75), stop_time=0.7), fixed_plant(False))) == 8
 
 
 @pytest.mark.parametrize("key", ["offset", "period"])
-def test_a_sample_in_millions_of_years_is_refused(key):
+def test_a_sample_in_millions_of_years_is_rejected(key):
     with pytest.raises(UsageError, match=rf"^components\.controller\.sampling\.{key} = 1e\+12 s: expected less"):
         instants(loop(sampled(**{key: 1e12})))
 
 
-def test_times_up_to_the_longest_are_what_they_are():
+def test_times_up_to_the_longest_are_exact():
     longest = (LONGEST - 10**6) / 10**9
     found = instants(loop(sampled(longest, offset=longest), command={"delay": longest, "delay_jitter": longest}))
     assert len(found) == 11
@@ -155,7 +155,7 @@ def test_times_up_to_the_longest_are_what_they_are():
         instants(loop(sampled(), command={"delay": 2e9}))
 
 
-def test_or_moves_to_the_next_point():
+def test_an_aligned_instant_moves_to_the_next_point():
     found = instants(loop(sampled(0.25), command={"delay": 0.03}, stop_time=0.8), fixed_plant(True))
     assert [i.time // MS for i in found for due in i.samples] == [0, 300, 500]
     assert [arrival // MS for i in found for *_, arrival in i.arrivals] == [100, 400, 600]

@@ -71,7 +71,7 @@ def test_values_at_the_steps_have_the_correlation_of_the_continuous_process(step
         assert found == pytest.approx(expected, abs=1e-13)
 
 
-def test_the_mean_wind_blows_where_it_is_told_to_and_gusts_turn_with_it() -> None:
+def test_the_mean_wind_blows_in_its_direction_and_gusts_turn_with_it() -> None:
     draws = stream().standard_normal((50, DRAWS)).tolist()
     north, east = (np.array(Dryden(direction=a, steady=3.0).velocities(draws)) for a in (0.0, 0.5 * math.pi))
     assert east[:, 1] == pytest.approx(north[:, 0])

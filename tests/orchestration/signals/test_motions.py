@@ -56,7 +56,7 @@ def test_position_to_snap_are_continuous_where_a_motion_changes_its_formula(name
 
 
 @pytest.mark.parametrize("name", sorted({*MOTIONS} - {"step"}))
-def test_what_has_a_ramp_begins_at_rest_where_it_is_told(name: str) -> None:
+def test_a_motion_with_a_ramp_begins_at_rest_at_its_first_point(name: str) -> None:
     given = {"x": 1.0, "y": -2.0, "z": 0.5} if name != "paper" else {"start_z": 0.5}
     begin = orders(make_signal(name, given | ({} if name == "hover" else {"ramp": 1.5})).at(0.0))
     assert begin[0] == pytest.approx([given.get("x", 0.0), given.get("y", 0.0), 0.5], abs=1e-15)
@@ -75,7 +75,7 @@ def test_a_step_rests_before_and_after_and_is_half_way_in_the_middle() -> None:
     assert step.at(3.0).position.x == pytest.approx(1.0)
 
 
-def test_the_paper_without_a_ramp_is_what_controllers_have_built_in() -> None:
+def test_the_paper_without_a_ramp_is_the_built_in_trajectory() -> None:
     for t in (0.0, 1.3, 17.0):
         assert np.array(orders(Paper().at(t))) == pytest.approx(np.array(orders(Trajectory().at(t))), abs=1e-15)
 
@@ -127,7 +127,7 @@ def test_many_times_at_once_give_the_bits_of_one_after_the_other(name: str) -> N
         ("dryden", {"step": 0.0}, "parameters.step = 0.0: expected a positive number"),
     ],
 )
-def test_what_no_signal_can_be_is_refused_in_one_line(name: str, parameters: dict[str, float], line: str) -> None:
+def test_an_invalid_signal_is_rejected_in_one_line(name: str, parameters: dict[str, float], line: str) -> None:
     with pytest.raises(UsageError) as error:
         make_signal(name, parameters)
     assert str(error.value).startswith(line)

@@ -1,4 +1,4 @@
-"""A reference from a CSV file: what is refused, and what lies between its rows."""
+"""A reference from a CSV file: errors, and values between its rows."""
 
 from pathlib import Path
 
@@ -72,50 +72,48 @@ def test_an_empty_file_misses_every_column(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("times", [(0.0, 1.0, 1.0, 2.0), (0.0, 1.5, 1.0, 2.0), (2.0, 0.0)])
-def test_times_that_do_not_increase_are_refused(tmp_path: Path, times: tuple[float, ...]) -> None:
+def test_times_that_do_not_increase_are_rejected(tmp_path: Path, times: tuple[float, ...]) -> None:
     assert "expected times that increase" in refused(tmp_path, *map(row, times))
 
 
 @pytest.mark.parametrize("times", [(0.1, 2.0), (0.0, 1.999), (5.0, 6.0)])
-def test_a_table_that_does_not_cover_the_run_is_refused(tmp_path: Path, times: tuple[float, ...]) -> None:
+def test_a_table_that_does_not_cover_the_run_is_rejected(tmp_path: Path, times: tuple[float, ...]) -> None:
     assert "expected 0 to stop_time = 2 s" in refused(tmp_path, *map(row, times))
 
 
 @pytest.mark.parametrize("cell", ["fast", "", "0x10"])
-def test_what_is_no_number_is_refused(tmp_path: Path, cell: str) -> None:
+def test_values_that_are_no_numbers_are_rejected(tmp_path: Path, cell: str) -> None:
     assert f"line 3: reference.position.x = {cell}: expected numbers only" in refused(
         tmp_path, row(0.0), row(1.0, cell), row(2.0)
     )
 
 
 @pytest.mark.parametrize("cell", ["nan", "inf", "-inf"])
-def test_what_is_not_finite_is_refused(tmp_path: Path, cell: str) -> None:
+def test_values_that_are_not_finite_are_rejected(tmp_path: Path, cell: str) -> None:
     assert f"line 3: reference.position.x = {cell}: expected finite numbers only" in refused(
         tmp_path, row(0.0), row(1.0, cell), row(2.0)
     )
 
 
 @pytest.mark.parametrize("rows", [(), (0.0,)])
-def test_fewer_than_two_rows_are_refused(tmp_path: Path, rows: tuple[float, ...]) -> None:
+def test_fewer_than_two_rows_are_rejected(tmp_path: Path, rows: tuple[float, ...]) -> None:
     assert "expected at least two rows" in refused(tmp_path, *map(row, rows))
 
 
-def test_rows_of_another_length_are_refused(tmp_path: Path) -> None:
+def test_rows_of_another_length_are_rejected(tmp_path: Path) -> None:
     assert "line 3: 17 values, expected 16" in refused(tmp_path, row(0.0), row(1.0) + ",3.0", row(2.0))
     assert "line 2: 15 values, expected 16" in refused(tmp_path, row(0.0).removesuffix(",0.0"), row(2.0))
 
 
 @pytest.mark.parametrize(("separator", "name"), [(";", "semicolons"), ("\t", "tabulators")])
-def test_columns_that_commas_do_not_separate_are_refused_with_what_does(
-    tmp_path: Path, separator: str, name: str
-) -> None:
+def test_columns_without_commas_are_rejected_naming_their_separator(tmp_path: Path, separator: str, name: str) -> None:
     rows = [row(t).replace(",", separator).replace(".", ",") for t in (0.0, 2.0)]
     message = refused(tmp_path, *rows, header=HEADER.replace(",", separator))
     assert message.endswith(f"columns separated by {name}; expected commas, and points in numbers")
 
 
 @pytest.mark.parametrize("cell", ['"' + "1" * 200_000 + '"', "1\n" * 70_000 + '"', "0" * 200_000])
-def test_a_field_or_a_line_without_end_is_refused(tmp_path: Path, cell: str) -> None:
+def test_a_field_or_a_line_without_end_is_rejected(tmp_path: Path, cell: str) -> None:
     assert "expected" in refused(tmp_path, row(0.0), row(1.0, cell), row(2.0))
 
 
@@ -124,7 +122,7 @@ def test_a_byte_order_mark_is_no_part_of_the_first_name(tmp_path: Path) -> None:
     assert reference.at(1.0)[:3] == [1.0, 1.0, 1.0]
 
 
-def test_a_file_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_read_is_rejected(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="expected a readable CSV file"):
         read_table(tmp_path / "none.csv", REFERENCE, STOP)
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00")

@@ -21,7 +21,7 @@ def written(tmp_path: Path, text: str) -> Path:
 
 
 def derivative(curve: Spline, order: int, *, at_end: bool) -> np.ndarray:
-    """Of each piece at one of its ends, shape (n, 3)."""
+    """The derivative of each piece at one of its ends, shape (n, 3)."""
     falling = [math.perm(n, order) for n in range(10)]
     weights = np.array([f if at_end or n == order else 0.0 for n, f in enumerate(falling)])
     spans = np.diff(curve.knots)[:, None]
@@ -54,7 +54,7 @@ def test_the_integral_is_least_where_the_next_four_derivatives_are_continuous_to
     assert ends == pytest.approx(begins, rel=1e-7, abs=1e-6)
 
 
-def test_it_rests_before_the_first_and_after_the_last_point() -> None:
+def test_it_is_at_rest_before_the_first_and_after_the_last_point() -> None:
     found = through(TIMES, POINTS).at(np.array([-1.0, 0.0, 7.0, 9.0]))
     assert found[:, 0] == pytest.approx(POINTS[[0, 0, -1, -1]], abs=1e-9)
     assert not found[:, 1:].any()
@@ -124,16 +124,14 @@ def test_a_hold_is_a_rest_of_that_length_and_a_speed_is_that_of_its_way(tmp_path
         ("x,y,z\n0,0,0\n", {}, "expected at least two rows of numbers"),
     ],
 )
-def test_what_is_wrong_with_a_file_is_said_with_line_and_column(
-    tmp_path: Path, text: str, limits: dict[str, float], line: str
-) -> None:
+def test_errors_in_a_file_have_line_and_column(tmp_path: Path, text: str, limits: dict[str, float], line: str) -> None:
     path = written(tmp_path, text)
     with pytest.raises(UsageError) as error:
         read_waypoints(path, limits)
     assert str(error.value).startswith(f"{path}: {line}")
 
 
-def test_limits_of_a_file_with_times_are_refused(tmp_path: Path) -> None:
+def test_limits_of_a_file_with_times_are_rejected(tmp_path: Path) -> None:
     path = written(tmp_path, "time,x,y,z\n0,0,0,0\n1,1,1,1\n")
     with pytest.raises(UsageError, match=r"parameters\.speed: expected none; .* has times"):
         read_waypoints(path, {"speed": 1.0})

@@ -1,4 +1,4 @@
-"""FMUs that are a description only: enough for all that reads no more than that."""
+"""FMUs that consist of a model description only, for code that reads nothing else."""
 
 from collections.abc import Mapping
 from pathlib import Path

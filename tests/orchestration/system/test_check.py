@@ -1,4 +1,4 @@
-"""A system against what its FMUs say of themselves: one line for each thing that cannot be, before any is loaded."""
+"""A system against the model descriptions of its FMUs: one line for each error, before any FMU is loaded."""
 
 from pathlib import Path
 
@@ -66,7 +66,7 @@ def checked(folder: Path, text: str) -> None:
     objectives.with_available_objectives(system, signals, set())
 
 
-def test_what_is_right_is_not_refused(tmp_path: Path) -> None:
+def test_a_valid_system_is_accepted(tmp_path: Path) -> None:
     checked(tmp_path, TANK)
 
 
@@ -75,14 +75,14 @@ def test_units_may_differ_where_a_conversion_is_stated(stated: str, tmp_path: Pa
     differing = TANK.replace('["controller.level"]', '["controller.height"]')
     with pytest.raises(UsageError, match=r"connections.level: tank.level is in m, controller.height in mm; expected "):
         checked(tmp_path, differing)
-    said = differing.replace('["controller.height"]', f'["controller.height"]\n{stated}')
-    checked(tmp_path, said)
+    converted = differing.replace('["controller.height"]', f'["controller.height"]\n{stated}')
+    checked(tmp_path, converted)
     checked(tmp_path, load_system(tmp_path / "system.toml").to_toml())
     checked(tmp_path, changed(system_of(tmp_path, differing), {"connections.level.scale": 1.0}).to_toml())
 
 
 @pytest.mark.parametrize("kind", ["constant = 1.0", 'file = "rain.csv"', "noise = 1.0\nperiod = 0.1"])
-def test_a_source_that_feeds_nothing_is_refused(kind: str, tmp_path: Path) -> None:
+def test_a_source_that_feeds_nothing_is_rejected(kind: str, tmp_path: Path) -> None:
     rest = TANK.replace('to = ["tank.inflow"]\n', "")
     with pytest.raises(UsageError, match=r"^sources.rain.to = nothing: expected inputs; only a motion may feed none$"):
         checked(tmp_path, rest.replace("constant = 1.0", kind))

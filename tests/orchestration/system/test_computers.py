@@ -1,4 +1,4 @@
-"""Computers and networks as a file says them: read, written, changed by path, refused by name, told from each other."""
+"""Computers and networks in files: read, written, changed by path, rejected by name, compared."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -101,7 +101,7 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-def test_what_is_written_of_a_system_is_read_as_the_same(file, tmp_path):
+def test_a_written_system_is_read_as_the_same(file, tmp_path):
     system = load_system(file)
     again = tmp_path / "again.toml"
     again.write_text(system.to_toml(), encoding="utf-8")
@@ -127,7 +127,7 @@ def test_computers_and_networks_alone_are_a_system(tmp_path):
         ("networks.bus.messages.load.from", "c"), ("networks.bus.messages.angle.bytes", 16.0),
     ],
 )  # fmt: skip
-def test_everything_is_a_path(file, path, value):
+def test_every_key_has_a_path(file, path, value):
     system = load_system(file)
     assert value_at(system, path) != value
     new = changed(system, {path: value})
@@ -136,23 +136,23 @@ def test_everything_is_a_path(file, path, value):
     hashes = {name: name for name in ("plant.fmu", "controller.fmu", "filter.fmu", "trace.csv")}
     files = Files(fmus={}, tables={})
     object.__setattr__(files, "hashes", {str(file.parent / name): name for name in hashes})
-    object.__setattr__(files, "starts", {str(file.parent / name): {} for name in hashes})
+    object.__setattr__(files, "start_values", {str(file.parent / name): {} for name in hashes})
     assert run_key(new, files) != run_key(system, files)
     assert run_key(changed(new, {path: value_at(system, path)}), files) == run_key(system, files)
 
 
-def test_a_trace_that_is_written_anew_has_a_schedule_of_its_own(file):
+def test_a_trace_that_is_written_anew_has_another_schedule(file):
     system = load_system(file)
     before = timing(system)
     (file.parent / "trace.csv").write_text("time\n0.001\n0.003\n0.004\n", encoding="utf-8")
     assert timing(system) != before
 
 
-def test_seeds_make_a_difference_where_anything_is_drawn(file):
+def test_a_system_is_random_where_anything_is_drawn(file):
     system = load_system(file)
     calm = replace(system, **punctual(system))
     assert is_random(system)
-    assert is_random(calm)  # arrivals come by chance
+    assert is_random(calm)  # arrivals are random
     assert calm.computers["node"].tasks["control"].execution == 0.001
     by_chance = {"tasks": "radio", "messages": "load"}
     without: dict[str, Any] = {
@@ -188,7 +188,7 @@ ON_ARRIVAL = 'sampling = { on = "angle" }'
         ("error = 0.1", "error = 1.0", "networks.bus.error = 1.0: expected a probability in [0, 1)"),
     ],
 )
-def test_what_cannot_be_is_refused_by_name(file, old, new, complaint):
+def test_invalid_values_are_rejected_by_name(file, old, new, complaint):
     assert old in FILE
     file.write_text(FILE.replace(old, new, 1), encoding="utf-8")
     with pytest.raises(UsageError) as error:

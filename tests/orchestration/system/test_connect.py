@@ -1,4 +1,4 @@
-"""`quadcosim connect`: what is proposed for some FMUs, and what is left open in words."""
+"""`quadcosim connect`: the proposal for some FMUs, and messages on what is undecided."""
 
 import json
 import re
@@ -37,7 +37,7 @@ def only(system: System) -> Connection:
     return connection
 
 
-# -- what goes together -----------------------------------------------------------------------------------
+# -- matches ----------------------------------------------------------------------------------------------
 
 
 def test_the_same_names_are_connected_and_travel_together(tmp_path: Path) -> None:
@@ -60,7 +60,7 @@ def test_the_same_names_are_connected_and_travel_together(tmp_path: Path) -> Non
         ("y", "u", "nothing else has its unit"),
     ],
 )
-def test_names_that_differ_are_told_from_words_then_from_units_and_the_file_says_so(
+def test_names_that_differ_are_matched_by_words_then_by_units_with_comments(
     output: str, entry: str, why: str, tmp_path: Path
 ) -> None:
     paths = described(tmp_path, "A", outputs={output: "Real m"}), described(tmp_path, "B", inputs={entry: "Real m"})
@@ -68,11 +68,11 @@ def test_names_that_differ_are_told_from_words_then_from_units_and_the_file_says
     assert wires(system) == {f"A.{output} -> B.{entry}"}
     assert undecided == ()
     assert f"# B.{entry} has A.{output} because {why}\n" in text
-    said = propose([(str(path), read_model(path)) for path in paths], tmp_path).guessed
-    assert said == (f"B.{entry} has A.{output} because {why}",)
+    message = propose([(str(path), read_model(path)) for path in paths], tmp_path).guessed
+    assert message == (f"B.{entry} has A.{output} because {why}",)
 
 
-def test_what_has_the_same_name_somewhere_feeds_nothing_by_likeness(tmp_path: Path) -> None:
+def test_an_output_matched_by_name_is_no_candidate_for_similar_names(tmp_path: Path) -> None:
     plant = described(tmp_path, "Plant", outputs={"position": "Real m"})
     law = described(tmp_path, "Law", inputs={"position": "Real m", "reference.position": "Real m"})
     system, undecided, _ = proposed(tmp_path, plant, law)
@@ -93,17 +93,17 @@ def test_an_fmu_is_not_connected_to_itself(tmp_path: Path) -> None:
     assert system.connections == ()
 
 
-# -- what is left open ------------------------------------------------------------------------------------
+# -- undecided --------------------------------------------------------------------------------------------
 
 
-def test_an_input_that_two_outputs_fit_is_left_open_with_both_named(tmp_path: Path) -> None:
+def test_an_input_that_two_outputs_fit_is_undecided_with_both_named(tmp_path: Path) -> None:
     plant = described(tmp_path, "Plant", outputs={"level": "Real m"})
     sensor = described(tmp_path, "Sensor", inputs={"level": "Real m"}, outputs={"level_out": "Real m"})
     twin = described(tmp_path, "Twin", outputs={"level": "Real m"})
     system, undecided, _ = proposed(tmp_path, plant, sensor, twin)
     assert wires(system) == set()
-    said = "Sensor.level (Real [m]) is not connected: it may be any of Plant.level, Twin.level"
-    assert undecided == (said,)
+    message = "Sensor.level (Real [m]) is not connected: it may be any of Plant.level, Twin.level"
+    assert undecided == (message,)
 
 
 @pytest.mark.parametrize(
@@ -119,7 +119,7 @@ def test_units_that_differ_are_converted_and_two_spellings_of_one_are_not(
     assert ("its units differ" in text) == ((scale, offset) != (1.0, 0.0))
 
 
-def test_signals_that_are_converted_differently_are_messages_of_their_own(tmp_path: Path) -> None:
+def test_signals_that_are_converted_differently_are_separate_messages(tmp_path: Path) -> None:
     giver = described(tmp_path, "A", outputs={"x": "Real mm", "t": "Real s"})
     system, _, _ = proposed(tmp_path, giver, described(tmp_path, "B", inputs={"x": "Real m", "t": "Real s"}))
     assert [(x.name, x.end, x.scale) for x in system.connections] == [
@@ -128,7 +128,7 @@ def test_signals_that_are_converted_differently_are_messages_of_their_own(tmp_pa
     ]
 
 
-def test_the_same_name_for_another_quantity_is_left_open(tmp_path: Path) -> None:
+def test_the_same_name_for_another_quantity_is_undecided(tmp_path: Path) -> None:
     paths = described(tmp_path, "A", outputs={"x": "Real m"}), described(tmp_path, "B", inputs={"x": "Real s"})
     system, undecided, _ = proposed(tmp_path, *paths)
     assert wires(system) == set()
@@ -138,7 +138,7 @@ def test_the_same_name_for_another_quantity_is_left_open(tmp_path: Path) -> None
 # -- components -------------------------------------------------------------------------------------------
 
 
-def test_one_whose_outputs_are_all_discrete_is_sampled_any_other_is_not(tmp_path: Path) -> None:
+def test_only_a_component_with_discrete_outputs_is_sampled(tmp_path: Path) -> None:
     given = {
         "Digital": {"a": "Real discrete", "b": "Boolean"},
         "Mixed": {"c": "Real discrete", "d": "Real"},
@@ -151,9 +151,7 @@ def test_one_whose_outputs_are_all_discrete_is_sampled_any_other_is_not(tmp_path
 
 
 @pytest.mark.parametrize(("name", "sampled"), [("PidLaw", True), ("Law", False)])
-def test_the_controller_of_a_loop_is_sampled_whatever_its_outputs_are_and_the_file_says_why(
-    tmp_path: Path, name: str, sampled: bool
-) -> None:
+def test_the_controller_of_a_loop_is_sampled_with_a_comment(tmp_path: Path, name: str, sampled: bool) -> None:
     plant = described(tmp_path, "Plant", inputs={"force": "Real N"}, outputs={"x": "Real m"})
     law = described(tmp_path, name, inputs={"x": "Real m"}, outputs={"force": "Real N"})
     system, _, text = proposed(tmp_path, plant, law)
@@ -164,7 +162,7 @@ def test_the_controller_of_a_loop_is_sampled_whatever_its_outputs_are_and_the_fi
     assert ("# sampled, as its name is that of a controller; its FMU does not say how often\n" in text) == sampled
 
 
-def test_the_criterion_that_is_to_be_filled_in_is_one_that_the_system_takes(tmp_path: Path) -> None:
+def test_the_criterion_to_fill_in_is_valid(tmp_path: Path) -> None:
     law = described(tmp_path, "Law", inputs={"x": "Real m"}, outputs={"force": "Real N discrete"})
     plant = described(tmp_path, "Plant", inputs={"force": "Real N"}, outputs={"x": "Real m"})
     _, _, text = proposed(tmp_path, law, plant)
@@ -174,7 +172,7 @@ def test_the_criterion_that_is_to_be_filled_in_is_one_that_the_system_takes(tmp_
     assert (system.criterion.good, system.criterion.diverged) == ("final < 0.05", "abs(Plant.x) > 1e3")
 
 
-def test_an_fmu_may_say_how_it_is_to_be_run(tmp_path: Path) -> None:
+def test_the_default_experiment_of_an_fmu_is_used(tmp_path: Path) -> None:
     one = described(tmp_path, "A", outputs={"x": "Boolean"}, experiment='stopTime="7" stepSize="0.25"')
     two = described(tmp_path, "B", experiment='stopTime="3" stepSize="0.5"')
     system, _, _ = proposed(tmp_path, one, two)
@@ -183,7 +181,7 @@ def test_an_fmu_may_say_how_it_is_to_be_run(tmp_path: Path) -> None:
     assert system.components["B"].step == 0.5
 
 
-def test_components_are_named_after_their_models_each_once(tmp_path: Path) -> None:
+def test_components_have_unique_names_after_their_models(tmp_path: Path) -> None:
     (tmp_path / "other").mkdir()
     models = ["Lib.Tank", "rows", "2 tanks", "Ventil für Öl"]
     paths = [described(tmp_path, model) for model in models]
@@ -196,7 +194,7 @@ def test_components_are_named_after_their_models_each_once(tmp_path: Path) -> No
 # -- the command ------------------------------------------------------------------------------------------
 
 
-def test_the_file_lies_where_it_is_asked_for_and_finds_its_fmus(
+def test_the_file_is_written_to_the_given_path_and_finds_its_fmus(
     tmp_path: Path, main: Main, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "fmus").mkdir()
@@ -204,11 +202,11 @@ def test_the_file_lies_where_it_is_asked_for_and_finds_its_fmus(
     described(tmp_path / "fmus", "B", inputs={"x": "Real m", "load": "Real N"})
     monkeypatch.chdir(tmp_path)
     done = main("connect", "fmus/A.fmu", "fmus/B.fmu", "--out", "new/system.toml")
-    said = "no output fits, so a start value is kept by B.load (Real [N]) = 0"
-    assert (done.stdout, done.stderr) == (f"{Path('new/system.toml')}\n", f"not decided: {said}\n")
+    message = "no output fits, so a start value is kept by B.load (Real [N]) = 0"
+    assert (done.stdout, done.stderr) == (f"{Path('new/system.toml')}\n", f"not decided: {message}\n")
     text = (tmp_path / "new" / "system.toml").read_text(encoding="utf-8")
     assert 'fmu = "../fmus/A.fmu"' in text
-    assert f"# - {said}" in text
+    assert f"# - {message}" in text
     assert Path(load_system("new/system.toml").components["A"].fmu).is_file()
     printed = main("connect", "fmus/A.fmu", "fmus/B.fmu").stdout
     assert 'fmu = "fmus/A.fmu"' in printed
@@ -224,7 +222,7 @@ def test_a_complete_proposal_runs(built: dict[str, Path], tmp_path: Path, main: 
     assert not metrics["diverged"]
 
 
-def test_what_is_no_fmu_is_refused_in_one_line(tmp_path: Path, main: Main) -> None:
+def test_a_file_that_is_no_fmu_is_rejected_in_one_line(tmp_path: Path, main: Main) -> None:
     (tmp_path / "text.fmu").write_text("no archive")
     for path in ("text.fmu", "nowhere.fmu"):
         stderr = main("connect", tmp_path / path, code=2).stderr

@@ -1,4 +1,4 @@
-"""Distributions and traces: what a file may say of them, what they are read as, and that they are told apart."""
+"""Distributions and traces: their tables in files, their values, and their keys."""
 
 import math
 import os
@@ -45,13 +45,13 @@ def read(folder: Path, line: str) -> Connection:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Where a trace is."""
+    """The folder of a trace."""
     (tmp_path / "trace.csv").write_text("delay,lost\n0.001,0\n0.004,1\n0.002,0\n")
     return tmp_path
 
 
 @pytest.mark.parametrize(
-    ("said", "meant", "words"),
+    ("text", "expected", "words"),
     [
         ("{ uniform = [0, 0.05] }", Distribution(uniform=(0.0, 0.05)), "0 s to 50 ms uniform"),
         (
@@ -67,9 +67,9 @@ def folder(tmp_path: Path) -> Path:
         ),
     ],
 )
-def test_a_delay_is_distributed_as_its_file_says(folder: Path, said: str, meant: Distribution, words: str) -> None:
-    assert read(folder, f"delay = {said}").delay == meant
-    assert timing(read(folder, f"delay_jitter = {said}")) == f"delay jitter {words}"
+def test_a_delay_has_the_distribution_of_its_file(folder: Path, text: str, expected: Distribution, words: str) -> None:
+    assert read(folder, f"delay = {text}").delay == expected
+    assert timing(read(folder, f"delay_jitter = {text}")) == f"delay jitter {words}"
 
 
 def test_a_trace_is_found_beside_the_file_and_read_when_it_is_needed(folder: Path) -> None:
@@ -116,7 +116,7 @@ def test_a_system_is_written_as_it_was_read(folder: Path) -> None:
         ('delay = "abc"', "connections.0.delay = 'abc': expected a valid number"),
     ],
 )
-def test_what_cannot_be_is_refused_by_its_place(folder: Path, line: str, message: str) -> None:
+def test_invalid_values_are_rejected_with_their_place(folder: Path, line: str, message: str) -> None:
     with pytest.raises(UsageError, match=message):
         read(folder, line)
 
@@ -126,13 +126,13 @@ def test_a_lateness_stays_within_the_period() -> None:
         Sampling(period=0.1, jitter=Distribution(uniform=(0.0, 0.2)))
 
 
-def test_a_trace_with_a_value_below_0_is_refused_by_its_line(folder: Path) -> None:
+def test_a_trace_with_a_value_below_0_is_rejected_with_its_line(folder: Path) -> None:
     (folder / "trace.csv").write_text("delay\n0.001\n-0.004\n")
     with pytest.raises(UsageError, match=r"trace.csv: line 3: delay = -0.004: expected zero or positive numbers"):
         highest(Distribution(file=folder / "trace.csv", column="delay"))
 
 
-def test_a_trace_that_is_written_anew_is_another(folder: Path) -> None:
+def test_a_trace_that_is_written_anew_has_another_key(folder: Path) -> None:
     trace = Distribution(file=folder / "trace.csv", column="delay")
     before = content(trace)
     assert highest(trace) == 0.004
@@ -152,7 +152,7 @@ def test_a_trace_that_is_written_anew_is_another(folder: Path) -> None:
         (Distribution(normal=(0.0, 1.0), range=(0.0, 9.0)), math.sqrt(2.0 / math.pi)),  # half a normal distribution
     ],
 )
-def test_the_mean_is_that_of_what_is_drawn(of: Distribution, known: float) -> None:
+def test_the_mean_is_that_of_the_draws(of: Distribution, known: float) -> None:
     drawn = times_from(of)(np.random.default_rng(1).random(40_000)) / NANOSECONDS
     assert math.isclose(mean(of), known)
     assert math.isclose(drawn.mean(), known, rel_tol=0.02)

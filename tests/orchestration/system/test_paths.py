@@ -26,7 +26,7 @@ CHANGES = {
 
 
 @pytest.mark.parametrize(("path", "value"), CHANGES.items())
-def test_what_is_changed_at_a_path_is_there_and_nothing_else_has_changed(path: str, value: object) -> None:
+def test_a_change_by_path_changes_nothing_else(path: str, value: object) -> None:
     system = changed(quadrotor(), {path: value})
     assert value_at(system, path) == value != value_at(quadrotor(), path)
     others = [other for other in CHANGES if other != path]
@@ -38,11 +38,11 @@ DRAWN = Distribution(uniform=(0.0, 0.002))
 
 @pytest.mark.parametrize("written", ["{uniform=[0.0,0.002]}", {"uniform": [0.0, 0.002]}, DRAWN])
 @pytest.mark.parametrize("path", ["connections.command.delay", "components.controller.sampling.jitter"])
-def test_what_may_be_drawn_is_given_as_the_table_of_a_file_or_its_text(path: str, written: object) -> None:
+def test_a_distribution_is_given_as_a_table_or_its_text(path: str, written: object) -> None:
     assert value_at(changed(quadrotor(), {path: written}), path) == DRAWN
 
 
-def test_the_execution_time_of_a_task_is_drawn_likewise() -> None:
+def test_the_execution_time_of_a_task_takes_a_distribution() -> None:
     load = System(stop_time=1.0, computers={"c": Computer(tasks={"t": Task(period=0.01)})})
     path = "computers.c.tasks.t.execution"
     assert value_at(changed(load, {path: "{uniform=[0.0,0.002]}"}), path) == DRAWN
@@ -66,14 +66,14 @@ def test_the_execution_time_of_a_task_is_drawn_likewise() -> None:
         ("components.plant.step", "{uniform=[0,1]}", "components.plant.step = {uniform=[0,1]}: expected a positive"),
     ],
 )
-def test_a_table_that_cannot_be_is_refused_in_one_line_with_its_path(path: str, written: str, line: str) -> None:
+def test_an_invalid_table_is_rejected_in_one_line_with_its_path(path: str, written: str, line: str) -> None:
     with pytest.raises(UsageError) as refused:
         changed(quadrotor(), {path: written})
     assert str(refused.value).startswith(line)
     assert str(refused.value).isprintable()
 
 
-def test_several_changes_are_all_made_at_once() -> None:
+def test_several_changes_are_made_at_once() -> None:
     system = changed(quadrotor(), CHANGES)
     assert {path: value_at(system, path) for path in CHANGES} == CHANGES
     once = {"components.controller.sampling.period": 0.5, "components.controller.sampling.jitter": 0.4}
@@ -96,7 +96,7 @@ def test_several_changes_are_all_made_at_once() -> None:
         ("sources.wind.noise", "sources.wind"),
     ],
 )
-def test_a_path_that_does_not_exist_is_refused_in_one_line(path: str, line: str) -> None:
+def test_a_path_that_does_not_exist_is_rejected_in_one_line(path: str, line: str) -> None:
     with pytest.raises(UsageError) as refused:
         changed(quadrotor(), {path: 1.0})
     assert str(refused.value).startswith(line)
@@ -118,20 +118,20 @@ def test_a_path_that_does_not_exist_is_refused_in_one_line(path: str, line: str)
         ("stop_time", 0.0),
     ],
 )
-def test_a_value_that_cannot_be_is_refused_with_its_path(path: str, value: object) -> None:
+def test_an_invalid_value_is_rejected_with_its_path(path: str, value: object) -> None:
     with pytest.raises(UsageError, match=rf"^{path} = .*: expected"):
         changed(quadrotor(), {path: value})
 
 
 @pytest.mark.parametrize("value", [-1, 2**63, True, "7"])
-def test_beside_parameters_alone_a_seed_is_held_to_what_it_can_be_too(value: object) -> None:
+def test_a_seed_beside_parameters_is_checked(value: object) -> None:
     with pytest.raises(UsageError, match=r"^seed = .*: expected a whole number"):
         changed(quadrotor(), {"seed": value, "components.plant.parameters.mass": 1.5})
 
 
 @pytest.mark.parametrize("given", [1.5, 2, "1.5", True])
-def test_a_system_with_other_parameters_and_seed_is_that_which_is_made_with_them(given: float | str) -> None:
-    """Of numbers alone it is not checked again, and it is the same, in its types and its order too."""
+def test_a_system_with_changed_parameters_and_seed_equals_one_made_with_them(given: float | str) -> None:
+    """A change of numbers only is not checked again, and gives the same system, with types and order."""
     changes = {"components.plant.parameters.mass": given, "components.controller.parameters.gain.eta": 12.0, "seed": 7}
     found, components = changed(quadrotor(), changes), dict(quadrotor().components)
     new: dict[str, dict[str, float | str]] = {"plant": {"mass": given}, "controller": {"gain.eta": 12.0}}
@@ -142,13 +142,13 @@ def test_a_system_with_other_parameters_and_seed_is_that_which_is_made_with_them
     assert (found, pickle.dumps(dataclasses.asdict(found))) == (made, pickle.dumps(dataclasses.asdict(made)))
 
 
-def test_a_range_and_the_command_line_mean_whole_seeds_and_files() -> None:
+def test_ranges_give_whole_seeds_and_the_command_line_gives_files() -> None:
     file = {"sources.reference.trajectory": None, "sources.reference.file": "path.csv"}
     found = changed(quadrotor(), {"seed": 3.0, **file})
     assert (repr(found.seed), found.sources["reference"].file) == ("3", Path("path.csv"))
 
 
-def test_a_task_that_there_is_not_is_told_with_those_there_are() -> None:
+def test_an_unknown_task_is_reported_with_the_known_ones() -> None:
     load = System(stop_time=1.0, computers={"c": Computer(tasks={"radio": Task(period=0.01)})})
     expected = "expected computers.c.tasks.NAME.KEY with NAME one of radio; did you mean radio?"
     with pytest.raises(UsageError) as refused:

@@ -1,4 +1,4 @@
-"""`quadcosim show` and `quadcosim schema`: a system in words, as a figure, and what its file may hold."""
+"""`quadcosim show` and `quadcosim schema`: a system as text, as a figure, and the keys of its file."""
 
 import json
 from pathlib import Path
@@ -82,7 +82,7 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-def test_components_connections_and_their_timing_are_said(file: Path, main: Main) -> None:
+def test_components_connections_and_their_timing_are_shown(file: Path, main: Main) -> None:
     assert main("show", file).stdout == TEXT
 
 
@@ -91,16 +91,16 @@ def test_flags_change_what_is_shown(file: Path, main: Main) -> None:
     assert "command      controller -> plant  delay 4 ms" in main("show", "--delay", "0.004").stdout
 
 
-def test_noise_of_what_no_message_carries_is_refused_in_the_words_of_who_wrote_it(file: Path, main: Main) -> None:
+def test_noise_of_a_signal_outside_the_message_is_rejected_in_terms_of_the_request(file: Path, main: Main) -> None:
     file.write_text(SYSTEM.replace("noise = 0.01", "noise = { volts = 0.01 }"), encoding="utf-8")
-    for given, said in (
+    for given, message in (
         ([file], f"{file}: connections.2.noise: volts is no signal of it; expected one of u"),
         (["--noise", "angle=0.1"], "timing.noise: angle is no signal of it; expected one of position, velocity, "),
     ):
-        assert main("show", *given, code=2).stderr.startswith(f"quadcosim: {said}")
+        assert main("show", *given, code=2).stderr.startswith(f"quadcosim: {message}")
 
 
-def test_times_have_the_unit_that_makes_them_readable() -> None:
+def test_times_have_a_readable_unit() -> None:
     values = [0.0, 2.0, 0.25, 1e-3, 2.5e-6, 3e-9]
     assert [seconds(value) for value in values] == ["0 s", "2 s", "250 ms", "1 ms", "2.5 µs", "3 ns"]
 
@@ -108,14 +108,14 @@ def test_times_have_the_unit_that_makes_them_readable() -> None:
 def test_the_figure_has_a_box_for_each_component_and_source_and_a_label_for_each_message(file: Path) -> None:
     figure = diagram.draw(load_system(file))
     (axes,) = figure.axes
-    said = [text.get_text() for text in axes.texts]
+    message = [text.get_text() for text in axes.texts]
     boxes = [text.get_text() for text in axes.texts if text.get_fontweight() == "bold"]
     assert boxes == ["load", "motor", "filter", "controller"]
     for label in ("angle\nquantisation 0.001", "bus: y.a, y.b\ndelay 3 ms", "u\nhold first", "load"):
-        assert any(text.startswith(label) for text in said), label
+        assert any(text.startswith(label) for text in message), label
 
 
-def test_nothing_in_the_figure_lies_over_something_else(file: Path) -> None:
+def test_nothing_in_the_figure_overlaps(file: Path) -> None:
     figure = diagram.draw(load_system(file))
     figure.canvas.draw()
     (axes,) = figure.axes
@@ -125,7 +125,7 @@ def test_nothing_in_the_figure_lies_over_something_else(file: Path) -> None:
         assert not any(one.overlaps(other) for other in boxes[i + 1 :]), axes.texts[i].get_text()
 
 
-def test_the_figure_is_written_where_it_is_asked_for(file: Path, main: Main) -> None:
+def test_the_figure_is_written_to_the_given_path(file: Path, main: Main) -> None:
     out = file.parent / "new" / "figure.png"
     assert main("show", file, "--out", out).stderr == f"{out}\n"
     expect_picture(out)
@@ -133,13 +133,13 @@ def test_the_figure_is_written_where_it_is_asked_for(file: Path, main: Main) -> 
     assert refused.startswith(f"quadcosim: --out {file.parent / 'figure.docx'}: expected a figure ending in one of")
 
 
-def test_the_quadrotor_can_be_shown_as_any_other() -> None:
+def test_the_quadrotor_is_shown_like_any_other_system() -> None:
     from orchestration.quadrotor.translation import quadrotor
 
     assert "measurement  plant -> controller  at once  position.{x,y,z}, velocity.{x,y,z}" in as_text(quadrotor())
 
 
-def test_the_schema_names_every_table_and_says_what_its_keys_are(main: Main) -> None:
+def test_the_schema_names_every_table_and_describes_its_keys(main: Main) -> None:
     schema = json.loads(main("schema").stdout)
     assert schema["title"] == "quadcosim system"
     assert {"stop_time", "components", "connections", "sources", "objectives", "criterion"} <= set(schema["properties"])

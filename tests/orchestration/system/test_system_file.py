@@ -1,4 +1,4 @@
-"""A system file: what is wrong is one line that names the place and what is valid, and it comes back as it was."""
+"""System files: an error is one line that names the place and what is valid; writing and reading give the same."""
 
 from pathlib import Path
 
@@ -159,7 +159,7 @@ def test_one_error_is_one_line_that_names_its_place(right: str, wrong: str, line
     assert refusal(tmp_path, TANK.replace(right, wrong, 1)).startswith(line)
 
 
-def test_a_system_comes_back_from_the_file_that_it_writes(tmp_path: Path) -> None:
+def test_a_system_equals_the_one_read_from_its_file(tmp_path: Path) -> None:
     first = loaded(tmp_path, TANK)
     (tmp_path / "elsewhere").mkdir()
     assert loaded(tmp_path / "elsewhere", first.to_toml()) == first
@@ -173,7 +173,7 @@ def test_a_tolerance_is_of_one_component_and_has_a_path(tmp_path: Path) -> None:
     assert value_at(changed(system, {path: 1e-3}), path) == 1e-3
 
 
-def test_the_order_at_the_top_is_that_of_connections_that_say_none(tmp_path: Path) -> None:
+def test_the_order_at_the_top_is_the_default_of_connections(tmp_path: Path) -> None:
     assert [x.order for x in loaded(tmp_path, TANK).connections] == ["jacobi", "gauss-seidel"]
 
 
@@ -188,12 +188,12 @@ def test_a_file_without_components_is_a_scenario_of_the_quadrotor(tmp_path: Path
     assert kinds == ["Scenario", "System"]
 
 
-def test_what_happens_when_needs_no_fmu(tmp_path: Path) -> None:
+def test_a_timetable_needs_no_fmu(tmp_path: Path) -> None:
     system = loaded(tmp_path, TANK.replace("60.0", "1.0"))
     assert sum(len(i.samples) for i in Cursor(Timetable(system, Streams(system.seed))).instants()) == 10
 
 
-def test_the_schema_holds_for_the_files_that_are_read_and_for_no_unknown_key(tmp_path: Path) -> None:
+def test_the_schema_accepts_valid_files_and_no_unknown_key(tmp_path: Path) -> None:
     jsonschema = pytest.importorskip("jsonschema")
     from orchestration.basics.documents import read_toml
 
@@ -207,7 +207,7 @@ def test_the_schema_holds_for_the_files_that_are_read_and_for_no_unknown_key(tmp
     assert "aling" in error.message
 
 
-def test_every_key_of_the_schema_is_explained() -> None:
+def test_every_key_of_the_schema_has_a_description() -> None:
     tables = [schema(), *schema()["$defs"].values()]
     assert len(tables) == 12
     assert all("description" in key for table in tables for key in table["properties"].values())

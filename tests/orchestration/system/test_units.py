@@ -1,4 +1,4 @@
-"""Units of what a run comes to: from the declarations of its FMUs to the table of `run` and of `show`."""
+"""Units of objectives: from the declarations of the FMUs to the tables of `run` and `show`."""
 
 import json
 from pathlib import Path
@@ -77,7 +77,7 @@ def test_objectives_have_the_units_of_signals_parameters_sources_and_of_one_anot
         ("> 10 * driver.goal", "> driver.weight", "criterion.diverged: >: abs(car.place) is in m, driver.weight is "),
     ],
 )  # fmt: skip
-def test_what_does_not_go_together_is_one_line_before_anything_is_loaded(
+def test_incompatible_units_are_one_line_before_anything_is_loaded(
     right: str, wrong: str, line: str, file: Path, main: Main
 ) -> None:
     file.write_text(SYSTEM.replace(right, wrong), encoding="utf-8")
@@ -87,7 +87,7 @@ def test_what_does_not_go_together_is_one_line_before_anything_is_loaded(
     assert main("run", file, code=2).stderr.startswith(f"quadcosim: {line}")
 
 
-def test_show_says_units_where_the_fmus_are_there(file: Path, main: Main) -> None:
+def test_show_has_units_where_the_fmus_exist(file: Path, main: Main) -> None:
     assert "  absement [m.s]  integral(car.place)" in main("show", file).stdout
     assert "  gear            max(" in main("show", file).stdout
     (file.parent / "Car.fmu").unlink()
@@ -107,7 +107,7 @@ def test_the_quadrotors_metrics_have_units() -> None:
     assert set(found) == {*system.objectives, "horizon", "divergence_time"}
 
 
-def test_a_run_prints_and_keeps_them(main: Main, tmp_path: Path) -> None:
+def test_a_run_prints_and_stores_units(main: Main, tmp_path: Path) -> None:
     lines = main("run", "--stop-time", "0.05", "--no-figures", "--out", tmp_path / "run").stdout.splitlines()
     values = {name: value for name, _, value in (line.partition(" ") for line in lines)}
     assert values["position_iae"].endswith(" m.s")

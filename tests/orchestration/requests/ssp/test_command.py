@@ -1,4 +1,4 @@
-"""`quadcosim ssp` as it is called: where the file goes, and which scenarios are refused."""
+"""The command `quadcosim ssp`: the path of the file, and the scenarios that are rejected."""
 
 import shutil
 import zipfile
@@ -32,7 +32,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, built: dict[str, Path]
 # -- the command ------------------------------------------------------------------------------------------
 
 
-def test_the_paper_s_flight_goes_to_the_folder_of_the_fmus_unless_told(here: Path, main: Main) -> None:
+def test_the_default_is_the_paper_s_flight_in_the_folder_of_the_fmus(here: Path, main: Main) -> None:
     done = main("ssp")
     assert done.stdout == f"{here / 'fmus' / 'QuadrotorLoop.ssp'}\n"
     assert done.stderr == f"{here / 'fmus' / 'QuadrotorLoop.timing.toml'} has its timing, for quadcosim run\n"
@@ -49,9 +49,9 @@ def test_flags_and_out_are_those_of_a_flight(here: Path, main: Main) -> None:
     assert not (here / "fmus" / "QuadrotorLoop.ssp").exists()
 
 
-def test_what_an_ssp_cannot_say_is_warned_of_even_quietly(here: Path, main: Main) -> None:
-    said = "timing.delay = 0.005: an SSP cannot express that; only its file with timing does"
-    assert main("ssp", "-q", "--delay", "0.005", "--out", "loop.ssp").stderr == f"warning: {said}\n"
+def test_features_that_an_ssp_lacks_are_warned_of_even_quietly(here: Path, main: Main) -> None:
+    message = "timing.delay = 0.005: an SSP cannot express that; only its file with timing does"
+    assert main("ssp", "-q", "--delay", "0.005", "--out", "loop.ssp").stderr == f"warning: {message}\n"
 
 
 def test_a_scenario_file_may_name_fmus_beside_it(here: Path, main: Main) -> None:
@@ -80,7 +80,7 @@ def test_the_installed_command_writes_it(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "message"),
     [
         (("--set", "plant.mas=1"), "plant.mas: QuadrotorPlant has no such variable; did you mean mass?"),
         (("--set", "plant.mass=true"), "plant.mass = True: expected a number"),
@@ -88,8 +88,10 @@ def test_the_installed_command_writes_it(tmp_path: Path) -> None:
         (("nowhere.toml",), "nowhere.toml: expected a readable system or scenario file"),
     ],
 )
-def test_wrong_usage_is_one_line_and_exit_code_2(here: Path, main: Main, arguments: tuple[str, ...], said: str) -> None:
-    assert error_line(main("ssp", *arguments, "--out", "loop.ssp", code=2)).startswith(said)
+def test_wrong_usage_is_one_line_and_exit_code_2(
+    here: Path, main: Main, arguments: tuple[str, ...], message: str
+) -> None:
+    assert error_line(main("ssp", *arguments, "--out", "loop.ssp", code=2)).startswith(message)
     assert not (here / "loop.ssp").exists()
 
 
@@ -101,7 +103,7 @@ def written(scenario: Scenario, folder: Path) -> bytes:
     return writing.write(scenario, folder / "expected.ssp").read_bytes()
 
 
-# -- what is refused --------------------------------------------------------------------------------------
+# -- rejections -------------------------------------------------------------------------------------------
 
 
 UNSAYABLE: dict[str, Any] = {
@@ -115,31 +117,29 @@ UNSAYABLE: dict[str, Any] = {
     "noise": {"position": 0.01},
     "quantisation": {"position": 0.01},
 }
-"""Of all that a timing has, what an SSP has no words for."""
+"""The keys of a timing that an SSP lacks."""
 
 
 @pytest.mark.parametrize("key", UNSAYABLE)
-def test_a_timing_that_an_ssp_cannot_say_is_said_to_be_in_its_file_only(
-    key: str, short: Scenario, tmp_path: Path
-) -> None:
+def test_timing_that_an_ssp_lacks_is_reported_as_in_its_file_only(key: str, short: Scenario, tmp_path: Path) -> None:
     value = UNSAYABLE[key]
     given = "" if isinstance(value, dict) else f" = {value}"
-    assert heard(short.with_changes(timing={key: value}), tmp_path) == [
+    assert warnings_of(short.with_changes(timing={key: value}), tmp_path) == [
         f"timing.{key}{given}: an SSP cannot express that; only its file with timing does"
     ]
 
 
-def test_nothing_is_said_of_a_scenario_that_an_ssp_can_say(short: Scenario, tmp_path: Path) -> None:
-    assert heard(short, tmp_path) == []
+def test_a_scenario_that_an_ssp_carries_has_no_warnings(short: Scenario, tmp_path: Path) -> None:
+    assert warnings_of(short, tmp_path) == []
 
 
-def test_an_enumeration_that_other_masters_do_not_take_is_said(short: Scenario, tmp_path: Path) -> None:
+def test_an_enumeration_that_other_masters_reject_is_warned_of(short: Scenario, tmp_path: Path) -> None:
     given = short.with_changes(parameters={"controller.discretisation": "match"})
-    assert heard(given, tmp_path) == [
+    assert warnings_of(given, tmp_path) == [
         "controller.discretisation = match: of type Enumeration; libcosim crashes, ecos and fmpy refuse the SSP; "
         "all take discretisation_index = 5"
     ]
-    assert heard(short.with_changes(parameters={"controller.discretisation_index": 5}), tmp_path) == []
+    assert warnings_of(short.with_changes(parameters={"controller.discretisation_index": 5}), tmp_path) == []
 
 
 MIXED = """\
@@ -161,7 +161,7 @@ to = ["a.u"]
 
 
 @needs_compiler
-def test_types_that_other_masters_do_not_take_are_said_by_the_command(
+def test_types_that_other_masters_reject_are_reported_by_the_command(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, main: Main
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -175,8 +175,8 @@ def test_types_that_other_masters_do_not_take_are_said_by_the_command(
     ]
 
 
-def heard(scenario: Scenario, folder: Path) -> list[str]:
-    """What is warned of as an SSP is written."""
+def warnings_of(scenario: Scenario, folder: Path) -> list[str]:
+    """The warnings while an SSP is written."""
     lines: list[str] = []
     writing.write(scenario, folder / "loop.ssp", warn=lines.append)
     return lines
@@ -186,7 +186,7 @@ UNCONNECTED = "expected a parameter or an input that nothing is connected to"
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "said"),
+    ("name", "value", "message"),
     [
         ("plant.mas", 1.0, "QuadrotorPlant has no such variable; did you mean mass?"),
         ("controller.gain", 1.0, "UnifiedController has no such variable; did you mean gain.eta?"),
@@ -196,10 +196,10 @@ UNCONNECTED = "expected a parameter or an input that nothing is connected to"
         ("plant.tilt", 1.0, f"is a local; {UNCONNECTED}"),
     ],
 )
-def test_what_is_no_parameter_and_no_open_input_is_refused(
-    name: str, value: float, said: str, short: Scenario, tmp_path: Path
+def test_a_name_that_is_neither_parameter_nor_open_input_is_rejected(
+    name: str, value: float, message: str, short: Scenario, tmp_path: Path
 ) -> None:
-    assert refusal(short.with_changes(parameters={name: value}), tmp_path).startswith(f"{name}: {said}")
+    assert refusal(short.with_changes(parameters={name: value}), tmp_path).startswith(f"{name}: {message}")
 
 
 @pytest.mark.parametrize(
@@ -211,14 +211,14 @@ def test_what_is_no_parameter_and_no_open_input_is_refused(
         ("controller.use_reference_inputs", 1.0, "true or false"),
     ],
 )
-def test_a_value_of_another_type_is_refused(
+def test_a_value_of_another_type_is_rejected(
     name: str, value: float | bool, expected: str, short: Scenario, tmp_path: Path
 ) -> None:
     chosen = short.with_changes(parameters={name: value})
     assert refusal(chosen, tmp_path) == f"{name} = {value}: expected {expected}"
 
 
-def test_two_fmus_of_one_file_name_are_refused(short: Scenario, built: dict[str, Path], tmp_path: Path) -> None:
+def test_two_fmus_of_one_file_name_are_rejected(short: Scenario, built: dict[str, Path], tmp_path: Path) -> None:
     copies = []
     for model in PAIR:
         copies.append(tmp_path / model / "model.fmu")
@@ -229,13 +229,13 @@ def test_two_fmus_of_one_file_name_are_refused(short: Scenario, built: dict[str,
     assert refusal(chosen, tmp_path) == f"{controller} and {plant}: expected FMUs of different file names"
 
 
-def test_fmus_that_do_not_fit_are_refused(short: Scenario, built: dict[str, Path], tmp_path: Path) -> None:
+def test_fmus_that_do_not_fit_are_rejected(short: Scenario, built: dict[str, Path], tmp_path: Path) -> None:
     swapped = short.with_fmus(plant=built["UnifiedController"], controller=built["QuadrotorPlant"])
     assert refusal(swapped, tmp_path).startswith("plant.fmu: UnifiedController has no output position.x, ")
 
 
 def refusal(scenario: Scenario, folder: Path) -> str:
-    """The line with which a scenario is refused; no file is left behind."""
+    """The error with which a scenario is rejected; no file is left behind."""
     with pytest.raises(UsageError) as refused:
         writing.write(scenario, folder / "loop.ssp")
     assert not (folder / "loop.ssp").exists()

@@ -1,4 +1,4 @@
-"""The SSP as other tools read it: what they fly is the scenario, its parameters included."""
+"""The SSP in other tools: they simulate the scenario with its parameters."""
 
 import shutil
 from pathlib import Path
@@ -19,7 +19,7 @@ FROM_SSP = ("libcosim, SSP", "ecos, SSP", "fmpy, SSP")
 
 
 def one_of_each() -> list[Tool]:
-    """A way of each tool that flies both, by the SSP where there is such a way."""
+    """A way for each tool to simulate both, by the SSP where possible."""
     return chosen([*FROM_SSP, "fmucontainer"], LOOP.ports)
 
 
@@ -31,7 +31,7 @@ def defaults(paper: Scenario) -> Scenario:
 
 @pytest.fixture(scope="module")
 def other(defaults: Scenario) -> Scenario:
-    """The same with parameters that are not the defaults.
+    """The same flight with parameters that are not the defaults.
 
     A lag and a late first sample depend on the inputs of initialisation: the actuators start at the command that they
     find as it ends; the first command is held to the first sample.
@@ -45,24 +45,24 @@ def others(other: Scenario) -> list[Agreement]:
     return agreements(other, chosen(None, LOOP.ports))
 
 
-def test_every_tool_flies_the_parameters_of_the_scenario(others: list[Agreement]) -> None:
+def test_every_tool_simulates_the_parameters_of_the_scenario(others: list[Agreement]) -> None:
     assert [agreement.tool.name for agreement in others] == [tool.name for tool in chosen(None, LOOP.ports)]
     for agreement in others:
         assert farthest(agreement, agreement.same_start) <= AIM, agreement.tool.name
 
 
 def test_the_defaults_would_have_been_seen(defaults: Scenario, other: Scenario) -> None:
-    """That the flight of each tool is this one, and not the one of the defaults, of all or of those about times."""
-    flown = states_of_master(other)
-    apart = np.abs(flown - states_of_master(defaults)).max(axis=0)
+    """Each tool simulates this flight, and not that of the defaults, of all parameters or of those of times."""
+    states = states_of_master(other)
+    apart = np.abs(states - states_of_master(defaults)).max(axis=0)
     assert apart.min() > 1e-2
     at_once = other.with_changes(parameters={"plant.actuator_time_constant": 0.0})
     for usual in (at_once, other.with_changes(timing={"offset": 0.0})):
-        assert np.abs(flown - states_of_master(usual)).max() > 1e-2
+        assert np.abs(states - states_of_master(usual)).max() > 1e-2
 
 
 def test_each_tool_takes_the_parameters_from_the_ssp(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Given an SSP with the default parameters, they all fly those."""
+    """With an SSP of the default parameters, all tools simulate those."""
     write = writing.write
     defaults = NATIVE.with_changes(timing={"plant_interval": 0.01}, stop_time=0.4)
 
@@ -79,7 +79,7 @@ def test_each_tool_takes_the_parameters_from_the_ssp(monkeypatch: pytest.MonkeyP
 def test_fmus_of_any_name_in_any_folder_with_parameters_of_every_type(
     odd_plant: Path, built: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """From a scenario file that is named relative to where the command is started, as are its FMUs."""
+    """From a scenario file with a path relative to the current folder, as are its FMUs."""
     folder = tmp_path / "my flights" / "später"
     folder.mkdir(parents=True)
     shutil.copyfile(odd_plant, folder / "plant.fmu")
@@ -112,8 +112,8 @@ controller = ["energy"]
 """
 
 
-def test_a_redesign_given_by_the_integer_beside_its_enumeration_flies_in_every_tool() -> None:
-    """libcosim and ecos leave the Enumeration itself as it starts."""
+def test_a_redesign_given_by_the_integer_beside_its_enumeration_runs_in_every_tool() -> None:
+    """libcosim and ecos leave the Enumeration itself at its start value."""
     redesign = {"controller.discretisation_index": 4, "controller.stages": 2}
     explicit = NATIVE.with_changes(timing={"period": 0.05, "plant_interval": 0.01}, stop_time=0.4)
     scenario = explicit.with_changes(parameters=redesign)

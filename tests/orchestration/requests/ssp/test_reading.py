@@ -1,4 +1,4 @@
-"""SSP 1.0 read: components, nested systems, transformations, units, parameter sets, and the timing on top."""
+"""Reading SSP 1.0: components, nested systems, transformations, units, parameter sets, and additional timing."""
 
 import json
 from collections.abc import Callable
@@ -62,7 +62,7 @@ def wire(start: str, end: str, inside: str = "", **more: str) -> str:
 
 
 def values(text: str, prefix: str = "", mapping: str = "") -> str:
-    """A binding with a set of its own, as `name=1.5 other=2:mm`."""
+    """A binding with an inline set, as `name=1.5 other=2:mm`."""
     made = ""
     for item in text.split():
         name, _, rest = item.partition("=")
@@ -123,7 +123,7 @@ def wires(read: System) -> dict[str, tuple[str, float, float]]:
     return {end: (start, x.scale, x.offset) for x in read.connections for start, end in zip(x.start, x.end)}
 
 
-def test_a_conversion_that_is_suppressed_leaves_the_value_whatever_the_units(loaded: Loaded) -> None:
+def test_a_suppressed_conversion_leaves_the_value_with_any_units(loaded: Loaded) -> None:
     suppressed = LOOP.replace('endConnector="x"', 'endConnector="x" suppressUnitConversion="true"')
     assert wires(loaded(structure(LOOP)))["law.x"] == ("plant.x", 1000.0, 0.0)
     read = loaded(structure(suppressed))
@@ -151,7 +151,7 @@ def test_components_and_connections_are_read_with_units_converted(loaded: Loaded
     assert {c.step for c in read.components.values()} == {0.01}
 
 
-def test_a_transformation_comes_on_top_of_units_unless_those_are_suppressed(loaded: Loaded) -> None:
+def test_a_transformation_adds_to_units_unless_those_are_suppressed(loaded: Loaded) -> None:
     linear = '<ssc:LinearTransformation factor="2.0" offset="0.5"/>'
     for suppressed, expected in (("false", (2000.0, 500.0)), ("true", (2.0, 0.5))):
         changed = wire("plant.x", "law.x", linear, suppressUnitConversion=suppressed)
@@ -159,12 +159,12 @@ def test_a_transformation_comes_on_top_of_units_unless_those_are_suppressed(load
         assert wires(read)["law.x"] == ("plant.x", *map(pytest.approx, expected))
 
 
-def test_a_connection_may_be_written_backwards_for_kinds_say_what_gives(loaded: Loaded) -> None:
+def test_a_connection_may_be_written_backwards_as_kinds_give_its_direction(loaded: Loaded) -> None:
     read = loaded(structure(system(PLANT + LAW, wire("plant.u", "law.u"))))
     assert wires(read) == {"plant.u": ("law.u", 1.0, 0.0)}
 
 
-def test_nested_systems_are_taken_apart_and_their_path_is_the_name(loaded: Loaded) -> None:
+def test_components_of_nested_systems_are_named_by_their_path(loaded: Loaded) -> None:
     half = '<ssc:LinearTransformation factor="0.5"/>'
     inner = system(
         LAW.replace('name="law"', 'name="core"'),
@@ -186,20 +186,20 @@ def linear(factor: float, offset: float) -> str:
     return f'<ssc:LinearTransformation factor="{factor}" offset="{offset}"/>'
 
 
-def test_transformations_through_systems_are_applied_in_the_order_in_which_a_value_meets_them(loaded: Loaded) -> None:
+def test_transformations_through_systems_are_applied_in_the_direction_of_values(loaded: Loaded) -> None:
     inner = system(LAW, wire(".speed", "law.v", linear(10.0, 1.0)), name="box", connectors="in speed")
     read = loaded(structure(system(PLANT + inner, wire("plant.v", "box.speed", linear(2.0, 3.0)))))
     assert wires(read) == {"box_law.v": ("plant.v", 20.0, 31.0)}  # 10 (2 v + 3) + 1, and not 2 (10 v + 1) + 3
 
 
-def test_of_values_for_one_input_along_its_way_the_outermost_is_taken_with_all_that_it_passes(loaded: Loaded) -> None:
+def test_the_outermost_value_for_an_input_is_used_with_all_its_conversions(loaded: Loaded) -> None:
     law = component("law", "in x:mm in v out u:N", values("v=1"))
     inner = system(
         law, wire(".speed", "law.v", linear(10.0, 1.0)), name="box", connectors="in speed", bindings=values("speed=2")
     )
     outer = wire(".wish", "box.speed", linear(2.0, 3.0))
     within = loaded(structure(system(inner, outer, connectors="in wish")))
-    assert within.components["box_law"].parameters["v"] == 21.0  # of its own system: 10 · 2 + 1
+    assert within.components["box_law"].parameters["v"] == 21.0  # of its system: 10 · 2 + 1
     both = loaded(structure(system(inner, outer, connectors="in wish", bindings=values("wish=5"))))
     assert both.components["box_law"].parameters["v"] == 131.0  # 10 (2 · 5 + 3) + 1
 
@@ -241,7 +241,7 @@ def test_parameters_are_taken_from_where_they_are_bound(
     assert read.components["law"].parameters == expected
 
 
-def test_a_parameter_set_may_be_a_file_of_its_own(loaded: Loaded, tmp_path: Path) -> None:
+def test_a_parameter_set_may_be_a_separate_file(loaded: Loaded, tmp_path: Path) -> None:
     (tmp_path / "my set.ssv").write_text(
         f'<ssv:ParameterSet {NAMES} version="1.0" name="s"><ssv:Parameters><ssv:Parameter name="k">'
         '<ssv:Real value="7.5"/></ssv:Parameter></ssv:Parameters></ssv:ParameterSet>'
@@ -259,7 +259,7 @@ def test_a_parameter_of_a_system_reaches_what_it_is_connected_to(loaded: Loaded)
     assert loaded(structure(top)).components["law"].parameters == {"k": 4.0, "x": pytest.approx(2000.0)}
 
 
-# -- timing on top ----------------------------------------------------------------------------------------
+# -- additional timing ------------------------------------------------------------------------------------
 
 TIMING = """
 stop_time = 2.0
@@ -282,7 +282,7 @@ peak = "max(plant.x)"
 """
 
 
-def test_a_second_file_says_what_ssp_does_not_know(loaded: Loaded) -> None:
+def test_a_second_file_has_the_timing_that_ssp_lacks(loaded: Loaded) -> None:
     law = component("law", "in x:mm in v out u:N", values("k=1.5 limit=3"))
     read = loaded(structure(system(PLANT + law, WIRES)), TIMING)
     assert (read.stop_time, read.seed, read.objectives) == (2.0, 3, {"peak": "max(plant.x)"})
@@ -296,7 +296,7 @@ def test_a_second_file_says_what_ssp_does_not_know(loaded: Loaded) -> None:
     ]
 
 
-def test_two_components_stand_for_all_that_goes_from_one_to_the_other(loaded: Loaded) -> None:
+def test_two_components_stand_for_all_signals_between_them(loaded: Loaded) -> None:
     plain = structure(LOOP.replace(":mm", "").replace('unit="mm"', 'unit="m"'))
     read = loaded(plain, '[[connections]]\nfrom = "plant"\nto = "law"\ndelay = 0.5\n')
     assert [(x.start, x.delay) for x in read.connections] == [(("plant.x", "plant.v"), 0.5), (("law.u",), 0.0)]
@@ -309,7 +309,7 @@ def test_the_timing_may_name_its_ssp_and_is_then_a_system_file(loaded: Loaded, t
 
 
 @pytest.mark.parametrize(
-    ("timing", "said"),
+    ("timing", "message"),
     [
         ("[components.lew]\nstep = 1.0\n", "components.lew: the SSP has no such component; expected one of plant, law"),
         (
@@ -323,13 +323,13 @@ def test_the_timing_may_name_its_ssp_and_is_then_a_system_file(loaded: Loaded, t
         ("[components.law]\nstep = 1.0\nsampling = { period = 1.0 }\n", "components.law.step = 1.0: expected none"),
     ],
 )
-def test_wrong_timing_is_one_line(timing: str, said: str, loaded: Loaded, tmp_path: Path) -> None:
+def test_wrong_timing_is_one_line(timing: str, message: str, loaded: Loaded, tmp_path: Path) -> None:
     with pytest.raises(UsageError) as refused:
         loaded(structure(LOOP), timing)
-    assert one_line(refused.value).startswith(f"{tmp_path / 'timing.toml'}: {said}")
+    assert one_line(refused.value).startswith(f"{tmp_path / 'timing.toml'}: {message}")
 
 
-# -- what is refused --------------------------------------------------------------------------------------
+# -- rejections -------------------------------------------------------------------------------------------
 
 
 def one(**more: str) -> str:
@@ -349,7 +349,7 @@ LATE, ENDLESS = STEP.replace('startTime="0.0"', 'startTime="1.0"'), STEP.replace
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("<ssd:", "expected a readable SSD document of SSP 1.0: "),
         (structure(LOOP).replace("Elements>", "Elephants>"), "expected a valid SSD document of SSP 1.0: "),
@@ -369,16 +369,16 @@ LATE, ENDLESS = STEP.replace('startTime="0.0"', 'startTime="1.0"'), STEP.replace
         (laws("law", "l w", "l_w"), "l w and l_w: would be named l_w"),
     ],
 )
-def test_what_cannot_be_read_is_refused_in_one_line_that_names_it(
-    text: str, said: str, loaded: Loaded, tmp_path: Path
+def test_unsupported_elements_are_rejected_by_name_in_one_line(
+    text: str, message: str, loaded: Loaded, tmp_path: Path
 ) -> None:
     with pytest.raises(UsageError) as refused:
         loaded(text)
-    assert one_line(refused.value).removeprefix(f"{tmp_path / 'loop.ssd'}: ").startswith(said)
+    assert one_line(refused.value).removeprefix(f"{tmp_path / 'loop.ssd'}: ").startswith(message)
 
 
 @pytest.mark.parametrize("content", [b"no archive", None])
-def test_an_archive_that_is_none_or_has_no_structure_is_refused(
+def test_an_archive_that_is_none_or_has_no_structure_is_rejected(
     content: bytes | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(package, "_cache", lambda: tmp_path / "cache")

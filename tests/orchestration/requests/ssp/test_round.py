@@ -1,4 +1,4 @@
-"""What is written as an SSP with its timing beside it is flown back as it was."""
+"""A system written as an SSP with its timing has the same run when it is read again."""
 
 import dataclasses
 import zipfile
@@ -56,7 +56,7 @@ def test_computers_and_networks_are_in_the_annotation_and_tasks_are_stepped_by_t
     assert run(read).metrics == run(system).metrics
 
 
-def test_a_component_that_nothing_is_connected_to_is_flown_back(tmp_path: Path) -> None:
+def test_a_component_without_connections_has_the_same_run(tmp_path: Path) -> None:
     system = carried("double_integrator")
     alone = dataclasses.replace(
         system,
@@ -70,7 +70,7 @@ def test_a_component_that_nothing_is_connected_to_is_flown_back(tmp_path: Path) 
     assert run(load_request(*writing.write_with_timing(alone, tmp_path / "loop.ssp"))).metrics == run(alone).metrics
 
 
-def test_the_timing_of_the_annotation_holds_where_no_file_is_given_and_is_held_to_the_rules_of_files(
+def test_without_a_file_the_timing_of_the_annotation_is_used_and_checked(
     tmp_path: Path,
 ) -> None:
     system = dataclasses.replace(carried("double_integrator"), seed=7)
@@ -91,7 +91,7 @@ def load_structure(ssp: Path, folder: Path) -> Path:
     return folder / package.STRUCTURE
 
 
-def test_what_the_timing_says_on_top_is_flown(tmp_path: Path) -> None:
+def test_additional_timing_is_used(tmp_path: Path) -> None:
     ssp, timing = writing.write_with_timing(carried("double_integrator"), tmp_path / "loop.ssp")
     timing.write_text(timing.read_text().replace('name = "command"', 'name = "command"\ndelay = 0.1'))
     read = load_request(ssp, timing)
@@ -99,7 +99,7 @@ def test_what_the_timing_says_on_top_is_flown(tmp_path: Path) -> None:
     assert [x.delay for x in read.connections] == [0.0, 0.1]
 
 
-def test_a_system_of_two_rates_with_a_late_and_lossy_connection_is_flown_back(tmp_path: Path) -> None:
+def test_a_system_of_two_rates_with_delay_and_loss_has_the_same_run(tmp_path: Path) -> None:
     system = load_request(EXAMPLES / "dc_servo" / "system.toml")
     system = dataclasses.replace(system, stop_time=0.5)
     assert isinstance(system, System)
@@ -108,16 +108,16 @@ def test_a_system_of_two_rates_with_a_late_and_lossy_connection_is_flown_back(tm
     assert bits(run(read)) == bits(run(system))
 
 
-def test_the_quadrotor_is_flown_back_to_the_bit(tmp_path: Path) -> None:
+def test_the_quadrotor_has_the_same_run_to_the_bit(tmp_path: Path) -> None:
     scenario = Scenario(stop_time=0.1).with_changes(timing={"period": 0.02, "offset": 0.01, "plant_interval": 0.005})
     read = load_request(*writing.write_with_timing(scenario, tmp_path / "loop.ssp"))
     assert isinstance(read, System)
-    flown = run(scenario)
-    assert bits(run(read)) == bits(flown)
+    result = run(scenario)
+    assert bits(run(read)) == bits(result)
     assert read.criterion == scenario.as_system().criterion
 
 
-def test_the_command_writes_both_and_run_flies_them(tmp_path: Path, main: Main) -> None:
+def test_the_command_writes_both_files_and_run_takes_them(tmp_path: Path, main: Main) -> None:
     system = dataclasses.replace(carried("water_tank"), stop_time=1.0)
     (tmp_path / "tank.toml").write_text(system.to_toml())
     done = main("ssp", tmp_path / "tank.toml", "--out", tmp_path / "tank.ssp")
@@ -126,15 +126,15 @@ def test_the_command_writes_both_and_run_flies_them(tmp_path: Path, main: Main) 
         "warning: controller.valve to tank.valve_control: from Boolean to Real; libcosim and ecos refuse the SSP",
         f"{tmp_path / 'tank.timing.toml'} has its timing, for quadcosim run",
     ]
-    flown = [main("run", *of, "--out", tmp_path / f"run{i}", "--no-figures") for i, of in enumerate(
+    result = [main("run", *of, "--out", tmp_path / f"run{i}", "--no-figures") for i, of in enumerate(
         [(tmp_path / "tank.toml",), (tmp_path / "tank.ssp", tmp_path / "tank.timing.toml")]
     )]  # fmt: skip
-    assert len({done.stdout.count("peak") for done in flown}) == 1
+    assert len({done.stdout.count("peak") for done in result}) == 1
     assert (tmp_path / "run0" / "signals.parquet").read_bytes() == (tmp_path / "run1" / "signals.parquet").read_bytes()
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("components = 3", "components = 3: expected a table"),
         ("[components]\nplant = 3", "components.plant = 3: expected a table"),
@@ -146,10 +146,10 @@ def test_the_command_writes_both_and_run_flies_them(tmp_path: Path, main: Main) 
         ('[[connections]]\nfrom = 1\nto = "a"', "connections.0.from = 1: expected a list"),
     ],
 )
-def test_timing_of_another_shape_is_refused_in_one_line(text: str, said: str, tmp_path: Path, main: Main) -> None:
+def test_timing_of_the_wrong_shape_is_rejected_in_one_line(text: str, message: str, tmp_path: Path, main: Main) -> None:
     ssp, timing = writing.write_with_timing(carried("double_integrator"), tmp_path / "loop.ssp")
     timing.write_text(text)
     with pytest.raises(UsageError) as refused:
         load_request(ssp, timing)
-    assert one_line(refused.value) == f"{timing}: {said}"
-    assert error_line(main("limit", ssp, timing, "--of", "connections.command.delay", code=2)) == f"{timing}: {said}"
+    assert one_line(refused.value) == f"{timing}: {message}"
+    assert error_line(main("limit", ssp, timing, "--of", "connections.command.delay", code=2)) == f"{timing}: {message}"

@@ -1,4 +1,4 @@
-"""The SSP that `quadcosim ssp` writes: what is in it, and what it refuses to say."""
+"""The SSP that `quadcosim ssp` writes: its content, and the scenarios that it rejects."""
 
 import dataclasses
 import re
@@ -46,7 +46,7 @@ def document(path: Path, name: str = "SystemStructure.ssd") -> Element:
 
 
 def values_in(path: Path, name: str) -> dict[str, tuple[str, str, str | None]]:
-    """Of a parameter set: type, text and unit by the name of the parameter."""
+    """Type, text and unit of the parameters of a set, by name."""
     found = {}
     for parameter in document(path, name).iterfind("ssv:Parameters/ssv:Parameter", NAMES):
         (value,) = parameter
@@ -56,7 +56,7 @@ def values_in(path: Path, name: str) -> dict[str, tuple[str, str, str | None]]:
 
 
 def expected_values(scenario: Scenario, component: str) -> Iterator[tuple[str, tuple[str, str, str | None]]]:
-    """By the table of the interface: every parameter that is a number, and what else is set."""
+    """The expected parameters: all numeric ones of the interface, and others that are set."""
     given = dict(getattr(scenario, component).parameters)
     if component == "controller":
         given |= {"sample_period": scenario.timing.period, "sample_offset": scenario.timing.offset}
@@ -113,7 +113,7 @@ def test_every_set_is_bound_where_it_belongs(written: Path) -> None:
     assert names == {PARAMETER_SET}, "ecos takes its sets by this name"
 
 
-def test_a_boolean_is_written_if_it_is_not_what_it_is_anyway(short: Scenario, tmp_path: Path) -> None:
+def test_a_boolean_is_written_if_it_differs_from_its_start_value(short: Scenario, tmp_path: Path) -> None:
     for given, expected in ((True, ("Boolean", "true", None)), (False, None)):
         chosen = changed(short.as_system(), {"components.controller.parameters.use_reference_inputs": given})
         path = writing.write(chosen, tmp_path / "loop.ssp")
@@ -212,7 +212,7 @@ def test_numbers_of_numpy_and_whole_numbers_are_written_as_any_other(short: Scen
     assert writing.write(same, tmp_path / "same.ssp").read_bytes() == expected.read_bytes()
 
 
-def test_the_clock_of_the_scenario_makes_no_difference_to_others(short: Scenario, tmp_path: Path) -> None:
+def test_the_clock_of_the_scenario_changes_nothing_for_other_tools(short: Scenario, tmp_path: Path) -> None:
     """It is in the annotation with the timing, and nowhere else."""
     paths = [
         writing.write(short.with_changes(timing={"clock": clock}), tmp_path / clock) for clock in ("master", "fmu")
@@ -230,7 +230,7 @@ def for_others(path: Path) -> dict[str, bytes]:
     return {**found, "SystemStructure.ssd": ElementTree.tostring(root)}
 
 
-def test_whole_numbers_stay_whole_and_only_they_are_taken(odd_plant: Path, short: Scenario, tmp_path: Path) -> None:
+def test_whole_numbers_stay_whole_and_others_are_rejected(odd_plant: Path, short: Scenario, tmp_path: Path) -> None:
     chosen = dataclasses.replace(short, plant=FmuChoice(fmu=str(odd_plant), parameters={"cargo": 3}))
     path = writing.write(chosen, tmp_path / "loop.ssp")
     assert values_in(path, "resources/plant.ssv")["cargo"] == ("Integer", "3", None)
@@ -246,7 +246,7 @@ def test_whole_numbers_stay_whole_and_only_they_are_taken(odd_plant: Path, short
 DEGREES = '<Unit name="deg"><BaseUnit rad="1" factor="0.017453292519943295"/></Unit><Unit name="box"/>'
 
 
-def test_fmus_of_others_may_have_units_of_any_kind(short: Scenario, built: dict[str, Path], tmp_path: Path) -> None:
+def test_third_party_fmus_may_have_units_of_any_kind(short: Scenario, built: dict[str, Path], tmp_path: Path) -> None:
     def changed(description: str) -> str:
         return description.replace("<UnitDefinitions>", f"<UnitDefinitions>{DEGREES}", 1)
 
@@ -259,7 +259,7 @@ def test_fmus_of_others_may_have_units_of_any_kind(short: Scenario, built: dict[
     assert "box" not in defined, "an FMU may leave out what its unit is; SSP may not"
 
 
-def test_fmus_of_others_need_no_units(short: Scenario, built: dict[str, Path], tmp_path: Path) -> None:
+def test_third_party_fmus_need_no_units(short: Scenario, built: dict[str, Path], tmp_path: Path) -> None:
     def changed(description: str) -> str:
         description = re.sub("<UnitDefinitions>.*</UnitDefinitions>", "", description, flags=re.DOTALL)
         return re.sub(r' unit="[^"]*"', "", description)
