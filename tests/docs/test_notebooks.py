@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+from typing import Any
 
 import nbformat
 import pytest
@@ -17,18 +18,28 @@ def test_there_are_a_flight_a_limit_a_controller_of_ones_own_and_arrays() -> Non
     assert [path.stem for path in NOTEBOOKS] == ["arrays", "flight", "limit", "own_controller"]
 
 
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_a_notebook_runs_from_top_to_bottom_and_shows_its_results(path: Path, tmp_path: Path) -> None:
-    notebook = nbformat.read(path, as_version=4)
-    client = NotebookClient(
-        notebook,
-        timeout=round(PATIENCE),
-        startup_timeout=round(PATIENCE),
-        kernel_name="python3",
-        resources={"metadata": {"path": tmp_path}},
-    )
+@pytest.fixture(scope="module")
+def executed(tmp_path_factory: pytest.TempPathFactory) -> dict[Path, list[Any]]:
+    """The cells of each notebook with their outputs, run in one kernel, which takes as long to start as one takes to run.
+
+    Each begins in an empty folder and with none of the names of the one before.
+    """
+    cells = {path: nbformat.read(path, as_version=4).cells for path in NOTEBOOKS}
+    all_cells = []
+    for path, own in cells.items():
+        folder = tmp_path_factory.mktemp(path.stem)
+        for cell in own:
+            cell["id"] = f"{path.stem}-{cell['id']}"
+        all_cells += [nbformat.v4.new_code_cell(f"%reset -f\n%cd -q {folder}"), *own]
+    notebook = nbformat.v4.new_notebook(cells=all_cells)
+    client = NotebookClient(notebook, timeout=round(PATIENCE), startup_timeout=round(PATIENCE), kernel_name="python3")
     client.execute(env={**os.environ, "PATH": os.defpath})  # no environment is activated
-    shown = [output for cell in notebook.cells for output in cell.get("outputs", ())]
+    return cells
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook_runs_from_top_to_bottom_and_shows_its_results(path: Path, executed: dict[Path, list[Any]]) -> None:
+    shown = [output for cell in executed[path] for output in cell.get("outputs", ())]
     kinds = {kind for output in shown for kind in output.get("data", ())}
     assert "text/html" in kinds
     assert any("image/png" in str(output) for output in shown)
