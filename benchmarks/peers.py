@@ -15,7 +15,7 @@ from benchmarks.mathematics import table
 from orchestration.basics.errors import UsageError
 from orchestration.building.fmus import native_twins
 from orchestration.interop.catalogue import TOOLS, Tool
-from orchestration.interop.flights import Flights
+from orchestration.interop.tool_runs import ToolRuns
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.runs.prepared import prepared
@@ -42,9 +42,9 @@ def scenario(stop: float) -> System:
 
 def by_tool(tool: Tool, stop: float) -> float:
     """CPU time of a flight in a tool's process, including its start [s]."""
-    with tempfile.TemporaryDirectory() as folder, Flights(scenario(stop), Path(folder), None) as flights:
+    with tempfile.TemporaryDirectory() as folder, ToolRuns(scenario(stop), Path(folder), None) as runs:
         before = _of_children()
-        flights.flown(tool)
+        runs.run(tool)
         return _of_children() - before
 
 

@@ -1,8 +1,8 @@
-"""The linear maps that a loop may go through from one period to the next: products of a few matrices and flows.
+"""The linear maps of a loop from one period to the next: products of a few matrices and flows.
 
-What happens in a period is a *letter*: a message that arrives after τ, a message that is lost. Its map is a product of
+The events of a period are a *letter*: a message that arrives after τ, a message that is lost. Its map is a product of
 matrices, and of exponentials exp(G t) with t affine in the letter's parameters τ, each of which is anywhere in an
-interval. Which letters may follow one another is said by modes: a letter moves from a mode to another.
+interval. Modes determine which letters may follow one another: a letter moves from a mode to another.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Factor:
 
 @dataclass(frozen=True, kw_only=True)
 class Letter:
-    """What may happen in a period."""
+    """The possible events of a period."""
 
     name: str
     moves: tuple[tuple[int, int], ...] = ((0, 0),)
@@ -44,20 +44,20 @@ class Letter:
 
 @dataclass(frozen=True, kw_only=True)
 class Family:
-    """All that may happen: the letters and what they are made of."""
+    """All letters, with their matrices."""
 
     matrices: Mapping[str, Floats]
     """by name, all of one size"""
     kept: tuple[int, ...]
-    """of the coordinates those that go from one period to the next; nothing depends on what the others were before"""
+    """the coordinates that matter from one period to the next; nothing depends on earlier values of the others"""
     letters: tuple[Letter, ...]
 
     def largest(self) -> list[float]:
-        """Of each parameter, over all letters."""
+        """The largest value of each parameter, over all letters."""
         return [max(high for _, high in ends) for ends in zip(*(letter.ranges for letter in self.letters))]
 
     def at(self, letter: Letter, point: Sequence[float] = ()) -> Floats:
-        """The map of a letter at values of its parameters, of the coordinates that are kept."""
+        """The map of a letter at values of its parameters, of the kept coordinates."""
         from scipy.linalg import expm
 
         size = len(next(iter(self.matrices.values())))
@@ -69,13 +69,13 @@ class Family:
         return found
 
     def without_idle(self) -> Family:
-        """The same without coordinates on whose values at the beginning of a period nothing depends."""
+        """The family without coordinates on whose values at the beginning of a period nothing depends."""
         samples = [abs(self.at(x, [low + share * (high - low) for low, high in x.ranges]))
                    for x in self.letters for share in (0.0, 0.37, 1.0)]  # fmt: skip
-        largest_sum = np.sum(samples, axis=0)
+        total = np.sum(samples, axis=0)
         alive = np.arange(len(self.kept))
         while True:
-            felt = alive[(largest_sum[np.ix_(alive, alive)] > 0.0).any(axis=0)]
-            if len(felt) == len(alive):
+            used = alive[(total[np.ix_(alive, alive)] > 0.0).any(axis=0)]
+            if len(used) == len(alive):
                 return replace(self, kept=tuple(self.kept[i] for i in alive))
-            alive = felt
+            alive = used

@@ -54,7 +54,7 @@ def interop(
             inform(str(path))
     far = [agreement.tool.name for agreement in found if not table.agrees(agreement)]
     if far:
-        inform(f"farther than {table.AIM:g} from this project's master: {'; '.join(far)}")
+        inform(f"farther than {table.TOLERANCE:g} from this project's master: {'; '.join(far)}")
     document = [table.as_dict(agreement) for agreement in found]
     return CommandResult(document=document, lines=table.text(found).splitlines(), good=not far)
 

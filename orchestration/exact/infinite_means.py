@@ -25,8 +25,8 @@ MOST = 50
 def infinite_means_warning(request: Request, systems: Sequence[System], files: Files) -> str | None:
     """A warning about averages over runs of these systems, in one line; None: none is due, or the radius is unknown.
 
-    Examined are systems with something random and an objective that is a mean of squares, unless their kind has a loop
-    of its own: those are not linear where they run.
+    Examined are systems with something random and an objective that is a mean of squares, unless their kind has its
+    own loop: those are not linear where they run.
     """
     if LOOPS.of(request.kind) is not None:
         return None

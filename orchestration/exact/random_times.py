@@ -105,7 +105,7 @@ class RandomTime:
 FEW = 40
 """values of a table that are enumerated"""
 FINE = 120
-"""nodes that sample a density, from which those of its own rule are made"""
+"""nodes that sample a density, from which those of its rule are computed"""
 
 
 @functools.lru_cache(maxsize=64)

@@ -1,1 +1,1 @@
-"""The same system by other people's masters."""
+"""The same system in third-party masters."""

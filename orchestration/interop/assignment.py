@@ -1,4 +1,4 @@
-"""What every tool flies: the wires of a system and the signals that are compared."""
+"""The task of every tool: the connections of a system and the signals that are compared."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,29 +20,29 @@ class Ports:
 
 @dataclass(frozen=True, kw_only=True)
 class Loop:
-    """Who is connected to whom."""
+    """The connections of a system, and its compared signals."""
 
     ports: Mapping[str, Ports]
-    """by component, in the order in which a tool that steps one after the other takes them"""
+    """by component, in the order for tools that step one after the other"""
     connections: tuple[tuple[End, End], ...]
     """output to input"""
     states: tuple[str, ...]
-    """connected outputs of components in continuous time, as COMPONENT.VARIABLE: of the end of a step"""
+    """connected outputs of components in continuous time, as COMPONENT.VARIABLE, at the end of a step"""
     commands: tuple[str, ...]
-    """of sampled ones: a step gives what it computed at its start"""
+    """those of sampled components: a step returns the value computed at its start"""
 
     kinds: Mapping[End, Kind]
     """of every connected variable"""
 
     @property
     def converted(self) -> tuple[str, ...]:
-        """Outputs that are no Reals, or do not go to Reals."""
+        """Outputs that are no Reals, or are not connected to Reals."""
         mixed = [start for start, end in self.connections if {self.kinds[start], self.kinds[end]} != {"Real"}]
         return tuple(dict.fromkeys(".".join(start) for start in mixed))
 
     @property
     def signals(self) -> tuple[str, ...]:
-        """Columns of a tool's record beside the time."""
+        """The columns of a tool's rows after the time."""
         return self.states + self.commands
 
     def feeding(self, component: str) -> dict[str, End]:
@@ -51,22 +51,22 @@ class Loop:
         return {name: behind[component, name] for name in self.ports[component].inputs}
 
 
-def loop_of(given: Export) -> Loop:
-    """The loop of a system; raises `UsageError` for a connection that does not pass on values as they are."""
-    for x in given.system.connections:
+def loop_of(export: Export) -> Loop:
+    """The loop of a system; raises `UsageError` for a connection with scale or offset."""
+    for x in export.system.connections:
         if x.converts:
             raise UsageError(f"connections.{x.name}: has scale or offset; expected none to compare with other masters")
-    sampled = {name for name, component in given.system.components.items() if component.sampling is not None}
-    outputs = [(part.name, f"{part.name}.{name}") for part in given.parts for name in part.outputs]
+    sampled = {name for name, component in export.system.components.items() if component.sampling is not None}
+    outputs = [(part.name, f"{part.name}.{name}") for part in export.parts for name in part.outputs]
     return Loop(
-        ports={part.name: Ports(inputs=part.inputs, outputs=part.outputs) for part in given.parts},
+        ports={part.name: Ports(inputs=part.inputs, outputs=part.outputs) for part in export.parts},
         connections=tuple(
             ((x.sender, variable_of(start)), (x.receiver, variable_of(end)))
-            for x in given.system.connections
+            for x in export.system.connections
             for start, end in zip(x.start, x.end, strict=True)
         ),
         kinds={
-            (part.name, name): part.variable(name).kind for part in given.parts for name in part.inputs + part.outputs
+            (part.name, name): part.variable(name).kind for part in export.parts for name in part.inputs + part.outputs
         },
         states=tuple(signal for owner, signal in outputs if owner not in sampled),
         commands=tuple(signal for owner, signal in outputs if owner in sampled),

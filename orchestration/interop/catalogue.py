@@ -1,4 +1,4 @@
-"""The tools that fly, and the call of each."""
+"""The tools that run a system, and the call of each."""
 
 import importlib
 import importlib.metadata
@@ -15,26 +15,26 @@ from orchestration.processes import subprocesses
 
 @dataclass(frozen=True, kw_only=True)
 class Tool:
-    """One way of one tool to fly a system, or one component of it."""
+    """One way of one tool to run a system, or one component of it."""
 
     name: str
     packages: tuple[str, ...]
-    """that pip installs for it"""
+    """that it needs from pip"""
     call: str
     """module:function in `orchestration.interop.tools`"""
     alone: str | None = None
-    """the component that it flies, if it is no master"""
+    """the component that it runs, if it is no master"""
     converts: bool = False
-    """whether it passes on values between variables of different types"""
+    """whether it supports connections between variables of different types"""
     sets_reals_only: bool = False
-    """whether it sets any parameter as a Real, which one of another type refuses"""
+    """whether it sets all parameters as Reals, which those of another type refuse"""
     python: str | None = None
-    """environment variable that names a Python with its packages, where they do not go with those of this project"""
+    """environment variable with the path of a Python with its packages, if these conflict with those of this project"""
 
     def versions(self) -> dict[str, str]:
-        """Of its packages; raises `ModuleNotFoundError`, naming the package, if one is not installed.
+        """The versions of its packages; raises `ModuleNotFoundError`, naming the package, if one is not installed.
 
-        Raises `UsageError` if the Python that it needs is not named, or has not got them.
+        Raises `UsageError` if the Python that it needs is not given, or lacks the packages.
         """
         if self.python is None:
             return {package: importlib.metadata.version(package) for package in self.packages}
@@ -48,7 +48,7 @@ class Tool:
         return dict(zip(self.packages, done.stdout.split(), strict=True))
 
     def command(self, job: Path, rows: Path) -> list[str] | subprocesses.Module:
-        """What flies a job in a process of its own and writes the rows."""
+        """The command or module that runs a job in a separate process and writes the rows."""
         if self.python is None:
             return subprocesses.Module.of("orchestration.interop.tool_process", self.name, job, rows)
         module, _, function = self.call.partition(":")
@@ -59,16 +59,16 @@ class Tool:
         path = os.environ.get(self.python or "")
         if not path:
             raise self._no_python()
-        return str(Path(path).absolute())  # not resolved: a link is what makes an environment
+        return str(Path(path).absolute())  # not resolved: an environment is a link
 
     def _no_python(self) -> UsageError:
         return UsageError(
-            f"--tool {self.name}: expected in {self.python} the path of a Python of its own environment, "
+            f"--tool {self.name}: expected in {self.python} the path of a Python in a separate environment, "
             f"with {', '.join(self.packages)} installed there by pip"
         )
 
     def function(self) -> Callable[[Job], Rows]:
-        """The call."""
+        """The function of its call."""
         module, _, name = self.call.partition(":")
         function: Callable[[Job], Rows] = getattr(
             importlib.import_module(f"orchestration.interop.tools.{module}"), name
@@ -77,33 +77,33 @@ class Tool:
 
 
 COFMUPY = "QUADCOSIM_COFMUPY"
-"""Names a Python with cofmupy, which insists on other versions of fmpy and pythonfmu than this project."""
+"""path of a Python with cofmupy, which requires other versions of fmpy and pythonfmu than this project"""
 
 TOOLS = {
     tool.name: tool
     for tool in (
-        Tool(name="libcosim", packages=("libcosimpy",), call="libcosim:fly"),
-        Tool(name="libcosim, SSP", packages=("libcosimpy",), call="libcosim:fly_ssp"),
-        Tool(name="ecos", packages=("ecospy", "tbb"), call="ecos:fly"),
-        Tool(name="ecos, SSP", packages=("ecospy", "tbb"), call="ecos:fly_ssp"),
-        Tool(name="fmpy, SSP", packages=("fmpy",), call="fmpy:fly_ssp"),
-        Tool(name="fmucontainer", packages=("fmu-manipulation-toolbox",), call="container:fly_jacobi", converts=True),
+        Tool(name="libcosim", packages=("libcosimpy",), call="libcosim:run"),
+        Tool(name="libcosim, SSP", packages=("libcosimpy",), call="libcosim:run_ssp"),
+        Tool(name="ecos", packages=("ecospy", "tbb"), call="ecos:run"),
+        Tool(name="ecos, SSP", packages=("ecospy", "tbb"), call="ecos:run_ssp"),
+        Tool(name="fmpy, SSP", packages=("fmpy",), call="fmpy:run_ssp"),
+        Tool(name="fmucontainer", packages=("fmu-manipulation-toolbox",), call="container:run_jacobi", converts=True),
         Tool(
             name="fmucontainer -sequential",
             packages=("fmu-manipulation-toolbox",),
-            call="container:fly_sequential",
+            call="container:run_sequential",
             converts=True,
         ),
-        Tool(name="cofmupy", packages=("cofmupy",), call="cofmupy:fly_jacobi", python=COFMUPY, sets_reals_only=True),
+        Tool(name="cofmupy", packages=("cofmupy",), call="cofmupy:run_jacobi", python=COFMUPY, sets_reals_only=True),
         Tool(
             name="cofmupy gauss_seidel",
             packages=("cofmupy",),
-            call="cofmupy:fly_gauss_seidel",
+            call="cofmupy:run_gauss_seidel",
             python=COFMUPY,
             sets_reals_only=True,
         ),
-        Tool(name="fmpy, plant alone", packages=("fmpy",), call="fmpy:fly_plant", alone="plant"),
-        Tool(name="fmpy, controller alone", packages=("fmpy",), call="fmpy:fly_controller", alone="controller"),
+        Tool(name="fmpy, plant alone", packages=("fmpy",), call="fmpy:run_plant", alone="plant"),
+        Tool(name="fmpy, controller alone", packages=("fmpy",), call="fmpy:run_controller", alone="controller"),
     )
 }
 
@@ -111,8 +111,8 @@ TOOLS = {
 def chosen(names: Sequence[str] | None, components: Collection[str]) -> list[Tool]:
     """The tools of these names, each once; raises `UsageError` naming those that exist.
 
-    Without names, all but those that need a Python of their own which no environment variable names, or a
-    component that a system of these `components` does not have.
+    Without names, all but those that need a separate Python that is not given, or a component that a system of these
+    `components` does not have.
     """
     for name in names or ():
         if name not in TOOLS:

@@ -1,6 +1,6 @@
-"""Copies of FMUs, whoever made them, that write down what they are given.
+"""Traced copies of any FMUs, which record their inputs and steps.
 
-A copy has a library before the FMU's own, which passes every call on: `recorder.c`.
+A copy has a library in front of the FMU's own, which forwards every call: `recorder.c`.
 """
 
 import functools
@@ -19,12 +19,12 @@ from orchestration.interop.assignment import Ports
 
 SOURCE = Path(__file__).with_name("recorder.c")
 _KINDS: dict[Kind, int] = {"Real": 0, "Integer": 1, "Enumeration": 1, "Boolean": 2}
-"""As `recorder.c` numbers them"""
+"""as numbered in `recorder.c`"""
 _GUID = re.compile(rb"""(\sguid\s*=\s*)("[^"]*"|'[^']*')""")
 
 
 def traced_copy(fmu: Path, component: str, ports: Ports, folder: Path) -> Path:
-    """A copy of `fmu` in `folder` that writes its steps to `log_of(component, folder)`.
+    """A copy of `fmu` in `folder` that records its steps in `log_of(component, folder)`.
 
     Raises `UsageError` as `expect_traceable` does, `QuadcosimError` if the compiler fails.
     """
@@ -55,20 +55,20 @@ def traced_copy(fmu: Path, component: str, ports: Ports, folder: Path) -> Path:
 
 
 def log_of(component: str, folder: Path) -> Path:
-    """Where a traced copy writes: one JSON object for the end of initialisation, one for each step."""
+    """The log of a traced copy: one JSON object for the end of initialisation, one for each step."""
     return folder / f"{component}.jsonl"
 
 
 def expect_traceable(fmu: Path) -> None:
-    """Raise `UsageError` for an FMU of which no copy can be made that other masters would load here."""
+    """Raise `UsageError` for an FMU without a traced copy that other masters load here."""
     model = read_model(fmu)
     if model.version != 2:
-        raise UsageError(f"{fmu}: FMI {model.description.fmiVersion}; expected FMI 2.0 to see what others give it")
+        raise UsageError(f"{fmu}: FMI {model.description.fmiVersion}; expected FMI 2.0 to trace it in other masters")
     if compiler() is None:
-        raise UsageError(f"{fmu}: expected a C compiler called cc, on Linux (x86_64), to see what others give it")
+        raise UsageError(f"{fmu}: expected a C compiler called cc, on Linux (x86_64), to trace it in other masters")
     with zipfile.ZipFile(fmu) as archive:
         if _library(model) not in archive.namelist():
-            raise UsageError(f"{fmu}: has no {_library(model)}; expected one to fly it here")
+            raise UsageError(f"{fmu}: has no {_library(model)}; expected one to run it here")
 
 
 def _library(model: Model) -> str:

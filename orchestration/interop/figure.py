@@ -1,4 +1,4 @@
-"""The agreement chart: how far each tool is from this project's master, by kind of signal."""
+"""The agreement chart: the difference of each tool to this project's master, by kind of signal."""
 
 import itertools
 from collections.abc import Collection, Mapping, Sequence
@@ -9,11 +9,11 @@ from matplotlib.figure import Figure
 from orchestration.figures.palette import BLUE, GREEN, GREY, ORANGE, RED
 from orchestration.figures.style import SCREEN, save
 from orchestration.interop.compare import Agreement
-from orchestration.interop.table import AIM
+from orchestration.interop.table import TOLERANCE
 from orchestration.system.variable_names import component_of
 
 SMALLEST = 1e-17
-"""Where a difference of zero is drawn."""
+"""at which a difference of zero is drawn"""
 
 _KINDS = {
     "position": ("plant.position", "o", BLUE),
@@ -22,7 +22,7 @@ _KINDS = {
     "angular velocity": ("plant.angular_velocity", "D", RED),
     "command": ("controller.", "P", "#5b4a8a"),
 }
-"""Of the quadrotor, by name: the signals' prefix, marker, colour; of any other system, by component."""
+"""Of the quadrotor, by name: prefix of the signals, marker, colour; any other system has one by component"""
 
 
 def draw(agreements: Sequence[Agreement], folder: Path) -> list[Path]:
@@ -33,7 +33,7 @@ def draw(agreements: Sequence[Agreement], folder: Path) -> list[Path]:
 
 
 def agreement_chart(agreements: Sequence[Agreement]) -> Figure:
-    """A row for each tool; open: as it comes; filled: the tool's first inputs given to this master too."""
+    """A row for each tool; open: as it comes; filled: with the tool's first inputs in this master, too."""
     figure = Figure(figsize=(9.0, 1.6 + 0.42 * len(agreements)))
     panel = figure.add_subplot()
     kinds = _kinds({signal for agreement in agreements for signal in agreement.as_it_comes})
@@ -48,13 +48,13 @@ def agreement_chart(agreements: Sequence[Agreement]) -> Figure:
                         markerfacecolor=color if filled else "none", linestyle="none",
                         label=name if filled else None,
                     )  # fmt: skip
-    panel.axvline(AIM, color=GREY, linestyle="--", linewidth=1.0, label=f"aim, {AIM:g}")
+    panel.axvline(TOLERANCE, color=GREY, linestyle="--", linewidth=1.0, label=f"aim, {TOLERANCE:g}")
     panel.set(xscale="log", xlabel="largest difference from quadcosim's master [SI units]")
     panel.set_yticks(range(len(agreements)), [agreement.tool.name for agreement in agreements])
     panel.invert_yaxis()
     panel.set_title("open: as the tool comes; filled: with the tool's inputs of the first step in both", fontsize=9)
     lines = {line.get_label(): line for line in reversed(panel.get_legend_handles_labels()[0])}
-    names = [name for name in (*kinds, f"aim, {AIM:g}") if name in lines]
+    names = [name for name in (*kinds, f"aim, {TOLERANCE:g}") if name in lines]
     figure.legend([lines[name] for name in names], names, loc="outside right upper", fontsize=8)
     return figure
 

@@ -1,4 +1,4 @@
-"""One flight for a tool to fly, as its process is told of it: it imports nothing that takes time to load."""
+"""A run for a tool, as passed to its process: this module imports nothing that takes time to load."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ End: TypeAlias = tuple[str, str]
 """Component and variable"""
 
 Rows: TypeAlias = list[list[float]]
-"""The time at the end of each step and the values of the signals then; NaN: the tool flies without that component."""
+"""The time at the end of each step and the values of the signals then; NaN: the tool does not run that component"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Job:
-    """One flight for a tool to fly."""
+    """A run for a tool."""
 
     fmus: dict[str, Path]
     """by component, in the order of the loop"""
@@ -30,14 +30,14 @@ class Job:
     stop: float
     """[s]"""
     parameters: dict[str, dict[str, Parameter]]
-    """by component, as the SSP has them"""
+    """by component, as in the SSP"""
     connections: tuple[tuple[End, End], ...]
     signals: tuple[str, ...]
     """see `assignment.Loop`"""
     recorded: Path
-    """a flight of this project's master, as .npy: time and signals at the start of each step"""
+    """a run of this project's master, as .npy: time and signals at the start of each step"""
     folder: Path
-    """for what the tool writes"""
+    """for files of the tool"""
 
     @property
     def steps(self) -> int:
@@ -45,14 +45,16 @@ class Job:
         return round(self.stop / self.step)
 
     def to_json(self) -> str:
-        """For a process of its own, which need not know this package."""
+        """As JSON, for a process that need not have this package."""
         return json.dumps(asdict(self), default=str)
 
     @classmethod
     def from_json(cls, text: str) -> Job:
-        """What `to_json` gave."""
-        given = json.loads(text)
-        paths = {name: Path(given[name]) for name in ("ssp", "recorded", "folder")}
-        connections = tuple((tuple(start), tuple(end)) for start, end in given["connections"])
-        fmus = {name: Path(path) for name, path in given["fmus"].items()}
-        return cls(**{**given, **paths, "fmus": fmus, "connections": connections, "signals": tuple(given["signals"])})
+        """The job of a text from `to_json`."""
+        document = json.loads(text)
+        paths = {name: Path(document[name]) for name in ("ssp", "recorded", "folder")}
+        connections = tuple((tuple(start), tuple(end)) for start, end in document["connections"])
+        fmus = {name: Path(path) for name, path in document["fmus"].items()}
+        return cls(
+            **{**document, **paths, "fmus": fmus, "connections": connections, "signals": tuple(document["signals"])}
+        )

@@ -1,4 +1,4 @@
-"""Whether other masters read an SSP that was written for them: those that are installed begin to fly it."""
+"""Whether installed third-party masters read a written SSP: each runs its first steps."""
 
 import importlib.metadata
 import tempfile
@@ -13,32 +13,32 @@ from orchestration.requests.ssp.export import Export
 
 READERS = tuple(name for name in TOOLS if name.endswith(", SSP"))
 STEPS = 2
-"""That each flies: parameters are set, and values exchanged, by then."""
-PATIENCE = 60.0
-"""[s] with a master"""
+"""that each runs: by then parameters are set and values exchanged"""
+TIME_LIMIT = 60.0
+"""[s] for a master"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Reading:
-    """What came of one master."""
+    """The result of one master."""
 
     master: str
     """its name and version"""
     refusal: str | None
-    """why it does not fly the file; None if it does"""
+    """why it does not run the file; None if it does"""
 
 
-def readings(ssp: Path, given: Export) -> Iterator[Reading]:
-    """What came of each master that is installed and reads SSPs, one after the other, in processes of their own."""
+def readings(ssp: Path, export: Export) -> Iterator[Reading]:
+    """The result of each installed master that reads SSPs, one after the other, in separate processes."""
     with tempfile.TemporaryDirectory() as temporary:
         job = Job(
-            fmus={part.name: part.fmu for part in given.parts},
+            fmus={part.name: part.fmu for part in export.parts},
             ssp=ssp.absolute(),
-            step=given.step,
-            stop=STEPS * given.step,
-            parameters={part.name: part.parameters for part in given.parts},
+            step=export.step,
+            stop=STEPS * export.step,
+            parameters={part.name: part.parameters for part in export.parts},
             connections=(),
-            signals=tuple(f"{part.name}.{name}" for part in given.parts for name in part.outputs),
+            signals=tuple(f"{part.name}.{name}" for part in export.parts for name in part.outputs),
             recorded=Path(temporary),
             folder=Path(temporary),
         )
@@ -50,6 +50,6 @@ def readings(ssp: Path, given: Export) -> Iterator[Reading]:
             except importlib.metadata.PackageNotFoundError:
                 continue
             command = tool.command(job.folder / "job.json", job.folder / "rows.npy")
-            ending = Child(command, folder=job.folder, communicates=False).ending(PATIENCE)
+            ending = Child(command, folder=job.folder, communicates=False).ending(TIME_LIMIT)
             refusal = None if ending.code == 0 else ending.last_line or ending.description
             yield Reading(master=f"{name.removesuffix(', SSP')} {versions[tool.packages[0]]}", refusal=refusal)

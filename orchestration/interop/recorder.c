@@ -1,8 +1,8 @@
-/* The library of a copy of an FMU that writes down what it is given: a line of JSON for the end of initialisation and
-   for each step. Every call goes to the FMU's own library, which lies beside this one. The file NAME.record beside it
-   has, a line each: where to write, the FMU's own library, its GUID (a copy has another, as some hosts keep one library
-   for each), how many inputs and outputs are connected, and the type and reference of each. Inputs are remembered as
-   they are set: FMI 2.0 lets nobody read between a set and a step. */
+/* The library of a traced copy of an FMU: it records a line of JSON for the end of initialisation and for each step.
+   Every call is forwarded to the FMU's own library in the same folder. The file NAME.record there has, a line each: the
+   path of the log, the FMU's own library, its GUID (a copy has another, as some hosts keep one library for each), the
+   numbers of connected inputs and outputs, and the type and reference of each. Inputs are remembered as they are set:
+   FMI 2.0 allows no reading between a set and a step. */
 
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -92,7 +92,7 @@ __attribute__((constructor)) static void open_own(void)
 #undef CALL
 }
 
-EXPORT void finalizePythonInterpreter(void); /* what an FMU with Python inside asks of its library as a process ends */
+EXPORT void finalizePythonInterpreter(void); /* an FMU with Python inside calls it in its library as a process ends */
 void finalizePythonInterpreter(void)
 {
     void (*finalize)(void) = (void (*)(void))dlsym(own, "finalizePythonInterpreter");

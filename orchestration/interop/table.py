@@ -1,19 +1,19 @@
-"""The agreements as text, as JSON types, and whether they hold."""
+"""Agreements as text and as JSON types, and whether they hold."""
 
 from collections.abc import Sequence
 from typing import Any
 
 from orchestration.interop.compare import Agreement
 
-AIM = 1e-9
-"""Largest difference of a state that counts as agreement [SI]"""
+TOLERANCE = 1e-9
+"""largest difference of a state that counts as agreement [SI]"""
 
 _HEAD = ("tool", "order", "inputs of the first step", "steps", "ends at", "drift", "difference", "same first inputs")
 
 
 def agrees(agreement: Agreement) -> bool:
-    """Whether the tool's flight is this project's, once both have the same inputs in the first step."""
-    return agreement.largest(agreement.same_start)[0] <= AIM
+    """Whether the tool's run is this project's, if both have the same inputs in the first step."""
+    return agreement.largest(agreement.same_first_inputs)[0] <= TOLERANCE
 
 
 def text(agreements: Sequence[Agreement]) -> str:
@@ -27,7 +27,7 @@ def text(agreements: Sequence[Agreement]) -> str:
 
 
 def as_dict(agreement: Agreement) -> dict[str, Any]:
-    """All that was found of a tool, in JSON types."""
+    """All results of a tool, in JSON types."""
     trace = agreement.trace
     return {
         "tool": agreement.tool.name,
@@ -39,7 +39,7 @@ def as_dict(agreement: Agreement) -> dict[str, Any]:
         "drift": trace.drift,
         "agrees": agrees(agreement),
         "as_it_comes": agreement.as_it_comes,
-        "same_first_inputs": agreement.same_start,
+        "same_first_inputs": agreement.same_first_inputs,
     }
 
 

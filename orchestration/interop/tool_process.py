@@ -1,6 +1,6 @@
-"""`python -m orchestration.interop.tool_process TOOL JOB ROWS`: one flight of a tool.
+"""`python -m orchestration.interop.tool_process TOOL JOB ROWS`: one run of a tool.
 
-Tools bring native libraries that need not get along, and log what they like.
+Tools load native libraries that may conflict, and log freely; so each runs in a separate process.
 """
 
 import os
@@ -14,9 +14,9 @@ from orchestration.interop.job import Job
 
 
 def main(tool: str, job: str, rows: str) -> None:
-    """Fly the job in a JSON file, write the rows to an .npy file."""
+    """Run the job in a JSON file, write the rows to an .npy file."""
     np.save(rows, np.array(TOOLS[tool].function()(Job.from_json(Path(job).read_text(encoding="utf-8")))))
-    os._exit(0)  # what pythonfmu's library does wrong as a process ends is not this flight's
+    os._exit(0)  # at once: pythonfmu's library may crash as a process ends
 
 
 if __name__ == "__main__":

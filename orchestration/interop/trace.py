@@ -1,4 +1,4 @@
-"""What a tool does with the FMUs, step by step: from what copies of them have written down."""
+"""How a tool steps the FMUs, from the logs of traced copies."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -16,17 +16,17 @@ from orchestration.interop.copies import log_of
 
 @dataclass(frozen=True, kw_only=True)
 class Trace:
-    """How a tool flew, as the FMUs saw it."""
+    """How a tool stepped the FMUs."""
 
     order: str
     """gauss-seidel: the components step one after the other, each with the newest outputs of those before it; jacobi:
-    all step with the outputs of the step before; alone: only a part of the loop was flown; other: none of these"""
+    all step with the outputs of the step before; alone: only a part of the loop was run; other: none of these"""
     initial_inputs: dict[str, tuple[float, ...]]
     """The values at the connected inputs of each component when its initialisation ended."""
     first_inputs: dict[str, tuple[float, ...]]
     """The values at the connected inputs of each component when its first step began."""
     first_exchange: dict[str, str]
-    """Where these came from, for each component: exchanged (outputs of the others), start values or zeros."""
+    """The origin of these, for each component: exchanged (outputs of the others), start values or zeros."""
     steps: int
     """How many steps the last component of the loop took."""
     drift: float
@@ -36,7 +36,7 @@ class Trace:
 
 
 def read_trace(folder: Path, components: Mapping[str, Path], loop: Loop, step: float) -> Trace:
-    """What the logs of `components`, FMUs by name, say; raises `QuadcosimError` if a component took no step."""
+    """The trace in the logs of `components`, FMUs by name; raises `QuadcosimError` if a component took no step."""
     starts, steps = {}, {}
     for component in components:
         log = log_of(component, folder)
@@ -62,15 +62,15 @@ def read_trace(folder: Path, components: Mapping[str, Path], loop: Loop, step: f
 
 
 def _order(steps: Mapping[str, list[dict[str, Any]]], loop: Loop) -> str:
-    """From which step's outputs each step had its inputs, the first apart."""
+    """The order of exchange: the step whose outputs were the inputs of each step after the first."""
     if set(steps) != set(loop.ports) or len(steps) < 2:
         return "alone"
     places = {name: i for i, name in enumerate(loop.ports)}
     old, new = True, True
     for component in steps:
-        for sender, given, before, now in _exchanged(component, steps, loop):
-            old &= given == before
-            new &= given == (now if places[sender] < places[component] else before)
+        for sender, values, before, now in _exchanged(component, steps, loop):
+            old &= values == before
+            new &= values == (now if places[sender] < places[component] else before)
     return "gauss-seidel" if new else "jacobi" if old else "other"
 
 
@@ -82,8 +82,8 @@ def _exchanged(
     """
     for i, (sender, output) in enumerate(loop.feeding(component).values()):
         outputs = [line["outputs"][loop.ports[sender].outputs.index(output)] for line in steps[sender]]
-        given = [line["inputs"][i] for line in steps[component][1:]]
-        yield sender, given, outputs[: len(given)], outputs[1 : len(given) + 1]
+        values = [line["inputs"][i] for line in steps[component][1:]]
+        yield sender, values, outputs[: len(values)], outputs[1 : len(values) + 1]
 
 
 def _first_exchange(
@@ -93,7 +93,7 @@ def _first_exchange(
     starts: Mapping[str, dict[str, Any]],
     steps: Mapping[str, list[dict[str, Any]]],
 ) -> str:
-    """What the connected inputs of `component` were at its first step."""
+    """The origin of the connected inputs of `component` at its first step."""
     variables = read_model(fmu).variables
     inputs = steps[component][0]["inputs"]
     if inputs == [number_of(variables[name], variables[name].start or 0.0) for name in loop.ports[component].inputs]:

@@ -1,4 +1,4 @@
-"""CoFmuPy, which was called CoFMPy: run as a program by a Python that has it and nothing of this project.
+"""CoFmuPy, formerly CoFMPy: run as a program by a Python that has it and not this project.
 
 `python -I cofmupy.py FUNCTION JOB ROWS`
 """
@@ -14,17 +14,17 @@ from cofmupy import Coordinator
 Rows = list[list[float]]
 
 
-def fly_jacobi(job: dict[str, Any]) -> Rows:
+def run_jacobi(job: dict[str, Any]) -> Rows:
     """All FMUs step, then all values are exchanged."""
-    return _fly(job, "jacobi")
+    return _run(job, "jacobi")
 
 
-def fly_gauss_seidel(job: dict[str, Any]) -> Rows:
+def run_gauss_seidel(job: dict[str, Any]) -> Rows:
     """One FMU after the other, in the order of the job."""
-    return _fly(job, "gauss_seidel")
+    return _run(job, "gauss_seidel")
 
 
-def _fly(job: dict[str, Any], method: str) -> Rows:
+def _run(job: dict[str, Any], method: str) -> Rows:
     coordinator = Coordinator()
     coordinator.start(
         {
@@ -39,12 +39,12 @@ def _fly(job: dict[str, Any], method: str) -> Rows:
             "iterative": False,
         }
     )
-    # Of itself it takes the FMUs of a loop in the order of a set of names, which each process has anew.
+    # By default it takes the FMUs of a loop in the order of a set of names, which differs from process to process.
     coordinator.master.sequence_order = [list(job["fmus"])]
     coordinator.run_simulation(step_size=job["step"], end_time=job["stop"])
     found = coordinator.get_results()
     columns = [found[tuple(signal.split(".", 1))] for signal in job["signals"]]
-    # It puts the time at which a step began beside the values at its end.
+    # It records the time at which a step began with the values at its end.
     return [[time + job["step"], *values] for time, *values in zip(found["time"], *columns)]
 
 
@@ -53,5 +53,5 @@ def _end(component: str, variable: str) -> dict[str, str]:
 
 
 if __name__ == "__main__":
-    function, given, rows = sys.argv[1:]
-    np.save(rows, np.array(globals()[function](json.loads(Path(given).read_text(encoding="utf-8")))))
+    function, job, rows = sys.argv[1:]
+    np.save(rows, np.array(globals()[function](json.loads(Path(job).read_text(encoding="utf-8")))))

@@ -9,18 +9,18 @@ from fmu_manipulation_toolbox.assembly import Assembly
 from orchestration.interop.job import Job, Rows
 
 
-def fly_jacobi(job: Job) -> Rows:
+def run_jacobi(job: Job) -> Rows:
     """The container's own order: all FMUs step, then all values are exchanged."""
-    return _fly(job, sequential=False)
+    return _run(job, sequential=False)
 
 
-def fly_sequential(job: Job) -> Rows:
+def run_sequential(job: Job) -> Rows:
     """One FMU after the other, in the order of the job."""
-    return _fly(job, sequential=True)
+    return _run(job, sequential=True)
 
 
-def _fly(job: Job, *, sequential: bool) -> Rows:
-    # File names of its own: it takes none with a space, and calls what it connects after the file.
+def _run(job: Job, *, sequential: bool) -> Rows:
+    # New file names: it accepts no spaces, and names components after files.
     files = {name: f"{name}_fmu.fmu" for name in job.fmus}
     description = {
         "name": "loop.fmu",

@@ -10,7 +10,7 @@ from orchestration.requests.ssp.names import PARAMETER_SET
 
 
 def _load_tbb() -> None:
-    """The library of ecospy links to oneTBB, which lies where only pip knows; loaded before, it is found."""
+    """Load oneTBB, to which the library of ecospy links, from its pip package; else it is not found."""
     if sys.platform != "linux":
         return
     found = [file.locate() for file in files("tbb") or [] if file.name == "libtbb.so.12"]
@@ -26,8 +26,8 @@ from ecospy.EcosSimulation import SimulationListener  # noqa: E402
 from ecospy.lib import EcosLib  # noqa: E402
 
 
-def fly(job: Job) -> Rows:
-    """Wired by hand, with a parameter set."""
+def run(job: Job) -> Rows:
+    """With connections made one by one, and a parameter set."""
     structure = EcosSimulationStructure()
     for name, path in job.fmus.items():
         structure.add_model(name, path)
@@ -39,7 +39,7 @@ def fly(job: Job) -> Rows:
     return _record(EcosSimulation(job.step, structure=structure), job)
 
 
-def fly_ssp(job: Job) -> Rows:
+def run_ssp(job: Job) -> Rows:
     """From the SSP, its parameter set by name."""
     return _record(EcosSimulation(job.step, ssp_path=str(job.ssp)), job)
 

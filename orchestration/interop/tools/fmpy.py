@@ -1,4 +1,4 @@
-"""fmpy: its SSP simulation, and `simulate_fmu` on each FMU alone, fed with what the others sent."""
+"""fmpy: its SSP simulation, and `simulate_fmu` on each FMU alone, with recorded outputs of the others as inputs."""
 
 import math
 
@@ -11,31 +11,31 @@ from orchestration.interop.job import Job, Rows
 from orchestration.requests.ssp.names import SYSTEM_PARAMETERS
 
 
-def fly_ssp(job: Job) -> Rows:
-    """From the SSP, with the set in which parameters carry the name of their component."""
+def run_ssp(job: Job) -> Rows:
+    """From the SSP, with the set in which parameters have the names of their components."""
     table = simulate_ssp(
         str(job.ssp), stop_time=job.stop, step_size=job.step, parameter_set=read_ssv(str(job.ssp), SYSTEM_PARAMETERS)
     )
-    # fmpy puts the time at which a step began beside the values at its end.
+    # fmpy records the time at which a step began with the values at its end.
     return [[row["time"] + job.step, *(row[signal] for signal in job.signals)] for row in table]
 
 
-def fly_plant(job: Job) -> Rows:
-    """The plant alone, fed with recorded commands."""
-    return _fly_alone(job, "plant")
+def run_plant(job: Job) -> Rows:
+    """The plant alone, with recorded commands."""
+    return _run_alone(job, "plant")
 
 
-def fly_controller(job: Job) -> Rows:
-    """The controller alone, fed with recorded measurements."""
-    return _fly_alone(job, "controller")
+def run_controller(job: Job) -> Rows:
+    """The controller alone, with recorded measurements."""
+    return _run_alone(job, "controller")
 
 
-def _fly_alone(job: Job, component: str) -> Rows:
+def _run_alone(job: Job, component: str) -> Rows:
     recorded = np.load(job.recorded)
     places = {signal: i for i, signal in enumerate(job.signals, start=1)}
     inputs = {name: places[".".join(start)] for start, (owner, name) in job.connections if owner == component}
     signals = np.zeros(len(recorded), dtype=[("time", np.float64), *((name, np.float64) for name in inputs)])
-    # fmpy's own points: an input is interpolated where its rows lie a last bit beside them.
+    # fmpy's own points: an input is interpolated where its rows differ from them in the last bit.
     signals["time"] = job.step * np.arange(len(recorded))
     for name, column in inputs.items():
         signals[name] = recorded[:, column]

@@ -9,11 +9,11 @@ from orchestration.interop.job import Job, Rows
 from orchestration.system.times import NANOSECONDS
 
 SPARE = 2
-"""Steps beyond the expected ones that the observer has room for."""
+"""steps beyond the expected ones for which the observer has room"""
 
 
-def fly(job: Job) -> Rows:
-    """Wired by hand, with initial values."""
+def run(job: Job) -> Rows:
+    """With connections made one by one, and initial values."""
     execution = CosimExecution.from_step_size(round(job.step * NANOSECONDS))
     for name, path in job.fmus.items():
         execution.add_local_slave(CosimLocalSlave(str(path), name))
@@ -26,13 +26,13 @@ def fly(job: Job) -> Rows:
                 CosimVariableType.BOOLEAN: execution.boolean_initial_value,
             }[variables.kind(name, parameter)]
             if not set_initial(*variables.at(name, parameter), value):
-                raise RuntimeError(f"{name}.{parameter} = {value}: libcosim did not take it")
+                raise RuntimeError(f"{name}.{parameter} = {value}: libcosim did not accept it")
     for output, target in job.connections:
         execution.connect_real_variables(*variables.at(*output), *variables.at(*target))
     return _record(execution, variables, job)
 
 
-def fly_ssp(job: Job) -> Rows:
+def run_ssp(job: Job) -> Rows:
     """From the SSP alone: its step, its parameters."""
     execution = CosimExecution.from_ssp_file(str(job.ssp))
     return _record(execution, _Variables(execution), job)

@@ -12,7 +12,7 @@ from orchestration.command.variant_flags import VariantFlags
 from orchestration.fmi.model import read_model
 from orchestration.interop.catalogue import chosen
 from orchestration.interop.compare import agreements
-from orchestration.interop.table import AIM
+from orchestration.interop.table import TOLERANCE
 from orchestration.quadrotor.vehicle import load_vehicle
 from quadcosim import Result, Scenario, UsageError, run
 from tests.commands import Main
@@ -111,7 +111,7 @@ def test_a_redesign_that_is_fixed_flies_in_masters_that_set_no_enumeration(
     scenario = Scenario(vehicle=vehicle, stop_time=0.3).with_fmus(plant="native/QuadrotorPlant", controller=fixed)
     scenario = scenario.with_changes(timing={"period": 0.05, "plant_interval": 0.01})
     for agreement in agreements(scenario, chosen(MASTERS[request.node.callspec.params["fixed"]], LOOP.ports)):
-        assert farthest(agreement, agreement.same_start) <= AIM, agreement.tool.name
+        assert farthest(agreement, agreement.same_first_inputs) <= TOLERANCE, agreement.tool.name
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,7 @@ LOOP = Loop(
 
 
 def components_of(tool: Tool) -> tuple[str, ...]:
-    """What a tool flies of it."""
+    """The components that a tool runs."""
     return tuple(PORTS) if tool.alone is None else (tool.alone,)
 
 
@@ -55,13 +55,13 @@ def with_other_parameters(scenario: Scenario) -> Scenario:
 
 
 def states_of_master(scenario: Scenario) -> Floats:
-    """The states of the plant as this project's master flies them, shape (n, 13)."""
+    """The states of the plant in a run of this project's master, shape (n, 13)."""
     signals = run(scenario.with_changes(timing={"clock": "fmu"})).signals
     return np.column_stack([signals[name] for name in LOOP.states])
 
 
 def farthest(agreement: Agreement, differences: dict[str, float]) -> float:
-    """The largest difference of a state, of a command if no plant was flown."""
+    """The largest difference of a state, of a command if no plant was run."""
     kind = "plant." if "plant" in components_of(agreement.tool) else "controller."
     values = [value for name, value in differences.items() if name.startswith(kind)]
     assert len(values) == (13 if kind == "plant." else 4)
@@ -70,11 +70,11 @@ def farthest(agreement: Agreement, differences: dict[str, float]) -> float:
 
 def agreement(
     tool: str = "libcosim",
-    same_start: float = 1e-12,
+    same_first_inputs: float = 1e-12,
     as_it_comes: float = 1e-3,
     first: Sequence[str] = ("exchanged",) * 2,
 ) -> Agreement:
-    """One that was never flown: every signal of the tool is so far from this project's."""
+    """An agreement without runs: every signal of the tool has this difference from this project's."""
     chosen = TOOLS[tool]
     names = [name for name in LOOP.signals if name.partition(".")[0] in components_of(chosen)]
     inputs: dict[str, tuple[float, ...]] = dict.fromkeys(components_of(chosen), (0.0,))
@@ -91,6 +91,6 @@ def agreement(
             end=30.0,
         ),
         as_it_comes=dict.fromkeys(names, as_it_comes),
-        same_start=dict.fromkeys(names, same_start),
+        same_first_inputs=dict.fromkeys(names, same_first_inputs),
         states=frozenset(LOOP.states),
     )

@@ -8,7 +8,7 @@ import pytest
 from orchestration.basics.simulator import Floats
 from orchestration.building import fmus
 from orchestration.fmi.fmi2 import Fmi2Instance
-from orchestration.interop.table import AIM
+from orchestration.interop.table import TOLERANCE
 from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT
 from orchestration.system.times import NANOSECONDS
 from quadcosim import run
@@ -54,4 +54,4 @@ def test_stepped_by_exactly_h_the_plant_alone_repeats_the_flight_to_the_last_bit
 
 
 def test_stepped_by_differences_of_times_it_drifts_away_by_less_than_the_aim(flight: tuple[Floats, Floats]) -> None:
-    assert 1e-12 < replayed(flight, lambda k: (k * H, (k + 1) * H - k * H)) < AIM
+    assert 1e-12 < replayed(flight, lambda k: (k * H, (k + 1) * H - k * H)) < TOLERANCE

@@ -11,8 +11,8 @@ import pytest
 
 from orchestration.interop import tools
 from orchestration.interop.catalogue import TOOLS
-from orchestration.interop.flights import parameters_for
 from orchestration.interop.job import Job
+from orchestration.interop.tool_runs import parameters_for
 from orchestration.requests.ssp.export import Part, export_of
 from quadcosim import Scenario, UsageError
 from tests.orchestration.interop.common import LOOP
@@ -37,7 +37,7 @@ class Coordinator:
 RUN = "import runpy, sys; sys.path.insert(0, sys.argv.pop(1)); runpy.run_path(sys.argv.pop(1), run_name='__main__')"
 
 
-def flown(name: str, folder: Path) -> tuple[dict[str, Any], list[list[str]], Any]:
+def run_by(name: str, folder: Path) -> tuple[dict[str, Any], list[list[str]], Any]:
     """The configuration, the order of the FMUs, and the rows."""
     (folder / "cofmupy.py").write_text(COORDINATOR)
     job = Job(
@@ -63,7 +63,7 @@ def flown(name: str, folder: Path) -> tuple[dict[str, Any], list[list[str]], Any
 
 @pytest.mark.parametrize(("name", "method"), [("cofmupy", "jacobi"), ("cofmupy gauss_seidel", "gauss_seidel")])
 def test_it_is_given_the_whole_loop_and_steps_the_controller_first(name: str, method: str, tmp_path: Path) -> None:
-    configuration, order, _ = flown(name, tmp_path)
+    configuration, order, _ = run_by(name, tmp_path)
     assert configuration["cosim_method"] == method
     assert order == [["controller", "plant"]]
     assert {fmu["id"]: (fmu["path"], fmu["initialization"]) for fmu in configuration["fmus"]} == {
@@ -79,7 +79,7 @@ def test_it_is_given_the_whole_loop_and_steps_the_controller_first(name: str, me
 
 
 def test_its_rows_have_the_time_at_the_end_of_each_step(tmp_path: Path) -> None:
-    _, _, rows = flown("cofmupy", tmp_path)
+    _, _, rows = run_by("cofmupy", tmp_path)
     assert rows.shape == (10, 1 + len(LOOP.signals))
     assert rows[:, 0] == pytest.approx(0.01 * np.arange(1, 11))
     assert (rows[:, 1:] == 7.0).all()

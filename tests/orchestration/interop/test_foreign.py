@@ -7,7 +7,7 @@ import pytest
 from orchestration.interop import copies
 from orchestration.interop.catalogue import chosen
 from orchestration.interop.compare import agreements
-from orchestration.interop.table import AIM
+from orchestration.interop.table import TOLERANCE
 from orchestration.system.model import System
 from orchestration.system.system_file import load_system
 from quadcosim import UsageError
@@ -73,7 +73,7 @@ def test_fmus_of_anybody_fly_as_in_other_masters(text: str, orders: dict[str, st
     found = agreements(system, chosen(list(orders), system.components))
     assert {agreement.tool.name: agreement.trace.order for agreement in found} == orders
     for agreement in found:
-        assert max(agreement.same_start.values()) <= AIM, agreement.tool.name
+        assert max(agreement.same_first_inputs.values()) <= TOLERANCE, agreement.tool.name
         assert agreement.trace.steps >= 39
 
 
@@ -83,7 +83,7 @@ def test_two_copies_of_one_fmu_are_told_apart_by_a_host_that_goes_by_the_guid(tm
     system = written(tmp_path, PAIR.replace('from = ["a.high"]\nto = ["b.on"]\n[[connections]]\n', ""))
     (found,) = agreements(system, chosen(["libcosim, SSP"], system.components))
     assert found.trace.order == "jacobi"
-    assert max(found.as_it_comes.values()) <= AIM
+    assert max(found.as_it_comes.values()) <= TOLERANCE
 
 
 @needs_compiler
@@ -93,8 +93,8 @@ def test_what_stands_in_the_way_is_named(tmp_path: Path, monkeypatch: pytest.Mon
             copies.expect_traceable(fmu)
         return str(refusal.value).removeprefix(f"{fmu}: ")
 
-    assert refused(small(tmp_path / "3", fmi=3)) == "FMI 3.0; expected FMI 2.0 to see what others give it"
+    assert refused(small(tmp_path / "3", fmi=3)) == "FMI 3.0; expected FMI 2.0 to trace it in other masters"
     empty = described(tmp_path, "Empty", outputs={"y": "Real"})
-    assert refused(empty) == "has no binaries/linux64/Empty.so; expected one to fly it here"
+    assert refused(empty) == "has no binaries/linux64/Empty.so; expected one to run it here"
     monkeypatch.setattr(copies, "compiler", lambda: None)
-    assert refused(empty).startswith("expected a C compiler called cc, on Linux (x86_64), to see what others give it")
+    assert refused(empty).startswith("expected a C compiler called cc, on Linux (x86_64), to trace it in other masters")

@@ -10,7 +10,7 @@ import pytest
 from orchestration.interop import table
 from orchestration.interop.catalogue import TOOLS, chosen
 from orchestration.interop.compare import Agreement, agreements
-from orchestration.interop.table import AIM, agrees
+from orchestration.interop.table import TOLERANCE, agrees
 from quadcosim import QuadcosimError, Scenario, UsageError
 from tests.native import NATIVE
 from tests.orchestration.interop.common import LOOP, components_of, farthest
@@ -48,7 +48,7 @@ FACTS = {
 
 
 @pytest.fixture(scope="session", params=[(0.01, 18.0), (0.001, 5.0)], ids=["10 ms", "1 ms"])
-def flown(request: pytest.FixtureRequest) -> tuple[Scenario, dict[str, Agreement]]:
+def compared(request: pytest.FixtureRequest) -> tuple[Scenario, dict[str, Agreement]]:
     """The beginning of the paper's flight at two communication steps, and how each tool agrees.
 
     Just as long that the rounding of added-up steps falls as it does over the page's 30 s. By native FMUs; those with
@@ -56,34 +56,34 @@ def flown(request: pytest.FixtureRequest) -> tuple[Scenario, dict[str, Agreement
     """
     step, stop = request.param
     scenario = NATIVE.with_changes(timing={"plant_interval": step}, stop_time=stop)
-    heard: list[float] = []
+    shares: list[float] = []
     tools = chosen(None, LOOP.ports)
-    found = agreements(scenario, tools, progress=heard.append)
-    assert heard == [(i + 1) / (2 * len(tools)) for i in range(2 * len(tools))]  # each flies twice
+    found = agreements(scenario, tools, progress=shares.append)
+    assert shares == [(i + 1) / (2 * len(tools)) for i in range(2 * len(tools))]  # each flies twice
     return scenario, {agreement.tool.name: agreement for agreement in found}
 
 
-Flown = tuple[Scenario, dict[str, Agreement]]
+Compared = tuple[Scenario, dict[str, Agreement]]
 
 
 @pytest.fixture(params=FACTS)
-def one(request: pytest.FixtureRequest, flown: Flown) -> tuple[Scenario, Agreement, Fact]:
+def one(request: pytest.FixtureRequest, compared: Compared) -> tuple[Scenario, Agreement, Fact]:
     """Each tool of the table."""
-    if request.param not in flown[1]:
+    if request.param not in compared[1]:
         pytest.skip(f"{request.param} needs an environment of its own: make interop makes it")
-    return flown[0], flown[1][request.param], FACTS[request.param]
+    return compared[0], compared[1][request.param], FACTS[request.param]
 
 
 One = tuple[Scenario, Agreement, Fact]
 
 
-def test_the_table_has_every_tool_in_order(flown: Flown) -> None:
+def test_the_table_has_every_tool_in_order(compared: Compared) -> None:
     assert list(TOOLS) == list(FACTS)
-    assert list(flown[1]) == [tool.name for tool in chosen(None, LOOP.ports)]
+    assert list(compared[1]) == [tool.name for tool in chosen(None, LOOP.ports)]
 
 
-def test_the_page_has_the_table_that_was_found(flown: Flown) -> None:
-    scenario, found = flown
+def test_the_page_has_the_table_that_was_found(compared: Compared) -> None:
+    scenario, found = compared
     page = (Path(__file__).parents[3] / "docs" / "interop.md").read_text(encoding="utf-8")
     block = page.partition(f"<!-- step {scenario.timing.plant_interval} -->")[2].partition("<!-- end -->")[0]
     columns = slice(1, 4)  # tool, order, first inputs: no rounding moves them, nor does the length of the flight
@@ -126,7 +126,7 @@ def test_who_adds_up_its_time_drifts_and_nobody_else(one: One) -> None:
 
 def test_with_the_same_start_every_tool_flies_what_this_project_s_master_flies(one: One) -> None:
     _, agreement, _ = one
-    assert farthest(agreement, agreement.same_start) <= AIM
+    assert farthest(agreement, agreement.same_first_inputs) <= TOLERANCE
     assert agrees(agreement)
 
 
@@ -134,7 +134,7 @@ def test_as_it_comes_a_tool_is_as_near_if_it_exchanges_the_initial_outputs_and_f
     _, agreement, fact = one
     difference = farthest(agreement, agreement.as_it_comes)
     if (fact.controller, fact.plant) == ("exchanged", "exchanged"):
-        assert difference <= AIM
+        assert difference <= TOLERANCE
     else:
         assert difference > 0.1
 
@@ -149,7 +149,7 @@ def test_the_versions_of_what_flew_are_told(one: One) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "expected"),
     [
         ({"timing": {"period": 0.015}}, "timing.period = 0.015: expected a multiple of the common step of 0.01 s"),
         ({"timing": {"offset": 0.005}}, "timing.offset = 0.005: expected a multiple of the common step of 0.01 s"),
@@ -162,11 +162,11 @@ def test_the_versions_of_what_flew_are_told(one: One) -> None:
     ],
 )
 def test_times_that_other_masters_do_not_step_on_are_refused(
-    changes: dict[str, Any], said: str, short: Scenario
+    changes: dict[str, Any], expected: str, short: Scenario
 ) -> None:
     with pytest.raises(UsageError) as refused:
         agreements(short.with_changes(**changes), chosen(["libcosim"], LOOP.ports))
-    assert one_line(refused.value).startswith(said)
+    assert one_line(refused.value).startswith(expected)
 
 
 def test_a_flight_that_diverges_is_not_compared(short: Scenario) -> None:

@@ -1,4 +1,4 @@
-"""`quadcosim interop` as it is called: what it prints, what fails, and how that is said."""
+"""`quadcosim interop` as it is called: what it prints, what fails, and with which message."""
 
 import functools
 import importlib.metadata
@@ -62,7 +62,7 @@ def libcosim_that(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[
     return does
 
 
-def said(done: subprocess.CompletedProcess[str]) -> list[str]:
+def messages_of(done: subprocess.CompletedProcess[str]) -> list[str]:
     """Its lines on standard error but for those that a slow machine has, about how far it is."""
     return [line for line in done.stderr.splitlines() if not line.startswith("flying in other masters: ")]
 
@@ -70,14 +70,14 @@ def said(done: subprocess.CompletedProcess[str]) -> list[str]:
 # -- what it prints ---------------------------------------------------------------------------------------
 
 
-def test_a_tool_by_name_is_flown_alone_and_its_row_printed(tmp_path: Path) -> None:
+def test_a_tool_by_name_is_run_alone_and_its_row_printed(tmp_path: Path) -> None:
     for model in MODELS:
         fmus.locate(model)  # a build would be announced
     done = quadcosim("interop", *SHORT, "--tool", "fmucontainer -sequential", cwd=tmp_path)
     rows = done.stdout.splitlines()
     assert len(rows) == 3
     assert rows[2].startswith("| fmucontainer -sequential | gauss-seidel | exchanged")
-    assert said(done) == []
+    assert messages_of(done) == []
     assert list(tmp_path.iterdir()) == []
 
 
@@ -89,7 +89,7 @@ def test_json_has_each_tool_once_and_the_chart_goes_to_out(tmp_path: Path, tempo
     assert [row["tool"] for row in found] == ["ecos, SSP", "fmpy, controller alone"]
     assert [row["agrees"] for row in found] == [True, True]
     assert found[0]["as_it_comes"].keys() >= {"plant.position.x", "controller.thrust"}
-    assert said(done) == [str(tmp_path / "drawn" / f"interop.{ending}") for ending in ("png", "svg")]
+    assert messages_of(done) == [str(tmp_path / "drawn" / f"interop.{ending}") for ending in ("png", "svg")]
     assert (tmp_path / "drawn" / "interop.png").read_bytes().startswith(b"\x89PNG")
     assert list(temporary.iterdir()) == [], "tools that unpack have left nothing"
 
@@ -107,7 +107,7 @@ def test_a_tool_that_flies_with_another_gain_is_noticed(interop: Main, monkeypat
     chosen = ("--tool", "libcosim", "--tool", "libcosim, SSP", "--tool", "fmpy, SSP")
     done = interop(*chosen, "--json", code=1)
     assert [row["agrees"] for row in json.loads(done.stdout)] == [True, False, False]
-    assert said(done) == ["farther than 1e-09 from this project's master: libcosim, SSP; fmpy, SSP"]
+    assert messages_of(done) == ["farther than 1e-09 from this project's master: libcosim, SSP; fmpy, SSP"]
 
 
 # -- what fails -------------------------------------------------------------------------------------------
@@ -119,7 +119,7 @@ def test_a_tool_that_there_is_none_of_is_wrong_usage_and_the_names_are_listed(ma
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "expected"),
     [
         (("--delay", "0.01"), "timing.delay = 0.01: an SSP cannot express that"),
         (("--jitter", "0.001"), "timing.jitter = 0.001: an SSP cannot express that"),
@@ -129,8 +129,10 @@ def test_a_tool_that_there_is_none_of_is_wrong_usage_and_the_names_are_listed(ma
         (("nowhere.toml",), "nowhere.toml: expected a readable system or scenario file"),
     ],
 )
-def test_a_scenario_that_others_cannot_fly_is_wrong_usage(main: Main, arguments: tuple[str, ...], said: str) -> None:
-    assert error_line(main("interop", *arguments, code=2)).startswith(said)
+def test_a_scenario_that_others_cannot_run_is_wrong_usage(
+    main: Main, arguments: tuple[str, ...], expected: str
+) -> None:
+    assert error_line(main("interop", *arguments, code=2)).startswith(expected)
 
 
 def test_a_parameter_that_an_fmu_refuses_is_wrong_usage(interop: Main) -> None:
@@ -163,7 +165,7 @@ def test_a_tool_with_an_environment_of_its_own_is_asked_for_by_its_variable(
         monkeypatch.setenv(COFMUPY, python)
     line = error_line(interop("--tool", "cofmupy", code=2))
     assert line == (
-        f"--tool cofmupy: expected in {COFMUPY} the path of a Python of its own environment, "
+        f"--tool cofmupy: expected in {COFMUPY} the path of a Python in a separate environment, "
         "with cofmupy installed there by pip"
     )
 
@@ -226,7 +228,7 @@ def wrong(self, slave, reference, *args, **options):
 CosimObserver.time_series_real_samples = wrong
 """)
     done = interop("--tool", "libcosim", code=1)
-    assert said(done) == ["farther than 1e-09 from this project's master: libcosim"]
+    assert messages_of(done) == ["farther than 1e-09 from this project's master: libcosim"]
 
 
 IS_LIBCOSIM = """

@@ -1,4 +1,4 @@
-"""An SSP is flown by the masters that are installed, as it is written, and what one refuses is said."""
+"""An SSP is run by the installed masters as it is written, and refusals are reported."""
 
 import json
 from importlib.metadata import PackageNotFoundError, version
@@ -30,7 +30,7 @@ def test_what_a_master_does_not_take_is_said_by_it(tmp_path: Path, main: Main) -
     assert [refusal is None for refusal in found.values()] == [False, False, True]
     assert "Incompatible connector types" in found[NAMES[1]]
     for name, refusal in found.items():
-        assert (f"warning: {name} does not fly it: {refusal}" in done.stderr.splitlines()) is (refusal is not None)
+        assert (f"warning: {name} does not run it: {refusal}" in done.stderr.splitlines()) is (refusal is not None)
 
 
 def test_nothing_is_flown_where_nobody_asks_and_what_is_not_installed_is_left_out(

@@ -8,8 +8,8 @@ import pytest
 
 from orchestration.interop.catalogue import TOOLS, chosen
 from orchestration.interop.compare import agreements
-from orchestration.interop.flights import Flights
-from orchestration.interop.table import AIM
+from orchestration.interop.table import TOLERANCE
+from orchestration.interop.tool_runs import ToolRuns
 from orchestration.runs.simulation import run
 from orchestration.system.model import System
 from orchestration.system.paths import changed
@@ -74,38 +74,38 @@ def carried(name: str) -> System:
 @pytest.mark.parametrize("name", [name for name in CARRIED if name != COMMANDED])
 def test_an_example_equals_other_masters_in_the_order_that_each_has(name: str) -> None:
     system = carried(name)
-    heard: list[str] = []
+    announced: list[str] = []
     asked = ORDERS if name == ALL else {tool: ORDERS[tool] for tool in ("libcosim", "fmucontainer -sequential")}
-    found = agreements(system, chosen(list(asked), system.components), announce=heard.append)
+    found = agreements(system, chosen(list(asked), system.components), announce=announced.append)
     expected = {tool: order for tool, order in asked.items() if TOOLS[tool].converts or name != "water_tank"}
     assert {agreement.tool.name: agreement.trace.order for agreement in found} == expected
-    assert any(line.startswith("left out libcosim") for line in heard) == (name == "water_tank")
+    assert any(line.startswith("left out libcosim") for line in announced) == (name == "water_tank")
     for agreement in found:
-        assert max(agreement.same_start.values()) <= AIM, agreement.tool.name
+        assert max(agreement.same_first_inputs.values()) <= TOLERANCE, agreement.tool.name
         if agreement.tool.name.startswith("libcosim"):  # which exchanges what this master does from the start
-            assert max(agreement.as_it_comes.values()) <= AIM
+            assert max(agreement.as_it_comes.values()) <= TOLERANCE
 
 
 def test_the_rows_that_are_compared_are_those_of_a_run_of_the_system_in_that_order(tmp_path: Path) -> None:
     system = carried("double_integrator")
-    flights = Flights(system, tmp_path, None)
+    runs = ToolRuns(system, tmp_path, None)
     for order in ("jacobi", "gauss-seidel"):
         orders = {f"connections.{x.name}.order": order for x in system.connections}
         signals = run(changed(system, orders)).signals
-        compared = flights.rows_of_master(order, {})
-        for i, name in enumerate(flights.loop.signals, start=1):
+        compared = runs.rows_of_master(order, {})
+        for i, name in enumerate(runs.loop.signals, start=1):
             assert compared[:, i].tobytes() == signals[name].tobytes()
-    assert (flights.rows_of_master("jacobi", {}) != flights.rows_of_master("gauss-seidel", {})).any()
+    assert (runs.rows_of_master("jacobi", {}) != runs.rows_of_master("gauss-seidel", {})).any()
 
 
-def test_no_tool_is_started_once_the_flights_have_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_tool_is_started_once_the_runs_have_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As by a thread that was still making its copies then."""
-    flights = Flights(carried("double_integrator"), tmp_path, None)
-    with flights:
+    runs = ToolRuns(carried("double_integrator"), tmp_path, None)
+    with runs:
         pass
-    monkeypatch.setattr("orchestration.interop.flights.Child", lambda *_, **__: pytest.fail("a process is started"))
-    with pytest.raises(QuadcosimError, match=r"^the flights have ended$"):
-        flights.flown(TOOLS["fmpy, SSP"])
+    monkeypatch.setattr("orchestration.interop.tool_runs.Child", lambda *_, **__: pytest.fail("a process is started"))
+    with pytest.raises(QuadcosimError, match=r"^the runs have ended$"):
+        runs.run(TOOLS["fmpy, SSP"])
 
 
 def test_the_command_takes_any_system_and_leaves_out_tools_for_components_that_it_has_not(
@@ -119,8 +119,8 @@ def test_the_command_takes_any_system_and_leaves_out_tools_for_components_that_i
     for row in rows:
         assert row["agrees"]
         assert set(row["as_it_comes"]) == {"plant.x", "plant.v", "controller.u"}
-        assert max(row["same_first_inputs"].values()) <= AIM
-    assert max(rows[0]["as_it_comes"].values()) <= AIM
+        assert max(row["same_first_inputs"].values()) <= TOLERANCE
+    assert max(rows[0]["as_it_comes"].values()) <= TOLERANCE
     assert (tmp_path / "interop.png").is_file()
     servo = carried("dc_servo").components
     assert not any(tool.alone == "plant" for tool in chosen(None, servo))
@@ -134,7 +134,7 @@ SAMPLING = "components.controller.sampling"
 
 
 @pytest.mark.parametrize(
-    ("name", "changes", "said"),
+    ("name", "changes", "expected"),
     [
         ("water_tank", {}, "connections.valve.delay = 0.25: an SSP cannot express that; expected 0.0"),
         ("water_tank", CARRIED["water_tank"], "tool = libcosim: no conversion of types, as of controller.valve"),
@@ -145,7 +145,9 @@ SAMPLING = "components.controller.sampling"
         ("four_components", UPHILL, "sources.slope.file: an SSP cannot feed one; expected a constant"),
     ],
 )
-def test_what_other_masters_cannot_say_is_refused_in_one_line(name: str, changes: dict[str, Any], said: str) -> None:
+def test_what_other_masters_cannot_express_is_refused_in_one_line(
+    name: str, changes: dict[str, Any], expected: str
+) -> None:
     with pytest.raises(UsageError) as refused:
         agreements(changed(example(name), changes), [TOOLS["libcosim"]])
-    assert one_line(refused.value).startswith(said)
+    assert one_line(refused.value).startswith(expected)

@@ -16,7 +16,7 @@ from tests.pictures import expect_picture
 
 SEVERAL = [
     agreement("fmpy, plant alone"),
-    agreement("libcosim", same_start=3e-14, as_it_comes=3e-14),
+    agreement("libcosim", same_first_inputs=3e-14, as_it_comes=3e-14),
     agreement("fmucontainer", first=("exchanged", "start values")),
     agreement("fmpy, controller alone"),
 ]
@@ -27,17 +27,19 @@ SEVERAL = [
 
 @pytest.mark.parametrize(("difference", "holds"), [(0.0, True), (1e-9, True), (1.0000001e-9, False), (math.inf, False)])
 def test_a_tool_agrees_up_to_1e_9_in_every_state_from_the_same_start(difference: float, holds: bool) -> None:
-    found = agreement(same_start=0.0)
-    for name in [name for name in found.same_start if name.startswith("plant.")]:
-        found.same_start[name] = difference
+    found = agreement(same_first_inputs=0.0)
+    for name in [name for name in found.same_first_inputs if name.startswith("plant.")]:
+        found.same_first_inputs[name] = difference
         assert table.agrees(found) == holds
-        found.same_start[name] = 0.0
+        found.same_first_inputs[name] = 0.0
 
 
-def test_the_command_counts_only_where_no_plant_is_flown() -> None:
+def test_the_command_counts_only_where_no_plant_is_run() -> None:
     for tool, holds in (("libcosim", True), ("fmpy, plant alone", True), ("fmpy, controller alone", False)):
         found = agreement(tool)
-        found.same_start.update({name: 1.0 for name in found.same_start if name.startswith("controller.")})
+        found.same_first_inputs.update(
+            {name: 1.0 for name in found.same_first_inputs if name.startswith("controller.")}
+        )
         assert table.agrees(found) == holds
 
 
@@ -77,15 +79,20 @@ def cells(row: str) -> list[str]:
 
 def test_all_that_was_found_is_there_in_json_types() -> None:
     for found in SEVERAL:
-        told = table.as_dict(found)
-        assert json.loads(json.dumps(told)) == told
-        assert told["tool"] == found.tool.name
-        assert told["versions"].keys() == set(found.tool.packages)
-        assert told["agrees"] is True
-        assert (told["steps"], told["end"], told["drift"], told["order"]) == (3000, 30.0, 2e-12, "jacobi")
-        assert told["first_inputs"] == found.trace.first_exchange
-        assert (told["as_it_comes"], told["same_first_inputs"]) == found.both()
-    assert table.as_dict(agreement(same_start=1e-8))["agrees"] is False
+        document = table.as_dict(found)
+        assert json.loads(json.dumps(document)) == document
+        assert document["tool"] == found.tool.name
+        assert document["versions"].keys() == set(found.tool.packages)
+        assert document["agrees"] is True
+        assert (document["steps"], document["end"], document["drift"], document["order"]) == (
+            3000,
+            30.0,
+            2e-12,
+            "jacobi",
+        )
+        assert document["first_inputs"] == found.trace.first_exchange
+        assert (document["as_it_comes"], document["same_first_inputs"]) == found.both()
+    assert table.as_dict(agreement(same_first_inputs=1e-8))["agrees"] is False
 
 
 # -- the chart --------------------------------------------------------------------------------------------
@@ -98,7 +105,7 @@ def markers(found: list[Agreement]) -> list[Any]:
 
 
 def test_each_kind_of_signal_has_an_open_and_a_filled_marker() -> None:
-    drawn = markers([agreement("libcosim", same_start=1e-12, as_it_comes=1e-3)])
+    drawn = markers([agreement("libcosim", same_first_inputs=1e-12, as_it_comes=1e-3)])
     assert sorted(line.get_marker() for line in drawn) == sorted("os^DP" * 2)
     for line in drawn:
         is_open = line.get_markerfacecolor() == "none"
@@ -132,12 +139,12 @@ def test_the_legend_names_what_any_tool_has_and_the_aim() -> None:
 
 
 def test_a_difference_of_zero_is_drawn_at_the_left_of_a_logarithmic_axis(tmp_path: Path) -> None:
-    found = [agreement("libcosim", same_start=0.0, as_it_comes=0.0)]
+    found = [agreement("libcosim", same_first_inputs=0.0, as_it_comes=0.0)]
     assert {line.get_xdata()[0] for line in markers(found)} == {figure.SMALLEST}
     (panel,) = figure.agreement_chart(found).axes
     assert panel.get_xscale() == "log"
     low, high = panel.get_xlim()
-    assert 0.0 < low < figure.SMALLEST < table.AIM < high
+    assert 0.0 < low < figure.SMALLEST < table.TOLERANCE < high
 
 
 def test_the_chart_is_written_into_a_folder_that_need_not_be_there(tmp_path: Path) -> None:

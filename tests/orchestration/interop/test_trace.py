@@ -1,4 +1,4 @@
-"""How a tool is seen to fly, from the logs of FMUs that write down what they are given."""
+"""How a tool steps the FMUs, from the logs of traced copies."""
 
 import json
 from pathlib import Path

@@ -8,7 +8,7 @@ import pytest
 
 from orchestration.interop.catalogue import Tool, chosen
 from orchestration.interop.compare import Agreement, agreements
-from orchestration.interop.table import AIM, agrees
+from orchestration.interop.table import TOLERANCE, agrees
 from orchestration.requests.ssp import writing
 from orchestration.system.model import System
 from quadcosim import Scenario, load_scenario
@@ -48,7 +48,7 @@ def others(other: Scenario) -> list[Agreement]:
 def test_every_tool_simulates_the_parameters_of_the_scenario(others: list[Agreement]) -> None:
     assert [agreement.tool.name for agreement in others] == [tool.name for tool in chosen(None, LOOP.ports)]
     for agreement in others:
-        assert farthest(agreement, agreement.same_start) <= AIM, agreement.tool.name
+        assert farthest(agreement, agreement.same_first_inputs) <= TOLERANCE, agreement.tool.name
 
 
 def test_the_defaults_would_have_been_seen(defaults: Scenario, other: Scenario) -> None:
@@ -72,7 +72,7 @@ def test_each_tool_takes_the_parameters_from_the_ssp(monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(writing, "write", without_parameters)
     for agreement in agreements(with_other_parameters(defaults), chosen(FROM_SSP, LOOP.ports)):
-        assert farthest(agreement, agreement.same_start) > 1e-2, agreement.tool.name
+        assert farthest(agreement, agreement.same_first_inputs) > 1e-2, agreement.tool.name
         assert not agrees(agreement)
 
 
@@ -88,7 +88,7 @@ def test_fmus_of_any_name_in_any_folder_with_parameters_of_every_type(
     monkeypatch.chdir(folder.parent)
     scenario = load_scenario(Path("später") / "flight.toml")
     for agreement in agreements(scenario, one_of_each()):
-        assert farthest(agreement, agreement.same_start) <= AIM, agreement.tool.name
+        assert farthest(agreement, agreement.same_first_inputs) <= TOLERANCE, agreement.tool.name
     empty = scenario.with_changes(parameters={"plant.cargo": 0})
     apart = np.abs(states_of_master(scenario) - states_of_master(empty)).max(axis=0)
     assert apart.max() > 1e-3
@@ -119,4 +119,4 @@ def test_a_redesign_given_by_the_integer_beside_its_enumeration_runs_in_every_to
     scenario = explicit.with_changes(parameters=redesign)
     assert np.abs(states_of_master(scenario) - states_of_master(explicit)).max() > 1e-3
     for agreement in agreements(scenario, chosen(FROM_SSP, LOOP.ports)):
-        assert farthest(agreement, agreement.same_start) <= AIM, agreement.tool.name
+        assert farthest(agreement, agreement.same_first_inputs) <= TOLERANCE, agreement.tool.name
