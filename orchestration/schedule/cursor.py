@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from orchestration.schedule.schedule import Instant, Schedule
 from orchestration.schedule.timetable import Timetable
 
-INSTANTS = 2**13
+INSTANTS = 2**15
 """Approximate number of a schedule, made at once"""
 TOGETHER = 2**9
 """Number made into objects at once, few enough to stay in the processor's cache"""

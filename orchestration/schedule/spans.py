@@ -27,6 +27,10 @@ class Instants:
         new = np.ones(len(others), dtype=np.bool_)
         inside = at < len(self)
         new[inside] = self.times[at[inside]] != others.times[inside]
+        if not new.any():
+            stepped = self.stepped.copy()
+            stepped[at] |= others.stepped
+            return Instants(times=self.times, stepped=stepped)
         stepped = np.insert(self.stepped, at[new], False, axis=0)
         stepped[at + np.cumsum(new) - new] |= others.stepped
         return Instants(times=np.insert(self.times, at[new], others.times[new]), stepped=stepped)
