@@ -238,7 +238,7 @@ def monte_carlo() -> list[str]:
     """How many survive and stay within 5 cm, and rank correlations of the survivors' errors with each axis."""
     table = run_study_file("monte_carlo")
     draw("monte_carlo", "ultimate_bound")
-    lines, alive, kinds = [fates(table)], survived(table), {"survive": survived, "stay within 5 cm": figures.flew}
+    lines, alive, kinds = [fates(table)], survived(table), {"survive": survived, "stay within 5 cm": figures.good_runs}
     groups = {"all": table}
     for axis, edge in RANDOM.items():
         groups |= {f"{axis} < {edge:g}": table[table[axis] < edge], f"{axis} >= {edge:g}": table[table[axis] >= edge]}

@@ -23,7 +23,7 @@ from orchestration.results.column_info import column_infos
 from orchestration.results.criterion import judged_objective
 from orchestration.results.quantities import quantity
 from orchestration.studies.axis_labels import quantity_of
-from orchestration.studies.shown_first import shown_first
+from orchestration.studies.default_metric import default_metric
 from orchestration.studies.store import open_for_reading
 from orchestration.studies.store_columns import FIXED, TEXTS, UNITS
 from orchestration.studies.study import Study
@@ -151,7 +151,7 @@ def metric_of(stored: Stored, study: Study | None) -> str:
         return np.array([float(row[name]) for row in stored.rows if is_good(row) and row[name] is not None])
 
     preferred = None if study is None else judged_objective(study.origin)
-    return shown_first((name for name in stored.metrics if name not in FIXED), values, preferred)
+    return default_metric((name for name in stored.metrics if name not in FIXED), values, preferred)
 
 
 def words_of(stored: Stored, study: Study | None) -> tuple[str, str]:

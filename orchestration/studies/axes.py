@@ -14,9 +14,9 @@ from orchestration.studies import sensitivity
 Value = Scalar
 Scale = Literal["linear", "logarithmic"]
 Method = Literal["random", "latin-hypercube", "sobol", "morris", "saltelli"]
-"""How sampled axes are: the last two for sensitivity (Morris screening, Sobol indices)."""
+"""Sampling methods: the last two are for sensitivity (Morris screening, Sobol indices)"""
 MOST_POINTS = 1_000_000
-"""of a study"""
+"""Largest number of runs of a study"""
 
 
 _BY_NAME = ("axis.name",)
@@ -27,24 +27,24 @@ class Axis:
     """One quantity that a study varies.
 
     It takes `values` in turn, or is sampled between `low` and `high` together with all other sampled axes. Raises
-    `UsageError` for values that cannot be.
+    `UsageError` for invalid values.
     """
 
     name: str
-    """The column that it is in the table of runs, and what it sets unless `targets` say it."""
+    """The name of its column in the table of runs; default target."""
     targets: tuple[str, ...] = _BY_NAME
-    """What it sets: of the quadrotor `timing.KEY`, `controller.NAME`, `plant.NAME`, of any system paths; `seed`,
+    """What it sets: paths of the system, for the quadrotor also `timing.KEY`, `controller.NAME`, `plant.NAME`; `seed`,
     `stop_time`."""
     multiplies: bool = False
-    """Whether its values are factors on what the targets are in the base, instead of setting them."""
+    """Whether its values are factors on the targets' values in the base, instead of setting them."""
     values: tuple[Value, ...] | None = None
     """The values, in turn; None: it is sampled."""
     low: float = 0.0
-    """The lower end of the range in which it is sampled, in the unit of its targets."""
+    """The lower end of its range if sampled, in the unit of its targets."""
     high: float = 1.0
     """The upper end of that range."""
     scale: Scale = "linear"
-    """Whether it is sampled evenly, or evenly in its logarithm."""
+    """Whether it is sampled uniformly, or uniformly in its logarithm."""
 
     def __post_init__(self) -> None:
         if self.targets == _BY_NAME:
@@ -57,7 +57,7 @@ class Axis:
             _check_range(self.name, self.low, self.high, self.scale)
 
     def at(self, share: float) -> float:
-        """The value at a share in [0, 1] of the range."""
+        """The value at `share` in [0, 1] of the range."""
         if self.scale == "logarithmic":
             return math.exp(math.log(self.low) + share * math.log(self.high / self.low))
         return self.low + share * (self.high - self.low)
@@ -71,7 +71,7 @@ def span(name: str, low: float, high: float, number: int, scale: Scale) -> tuple
     if number > MOST_POINTS:
         raise UsageError(f"axis {name}: number = {number}, expected at most {MOST_POINTS}")
     axis = Axis(name=name, targets=(), low=low, high=high, scale=scale)
-    # Twelve digits: the steps of a decimal range are decimal numbers, 0.003 and not 0.0030000000000000005.
+    # Twelve digits keep the steps of a decimal range decimal: 0.003 instead of 0.0030000000000000005.
     inner = [float(f"{axis.at(i / (number - 1)):.12g}") for i in range(1, number - 1)]
     return (low, *inner, high)
 
@@ -79,8 +79,8 @@ def span(name: str, low: float, high: float, number: int, scale: Scale) -> tuple
 class Points(Sequence[dict[str, Value]]):
     """The design: every combination of the listed values, each with every sampled point, in that order.
 
-    One value by axis name for each point, made when it is asked for; the last listed axis varies fastest, then
-    the samples. Raises `UsageError` for a design of more than `MOST_POINTS`, before anything is expanded.
+    Each point is a dictionary of values by axis name, computed on access; the last listed axis varies fastest, but for
+    the samples. Raises `UsageError` for a design of more than `MOST_POINTS`, before it is expanded.
     """
 
     def __init__(self, axes: Sequence[Axis], method: Method, samples: int, seed: int) -> None:
@@ -124,7 +124,7 @@ class Points(Sequence[dict[str, Value]]):
 
 
 def unit_points(method: Method, dimension: int, samples: int, seed: int) -> Floats:
-    """Points of the unit cube, shape (n, dimension); n is `samples` but for the sensitivity designs."""
+    """Points of the unit cube, shape (n, dimension); n is `samples` except for the sensitivity designs."""
     if method in ("morris", "saltelli"):
         return sensitivity.shares(method, dimension, samples, seed)
     generator = np.random.default_rng(seed)

@@ -1,4 +1,4 @@
-"""Axes of studies in words and units for people, and as edges of cells."""
+"""Display names, units and cell edges of the axes of studies."""
 
 from collections.abc import Mapping
 
@@ -11,11 +11,11 @@ from orchestration.results.quantities import Quantity, quantity, unit_known
 from orchestration.studies.axes import Axis
 
 SCALES = {"linear": "linear", "logarithmic": "log"}
-"""As matplotlib calls them"""
+"""Names of scales in matplotlib"""
 
 
 def quantity_of(axis: Axis, units: Mapping[str, str]) -> Quantity:
-    """An axis in words and in the unit that its store has for it, by its name; a factor has none."""
+    """The quantity of an axis, with its display name and its unit in the store; a factor has no unit."""
     unit = None
     if axis.targets and not axis.multiplies:
         known = {unit_known(target) for target in axis.targets}
@@ -24,10 +24,10 @@ def quantity_of(axis: Axis, units: Mapping[str, str]) -> Quantity:
 
 
 def name_of(axis: Axis) -> str:
-    """An axis in words: its own name, or that of what it sets where it is named by its path."""
+    """The display name of an axis: its own name, or that of its target if it is named by its path."""
     return labels.setting(axis.name) if axis.name in axis.targets else labels.words(axis.name)
 
 
 def edges(axis: Axis, values: Floats) -> Floats:
-    """Of the cells around the values that an axis takes."""
+    """The edges of the cells around the values of an axis."""
     return cells.edges(np.unique(values), logarithmic=axis.scale == "logarithmic")

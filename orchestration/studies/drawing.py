@@ -1,4 +1,4 @@
-"""Which figures a study gets: decides by its axes, reads the store, writes beside it."""
+"""The figures of a study: chosen by its axes, drawn from its store, written beside it."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,8 +14,8 @@ from orchestration.figures.style import SCREEN, Style, save
 from orchestration.results.criterion import bound_of, judged_objective
 from orchestration.studies import figures, sensitivity
 from orchestration.studies.axes import Axis, unit_points
+from orchestration.studies.default_metric import default_metric
 from orchestration.studies.maps import heat_map
-from orchestration.studies.shown_first import shown_first
 from orchestration.studies.store import store_path
 from orchestration.studies.store_columns import TEXTS, metrics_with
 from orchestration.studies.study import Study
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 
 def expect_metric(study: Study, metric: str | None) -> None:
-    """Raise `UsageError` for a metric that was asked for and is none."""
-    known = [name for name in metrics_with(study.judged) if name not in TEXTS or _is_screened(study)]
+    """Raise `UsageError` for an unknown metric."""
+    known = [name for name in metrics_with(study.metric_names) if name not in TEXTS or _is_screened(study)]
     if metric is not None and metric not in known:
         raise UsageError(f"metric {metric}: expected one of {', '.join(known)}; every figure shows the outcome")
 
@@ -39,14 +39,14 @@ def draw_study(
     style: Style = SCREEN,
     progress: Share = lambda share: None,
 ) -> list[Path]:
-    """Draw what is in the store of `study`, by default the first objective that varies; the paths.
+    """Draw a metric from the store of `study`, default: the first objective that varies; the paths.
 
-    Raises `UsageError` for a metric that does not exist, or axes that no figure here is for.
+    Raises `UsageError` for an unknown metric, or axes for which there is no figure.
     """
     path = store_path(study.name, folder)
-    made, indices = study_figures(study, path, metric, style)
-    listed = [sensitivity.write(indices, (path.parent / next(iter(made))).with_suffix(".csv"))] if indices else []
-    return listed + save(made, path.parent, style, progress)
+    drawn, indices = study_figures(study, path, metric, style)
+    tables = [sensitivity.write(indices, (path.parent / next(iter(drawn))).with_suffix(".csv"))] if indices else []
+    return tables + save(drawn, path.parent, style, progress)
 
 
 def study_figures(
@@ -59,7 +59,7 @@ def study_figures(
     expect_metric(study, metric)
     table, units = frame(store), units_in(store)
     if metric is None:
-        metric = _shown_first(study, table)
+        metric = _default_metric_of(study, table)
     indices = indices_of(study, numbers(table, metric), metric) if _is_screened(study) else []
     with style.applied():
         if indices:
@@ -77,10 +77,10 @@ def _over_axes(
     words = system.criterion.outcomes
     if len(axes) > 2:
         return {metric: figures.scatter(table, axes, metric, words, units=units, style=style)}
-    made = {metric: figures.lines(table, axes, metric, words, bound_of(system, metric), units=units, style=style)}
+    drawn = {metric: figures.lines(table, axes, metric, words, bound_of(system, metric), units=units, style=style)}
     if len(axes) == 2 and all(axis.values is not None for axis in axes):
-        made[f"{metric}_map"] = heat_map(table, axes, metric, words, units=units, style=style)
-    return made
+        drawn[f"{metric}_map"] = heat_map(table, axes, metric, words, units=units, style=style)
+    return drawn
 
 
 def indices_of(study: Study, values: Floats, metric: str) -> list[sensitivity.Index]:
@@ -97,15 +97,17 @@ def indices_of(study: Study, values: Floats, metric: str) -> list[sensitivity.In
 
 
 def numbers(table: "pd.DataFrame", metric: str) -> Floats:
-    """A metric run by run, shape (n,); of the outcome, 1 for a run that is good, 0 for one that is not."""
-    values = figures.flew(table).astype(float).where(table["outcome"].notna()) if metric == "outcome" else table[metric]
+    """A metric by run, shape (n,); for the outcome, 1 for a good run and 0 for another."""
+    values = (
+        figures.good_runs(table).astype(float).where(table["outcome"].notna()) if metric == "outcome" else table[metric]
+    )
     return np.asarray(values.to_numpy(float, na_value=np.nan))
 
 
-def _shown_first(study: Study, table: "pd.DataFrame") -> str:
-    good = figures.flew(table)
-    return shown_first(
-        study.judged,
+def _default_metric_of(study: Study, table: "pd.DataFrame") -> str:
+    good = figures.good_runs(table)
+    return default_metric(
+        study.metric_names,
         lambda name: table[name].where(good).to_numpy(float, na_value=np.nan),
         judged_objective(study.origin),
     )

@@ -1,4 +1,4 @@
-"""A study or a run in the formats of other programs, as `quadcosim export` writes them."""
+"""Export of a study or a run in the formats of other programs, for `quadcosim export`."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,11 +13,11 @@ OF_RUNS = ("csv", "mat")
 def of_run(folder: Path, out: Path, formats: Sequence[str]) -> list[Path]:
     """Write the signals and events of a run as CSV (default), or all of it as MAT; the paths.
 
-    Raises `UsageError` for a format that there is not, and for a folder that is no directory of a run.
+    Raises `UsageError` for an unknown format, and for a folder that is not the directory of a run.
     """
     for kind in formats:
-        there = " (signals.parquet and events.parquet are there already)" if kind == "parquet" else ""
-        _expect(kind, OF_RUNS, there)
+        hint = " (signals.parquet and events.parquet are there already)" if kind == "parquet" else ""
+        _expect(kind, OF_RUNS, hint)
     result = load_run(folder)
     written = result.to_csv(out) if "csv" in formats or not formats else []
     return [*written, *([result.to_mat(out / MAT)] if "mat" in formats else [])]
@@ -30,6 +30,6 @@ def of_study(store: Path, formats: Sequence[str]) -> list[Path]:
     return export(store, store.parent, formats or FORMATS[:2])
 
 
-def _expect(kind: str, known: Sequence[str], otherwise: str = "") -> None:
+def _expect(kind: str, known: Sequence[str], hint: str = "") -> None:
     if kind not in known:
-        raise UsageError(f"--format {kind}: expected {' or '.join(known)}{otherwise}")
+        raise UsageError(f"--format {kind}: expected {' or '.join(known)}{hint}")

@@ -40,10 +40,10 @@ def lines(
     units: Mapping[str, str],
     style: Style = SCREEN,
 ) -> Figure:
-    """A metric against the first axis, one line for each value of the second; what is not good is crossed.
+    """A metric against the first axis, one line for each value of the second; runs that are not good are crosses.
 
-    What diverged has no metric; it is marked along the lower edge, in a row for each line. `units` are those of metrics
-    and axes that have one.
+    Diverged runs have no metric and are marked along the lower edge, in a row for each line. `units` are those of
+    metrics and axes.
     """
     figure = style.figure(35.0)
     panel = figure.add_subplot()
@@ -54,15 +54,15 @@ def lines(
     diverged: dict[str | tuple[float, ...], Floats] = {}
     for (value, group), color in zip(groups, [BLUE] if len(groups) == 1 else colors, strict=True):
         ordered = group.sort_values(x.name)
-        fell = ~flew(ordered)
+        not_good = ~good_runs(ordered)
         at, y = across.of(ordered[x.name]), ordered[metric].to_numpy(float)
         named = None if value is None else f"{float(second.of(value)):g}"
-        panel.plot(at, np.where(fell, np.nan, y), ".-", color=color, label=named)
-        panel.plot(at[fell], y[fell], "x", color=color, markersize=5)
+        panel.plot(at, np.where(not_good, np.nan, y), ".-", color=color, label=named)
+        panel.plot(at[not_good], y[not_good], "x", color=color, markersize=5)
         diverged[color if len(groups) == 1 else tuple(color)] = at[(ordered["outcome"] == DIVERGED).to_numpy()]
-    there = {*table["outcome"].dropna()}
+    outcomes = {*table["outcome"].dropna()}
     for word, mark in ((words[0], ".-"), (words[1], "x"), (TERMINATED, "x"), (DIVERGED, "v")):
-        if word in there:
+        if word in outcomes:
             color = BLUE if len(groups) == 1 and word == words[0] else GREY
             panel.plot([], [], mark, color=color, markersize=4 if mark == "v" else None, label=word)
     panel.set(
@@ -81,7 +81,7 @@ def lines(
 
 
 def _mark_diverged(panel: Axes, places: Mapping[str | tuple[float, ...], Floats]) -> None:
-    """Triangles along the lower edge, in a row for each colour, below all that is drawn."""
+    """Triangles along the lower edge, in a row for each colour, below all other marks."""
     if not places:
         return
     step = min(0.022, 0.25 / len(places))
@@ -104,13 +104,13 @@ def scatter(
     units: Mapping[str, str],
     style: Style = SCREEN,
 ) -> Figure:
-    """A metric against each of many axes; what is not good is crossed, what diverged marked along the lower edge."""
+    """A metric against each of many axes; crosses for runs that are not good, marks at the lower edge for diverged."""
     figure = style.figure(17.0 * math.ceil(len(axes) / 2))
     panels = figure.subplots(math.ceil(len(axes) / 2), 2, squeeze=False, sharey=True).ravel()
-    fell = ~flew(table)
+    not_good = ~good_runs(table)
     for panel, axis in zip(panels, axes, strict=False):
         across = quantity_of(axis, units)
-        for chosen, marker, color in ((table[~fell], ".", BLUE), (table[fell], "x", RED)):
+        for chosen, marker, color in ((table[~not_good], ".", BLUE), (table[not_good], "x", RED)):
             panel.plot(across.of(chosen[axis.name]), chosen[metric], marker, color=color, markersize=4, alpha=0.7)
         down = across.of(table.loc[table["outcome"] == "diverged", axis.name])
         panel.plot(down, np.full(len(down), 0.02), "v", color=RED, markersize=3, transform=panel.get_xaxis_transform())
@@ -123,10 +123,10 @@ def scatter(
     kinds = zip((*words, TERMINATED, DIVERGED), ("dots", "crosses", "crosses", "below"), strict=True)
     counted = [(int((table["outcome"] == kind).sum()), kind, mark) for kind, mark in kinds]
     counts = [f"{count} {kind} ({mark})" for count, kind, mark in counted if count]
-    low, high = wilson(int((~fell).sum()), len(table))
+    low, high = wilson(int((~not_good).sum()), len(table))
     figure.suptitle(
         f"{len(table)} runs: {', '.join(counts)}{by_horizon(table)}\n"
-        f"share that is {words[0]} {(~fell).mean():.0%}, 95 % interval {low:.0%} to {high:.0%}",
+        f"share that is {words[0]} {(~not_good).mean():.0%}, 95 % interval {low:.0%} to {high:.0%}",
     )
     return figure
 
@@ -158,7 +158,7 @@ def spectral_radius(
 
 
 def sensitivity_bars(indices: "list[Index]", metric: str, style: Style = SCREEN) -> Figure:
-    """Bars with confidence, one group for each kind of index."""
+    """Bars with confidence intervals, one group for each kind of index."""
     kinds = list(dict.fromkeys(index.kind for index in indices))
     axes = list(dict.fromkeys(index.axis for index in indices))
     figure = style.figure(4.3 * len(axes) + 13.0)
@@ -185,20 +185,20 @@ def sensitivity_bars(indices: "list[Index]", metric: str, style: Style = SCREEN)
     return figure
 
 
-def flew(table: "pd.DataFrame") -> "pd.Series":
-    """Which runs meet the criterion; of the quadrotor, fly: those that settle by their horizon."""
+def good_runs(table: "pd.DataFrame") -> "pd.Series":
+    """Whether each run meets the criterion."""
     return table["good"].eq(1).fillna(False).astype(bool)
 
 
 def save(make: Callable[[Style], Figure], path: Path, style: Style = SCREEN) -> list[Path]:
-    """Make a figure in a style and write it, `path` with the ending of each format; the paths."""
+    """Make a figure in a style and write it as `path` with the suffix of each format; the paths."""
     with style.applied():
         figure = make(style)
     return write({path.name: figure}, path.parent, style)
 
 
 def by_horizon(table: "pd.DataFrame") -> str:
-    """The time by which the outcomes are judged, if it is one for all."""
+    """The stop time as text, if all runs have the same."""
     horizons = set(table["horizon"].dropna()) if "horizon" in table else set()
     return f", by {horizons.pop():g} s" if len(horizons) == 1 else ""
 

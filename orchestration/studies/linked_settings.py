@@ -1,4 +1,4 @@
-"""What a value of an axis stands for, where that is more than one number: a vehicle, a start, a set of gains."""
+"""Settings linked to the values of axes: a vehicle, an initial condition, a set of gains."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -11,26 +11,26 @@ Key = tuple[Value, ...]
 
 @dataclass(frozen=True, kw_only=True)
 class LinkedSettings:
-    """Targets that values of one axis, or of several, set together."""
+    """Targets that the values of one or several axes set together."""
 
     axes: tuple[str, ...]
     sets: Mapping[Key, Mapping[str, Value]] = field(default_factory=dict)
-    """values by target, by the values of the axes; for values that are not here nothing is set"""
+    """values by target, by the values of the axes; values without an entry set nothing"""
     multiplies: Mapping[Key, Mapping[str, float]] = field(default_factory=dict)
-    """likewise factors on what a target is by then, by itself or in the base"""
+    """likewise factors on the targets' values so far, or in the base"""
 
     @property
     def targets(self) -> Iterator[str]:
-        """All that it sets or multiplies."""
+        """All targets that it sets or multiplies."""
         for table in (self.sets, self.multiplies):
             for changes in table.values():
                 yield from changes
 
     def of(self, point: Mapping[str, Value]) -> tuple[Mapping[str, Value], Mapping[str, float]]:
-        """What is set and what is multiplied at a point of the design."""
+        """The values and the factors by target at a point of the design."""
         key = tuple(point[name] for name in self.axes)
         return self.sets.get(key, {}), self.multiplies.get(key, {})
 
     def as_lists(self) -> list[Any]:
-        """In JSON types."""
+        """The content in JSON types."""
         return [[[*key, dict(changes)] for key, changes in table.items()] for table in (self.sets, self.multiplies)]

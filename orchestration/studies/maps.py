@@ -1,4 +1,4 @@
-"""A metric of a study over two axes, cell by cell."""
+"""Maps of a metric of a study over two axes."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
@@ -17,7 +17,7 @@ from orchestration.figures.style import SCREEN, Style
 from orchestration.results import display_names as labels
 from orchestration.studies.axes import Axis
 from orchestration.studies.axis_labels import SCALES, edges, quantity_of
-from orchestration.studies.figures import by_horizon, flew
+from orchestration.studies.figures import by_horizon, good_runs
 from orchestration.system.criterion import DIVERGED, TERMINATED
 
 if TYPE_CHECKING:
@@ -33,14 +33,14 @@ def heat_map(
     units: Mapping[str, str],
     style: Style = SCREEN,
 ) -> Figure:
-    """A metric where runs are good, the outcome where not, the limit between the two; what is missing is hatched.
+    """A metric where runs are good, the outcome elsewhere, and the limit between the two; missing runs are hatched.
 
-    Outcomes are told where they occur.
+    The legend lists the outcomes that occur.
     """
     kinds = {words[0]: 0, words[1]: 1, TERMINATED: 1, DIVERGED: 2}
-    coded = table.assign(flew=flew(table).astype(float), kind=table["outcome"].map(kinds).astype(float))
-    coded.loc[table["outcome"].isna(), "flew"] = np.nan
-    values, good, kind = (_grid(coded, axes, name) for name in (metric, "flew", "kind"))
+    coded = table.assign(good_run=good_runs(table).astype(float), kind=table["outcome"].map(kinds).astype(float))
+    coded.loc[table["outcome"].isna(), "good_run"] = np.nan
+    values, good, kind = (_grid(coded, axes, name) for name in (metric, "good_run", "kind"))
     across, up = (quantity_of(axis, units) for axis in axes[:2])
     x, y = (edges(axis, each.of(coded[axis.name])) for axis, each in zip(axes, (across, up)))
     figure = style.figure(36.0)
@@ -53,22 +53,22 @@ def heat_map(
     panel.set(xlabel=across.title, ylabel=up.title, xscale=SCALES[axes[0].scale], yscale=SCALES[axes[1].scale])
     named = labels.metric_with_unit(metric, units.get(metric))
     cells.color_bar(panel, mesh, shown, f"{named}, where {words[0]}")
-    there = {*table["outcome"].dropna()}
-    bad = " or ".join(word for word in (words[1], TERMINATED) if word in there)
-    told: list[Patch | Line2D] = [
+    outcomes = {*table["outcome"].dropna()}
+    bad = " or ".join(word for word in (words[1], TERMINATED) if word in outcomes)
+    handles: list[Patch | Line2D] = [
         Patch(color=color, label=word)
         for word, color in ((words[0], matplotlib.colormaps[SHADES](0.5)), (bad, NOT_GOOD), (DIVERGED, DARK))
-        if word and (word == bad or word in there)
+        if word and (word == bad or word in outcomes)
     ]
-    told += [cells.hatched()] if np.isnan(kind).any() else []
-    told += [Line2D([], [], color=RED, label=f"limit of what is {words[0]}{by_horizon(table)}")] if has_limit else []
-    figure.legend(handles=told, loc="outside lower center", ncols=len(told) if style.is_wide else 2)
+    handles += [cells.hatched()] if np.isnan(kind).any() else []
+    handles += [Line2D([], [], color=RED, label=f"limit of what is {words[0]}{by_horizon(table)}")] if has_limit else []
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles) if style.is_wide else 2)
     return figure
 
 
 def _grid(table: "pd.DataFrame", axes: tuple[Axis, ...], name: str) -> Floats:
     """Values by cell, shape (values of the second axis, values of the first); nan where there is no run."""
-    found: Floats = table.pivot_table(index=axes[1].name, columns=axes[0].name, values=name, dropna=False).to_numpy(
+    grid: Floats = table.pivot_table(index=axes[1].name, columns=axes[0].name, values=name, dropna=False).to_numpy(
         float
     )
-    return found
+    return grid

@@ -1,4 +1,4 @@
-"""What a run and a store are identified by: content, sources and versions, never where a file lies or its age."""
+"""Identity of runs and stores: by content, sources and versions, never by the path or age of a file."""
 
 import dataclasses
 import hashlib
@@ -21,9 +21,9 @@ from orchestration.workers.provenance import machine, versions
 
 
 def run_key(system: System, files: Files, metrics: Sequence[OwnMetric] = ()) -> str:
-    """The hash of everything that determines a run, and what it comes to.
+    """The hash of everything that determines a run and its metrics.
 
-    A parameter that has the value with which its FMU starts counts as not given.
+    A parameter with the start value of its FMU counts as not set.
     """
     content = {
         **_texts_shared(
@@ -62,7 +62,7 @@ def _texts_shared(
     software: Mapping[str, str],
     hashes: Mapping[str, str],
 ) -> dict[str, str]:
-    """The JSON of what runs of a study have in common, mostly."""
+    """The JSON of the parts that most runs of a study share."""
     parts: dict[str, Any] = {
         "connections": [_content(x, hashes) for x in connections],
         "sources": [[name, _source_of(source, hashes)] for name, source in sources.items()],
@@ -92,9 +92,7 @@ def _text_of_component(name: str, component: Component, hashes: Mapping[str, str
 
 
 def _shared_of(part: str, shared: Mapping[str, Any], hashes: Mapping[str, str]) -> list[Any]:
-    """Computers with their tasks or networks with their messages, which are what they are in their order: it decides
-    ties.
-    """
+    """Computers with their tasks or networks with their messages, as lists, since their order decides ties."""
     return [
         [
             name,
@@ -113,18 +111,18 @@ def _values_of(of: Any) -> dict[str, Any]:
 
 
 def _content(of: Any, hashes: Mapping[str, str]) -> dict[str, Any]:
-    """The values of a part of a system, with what is drawn as its own values, and files as what is in them."""
-    return {name: _told(value, hashes) for name, value in _values_of(of).items()}
+    """The fields of a part of a system, with distributions by their fields and files by the hash of their content."""
+    return {name: _plain(value, hashes) for name, value in _values_of(of).items()}
 
 
-def _told(value: Any, hashes: Mapping[str, str]) -> Any:
+def _plain(value: Any, hashes: Mapping[str, str]) -> Any:
     if isinstance(value, Path):
         return hashes[str(value)]
     return _content(value, hashes) if dataclasses.is_dataclass(value) else value
 
 
 def study_parts(study: Study) -> dict[str, str]:
-    """What a study file says of the runs, part by part, so that a difference can be named."""
+    """The parts of a study that determine its runs, by name, so that a difference can be named."""
     system = study.origin
     tables = Files(fmus={}, tables=tables_of(system)).hashes
     parts: dict[str, Any] = {key: getattr(system, key) for key in ("stop_time", "seed")}
@@ -142,29 +140,29 @@ def study_parts(study: Study) -> dict[str, str]:
     parts |= {f"objectives.{name}": text for name, text in system.objectives.items()}
     parts |= {f"metrics.{metric.name}": metric.source for metric in study.metrics}
     parts |= _parts("criterion", system.criterion, tables)
-    said: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for path, value in parts.items():
         name = study.base.in_own_terms(path)
-        said[path if name in said else name] = json.dumps(value, sort_keys=True)
-    return said
+        texts[path if name in texts else name] = json.dumps(value, sort_keys=True)
+    return texts
 
 
 def _parts(place: str, of: Any, hashes: Mapping[str, str], without: Container[str] = ()) -> dict[str, Any]:
-    """Every value of `of`, by path; what is `None` is not there."""
-    found: dict[str, Any] = {}
+    """Every value of `of` by path, except `None`."""
+    parts: dict[str, Any] = {}
     for field in dataclasses.fields(of):
         value, path = getattr(of, field.name), f"{place}.{field.name}"
         if dataclasses.is_dataclass(value):
-            found |= _parts(path, value, hashes)
+            parts |= _parts(path, value, hashes)
         elif field.name == "parameters":
-            found |= {f"{path}.{name}": given for name, given in value.items()}
+            parts |= {f"{path}.{name}": parameter for name, parameter in value.items()}
         elif value is not None and field.name not in without:
-            found[path] = _told(value, hashes)
-    return found
+            parts[path] = _plain(value, hashes)
+    return parts
 
 
 def design_parts(study: Study) -> dict[str, str]:
-    """What a study file says of its design; this may change, for rows are found by their keys."""
+    """The parts of a study that determine its design only; they may change, since rows are identified by their keys."""
     sampled = any(axis.values is None for axis in study.axes)
     parts: dict[str, Any] = {
         "axes": [axis.name for axis in study.axes],
@@ -177,7 +175,7 @@ def design_parts(study: Study) -> dict[str, str]:
 
 
 def place_parts(study: Study, files: Files) -> dict[str, str]:
-    """What the rows of a store came from beside the study file."""
+    """The origin of a store's rows besides the study file."""
     return {
         **{f"FMU of the {name}": files.hashes[one.fmu] for name, one in study.origin.components.items()},
         **{f"version of {name}": version for name, version in versions().items()},
@@ -186,11 +184,11 @@ def place_parts(study: Study, files: Files) -> dict[str, str]:
 
 
 def difference(before: Mapping[str, str], now: Mapping[str, str]) -> str:
-    """What changed, in a few words; empty if nothing did."""
+    """The changes in a few words; empty if there are none."""
     differing = [name for name in sorted({*before, *now}) if before.get(name) != now.get(name)]
-    told = [f"{n} was {_short(before.get(n))}, is {_short(now.get(n))}" for n in differing[:_MOST]]
+    changes = [f"{n} was {_short(before.get(n))}, is {_short(now.get(n))}" for n in differing[:_MOST]]
     more = f"; and {len(differing) - _MOST} more" if len(differing) > _MOST else ""
-    return "; ".join(told) + more
+    return "; ".join(changes) + more
 
 
 _MOST, _LONGEST = 3, 60

@@ -14,12 +14,12 @@ METHODS: tuple[SensitivityMethod, ...] = ("morris", "saltelli")
 LEVELS = 4
 """of the Morris design"""
 RESAMPLING_SEED = 1
-"""of the confidence intervals; SALib takes 0 for none"""
+"""of the confidence intervals; SALib treats 0 as no seed"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Index:
-    """How much one axis matters for a metric; bars are 95 % confidence."""
+    """The sensitivity of a metric to one axis, with its 95 % confidence."""
 
     axis: str
     kind: str
@@ -29,7 +29,7 @@ class Index:
 
 
 def runs_a_sample(method: str, dimension: int) -> int:
-    """How many runs one sample of `dimension` axes takes: one but for the sensitivity designs."""
+    """The number of runs per sample of `dimension` axes: one except for the sensitivity designs."""
     return {"morris": dimension + 1, "saltelli": dimension + 2}.get(method, 1)
 
 
@@ -50,7 +50,7 @@ def shares(method: SensitivityMethod, dimension: int, samples: int, seed: int) -
 def analyse(method: SensitivityMethod, axes: list[str], design: Floats, values: Floats, metric: str) -> list[Index]:
     """The indices of a metric, whose `values` (n,) belong to the rows of `design` (n, d).
 
-    Raises `UsageError` if a value is missing: a run that failed, or a metric that some runs do not have.
+    Raises `UsageError` if a value is missing, of a failed run or a metric that some runs do not have.
     """
     missing = int(np.count_nonzero(~np.isfinite(values)))
     if missing:
@@ -62,15 +62,15 @@ def analyse(method: SensitivityMethod, axes: list[str], design: Floats, values: 
     if method == "morris":
         from SALib.analyze.morris import analyze as morris
 
-        found = morris(problem, design, values, num_levels=LEVELS, seed=RESAMPLING_SEED)
-        sigma = [Index(axis=a, kind="sigma", value=float(v), confidence=0.0) for a, v in zip(axes, found["sigma"])]
-        return [*_indices(axes, "mu_star", found["mu_star"], found["mu_star_conf"]), *sigma]
+        result = morris(problem, design, values, num_levels=LEVELS, seed=RESAMPLING_SEED)
+        sigma = [Index(axis=a, kind="sigma", value=float(v), confidence=0.0) for a, v in zip(axes, result["sigma"])]
+        return [*_indices(axes, "mu_star", result["mu_star"], result["mu_star_conf"]), *sigma]
     from SALib.analyze.sobol import analyze as sobol
 
-    found = sobol(problem, values, calc_second_order=False, seed=RESAMPLING_SEED)
+    result = sobol(problem, values, calc_second_order=False, seed=RESAMPLING_SEED)
     return [
-        *_indices(axes, "first", found["S1"], found["S1_conf"]),
-        *_indices(axes, "total", found["ST"], found["ST_conf"]),
+        *_indices(axes, "first", result["S1"], result["S1_conf"]),
+        *_indices(axes, "total", result["ST"], result["ST_conf"]),
     ]
 
 

@@ -1,4 +1,4 @@
-"""What a study is: a base system, axes, and the runs that they make."""
+"""Studies: a base system, axes, and the runs that they define."""
 
 import hashlib
 import json
@@ -29,11 +29,11 @@ class Study:
     name: str
     """The name of the study, and of the folder of its store in `results`."""
     base: Request
-    """The scenario or the system that is varied."""
+    """The scenario or the system to vary."""
     axes: tuple[Axis, ...]
-    """What is varied: every combination of the listed values, each with every sampled point."""
+    """The axes: every combination of the listed values, each with every sampled point, is a run."""
     together: tuple[LinkedSettings, ...] = ()
-    """What values of the axes stand for beside their own targets, each on top of what was before."""
+    """Settings linked to the values of the axes besides their own targets, each applied on top of the previous."""
     method: Method = "sobol"
     """How axes without values are sampled; morris and saltelli are for sensitivity."""
     samples: int = 0
@@ -41,13 +41,13 @@ class Study:
     design_seed: int = 0
     """The seed of the sampling."""
     vary_seed: bool = False
-    """Whether each run has a seed of its own, made of that of the base and the values of the axes."""
+    """Whether each run has its own seed, derived from that of the base and the values of the axes."""
     keep_signals: tuple[int, ...] | bool = False
     """The indices of the runs whose signals are kept, or whether all are."""
     metrics: tuple[OwnMetric, ...] = ()
-    """Functions of a result, which `sweep` is given, beside the objectives of the base."""
+    """Functions of a result, passed to `sweep`, besides the objectives of the base."""
     native: bool = False
-    """Whether it is flown by the native twins of its FMUs."""
+    """Whether it is run with the native twins of its FMUs."""
 
     def __post_init__(self) -> None:
         names = [axis.name for axis in self.axes]
@@ -59,32 +59,32 @@ class Study:
             )
         for axis in self.axes:
             is_of_seeds = (axis.name, axis.targets, axis.multiplies) == ("seed", ("seed",), False)
-            if is_column(axis.name, self.judged) and not is_of_seeds:
+            if is_column(axis.name, self.metric_names) and not is_of_seeds:
                 raise UsageError(f"axis {axis.name}: the table of runs has a column of that name, expected another")
         for each in self.together:
             if not set(each.axes) <= set(names):
                 raise UsageError(f"axes = {', '.join(names)}: expected {', '.join(each.axes)} among them")
-        assert self._paths is not None  # every target is known, or said not to be
+        assert self._paths is not None  # raises UsageError for an unknown target
 
     @cached_property
     def origin(self) -> System:
-        """The system that the base means."""
+        """The system that the base describes."""
         system = system_of(self.base)
         return native_twins(system) if self.native else system
 
     @property
-    def judged(self) -> tuple[str, ...]:
-        """What a run comes to, beside what every run does: the objectives, and metrics of its own."""
+    def metric_names(self) -> tuple[str, ...]:
+        """The names of the objectives and of the study's own metrics."""
         return (*self.origin.objectives, *(metric.name for metric in self.metrics))
 
     @cached_property
     def points(self) -> Sequence[Mapping[str, Value]]:
-        """The value of each axis, run by run; made when it is asked for."""
+        """The value of each axis by run, computed on access."""
         return Points(self.axes, self.method, self.samples, self.design_seed)
 
     @cached_property
     def _paths(self) -> dict[str, tuple[str, ...]]:
-        """By target, the paths that it is."""
+        """The paths of each target."""
         listed = [target for axis in self.axes for target in axis.targets]
         listed += [target for each in self.together for target in each.targets]
         return {target: paths_in(self.base, target) for target in dict.fromkeys(listed)}
@@ -92,28 +92,28 @@ class Study:
     def system(self, index: int, starts: Mapping[str, float]) -> System:
         """The system of one run; `starts` are the FMUs' own parameters, as COMPONENT.NAME.
 
-        Raises `UsageError` for a value that cannot be.
+        Raises `UsageError` for an invalid value.
         """
         return self.settings_and_system(index, starts)[1]
 
     def settings_and_system(self, index: int, starts: Mapping[str, float]) -> tuple[Mapping[str, Value], System]:
         """The value of each axis in one run, and its system; raises as `system` does."""
-        made, of = self._made
-        if of != starts:
-            of.clear()
-            made.clear()
-            of.update(starts)
-        if index in made:
-            return made[index]
+        cached, cached_starts = self._cache
+        if cached_starts != starts:
+            cached_starts.clear()
+            cached.clear()
+            cached_starts.update(starts)
+        if index in cached:
+            return cached[index]
         point = self.points[index]
         run = point, self._system(point, starts)
-        if len(made) < _KEPT:
-            made[index] = run
+        if len(cached) < _CACHE_SIZE:
+            cached[index] = run
         return run
 
     @cached_property
-    def _made(self) -> tuple[dict[int, tuple[Mapping[str, Value], System]], dict[str, float]]:
-        """Runs that are asked for again, to be checked, hashed and flown; and the FMUs' own parameters in them."""
+    def _cache(self) -> tuple[dict[int, tuple[Mapping[str, Value], System]], dict[str, float]]:
+        """Runs, each of which is requested for checks, for its key and for its execution; and the start values used."""
         return {}, {}
 
     def _system(self, point: Mapping[str, Value], starts: Mapping[str, float]) -> System:
@@ -136,7 +136,7 @@ class Study:
 
     @cached_property
     def _varies_fmu(self) -> bool:
-        """Whether it is native, and an axis names FMUs that may not be."""
+        """Whether it is native, and an axis sets FMUs, which may not be."""
         return self.native and any(names_fmu(path) for paths in self._paths.values() for path in paths)
 
     def _paths_of(self, targets: Iterable[str]) -> Iterator[str]:
@@ -147,12 +147,12 @@ class Study:
         return self.keep_signals if isinstance(self.keep_signals, bool) else index in self.keep_signals
 
     def files(self) -> Files:
-        """The files of all runs, FMUs built if need be."""
+        """The files of all runs; missing FMUs are built."""
         values = [
             (path, str(v)) for axis in self.axes for path in self._paths_of(axis.targets) for v in axis.values or ()
         ]
-        given = [item for each in self.together for sets in each.sets.values() for item in sets.items()]
-        values += [(path, str(value)) for target, value in given for path in self._paths[target]]
+        linked = [item for each in self.together for sets in each.sets.values() for item in sets.items()]
+        values += [(path, str(value)) for target, value in linked for path in self._paths[target]]
         return files_of(
             self.origin,
             fmus_too=[native_twin(value) if self.native else value for path, value in values if names_fmu(path)],
@@ -161,29 +161,29 @@ class Study:
 
 
 def _traces(values: Iterable[tuple[str, str]]) -> list[str]:
-    """The files of what is drawn that values say."""
-    found = (trace_path(value) for path, value in values if is_table(value) and ".parameters." not in path)
-    return [file for file in found if file is not None]
+    """The files of distributions among the values."""
+    paths = (trace_path(value) for path, value in values if is_table(value) and ".parameters." not in path)
+    return [path for path in paths if path is not None]
 
 
-_KEPT = 2**14
-"""Runs of a study, some kB each"""
+_CACHE_SIZE = 2**14
+"""Runs, some kB each"""
 _NAME = re.compile(r"[^\W_][\w .+-]{0,99}")
 
 
 def names_fmu(path: str) -> bool:
-    """Whether the value at a path is that of an FMU."""
+    """Whether the value at a path is an FMU."""
     return path.startswith("components.") and path.endswith(".fmu") and ".parameters." not in path
 
 
 def _own_seed(seed: int, point: Mapping[str, Value]) -> int:
-    """A seed that only the base's and the point determine, so that a design may grow."""
+    """A seed determined by that of the base and the point only, so that a design may grow."""
     text = json.dumps([seed, dict(point)], sort_keys=True)
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:6], "big")
 
 
 def _product(value: Value, path: str, changes: Mapping[str, Any], origin: System, starts: Mapping[str, float]) -> float:
-    """`value` times what a path is changed to, else in the base, else in its FMU."""
+    """`value` times the changed value at a path, else that of the base, else that of its FMU."""
     if not isinstance(value, (int, float)):
         raise UsageError(f"{path}: expected a number to multiply with, got {value}")
     base = changes[path] if path in changes else value_at(origin, path)

@@ -19,22 +19,22 @@ from orchestration.system.request import ControlLoop, Request
 
 @record()
 class AxisTable:
-    """`[[axes]]`: a target or several, and a list, a range with a number, or a range to sample."""
+    """`[[axes]]`: one or several targets, and a list, a range with a number, or a range to sample."""
 
     name: str
     """The name of the axis: a column of the table of runs."""
     sets: list[str] | None = None
     """The paths that get its value; without `sets` and `multiplies`, the name is the path."""
     multiplies: list[str] | None = None
-    """The paths whose value in the base is multiplied by it."""
+    """The paths whose value in the base it multiplies."""
     values: list[Value | dict[str, Any]] | None = None
-    """The values, one by one; a table is how something is distributed."""
+    """The values; a table is a distribution."""
     start: float | None = None
     """The first value of a range."""
     stop: float | None = None
     """The last value of a range."""
     number: int | None = None
-    """How many values the range has; a range without a number is sampled."""
+    """The number of values in the range; a range without a number is sampled."""
     scale: Scale = "linear"
     """Whether the range has equal steps or equal ratios."""
 
@@ -49,16 +49,16 @@ class DesignTable(
 
 @record()
 class StudyFile:
-    """The file: the base as the tables of a system or a scenario, or the path of one; axes, design."""
+    """The study file: the base as the tables of a system or a scenario, or the path of one; axes, design."""
 
     name: str | None = None
-    """The name of the study and of its folder in `results/`; without it, that of the file."""
+    """The name of the study and of its folder in `results/`; default: that of the file."""
     scenario: str | None = None
     """The path of the system file or scenario file that the study varies."""
     base: dict[str, Any] = field(default_factory=dict)
-    """The same here instead of in a file of its own: the tables of a system file or a scenario file."""
+    """The same given here instead of in a separate file: the tables of a system file or a scenario file."""
     axes: list[AxisTable] = field(default_factory=list)
-    """What is varied."""
+    """The axes."""
     design: DesignTable = field(default_factory=DesignTable)
     """How the axes without values are sampled."""
     keep_signals: list[int] | bool = False
@@ -68,14 +68,13 @@ class StudyFile:
 def load_study(path: str | Path) -> Study:
     """Read a study file; paths in it are relative to its folder.
 
-    Raises `UsageError` for a file that cannot be read, a key that does not exist (naming those that do) or a
-    value that cannot be.
+    Raises `UsageError` for an unreadable file, an unknown key (naming the known ones) or an invalid value.
     """
     return load(Path(path), "study file", StudyFile, _study)
 
 
-class Based(Protocol):
-    """A file that builds on a system or a scenario: its tables, or the path of one."""
+class HasBase(Protocol):
+    """A file that is based on a system or a scenario: its tables, or the path of one."""
 
     @property
     def scenario(self) -> str | None:
@@ -87,11 +86,11 @@ class Based(Protocol):
 
 
 File = TypeVar("File")
-Made = TypeVar("Made")
+Result = TypeVar("Result")
 
 
-def load(path: Path, kind: str, shape: type[File], make: Callable[[File, Path], Made]) -> Made:
-    """What is made of a file of a shape; raises `UsageError` that names it."""
+def load(path: Path, kind: str, shape: type[File], make: Callable[[File, Path], Result]) -> Result:
+    """Read a file of a shape and convert it by `make`; raises `UsageError` that names the file."""
     tables = read_toml(path, kind)
     try:
         return make(parsed(tables, shape), path)
@@ -99,18 +98,18 @@ def load(path: Path, kind: str, shape: type[File], make: Callable[[File, Path], 
         raise UsageError(f"{path}: {error}") from error
 
 
-def base_of(file: Based, folder: Path) -> Request:
-    """What a file builds on."""
+def base_of(file: HasBase, folder: Path) -> Request:
+    """The system or scenario that a file is based on."""
     if file.scenario is not None and file.base:
         raise UsageError("scenario and base: expected one of them")
     return load_request(folder / file.scenario) if file.scenario else request_from_tables(file.base, folder)
 
 
-def loop_of(file: Based, folder: Path) -> ControlLoop:
-    """Likewise, where starts of its plant are needed; raises `UsageError` for a system of which none are known."""
+def loop_of(file: HasBase, folder: Path) -> ControlLoop:
+    """Likewise for files that need initial conditions; raises `UsageError` for a system without known ones."""
     base = base_of(file, folder)
     if not isinstance(base, ControlLoop):
-        raise UsageError("base: expected a scenario of the quadrotor, whose starts are known")
+        raise UsageError("base: expected a scenario of the quadrotor, whose initial conditions are known")
     return base
 
 
@@ -132,7 +131,7 @@ def _study(file: StudyFile, path: Path) -> Study:
 
 
 def _expect_consumed(file: StudyFile, study: Study) -> None:
-    """Raise `UsageError` for what is said of samples where none are drawn, and of runs that there are not."""
+    """Raise `UsageError` for sampling keys without sampled axes, and for indices of runs that do not exist."""
     if all(axis.values is not None for axis in study.axes):
         for key, field in (("method", "method"), ("samples", "samples"), ("seed", "design_seed")):
             if getattr(file.design, field) != getattr(Study, field):
@@ -143,7 +142,7 @@ def _expect_consumed(file: StudyFile, study: Study) -> None:
 
 
 def axis_of(table: AxisTable, folder: Path) -> Axis:
-    """The axis that a table says; raises `UsageError` for one that cannot be."""
+    """The axis of a table; raises `UsageError` for an invalid one."""
     if table.sets is not None and table.multiplies is not None:
         raise UsageError(f"axis {table.name}: expected sets or multiplies, not both")
     targets = tuple(table.multiplies or table.sets or [table.name])
@@ -166,10 +165,10 @@ def axis_of(table: AxisTable, folder: Path) -> Axis:
     )
 
 
-def _values(given: list[Value | dict[str, Any]], targets: tuple[str, ...], folder: Path) -> tuple[Value, ...]:
-    """Listed values; paths are relative to the study file, what is drawn is the text of its table."""
+def _values(listed: list[Value | dict[str, Any]], targets: tuple[str, ...], folder: Path) -> tuple[Value, ...]:
+    """Listed values: paths made relative to the study file, distributions as the text of their table."""
     are_paths = all(names_fmu(target) or names_table(target) or target.endswith(".fmu") for target in targets)
-    plain = [as_text(value, folder) if isinstance(value, dict) else value for value in given]
+    plain = [as_text(value, folder) if isinstance(value, dict) else value for value in listed]
     return tuple(
         str(folder / str(value)) if are_paths and str(value).endswith((".fmu", ".csv")) else value for value in plain
     )

@@ -1,4 +1,4 @@
-"""Flies what is missing of a study, and nothing twice."""
+"""Runs what is missing of a study, without repeating runs."""
 
 import contextlib
 import json
@@ -21,12 +21,12 @@ from orchestration.requests.ranges import paths_in, unit_at
 from orchestration.results.own_metrics import metrics_from_sources
 from orchestration.runs.result import Result
 from orchestration.studies import store
-from orchestration.studies.checks import described, expect_flyable
+from orchestration.studies.checks import check_design, describe_run
+from orchestration.studies.lane_agreement import lane_agreement, with_python_twins
 from orchestration.studies.run_key import design_parts, difference, place_parts, run_key, study_parts
 from orchestration.studies.store_columns import UNITS
 from orchestration.studies.study import Study
 from orchestration.studies.swept import Swept
-from orchestration.studies.vouching import vouched, with_python_twins
 from orchestration.system.model import System
 from orchestration.workers.batching import chunks
 from orchestration.workers.choice import EngineChoice, Execution, choose_execution
@@ -37,13 +37,13 @@ from orchestration.workers.row import Row
 from orchestration.workers.task import Outcome, RunTask
 
 Announce = Callable[[str], None]
-"""Hears of a run that failed."""
+"""Called with lines about the engine and failed runs."""
 
 TOTAL, STUDY_PARTS, DESIGN_PARTS, PLACE_PARTS, AXES = "total", "study", "design", "place", "axes"
 ENGINE, AGREEMENT = "engine", "agreement"
-"""What a store says by these names: what has flown last, and how runs flown in lanes agree with their FMUs"""
-_TOLD = 3
-"""failed runs that are announced one by one"""
+"""Names of entries of a store: the engine used last, and the agreement of runs in lanes with their FMUs"""
+_ANNOUNCED = 3
+"""Largest number of failed runs that are announced"""
 
 
 @explains_missing
@@ -62,82 +62,82 @@ def sweep(
 ) -> Swept:
     """Run what the store of a study does not have, writing each row as it comes.
 
-    `metrics` are more of what each run comes to, by name: functions of its `Result` that give a number, or None for no
-    value. Their source is what is run, in other processes, and what a run is known by, so a function has all that it
-    uses in itself, but for modules. Such runs are flown one at a time.
+    `metrics` are further metrics by name: functions of a run's `Result` that return a number, or None for no value.
+    Their source is executed in other processes and identifies the run, so a function must contain everything that it
+    uses, except modules. Such runs are executed one at a time.
 
-    The store is in `folder`, default `results/NAME`: what is there is not flown again, so that a sweep may be
-    stopped and called again. Runs are flown by `workers` processes of this machine, which need no guard of the main
-    module and work from a notebook, or by those of a `dask` scheduler at that address. The engine `batch` flies them as
-    lanes of native FMUs, `cuda` as threads of a GPU, and some of them by the FMUs too, to compare; `auto` takes lanes
-    where these can be had, else native FMUs one at a time, else the FMUs as they are. A run that takes more than
-    `time_limit` [s] of the processor has failed, and says so. `progress` hears how many of how many are done,
-    `announce` what flies and of runs that failed; None for silence.
+    The store is in `folder`, default `results/NAME`; runs in it are not repeated, so that a sweep may be stopped and
+    called again. Runs are executed by `workers` processes of this machine, which need no guard of the main module and
+    work from a notebook, or by those of the `dask` scheduler at this address. The engine `batch` runs native FMUs in
+    SIMD lanes, `cuda` in threads of a GPU, and repeats some runs with the FMUs to compare; `auto` uses lanes if
+    available, else native FMUs one at a time, else the FMUs as they are. A run that takes more than `time_limit` [s] of
+    processor time fails. `progress` is called with the number of runs done and the total, `announce` with the engine
+    and failed runs; None for silence.
 
-    Raises `UsageError`, before anything is flown, for a design with a run that cannot be, or if the store holds
-    another study, saying what differs; `QuadcosimError` for what is not a run's own failure, without a row;
-    `KeyboardInterrupt`, which says how far it came, after Ctrl-C.
+    Raises `UsageError`, before any run, for a design with an invalid run, or if the store holds another study, stating
+    the difference; `QuadcosimError` for failures not caused by a run, without a row; `KeyboardInterrupt`, stating how
+    far it came, after Ctrl-C.
     """
     _expect_workers(workers, dask)
     if time_limit is not None and not time_limit > 0.0:
         raise UsageError(f"--time-limit {time_limit:g}: expected a positive number of seconds")
     if metrics is not None:
         study = replace(study, metrics=metrics_from_sources(metrics))
-    study, files, how, follows = ready(study, engine)
+    study, files, execution, follows = prepare(study, engine)
     path = store.store_path(study.name, folder)
-    with runs_reporter(progress) as hear, store.open_for_writing(path, study.judged) as opened:
+    with runs_reporter(progress) as report, store.open_for_writing(path, study.metric_names) as opened:
         _describe(opened, study, files)
         missing = _missing(opened, study, retry_failed)
-        counted = _Counted(len(study.points), opened, hear, announce)
+        sweep_progress = _Progress(len(study.points), opened, report, announce)
         agreement = None
         if missing:
-            opened.describe({ENGINE: how.name})
+            opened.describe({ENGINE: execution.name})
             if announce is not None and engine == "auto":
-                announce(str(how))
-            flown_with = with_python_twins(files) if how.in_lanes else files
+                announce(str(execution))
+            all_files = with_python_twins(files) if execution.in_lanes else files
             task_of = partial(_task, study, files.start_values_of(study.origin), time_limit)
-            tasks = (task_of(index, key, how.engine) for index, key in missing.items())
+            tasks = (task_of(index, key, execution.engine) for index, key in missing.items())
             lanes: dict[str, Row] = {}
             try:
-                with _workers(Inputs.of(flown_with), workers, dask) as fly:
-                    asked = chunks(tasks, len(missing), workers, how.on_gpu) if how.in_lanes else tasks
-                    with contextlib.closing(fly(asked)) as outcomes:
-                        for some in outcomes:
-                            _keep(some, opened)
-                            counted.add(some)
-                            lanes |= {each.row.key: each.row for each in some if each.in_lanes}
-                    agreement = vouched(lanes, flown_with, partial(task_of, engine=None), fly)
+                with _workers(Inputs.of(all_files), workers, dask) as run:
+                    parts = chunks(tasks, len(missing), workers, execution.on_gpu) if execution.in_lanes else tasks
+                    with contextlib.closing(run(parts)) as results:
+                        for outcomes in results:
+                            _keep(outcomes, opened)
+                            sweep_progress.add(outcomes)
+                            lanes |= {each.row.key: each.row for each in outcomes if each.in_lanes}
+                    agreement = lane_agreement(lanes, all_files, partial(task_of, engine=None), run)
             except KeyboardInterrupt:
-                raise Interrupted(f"with {counted.done} of {counted.total} runs done") from None
+                raise Interrupted(f"with {sweep_progress.done} of {sweep_progress.total} runs done") from None
         if agreement is not None:
             opened.describe({AGREEMENT: agreement.as_text()})
             agreement.expect()
         failed = opened.counts().get("failed", 0)
     return Swept(
-        study=study, total=counted.total, flown=len(missing), failed=failed, path=path, engine=how.name,
+        study=study, total=len(study.points), flown=len(missing), failed=failed, path=path, engine=execution.name,
         agreement=agreement, follows=follows,
     )  # fmt: skip
 
 
-def ready(study: Study, engine: EngineChoice) -> tuple[Study, Files, Execution, tuple[str, ...]]:
-    """A study as it is flown by an engine, its files, how, and what is followed in it, by whom.
+def prepare(study: Study, engine: EngineChoice) -> tuple[Study, Files, Execution, tuple[str, ...]]:
+    """A study as an engine runs it, its files, how it is executed, and its references with their followers.
 
-    Raises `UsageError` for a run that cannot be.
+    Raises `UsageError` for an invalid run.
     """
-    found: dict[bool, tuple[Study, Files, tuple[str, ...]]] = {}
+    candidates: dict[bool, tuple[Study, Files, tuple[str, ...]]] = {}
 
     def first(native: bool) -> tuple[System, Files]:
-        asked = replace(study, native=native)
-        files = asked.files()
-        found[native] = asked, files, expect_flyable(asked, files)
-        return asked.system(0, files.start_values_of(asked.origin)), files
+        candidate = replace(study, native=native)
+        files = candidate.files()
+        candidates[native] = candidate, files, check_design(candidate, files)
+        return candidate.system(0, files.start_values_of(candidate.origin)), files
 
-    apart = "metrics that are functions need whole runs, one at a time" if study.metrics else None
-    how = choose_execution(engine, study.native, first, no_lanes=apart)
-    if how.native not in found:
-        first(how.native)
-    flown, files, follows = found[how.native]
-    return flown, files, how, follows
+    no_lanes = "metrics that are functions need whole runs, one at a time" if study.metrics else None
+    execution = choose_execution(engine, study.native, first, no_lanes=no_lanes)
+    if execution.native not in candidates:
+        first(execution.native)
+    prepared, files, follows = candidates[execution.native]
+    return prepared, files, execution, follows
 
 
 def _expect_workers(workers: int, dask: str | None) -> None:
@@ -148,7 +148,7 @@ def _expect_workers(workers: int, dask: str | None) -> None:
 
 
 def _workers(inputs: Inputs, workers: int, dask: str | None) -> AbstractContextManager[TaskRunner]:
-    """Those that fly tasks, here or on a cluster."""
+    """The workers that run tasks, local or on a cluster."""
     return local_workers(inputs, workers) if dask is None else cluster(inputs, dask)
 
 
@@ -163,34 +163,34 @@ def expect_current(opened: store.Store, study: Study) -> None:
     )
     if changes:
         raise UsageError(
-            f"{opened.path}: the study file has changed since ({changes}); expected the study that was flown: "
-            "quadcosim sweep flies what is missing"
+            f"{opened.path}: the study file has changed since ({changes}); expected the study that was run: "
+            "quadcosim sweep runs what is missing"
         )
 
 
-class _Counted:
-    """How far a sweep is, for those who want to hear of it."""
+class _Progress:
+    """Counts the runs of a sweep, and reports progress and failures."""
 
-    def __init__(self, total: int, opened: store.Store, hear: Count, announce: Announce | None) -> None:
+    def __init__(self, total: int, opened: store.Store, report: Count, announce: Announce | None) -> None:
         self.total, self.failed = total, 0
-        self._hear, self._announce = hear, announce
-        self._lacking = opened.missing_counts()
-        self.done = total - sum(self._lacking.values())
-        self._tell()
+        self._callback, self._announce = report, announce
+        self._missing = opened.missing_counts()
+        self.done = total - sum(self._missing.values())
+        self._report()
 
     def add(self, outcomes: Iterable[Outcome]) -> None:
-        """More runs have a row."""
+        """Count runs that have been written."""
         for row in (outcome.row for outcome in outcomes):
             if row.status == "failed":
                 self.failed += 1
-                if self._announce is not None and self.failed <= _TOLD:
-                    more = "; further ones are not told" if self.failed == _TOLD else ""
-                    self._announce(f"{described(row.index, row.settings)} failed: {row.message}{more}")
-            self.done += self._lacking.pop(row.key, 0)
-        self._tell()
+                if self._announce is not None and self.failed <= _ANNOUNCED:
+                    more = "; further ones are not shown" if self.failed == _ANNOUNCED else ""
+                    self._announce(f"{describe_run(row.index, row.settings)} failed: {row.message}{more}")
+            self.done += self._missing.pop(row.key, 0)
+        self._report()
 
-    def _tell(self) -> None:
-        self._hear(self.done, self.total)
+    def _report(self) -> None:
+        self._callback(self.done, self.total)
 
 
 def _task(
@@ -209,18 +209,18 @@ def _task(
 
 
 def _missing(opened: store.Store, study: Study, retry_failed: bool) -> dict[int, str]:
-    """The places of the design that are to be flown, with their keys: without a row, or without signals to be kept."""
+    """The indices and keys of the design to run: without a row, or without the signals to keep."""
     missing = opened.missing(failed_too=retry_failed)
     if not study.keep_signals:
         return missing
-    lacking = {
+    without_signals = {
         row["design_index"]: row["key"]
         for row in opened.rows()
         if study.keeps_signals(row["design_index"])
         and row["status"] == "done"
         and not _signals_path(opened, row["key"]).is_file()
     }
-    return dict(sorted({**missing, **lacking}.items()))
+    return dict(sorted({**missing, **without_signals}.items()))
 
 
 def _signals_path(opened: store.Store, key: str) -> Path:
@@ -228,7 +228,7 @@ def _signals_path(opened: store.Store, key: str) -> Path:
 
 
 def _keep(outcomes: Sequence[Outcome], opened: store.Store) -> None:
-    """Signals first, then the rows, so that a row never lacks what it promises."""
+    """Write signals first, then the rows, so that every row has its signals."""
     for outcome in outcomes:
         if outcome.signals is not None:
             target = _signals_path(opened, outcome.row.key)
@@ -240,7 +240,7 @@ def _keep(outcomes: Sequence[Outcome], opened: store.Store) -> None:
 
 
 def _describe(opened: store.Store, study: Study, files: Files) -> None:
-    """A store belongs to one study, whose design may grow; a changed one is told what changed."""
+    """Describe the study in its store, which may hold no other; the design may grow."""
     about = opened.about()
     parts, place = study_parts(study), place_parts(study, files)
     if STUDY_PARTS in about:
@@ -268,12 +268,12 @@ def _describe(opened: store.Store, study: Study, files: Files) -> None:
             "versions": json.dumps(versions()),
             UNITS: json.dumps(_units(study, files)),
         },
-        _places(study, files),
+        _design_points(study, files),
     )
 
 
 def _units(study: Study, files: Files) -> dict[str, str]:
-    """Of the axes, and of what its runs come to, as the first of them has them."""
+    """The units of axes and metrics, as in the first run."""
     first = study.system(0, files.start_values_of(study.origin))
     models = files.models_of(first)
     of_axes = {
@@ -284,7 +284,7 @@ def _units(study: Study, files: Files) -> dict[str, str]:
     return {name: unit for name, unit in of_axes.items() if unit} | check_against_fmus(first, models).units
 
 
-def _places(study: Study, files: Files) -> Iterator[store.DesignPoint]:
+def _design_points(study: Study, files: Files) -> Iterator[store.DesignPoint]:
     starts = files.start_values_of(study.origin)
     for index in range(len(study.points)):
         settings, system = study.settings_and_system(index, starts)

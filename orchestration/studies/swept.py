@@ -1,4 +1,4 @@
-"""What a sweep leaves, to look at."""
+"""The result of a sweep."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -20,34 +20,34 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Swept:
-    """A study that was flown: how that went, and where its rows are."""
+    """The result of a sweep: counts of runs, and the store with the rows."""
 
     total: int
-    """How many runs the study has."""
+    """The number of runs of the study."""
     flown: int
-    """How many of them this sweep has flown; the others were there."""
+    """How many of them this sweep has run; the others were in the store."""
     failed: int
-    """How many runs in the store have failed, as `message` in their row says; a run that diverges has not."""
+    """How many runs in the store have failed, with `message` in their row; divergence is not a failure."""
     study: Study
-    """What was flown."""
+    """The study as it was run."""
     path: Path
     """The store of the study."""
     engine: str
-    """What flew, as `--engine` has it."""
+    """The engine, by its name in `--engine`."""
     agreement: Agreement | None = None
-    """How runs flown as lanes agree with the same flown by FMUs; None if none were."""
+    """Agreement of runs in SIMD lanes with the same runs by FMUs; None if there were none."""
     follows: tuple[str, ...] = ()
-    """What is followed in its runs, and by whom."""
+    """The references of its runs and the components that follow them."""
 
     def __repr__(self) -> str:
         return f"<Swept: {self._counts()}, in {self.path}>"
 
     def _counts(self) -> str:
         failed = f", {self.failed} failed" if self.failed else ""
-        return f"{self.total} runs, {self.flown} flown now{failed}"
+        return f"{self.total} runs, {self.flown} of them new{failed}"
 
     def _repr_html_(self) -> str:
-        """As notebooks show it: what became of how many runs."""
+        """The form that notebooks show: the number of runs by outcome."""
         with open_for_reading(self.path) as opened:
             outcomes = Counter(str(outcome or "failed") for block in opened.blocks() for outcome in block["outcome"])
         rows = [(outcome, str(count), "runs") for outcome, count in outcomes.most_common()]
@@ -55,16 +55,16 @@ class Swept:
 
     @explains_missing
     def plot(self, metric: str | None = None) -> "Figures":
-        """The figures of a metric over the axes, by default of the first that varies; a notebook shows them.
+        """The figures of a metric over the axes, default: the first that varies; a notebook shows them.
 
-        Raises `UsageError` for a metric that does not exist, or axes that no figure is for.
+        Raises `UsageError` for an unknown metric, or axes for which there is no figure.
         """
         from orchestration.figures.gallery import Figures
         from orchestration.figures.style import SCREEN
         from orchestration.studies.drawing import study_figures
 
-        made, _ = study_figures(self.study, self.path, metric, SCREEN)
-        return Figures(made, SCREEN)
+        figures, _ = study_figures(self.study, self.path, metric, SCREEN)
+        return Figures(figures, SCREEN)
 
     @explains_missing
     def to_pandas(self) -> "pd.DataFrame":

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 FORMATS = ("parquet", "csv", "mat")
 
 SHARED = (*TEXTS, "status", "machine")
-"""Columns of few words"""
+"""Columns with few distinct texts"""
 
 
 def frame(path: Path) -> "pd.DataFrame":
@@ -41,7 +41,7 @@ def frame(path: Path) -> "pd.DataFrame":
         table[name] = table[name].astype("boolean")
     for name in ("steps", "design_index", "seed"):
         table[name] = table[name].astype("Int64")
-    settings = settings.drop(columns=[name for name in settings if name in table])  # no axis but the seed's can be
+    settings = settings.drop(columns=[name for name in settings if name in table])  # only an axis of seeds can coincide
     table = pd.concat([table[["design_index"]], settings, table.drop(columns="design_index")], axis=1)
     for kind, prefix in (("guids", "guid"), ("versions", "version")):
         for name, value in json.loads(about[kind]).items():
@@ -50,19 +50,19 @@ def frame(path: Path) -> "pd.DataFrame":
 
 
 def _columns(store: Store, axes: Sequence[str]) -> tuple[dict[str, list[Any]], dict[str, Any]]:
-    """The settings by axis and the other columns of a store's rows, each whole; block by block, for there are many."""
+    """The settings by axis and the other columns of a store's rows, read block by block."""
     settings: dict[str, list[Any]] = {name: [] for name in axes}
     blocks: dict[str, list[Any]] = {name: [] for name in store.columns}
-    known: dict[Any, Any] = {}  # a text that many rows share is kept once
+    known: dict[Any, Any] = {}  # keeps one object per text
     for block in store.blocks():
         points = json.loads(f"[{','.join(block.pop(SETTINGS))}]")
         for name, values in settings.items():
             values += [point[name] for point in points]
-        for name, found in block.items():
+        for name, column in block.items():
             if name in store.metrics and name not in TEXTS:
-                blocks[name].append(np.array(found, dtype=float))
+                blocks[name].append(np.array(column, dtype=float))
             else:
-                blocks[name] += [known.setdefault(each, each) for each in found] if name in SHARED else found
+                blocks[name] += [known.setdefault(each, each) for each in column] if name in SHARED else column
     numeric = {name: np.concatenate(blocks[name] or [[]]) for name in store.metrics if name not in TEXTS}
     return settings, {**blocks, **numeric}
 
@@ -86,14 +86,14 @@ def dataset(path: Path) -> "xr.Dataset":
 
 
 def units_in(path: Path) -> dict[str, str]:
-    """The units of the axes and metrics in a store that have one."""
+    """The units of the axes and metrics in a store."""
     with open_for_reading(path) as opened:
-        found: dict[str, str] = json.loads(opened.about().get(UNITS, "{}"))
-    return {**found, "duration": "s"}
+        units: dict[str, str] = json.loads(opened.about().get(UNITS, "{}"))
+    return {**units, "duration": "s"}
 
 
 def _with_units(table: Any, units: Mapping[str, str]) -> Any:
-    """A table whose fields say their unit in their metadata."""
+    """A table with the units in the metadata of its fields."""
     fields = [f.with_metadata({"unit": units[f.name]}) if f.name in units else f for f in table.schema]
     return table.cast(pa.schema(fields, metadata=table.schema.metadata))
 
@@ -120,7 +120,7 @@ def _write_mat(table: Any, file: Path) -> None:
 
 
 def _column(values: Any) -> Any:
-    """As MATLAB has it: numbers with NaN for what is not there, texts with empty ones."""
+    """The values for MATLAB: NaN for missing numbers, empty for missing texts."""
     if pa.types.is_string(values.type) or pa.types.is_large_string(values.type):
         return [text or "" for text in values.to_pylist()]
     return values.to_pandas().to_numpy(float, na_value=np.nan)

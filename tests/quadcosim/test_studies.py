@@ -42,7 +42,7 @@ def test_a_sweep_is_not_flown_twice_and_tells_its_progress(swept: Swept) -> None
         STUDY, folder=swept.path.parent, progress=lambda done, total: reported.append((done, total))
     )
     assert (again.total, again.flown, reported) == (2, 0, [(2, 2)])
-    assert repr(again) == f"<Swept: 2 runs, 0 flown now, in {again.path}>"
+    assert repr(again) == f"<Swept: 2 runs, 0 of them new, in {again.path}>"
 
 
 MARGIN = 2.0

@@ -102,7 +102,7 @@ def test_failed_runs_are_told_at_once_and_fail_the_command(folder: Path, main: M
     assert told.pop() == "follows the trajectory that UnifiedController has built in"
     assert len(told) == 3
     assert told[0].startswith("run 1 (period = 0.02, delay = 0.0, plant.mass = 0.0) failed: plant.mass = 0.0: ")
-    assert told[2].endswith("; further ones are not told")
+    assert told[2].endswith("; further ones are not shown")
     assert "12 of 12 runs, 6 failed, 0 missing" in main("status", "study.toml").stdout
     again = main("sweep", "study.toml", "--engine", "compiled", "--retry-failed", code=1)
     assert "12 runs, 6 of them new, 6 failed" in again.stdout

@@ -140,7 +140,7 @@ def test_a_study_that_was_never_flown_is_told(tmp_path: Path) -> None:
 def test_what_flies_has_settled() -> None:
     runs = table(4)
     runs["outcome"] = ["settled", "bounded", "diverged", None]  # the last of a run that failed
-    assert figures.flew(judged(runs)).tolist() == [True, False, False, False]
+    assert figures.good_runs(judged(runs)).tolist() == [True, False, False, False]
 
 
 def test_a_line_goes_through_what_flies_in_order_and_the_rest_is_crossed() -> None:

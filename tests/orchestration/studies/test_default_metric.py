@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from orchestration.studies.shown_first import shown_first
+from orchestration.studies.default_metric import default_metric
 
 VALUES = {
     "alike": np.array([1.0, 1.0, np.nan]),
@@ -26,4 +26,4 @@ VALUES = {
 def test_the_first_objective_that_varies_else_the_one_of_the_criterion(
     objectives: tuple[str, ...], preferred: str | None, expected: str
 ) -> None:
-    assert shown_first(objectives, VALUES.__getitem__, preferred) == expected
+    assert default_metric(objectives, VALUES.__getitem__, preferred) == expected

@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from orchestration.basics.errors import QuadcosimError
+from orchestration.studies.lane_agreement import lane_agreement, with_python_twins
 from orchestration.studies.study import Study
-from orchestration.studies.vouching import vouched, with_python_twins
 from orchestration.system.model import System
 from orchestration.workers.batching import Agreement
 from orchestration.workers.row import Row
@@ -29,7 +29,7 @@ def chosen() -> Study:
 
 
 def agreement(chosen: Study, error: Error) -> Agreement | None:
-    """What two runs are vouched for by, if each way to fly is off by so much."""
+    """What two runs are lane_agreement for by, if each way to fly is off by so much."""
     files = with_python_twins(chosen.files())
 
     def row(task: RunTask, chunk: bool) -> Row:
@@ -45,7 +45,7 @@ def agreement(chosen: Study, error: Error) -> Agreement | None:
                 assert files.fmus.keys() >= {*one.system.fmus.values()}
                 yield [Outcome(row=row(one, isinstance(each, Chunk)))]
 
-    return vouched({str(i): row(task(i, str(i)), True) for i in range(2)}, files, task, fly)
+    return lane_agreement({str(i): row(task(i, str(i)), True) for i in range(2)}, files, task, fly)
 
 
 def in_python(task: RunTask) -> bool:
