@@ -20,7 +20,7 @@ def test_there_are_a_flight_a_limit_a_controller_of_ones_own_and_arrays() -> Non
 
 @pytest.fixture(scope="module")
 def executed(tmp_path_factory: pytest.TempPathFactory) -> dict[Path, list[Any]]:
-    """The cells of each notebook with their outputs, run in one kernel: to start one takes as long as to run a notebook.
+    """The cells of each notebook with their outputs, run in one kernel: starting one takes as long as a notebook.
 
     Each begins in an empty folder and with none of the names of the one before.
     """

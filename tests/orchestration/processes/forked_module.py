@@ -10,6 +10,7 @@ from orchestration.processes.channel import Parent
 
 IMPORTED_BY = os.getpid()
 """The process that has imported this module"""
+tempfile.gettempdir()  # which is remembered
 
 
 def main(what: str, *arguments: str) -> None:
