@@ -22,7 +22,7 @@ from orchestration.system.distribution import Varying as Delay
 from orchestration.system.model import System
 from orchestration.system.paths import changed
 from orchestration.system.placement import placed_messages, placed_tasks
-from orchestration.system.times import NANOSECONDS, down_to_nanoseconds, exact_nanoseconds
+from orchestration.system.times import NANOSECONDS, exact_nanoseconds, floor_to_nanoseconds
 
 EXECUTION = "execution"
 
@@ -82,7 +82,7 @@ class ScheduledLoop:
                 return True
             return False
 
-        return down_to_nanoseconds(bisected(fails, 0.0, self._cause.period, FINE * self._cause.period).good or 0.0)
+        return floor_to_nanoseconds(bisected(fails, 0.0, self._cause.period, FINE * self._cause.period).good or 0.0)
 
     def value_of(self, family: Family) -> float:
         """The largest value [s] whose windows are no wider than those of a family."""
@@ -96,7 +96,7 @@ class ScheduledLoop:
             return len(widths) > len(most) or (len(widths) == len(most) and any(a > b for a, b in zip(widths, most)))
 
         found = bisected(fails, 0.0, self._cause.period, 0.5 / NANOSECONDS).good or 0.0
-        return min(down_to_nanoseconds(found), self.largest())
+        return min(floor_to_nanoseconds(found), self.largest())
 
     def _windows(self, value: float) -> dict[str, Window]:
         windows = windows_of(self._cause.with_draws_up_to(self._system, value))

@@ -31,7 +31,7 @@ from orchestration.stability.loop_at_rest import at_rest
 from orchestration.system.distribution import lowest
 from orchestration.system.placement import messages_by_connection, tasks_of
 from orchestration.system.request import Request, errors_in_own_terms, system_of
-from orchestration.system.times import NANOSECONDS, down_to_nanoseconds
+from orchestration.system.times import NANOSECONDS, floor_to_nanoseconds
 from orchestration.system.variable_names import variable_of
 
 MOST_LOST = 8
@@ -149,7 +149,7 @@ def _of_times(timeline: Timeline, varying: Varying, progress: Share) -> Certifie
     def up_to(value: float) -> Family:
         return timeline.family([value])
 
-    largest = down_to_nanoseconds(timeline.largest())
+    largest = floor_to_nanoseconds(timeline.largest())
     searched = (
         f"draws at either end of each range, sequences that repeat after at most {LONGEST}, values up to {largest:g} s"
     )
@@ -234,7 +234,7 @@ def largest_certified(
         nonlocal best, step, attempts
         attempts += 1
         progress(1.0 - 0.7**attempts)
-        value = down_to_nanoseconds(share * top)
+        value = floor_to_nanoseconds(share * top)
         found = find_certificate(family_up_to(value), of, step)
         if found is not None:
             best, step = (value, found.certificate.to_json()), found.step

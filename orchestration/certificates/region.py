@@ -19,7 +19,7 @@ from orchestration.certificates.timeline import Timeline
 from orchestration.figures.palette import BLUE, RED
 from orchestration.figures.style import SCREEN, Style, save
 from orchestration.requests.request import RequestLike, request_of
-from orchestration.system.times import down_to_nanoseconds
+from orchestration.system.times import floor_to_nanoseconds
 
 COLUMNS = 6
 """values of the first quantity, from 0 to the one that alone breaks the loop"""
@@ -99,13 +99,13 @@ def region(
     paths = (pair[0].path, pair[1].path)
     with share_reporter(progress, "certifying") as report:
         widest = _least_breaking(timeline, 0.0, first=True)
-        most = down_to_nanoseconds(timeline.largest()) if widest is None else widest.value
+        most = floor_to_nanoseconds(timeline.largest()) if widest is None else widest.value
         certified, breaking, texts = list[Pair](), list[Pair](), list[str]()
         for i in range(columns):
             report(i / columns)
-            a = down_to_nanoseconds(most * i / columns)
+            a = floor_to_nanoseconds(most * i / columns)
             broken = _least_breaking(timeline, a)
-            top = down_to_nanoseconds(timeline.largest() - a) if broken is None else broken.value
+            top = floor_to_nanoseconds(timeline.largest() - a) if broken is None else broken.value
             if broken is not None:
                 breaking.append((a, broken.value))
             b, text = largest_certified(_second_varies(timeline, a), paths, top, lambda share: None, SHARES)
@@ -129,4 +129,4 @@ def _least_breaking(timeline: Timeline, other: float, *, first: bool = False) ->
     def up_to(value: float) -> Family:
         return timeline.family([value, other] if first else [other, value])
 
-    return least_breaking(up_to, down_to_nanoseconds(timeline.largest() - other), LONGEST)
+    return least_breaking(up_to, floor_to_nanoseconds(timeline.largest() - other), LONGEST)

@@ -80,8 +80,8 @@ def show(
 ) -> CommandResult:
     """Show a system: components with their rates, connections with their delay, jitter, loss and hold, units."""
     from orchestration.system.description import as_text
+    from orchestration.system.file_tables import tables_of
     from orchestration.system.request import system_of
-    from orchestration.system.written import tables_of
 
     meant = system_of(request_from(system, flags, timing))
     if out is not None:

@@ -42,42 +42,42 @@ def fixed_priority(tasks: Sequence[Periodic], *, preemptive: bool, switch: int) 
     Tasks of equal priority count as more urgent than each other. Every start and every resume costs `switch`: a job
     that preempts another adds its own and a second one of the other.
     """
-    tasks = [_on_grid(task) for task in tasks]
+    tasks = [_with_rounding(task) for task in tasks]
     return [_of_task(tasks, i, preemptive, switch) for i in range(len(tasks))]
 
 
 def can(frames: Sequence[Periodic], *, bit: int) -> list[int | None]:
     """Bounds on the responses of the messages on a CAN bus; `bit` is the time of a bit, rounded up."""
-    frames = [_on_grid(frame) for frame in frames]
+    frames = [_with_rounding(frame) for frame in frames]
     found = []
     for i, frame in enumerate(frames):
         above = [other for j, other in enumerate(frames) if j != i and other.priority < frame.priority]
         below = [other.execution for other in frames if other.priority > frame.priority]
-        found.append(_uninterrupted(frame, above, blocking=max(below, default=0), seen_after=bit))
+        found.append(_nonpreemptive_response(frame, above, blocking=max(below, default=0), seen_after=bit))
     return found
 
 
 def earliest_deadline(tasks: Sequence[Periodic], *, preemptive: bool, switch: int) -> list[int | None]:
     """The deadlines of the tasks, if all jobs always meet them; else None for each."""
     begins = 2 * switch if preemptive else switch
-    tasks = [_costing(_on_grid(task), begins) for task in tasks]
-    holds = _load(tasks) <= 1 and _meets_demand(tasks, preemptive)
+    tasks = [_with_overhead(_with_rounding(task), begins) for task in tasks]
+    holds = _utilisation(tasks) <= 1 and _meets_demand(tasks, preemptive)
     return [task.deadline if holds else None for task in tasks]
 
 
-def _on_grid(task: Periodic) -> Periodic:
+def _with_rounding(task: Periodic) -> Periodic:
     """The task with the rounding of its releases as jitter, if its period is no whole number of nanoseconds."""
     if task.period is None or task.period == int(task.period):
         return task if task.period is None else replace(task, period=int(task.period))
     return replace(task, jitter=task.jitter + 1)
 
 
-def _costing(task: Periodic, more: int) -> Periodic:
+def _with_overhead(task: Periodic, more: int) -> Periodic:
     """The task with `more` overhead; at least 1 ns in all, as jobs of one task start 1 ns apart."""
     return replace(task, execution=max(task.execution + more, 1))
 
 
-def _load(tasks: Sequence[Periodic]) -> Fraction:
+def _utilisation(tasks: Sequence[Periodic]) -> Fraction:
     """The utilisation by the tasks; above 1 if it is unknown."""
     if any(task.period is None for task in tasks):
         return Fraction(2)
@@ -90,12 +90,12 @@ def _released(task: Periodic, within: int) -> int:
     return int(-(-(within + task.jitter) // task.period))
 
 
-def _after(work: int, tasks: Sequence[Periodic], within: int, seen_after: int = 0) -> int:
+def _total_work(work: int, tasks: Sequence[Periodic], within: int, seen_after: int = 0) -> int:
     """`work`, with all jobs of `tasks` that are released in the interval `within` and `seen_after` beyond it."""
     return work + sum(_released(task, within + seen_after) * task.execution for task in tasks)
 
 
-def _settled(first: int, following: Callable[[int], int]) -> int | None:
+def _fixed_point(first: int, following: Callable[[int], int]) -> int | None:
     """The fixed point of an increasing iteration; None: not within `STEPS`."""
     before = first
     for _ in range(STEPS):
@@ -107,24 +107,26 @@ def _settled(first: int, following: Callable[[int], int]) -> int | None:
 
 
 def _of_task(tasks: Sequence[Periodic], i: int, preemptive: bool, switch: int) -> int | None:
-    own = _costing(tasks[i], switch)
+    own = _with_overhead(tasks[i], switch)
     others = [other for j, other in enumerate(tasks) if j != i]
-    above = [_costing(each, 2 * switch if preemptive else switch) for each in others if each.priority <= own.priority]
+    above = [
+        _with_overhead(each, 2 * switch if preemptive else switch) for each in others if each.priority <= own.priority
+    ]
     if preemptive:
-        return _interrupted(own, above)
+        return _preemptive_response(own, above)
     below = [each.execution + switch - 1 for each in others if each.priority > own.priority]
-    return _uninterrupted(own, above, blocking=max((0, *below)), seen_after=1)
+    return _nonpreemptive_response(own, above, blocking=max((0, *below)), seen_after=1)
 
 
-def _interrupted(own: Periodic, above: Sequence[Periodic]) -> int | None:
+def _preemptive_response(own: Periodic, above: Sequence[Periodic]) -> int | None:
     """The largest response in the longest busy period of jobs that those of `above` preempt."""
-    if _load([own, *above]) > 1:
+    if _utilisation([own, *above]) > 1:
         return None
     assert own.period is not None
     most, end = 0, 0
     for number in range(STEPS):
         work = (number + 1) * own.execution
-        found = _settled(max(end, work), partial(_after, work, above))
+        found = _fixed_point(max(end, work), partial(_total_work, work, above))
         if found is None:
             return None
         end = found
@@ -134,21 +136,21 @@ def _interrupted(own: Periodic, above: Sequence[Periodic]) -> int | None:
     return None
 
 
-def _uninterrupted(own: Periodic, above: Sequence[Periodic], *, blocking: int, seen_after: int) -> int | None:
+def _nonpreemptive_response(own: Periodic, above: Sequence[Periodic], *, blocking: int, seen_after: int) -> int | None:
     """The largest response in the longest busy period of jobs that are not preempted once started.
 
     Releases less than `seen_after` ns after the start of a job count as before it.
     """
-    if _load([own, *above]) > 1:
+    if _utilisation([own, *above]) > 1:
         return None
     assert own.period is not None
-    longest = _settled(own.execution, partial(_after, blocking, [own, *above]))
+    longest = _fixed_point(own.execution, partial(_total_work, blocking, [own, *above]))
     if longest is None or (count := _released(own, longest)) > STEPS:
         return None
     most, begin = 0, 0
     for number in range(count):
         before = blocking + number * own.execution
-        found = _settled(max(begin, before), partial(_after, before, above, seen_after=seen_after))
+        found = _fixed_point(max(begin, before), partial(_total_work, before, above, seen_after=seen_after))
         if found is None:
             return None
         begin = found
@@ -162,7 +164,7 @@ def _meets_demand(tasks: Sequence[Periodic], preemptive: bool) -> bool:
     """Whether the demand up to each deadline of the longest busy period is at most the time."""
     allowed = [task.deadline - task.jitter for task in tasks]
     block = 0 if preemptive else max((task.execution - 1 for task in tasks), default=0)
-    longest = _settled(sum(task.execution for task in tasks), partial(_after, block, tasks))
+    longest = _fixed_point(sum(task.execution for task in tasks), partial(_total_work, block, tasks))
     if longest is None or sum(_released(task, longest) for task in tasks) > STEPS:
         return False
     times: set[int] = set()
@@ -170,7 +172,7 @@ def _meets_demand(tasks: Sequence[Periodic], preemptive: bool) -> bool:
         assert task.period is not None
         count = max(math.ceil((longest - first) / Fraction(task.period)), 0) + 1
         times.update(math.floor(first + k * task.period) for k in range(count))
-    return all(_demand(tasks, allowed, time) + _blocked(tasks, allowed, time, preemptive) <= time for time in times)
+    return all(_demand(tasks, allowed, time) + _blocking(tasks, allowed, time, preemptive) <= time for time in times)
 
 
 def _demand(tasks: Sequence[Periodic], allowed: Sequence[int], time: int) -> int:
@@ -182,7 +184,7 @@ def _demand(tasks: Sequence[Periodic], allowed: Sequence[int], time: int) -> int
     return total
 
 
-def _blocked(tasks: Sequence[Periodic], allowed: Sequence[int], time: int, preemptive: bool) -> int:
+def _blocking(tasks: Sequence[Periodic], allowed: Sequence[int], time: int, preemptive: bool) -> int:
     """The blocking by a job that is due later, if it is not preempted."""
     if preemptive:
         return 0

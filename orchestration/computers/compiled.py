@@ -18,8 +18,8 @@ from orchestration.computers.parts import (
     ALL_KINDS,
     AT_ONCE,
     COLUMNS,
+    IS_CONSTANT,
     LATER,
-    STAYS,
     Carrier,
     Constant,
     Leg,
@@ -134,7 +134,7 @@ class CompiledScheduler:
         count = int(self._library.scheduler_run(self._handle, until))
         self._expect(count != _NO_MEMORY)
         if count < _NO_MEMORY:
-            raise self._parts.overfull(-2 - count)
+            raise self._parts.queue_overflow(-2 - count)
         self._notes.collect(count)
 
     def take_notes(self) -> Integers:
@@ -161,7 +161,7 @@ class _Numbers:
         self.used = np.full(len(streams), AT_ONCE, dtype=np.int64)
         for i, stream in enumerate(streams):
             if isinstance(stream, Constant):
-                self._table[i, 0], self.used[i] = stream.value, STAYS
+                self._table[i, 0], self.used[i] = stream.value, IS_CONSTANT
         self.failure: BaseException | None = None
 
     def draw(self, stream: int) -> None:

@@ -20,7 +20,7 @@ Stream: TypeAlias = Callable[[int], Integers]
 """The next `count` numbers: times [ns], or 0 and 1"""
 AT_ONCE = 1024
 """Numbers drawn at once"""
-STAYS = -1
+IS_CONSTANT = -1
 """In place of the used numbers of a stream: it is constant"""
 
 MOST_WAITING = 2**20
@@ -130,7 +130,7 @@ class Parts:
     places: Sequence[str] = ()
     """the paths of tasks, then of messages, for errors"""
 
-    def overfull(self, owner: int) -> UsageError:
+    def queue_overflow(self, owner: int) -> UsageError:
         """The error for a task, or with an index after those of all tasks a message, of which too many wait."""
         place = self.places[owner] if owner < len(self.places) else str(owner)
         if owner < len(self.tasks):

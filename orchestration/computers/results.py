@@ -18,7 +18,7 @@ RUN, SWITCH, CORRUPTED = range(3)
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Served:
+class _Records:
     """Jobs or frames, in the order of their release."""
 
     nominal: Integers
@@ -60,7 +60,7 @@ class _Served:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Jobs(_Served):
+class Jobs(_Records):
     """The jobs of one task, by index in the order of release, including skipped ones."""
 
     released: Integers
@@ -80,7 +80,7 @@ class Jobs(_Served):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Frames(_Served):
+class Frames(_Records):
     """The messages of one name, in the order in which they were queued."""
 
     queued: Integers

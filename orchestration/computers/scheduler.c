@@ -26,7 +26,7 @@ typedef struct {
 } TaskState;
 
 typedef struct {
-    int64_t running, at_work, ready_at, changed;
+    int64_t running, executing, ready_at, changed;
 } ProcessorState;
 
 typedef struct {
@@ -51,7 +51,7 @@ typedef struct {
     int64_t counts[PART_KINDS];
     const int64_t *processors, *tasks, *carriers, *releases, *messages, *legs, *links;
     int64_t **numbers; /* of each stream, AT_ONCE of them */
-    int64_t *used;     /* how many of these are used, or STAYS */
+    int64_t *used;     /* how many of these are used, or IS_CONSTANT */
     int64_t *notes, room, note_count;
     const uint8_t *kept; /* which kinds of notes are kept */
     void (*draw)(int64_t stream);
@@ -70,7 +70,7 @@ typedef struct {
     int64_t *busy, *line, *deadline, *arrival, *release, *instant, *hop, *slot; /* parts of due */
     int has_deadlines; /* whether any task writes or aborts at its deadline */
     int no_memory;
-    int64_t overfull; /* the task, or after all tasks the message, of which too many wait */
+    int64_t queue_overflow; /* the task, or after all tasks the message, of which too many wait */
 } Scheduler;
 
 /* -- queues, numbers, notes ---------------------------------------------------------------------------------------- */
@@ -104,13 +104,13 @@ static void grow(Scheduler *s, Queue *q) {
 
 static int has_room(Scheduler *s, const Queue *q, int64_t owner) {
     if (q->count < MOST_WAITING) return 1;
-    s->overfull = owner, s->no_memory = 1;
+    s->queue_overflow = owner, s->no_memory = 1;
     return 0;
 }
 
 static int64_t number(Scheduler *s, int64_t stream) {
     int64_t used = s->g.used[stream];
-    if (used == STAYS) return s->g.numbers[stream][0];
+    if (used == IS_CONSTANT) return s->g.numbers[stream][0];
     if (used == AT_ONCE) s->g.draw(stream), used = 0;
     s->g.used[stream] = used + 1;
     return s->g.numbers[stream][used];
@@ -283,7 +283,7 @@ static void finish(Scheduler *s, ProcessorState *processor, int64_t now) {
     TaskState *task = &s->tasks[i];
     Job job = *first_job(s, i);
     drop(&task->jobs);
-    processor->running = NONE, processor->at_work = 0;
+    processor->running = NONE, processor->executing = 0;
     note(s, now, FINISHED, i, job.number, 0);
     if (TASK(i, WRITES_AT_DEADLINE) && now <= job.deadline)
         PUSH(s, &task->unwritten, &job);
@@ -298,7 +298,7 @@ static void abort_job(Scheduler *s, int64_t i, int64_t now) {
     drop(&s->tasks[i].jobs);
     if (processor->running == i) {
         note(s, now, INTERRUPTED, i, job.number, 0);
-        processor->running = NONE, processor->at_work = 0;
+        processor->running = NONE, processor->executing = 0;
         s->busy[TASK(i, PROCESSOR)] = LATER;
     }
     note(s, now, ABORTED, i, job.number, 0);
@@ -330,15 +330,15 @@ static void preempt(Scheduler *s, ProcessorState *processor, int64_t now) {
     int64_t i = processor->running;
     if (i == NONE) return;
     Job *job = first_job(s, i);
-    if (processor->at_work) job->left -= now - processor->ready_at;
-    note(s, now, processor->at_work ? PREEMPTED : INTERRUPTED, i, job->number, 0);
-    processor->running = NONE, processor->at_work = 0;
+    if (processor->executing) job->left -= now - processor->ready_at;
+    note(s, now, processor->executing ? PREEMPTED : INTERRUPTED, i, job->number, 0);
+    processor->running = NONE, processor->executing = 0;
 }
 
 static void resume(Scheduler *s, ProcessorState *processor, int64_t now) {
     int64_t i = processor->running;
     Job *job = first_job(s, i);
-    processor->at_work = 1, processor->ready_at = now;
+    processor->executing = 1, processor->ready_at = now;
     note(s, now, job->started ? RESUMED : STARTED, i, job->number, 0);
     if (job->started) return;
     job->started = 1, s->tasks[i].started_at = now;
@@ -365,8 +365,8 @@ static void dispatch(Scheduler *s, int64_t p, int64_t now) {
     }
     int64_t then = LATER;
     if (processor->running != NONE) {
-        if (!processor->at_work && processor->ready_at <= now) resume(s, processor, now);
-        then = processor->ready_at + (processor->at_work ? first_job(s, processor->running)->left : 0);
+        if (!processor->executing && processor->ready_at <= now) resume(s, processor, now);
+        then = processor->ready_at + (processor->executing ? first_job(s, processor->running)->left : 0);
     }
     s->busy[p] = waits && now + 1 < then ? now + 1 : then;
 }
@@ -378,7 +378,7 @@ static void end(Scheduler *s, int64_t now) {
         ProcessorState *processor = &s->processors[p];
         if (s->busy[p] != now) continue;
         s->busy[p] = LATER, processor->changed = 1;
-        if (processor->at_work && processor->ready_at + first_job(s, processor->running)->left == now)
+        if (processor->executing && processor->ready_at + first_job(s, processor->running)->left == now)
             finish(s, processor, now);
     }
     EACH(k, LINKS) {
@@ -491,7 +491,7 @@ static void *zeros(Scheduler *s, int64_t count, size_t size) {
 EXPORTED Scheduler *scheduler_new(const Arguments *arguments) {
     Scheduler *s = calloc(1, sizeof(Scheduler));
     if (!s) return NULL;
-    s->g = *arguments, s->overfull = NONE;
+    s->g = *arguments, s->queue_overflow = NONE;
     const int64_t *n = s->g.counts;
     s->due_count = n[PROCESSORS] + 2 * n[LINKS] + 2 * n[TASKS] + n[CARRIERS] + n[MESSAGES] + n[LEGS];
     s->tasks = zeros(s, n[TASKS], sizeof(TaskState)), s->processors = zeros(s, n[PROCESSORS], sizeof(ProcessorState));
@@ -538,5 +538,5 @@ EXPORTED int64_t scheduler_run(Scheduler *s, int64_t until) {
     while (now <= last && !s->no_memory) now = process_instant(s, now);
     int64_t note_count = s->g.note_count;
     s->g.note_count = 0;
-    return s->overfull != NONE ? -2 - s->overfull : s->no_memory ? -1 : note_count;
+    return s->queue_overflow != NONE ? -2 - s->queue_overflow : s->no_memory ? -1 : note_count;
 }

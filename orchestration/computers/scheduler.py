@@ -90,13 +90,13 @@ class _TaskState:
 class _ProcessorState:
     """The state of a processor."""
 
-    __slots__ = ("at_work", "changed", "ready_at", "running", "tasks")
+    __slots__ = ("changed", "executing", "ready_at", "running", "tasks")
 
     def __init__(self, tasks: list[int]) -> None:
         self.tasks = tasks
         self.running = NONE
         """the task whose job has the processor"""
-        self.at_work = False
+        self.executing = False
         """whether that job executes, after its switch"""
         self.ready_at = 0
         """when its switch is over, or when it started to execute"""
@@ -247,7 +247,7 @@ class Scheduler:
             if due[self._busy + p] == now:
                 due[self._busy + p] = LATER
                 processor.changed = True
-                if processor.at_work and processor.ready_at + self._tasks[processor.running].jobs[0].left == now:
+                if processor.executing and processor.ready_at + self._tasks[processor.running].jobs[0].left == now:
                     self._finish(processor, now)
         for k, link in enumerate(self._links):
             if due[self._line + k] == now:
@@ -317,7 +317,7 @@ class Scheduler:
             return
         job = _Job(number, nominal, now, nominal + task.part.deadline, execution)
         if len(task.jobs) == MOST_WAITING:
-            raise self._parts.overfull(i)
+            raise self._parts.queue_overflow(i)
         task.jobs.append(job)
         self._note(now, RELEASED, i, number, nominal)
         if task.part.reads_at_release and task.part.overrun != ABORT:
@@ -346,7 +346,7 @@ class Scheduler:
         i = processor.running
         task = self._tasks[i]
         job = task.jobs.popleft()
-        processor.running, processor.at_work = NONE, False
+        processor.running, processor.executing = NONE, False
         self._note(now, FINISHED, i, job.number, 0)
         if task.part.writes_at_deadline and now <= job.deadline:
             task.unwritten.append(job)
@@ -359,7 +359,7 @@ class Scheduler:
         job, processor = task.jobs.popleft(), self._processors[task.part.processor]
         if processor.running == i:
             self._note(now, INTERRUPTED, i, job.number, 0)
-            processor.running, processor.at_work = NONE, False
+            processor.running, processor.executing = NONE, False
             self._due[self._busy + task.part.processor] = LATER
         self._note(now, ABORTED, i, job.number, 0)
         processor.changed = True
@@ -402,9 +402,9 @@ class Scheduler:
                 self._note(now, SWITCHING, chosen, self._tasks[chosen].jobs[0].number, 0)
         then = LATER
         if processor.running != NONE:
-            if not processor.at_work and processor.ready_at <= now:
+            if not processor.executing and processor.ready_at <= now:
                 self._resume(processor, now)
-            left = self._tasks[processor.running].jobs[0].left if processor.at_work else 0
+            left = self._tasks[processor.running].jobs[0].left if processor.executing else 0
             then = processor.ready_at + left
         self._due[self._busy + p] = min(then, now + 1) if waits else then
 
@@ -423,19 +423,19 @@ class Scheduler:
         if i == NONE:
             return
         job = self._tasks[i].jobs[0]
-        if processor.at_work:
+        if processor.executing:
             job.left -= now - processor.ready_at
             self._note(now, PREEMPTED, i, job.number, 0)
         else:
             self._note(now, INTERRUPTED, i, job.number, 0)
-        processor.running, processor.at_work = NONE, False
+        processor.running, processor.executing = NONE, False
 
     def _resume(self, processor: _ProcessorState, now: int) -> None:
         """Execute the job that has the processor: its switch is over."""
         i = processor.running
         task = self._tasks[i]
         job = task.jobs[0]
-        processor.at_work, processor.ready_at = True, now
+        processor.executing, processor.ready_at = True, now
         self._note(now, RESUMED if job.started else STARTED, i, job.number, 0)
         if not job.started:
             job.started, task.started_at = True, now
@@ -493,7 +493,7 @@ class Scheduler:
         leg = self._legs[j]
         frame.queued = now
         if len(leg.frames) == MOST_WAITING:
-            raise self._parts.overfull(len(self._tasks) + leg.message)
+            raise self._parts.queue_overflow(len(self._tasks) + leg.message)
         leg.frames.append(frame)
         self._links[leg.part.link].changed = True
 

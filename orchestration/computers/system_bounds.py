@@ -44,14 +44,14 @@ def _of_computer(computer: Computer) -> list[int | None]:
 def _periodic(task: Task, computer: Computer) -> Periodic:
     return Periodic(
         execution=nanoseconds(highest(task.execution)),
-        period=None if task.period is None else _true(task.period, computer.clock_ratio),
+        period=None if task.period is None else _true_period(task.period, computer.clock_ratio),
         jitter=nanoseconds(highest(task.jitter)),
         deadline=nanoseconds(task.due),
         priority=task.priority,
     )
 
 
-def _true(period: float, clock_ratio: float) -> Fraction:
+def _true_period(period: float, clock_ratio: float) -> Fraction:
     return exact_nanoseconds(period) / Fraction(repr(float(clock_ratio)))
 
 
@@ -62,12 +62,12 @@ def _of_network(system: System, network: Network, bounds: Bounds) -> Bounds:
     for name, message in network.messages.items():
         length = frame_nanoseconds(network, message)
         frame = Periodic(execution=length, period=None, priority=message.identifier or 0)
-        frames[name] = replace(frame, **_sent(system, message, bounds))
+        frames[name] = replace(frame, **_queueing(system, message, bounds))
     bit = math.ceil(NANOSECONDS / Fraction(repr(float(network.bit_rate))))
     return dict(zip(frames, can([*frames.values()], bit=bit), strict=True))
 
 
-def _sent(system: System, message: Message, bounds: Bounds) -> dict[str, Any]:
+def _queueing(system: System, message: Message, bounds: Bounds) -> dict[str, Any]:
     """The times at which frames of a message are queued, as fields of `Periodic`."""
     if message.connection is None or message.period is not None:
         period = None if message.period is None else exact_nanoseconds(message.period)
@@ -76,18 +76,18 @@ def _sent(system: System, message: Message, bounds: Bounds) -> dict[str, Any]:
     for name, computer in system.computers.items():
         for task_name, task in computer.tasks.items():
             if task.component == sender:
-                return _written(task, computer, bounds[f"{name}.{task_name}"])
+                return _writing(task, computer, bounds[f"{name}.{task_name}"])
     sampling = system.components[sender].sampling
     if sampling is None or isinstance(sampling, SamplingOnArrival):
         return {}
-    period = _true(sampling.period, sampling.clock_ratio)
+    period = _true_period(sampling.period, sampling.clock_ratio)
     return {"period": period, "jitter": nanoseconds(highest(sampling.jitter)), "counts_when_queued": True}
 
 
-def _written(task: Task, computer: Computer, bound: int | None) -> dict[str, Any]:
+def _writing(task: Task, computer: Computer, bound: int | None) -> dict[str, Any]:
     """The times at which a task writes: when a job is done, or at its deadline if it is done by then."""
     if task.period is None or bound is None:
         return {}
     least = nanoseconds(lowest(task.execution)) + nanoseconds(computer.switch)
     jitter = bound - least if task.write == "end" else max(bound - nanoseconds(task.due), 0)
-    return {"period": _true(task.period, computer.clock_ratio), "jitter": jitter, "counts_when_queued": True}
+    return {"period": _true_period(task.period, computer.clock_ratio), "jitter": jitter, "counts_when_queued": True}

@@ -83,7 +83,7 @@ def windows_of(system: System) -> dict[str, Window]:
                 end=nanoseconds(highest(sampling.jitter)),
             )  # fmt: skip
         if over:
-            found[name] = _sent(found[name], over[0], bounds)
+            found[name] = _with_frame(found[name], over[0], bounds)
     return found
 
 
@@ -118,7 +118,7 @@ def _is_uninterrupted(of: PlacedTask) -> bool:
     return comes_first or not of.computer.preemptive
 
 
-def _sent(window: Window, of: PlacedMessage, bounds: Bounds) -> Window:
+def _with_frame(window: Window, of: PlacedMessage, bounds: Bounds) -> Window:
     """The window with a frame between the sample and the arrival."""
     bound = bounds[f"{of.network_name}.{of.name}"]
     if bound is None:

@@ -94,7 +94,7 @@ class Backlog:
         self.tables.replace_events(self._past_and_later()[1])
         self.tables.replace_rows(b"")
         self.handed_over = self._running.now
-        self._run_events.hand_over(self._running.now)
+        self._run_events.discard_until(self._running.now)
 
     def hand_over_rest(self) -> None:
         """Hand over the rest at the end of the run; a recorder receives at least one chunk."""
@@ -125,7 +125,7 @@ class Backlog:
         self.tables.replace_events(events)
         self.handed_over = handed_over
         if handed_over is not None:
-            self._run_events.hand_over(handed_over)
+            self._run_events.discard_until(handed_over)
 
     def _past_and_later(self) -> tuple[Integers, Integers]:
         """The events up to now, and those of messages that are sent later."""

@@ -12,8 +12,8 @@ from orchestration.exact.objectives import inlined_objectives, means_of
 from orchestration.fmi.foreign import isolated_call
 from orchestration.fmi.model import Model
 from orchestration.stability.known_loops import LOOPS
-from orchestration.system.chance import is_random
 from orchestration.system.model import System
+from orchestration.system.randomness import is_random
 from orchestration.system.request import Request
 
 AGREE = 1e-3

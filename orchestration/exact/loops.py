@@ -33,12 +33,12 @@ from orchestration.fmi.reuse import Instances
 from orchestration.schedule.plan import Plan
 from orchestration.stability.loop_at_rest import ExtraSignals, at_rest
 from orchestration.stability.operating_point import true_period
+from orchestration.system.file_tables import tables_of
 from orchestration.system.model import System
 from orchestration.system.paths import changed
 from orchestration.system.sampling import Sampling, has_scheduled_instants
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
 from orchestration.system.variable_names import component_of
-from orchestration.system.written import tables_of
 
 T = TypeVar("T")
 

@@ -45,7 +45,7 @@ class Name:
     text: str
 
 
-class _Deep:
+class _Nested:
     """An expression with nested ones, used as a key: its hash is computed once."""
 
     @functools.cached_property
@@ -60,33 +60,33 @@ class _Deep:
 
 
 @dataclass(frozen=True)
-class Operation(_Deep):
+class Operation(_Nested):
     """An operator of `OPERATORS` with its operands; the sign of a number is `neg`."""
 
     sign: str
     operands: tuple["Node", ...]
 
-    __hash__ = _Deep.__hash__
+    __hash__ = _Nested.__hash__
 
 
 @dataclass(frozen=True)
-class Call(_Deep):
+class Call(_Nested):
     """A function with its arguments."""
 
     function: str
     arguments: tuple["Node", ...]
 
-    __hash__ = _Deep.__hash__
+    __hash__ = _Nested.__hash__
 
 
 @dataclass(frozen=True)
-class Sampled(_Deep):
+class Sampled(_Nested):
     """The values of an expression where messages of a connection arrived."""
 
     connection: str
     argument: "Node"
 
-    __hash__ = _Deep.__hash__
+    __hash__ = _Nested.__hash__
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from matplotlib.patches import FancyBboxPatch
 from orchestration.basics.errors import UsageError
 from orchestration.figures.names import FORMATS
 from orchestration.figures.style import SCREEN, save
-from orchestration.system.description import rate, timing, what
+from orchestration.system.description import describe_faults, describe_rate, describe_source
 from orchestration.system.model import System
 from orchestration.system.variable_names import component_of, variable_of
 
@@ -84,14 +84,14 @@ def draw(system: System) -> Figure:
 def _boxes(system: System) -> dict[str, _Box]:
     """Boxes by name, in the order of the row: the sources that are connected, then the components."""
     sources = {
-        f"sources.{name}": _Box(title=name, lines=(what(source),), color=SOURCE)
+        f"sources.{name}": _Box(title=name, lines=(describe_source(source),), color=SOURCE)
         for name, source in system.sources.items()
         if source.to
     }
     components = {
         name: _Box(
             title=name,
-            lines=(Path(component.fmu).name, rate(component)),
+            lines=(Path(component.fmu).name, describe_rate(component)),
             color=CONTINUOUS if component.sampling is None else SAMPLED,
         )
         for name, component in system.components.items()
@@ -123,7 +123,7 @@ def _arrows(system: System, places: Mapping[str, int]) -> list[_Arrow]:
                 start=places[x.sender],
                 end=places[x.receiver],
                 name="" if x.name.isdecimal() else x.name,
-                text="\n".join(filter(None, (_listed([variable_of(end) for end in x.start]), timing(x)))),
+                text="\n".join(filter(None, (_listed([variable_of(end) for end in x.start]), describe_faults(x)))),
                 is_late=bool(x.delay or x.delay_jitter or x.loss),
             )
         )

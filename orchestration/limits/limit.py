@@ -23,7 +23,7 @@ from orchestration.results import html
 from orchestration.results.criterion import bound_of, judged_objective
 from orchestration.stability.known_loops import LocalLimit
 from orchestration.stability.local_limit import local_limits
-from orchestration.system.chance import has_random_timing, is_random
+from orchestration.system.randomness import has_random_timing, is_random
 from orchestration.system.request import Request, errors_in_own_terms, system_of
 from orchestration.workers.choice import single_run_execution
 from orchestration.workers.executors import RunEvaluator

@@ -52,7 +52,7 @@ class Starts:
             if not (math.isfinite(value) and 0.0 <= value <= highest):
                 raise UsageError(f"starts.{name} = {value}: expected a number from 0{_to(highest)}")
 
-    def some(self, first: int, count: int) -> "Starts":
+    def subset(self, first: int, count: int) -> "Starts":
         """The same ensemble with `count` members from index `first` on."""
         return dataclasses.replace(self, first=first, count=count)
 

@@ -37,7 +37,7 @@ from orchestration.quadrotor.wiring import (
 )
 from orchestration.results.quantities import setting
 from orchestration.system.component import Parameter
-from orchestration.system.description import varying
+from orchestration.system.description import describe_varying
 from orchestration.system.distribution import Distribution
 from orchestration.system.distribution_table import parsed_fields
 from orchestration.system.model import System
@@ -219,7 +219,7 @@ class Scenario:
         for key in ("period", "delay"):
             if value := getattr(timing, key):
                 named = setting(f"timing.{key}", [value])
-                text = varying(value) if isinstance(value, Distribution) else named.text_of(value)
+                text = describe_varying(value) if isinstance(value, Distribution) else named.text_of(value)
                 parts.append(f"{named.name} {text}")
         if timing.order != "gauss-seidel":
             parts.append("Jacobi")

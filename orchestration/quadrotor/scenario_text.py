@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from orchestration.quadrotor.fmu_choice import FmuChoice
 from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice
-from orchestration.system.written import in_toml
+from orchestration.system.file_tables import in_toml
 
 if TYPE_CHECKING:
     from orchestration.quadrotor.scenario import Scenario

@@ -175,6 +175,6 @@ def _chunk(resolved: ResolvedRequest, receiver: _Receiver, unrecorded: Unrecorde
         rows[:, places] = values.over(rows[:, 0])
     run_events = RunEvents(system)
     if receiver.recorded_until >= 0.0:
-        run_events.hand_over(round(receiver.recorded_until * NANOSECONDS))
+        run_events.discard_until(round(receiver.recorded_until * NANOSECONDS))
     events = run_events.with_messages(unrecorded.events, round(float(rows[-1, 0]) * NANOSECONDS))
     return Chunk(columns=columns, rows=rows, events=events)

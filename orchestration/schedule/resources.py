@@ -78,7 +78,7 @@ class Resources:
         self._links: list[Link] = []
         self._link_names: list[str] = []
         self._zero = self._stream(Constant(0))
-        placed, self._over = [*placed_tasks(system.computers)], [*placed_messages(system.networks)]
+        placed, self._placed_messages = [*placed_tasks(system.computers)], [*placed_messages(system.networks)]
         released = released_by(system)
         self.tasks = {each.task.component: i for i, each in enumerate(placed) if each.task.component is not None}
         """the task whose jobs are the steps of a component, by component"""
@@ -89,8 +89,8 @@ class Resources:
             on_its_own = isinstance(sampling, SamplingOnArrival) or (sampling is not None and name in sending)
             if on_its_own and not isinstance(sampling, TaskSampling):
                 self.tasks[name] = len(placed) + len([x for x in self.tasks.values() if x >= len(placed)])
-        self._alone = [name for name, i in self.tasks.items() if i >= len(placed)]
-        messages = {x.message.connection: m for m, x in enumerate(self._over)}
+        self._without_computer = [name for name, i in self.tasks.items() if i >= len(placed)]
+        messages = {x.message.connection: m for m, x in enumerate(self._placed_messages)}
         self.carriers = {
             x.name: i
             for i, x in enumerate(
@@ -104,28 +104,28 @@ class Resources:
             Processor(_POLICIES[each.scheduling], each.preemptive, nanoseconds(each.switch))
             for each in system.computers.values()
         ]
+        tasks = [self._task(each) for each in placed]
+        for i, name in enumerate(self._without_computer, len(processors)):
+            tasks.append(self._task_without_computer(name, i))
         self.parts = Parts(
             stop=self._stop,
-            processors=(*processors, *(Processor(FIRST_COME, False, 0) for _ in self._alone)),
-            tasks=(
-                *map(self._task, placed),
-                *(self._task_alone(name, len(processors) + i) for i, name in enumerate(self._alone)),
-            ),
+            processors=(*processors, *(Processor(FIRST_COME, False, 0) for _ in self._without_computer)),
+            tasks=tuple(tasks),
             carriers=tuple(
                 self._carrier(name, messages.get(name, NONE), self._indices(released.get(name, ())))
                 for name in self.carriers
             ),
-            messages=tuple(self._message(each) for each in self._over),
+            messages=tuple(self._message(each) for each in self._placed_messages),
             links=tuple(self._links),
             streams=(),
-            places=[*(each.place for each in placed), *(f"components.{name}" for name in self._alone),
-                    *(each.place for each in self._over)],
+            places=[*(each.place for each in placed), *(f"components.{name}" for name in self._without_computer),
+                    *(each.place for each in self._placed_messages)],
         )  # fmt: skip
         """without the streams, which belong to a run"""
         self._names = Names(
-            processors=[*system.computers, *self._alone],
-            tasks=[*(f"{each.computer_name}.{each.name}" for each in placed), *self._alone],
-            messages=[f"{each.network_name}.{each.name}" for each in self._over],
+            processors=[*system.computers, *self._without_computer],
+            tasks=[*(f"{each.computer_name}.{each.name}" for each in placed), *self._without_computer],
+            messages=[f"{each.network_name}.{each.name}" for each in self._placed_messages],
             links=self._link_names,
         )
 
@@ -139,13 +139,13 @@ class Resources:
         parts = self.of_run(streams)
         running = scheduler(parts, NEEDED)
         running.run(LATER)
-        dues = [each.message.due for each in self._over]
+        dues = [each.message.due for each in self._placed_messages]
         deadlines = [LATER if due is None else nanoseconds(due) for due in dues]
-        return timeline(parts, self._names, deadlines, running.take_notes(), without=self._alone)
+        return timeline(parts, self._names, deadlines, running.take_notes(), without=self._without_computer)
 
     def event_builder(self) -> EventBuilder:
         """The builder of events from notes of a scheduler of these parts."""
-        return EventBuilder(self.parts, self._names.all, without=self._alone)
+        return EventBuilder(self.parts, self._names.all, without=self._without_computer)
 
     # -- tasks -----------------------------------------------------------------------------------------------------
 
@@ -167,7 +167,7 @@ class Resources:
             reports_samples=task.component is not None,
         )
 
-    def _task_alone(self, name: str, processor: int) -> Task:
+    def _task_without_computer(self, name: str, processor: int) -> Task:
         """The task of a sampled component that is on no computer; its jobs take no time."""
         sampling = self._system.components[name].sampling
         assert sampling is not None
@@ -250,7 +250,7 @@ class Resources:
             if slots:
                 lengths = [exact_nanoseconds(each) for each in slots]
                 grids = [Grid(sum(lengths[:i], Fraction(0)), sum(lengths, Fraction(0))) for i in range(len(lengths))]
-                begins = self._stream(_InTurn(grids, self._stop).of_run)
+                begins = self._stream(_Interleaved(grids, self._stop).of_run)
             self._link_names.append(name)
             self._links.append(Link(slots=len(slots), begins=begins))
         return self._link_names.index(name)
@@ -290,10 +290,10 @@ class Resources:
             rate, begin = arrivals.poisson, round(start)
             return self._stream(lambda streams: _poisson(begin, rate, streams.of(place, ARRIVALS)))
         assert period is not None
-        return self._stream(_InTurn([Grid(start, exact_nanoseconds(period) / ratio)], self._stop).of_run)
+        return self._stream(_Interleaved([Grid(start, exact_nanoseconds(period) / ratio)], self._stop).of_run)
 
 
-class _InTurn:
+class _Interleaved:
     """The first instant of each grid, the second of each, and so on; LATER in place of those after the end."""
 
     def __init__(self, grids: Sequence[Grid], stop: int) -> None:

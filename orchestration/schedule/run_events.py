@@ -54,7 +54,7 @@ class RunEvents:
             events = np.concatenate([self._kept, events])
         return Events(self._names, _in_order(events))
 
-    def hand_over(self, time: int) -> None:
+    def discard_until(self, time: int) -> None:
         """Discard the events up to `time` [ns]."""
         if self._on_computers is not None:
             begin = self._on_computers.reached

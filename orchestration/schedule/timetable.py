@@ -61,7 +61,7 @@ class Timetable:
         self._posted = {i: [self._links[j] for j in own if frame.sender[j] == i] for i in frame.points}
         self._over_networks = [self._links[j] for j in self._plan.posted if j in self._plan.over_networks]
         self._posted_before = dict.fromkeys((link.index for link in self._over_networks), 0)
-        self._on_their_way = _NO_MESSAGES
+        self._in_flight = _NO_MESSAGES
         self._ahead: Schedule | None = None
 
     def _timed(self, name: str, streams: Streams) -> TimedComponent:
@@ -143,20 +143,20 @@ class Timetable:
             for place, link in enumerate(links):
                 sent = _Sent(link, np.arange(first, last), points, link.messages(points), points, 0, component, place)
                 tables.append(sent.table())
-                later.append(self._under_way(sent, found))
+                later.append(self._not_arrived(sent, found))
         for link in self._over_networks:
             component = int(self._frame.sender[link.index])
-            k, points, arrivals = self._networked(link, end)
+            k, points, arrivals = self._network_messages(link, end)
             found.add(points, self._frame.place[component])
             sent = _Sent(link, k, points, arrivals, points, 0, component, link.index)
             tables.append(sent.table())
-            later.append(self._under_way(sent, found))
+            later.append(self._not_arrived(sent, found))
         table = np.concatenate(tables)
         if len(tables) > 2:
             table = table[np.lexsort((table[:, 7], table[:, 6], table[:, 4]))]
         return np.ascontiguousarray(table[:, :4]), np.concatenate(later)
 
-    def _networked(self, link: Link, end: int) -> tuple[Integers, Integers, Integers]:
+    def _network_messages(self, link: Link, end: int) -> tuple[Integers, Integers, Integers]:
         """Messages of a component in continuous time over a network before `end` [ns]: k, sending and arrival."""
         lookahead = self._lookahead
         assert lookahead is not None
@@ -201,7 +201,7 @@ class Timetable:
             found.add(now, *place[sender[now_read]].tolist())
             for i, link in enumerate(task.outgoing):
                 sent = task.sent(i)[:count], task.arrivals(i)[:count]
-                later.append(self._under_way(_Sent(link, task.numbers[:count], *sent, now, 1, task.rank, i), found))
+                later.append(self._not_arrived(_Sent(link, task.numbers[:count], *sent, now, 1, task.rank, i), found))
             found.add(task.times[count:to_end])
             messages = task.messages(slice(count))
             table = np.empty((count, 5), dtype=np.int64)
@@ -210,9 +210,9 @@ class Timetable:
             times.append(now)
             samples.append(table)
             exchanged.append(messages)
-        return *_one_after_the_other(_concatenated(times), _concatenated(samples), exchanged), _concatenated(later)
+        return *_sorted_samples(_concatenated(times), _concatenated(samples), exchanged), _concatenated(later)
 
-    def _under_way(self, sent: "_Sent", found: InstantCollector) -> Integers:
+    def _not_arrived(self, sent: "_Sent", found: InstantCollector) -> Integers:
         """The messages that arrive later; the receivers of the others are stepped at once."""
         at_once = sent.arrival == sent.time
         found.add(
@@ -222,11 +222,11 @@ class Timetable:
 
     def _arrive(self, end: int, more: Sequence[Integers], found: InstantCollector) -> Integers:
         """The messages that arrive before `end`; the others remain under way."""
-        table = _concatenated([self._on_their_way, *more])
+        table = _concatenated([self._in_flight, *more])
         if not len(table):
             return table[:, :4]
         now = table[:, 3] < end
-        self._on_their_way, table = table[~now], table[now]
+        self._in_flight, table = table[~now], table[now]
         found.add_each(table[:, 3], self._frame.place[self._frame.receiver[table[:, 0]]])
         return np.ascontiguousarray(table[np.lexsort(table[:, [1, 7, 6, 5, 4, 3]].T), :4])
 
@@ -265,7 +265,7 @@ def _concatenated(tables: Sequence[Integers]) -> Integers:
     return np.concatenate(some or tables[:1]) if len(some) != 1 else some[0]
 
 
-def _one_after_the_other(
+def _sorted_samples(
     times: Integers, samples: Integers, exchanged: Sequence[Integers]
 ) -> tuple[Integers, Integers, Integers]:
     """Samples in order of time, and the messages that they exchange, which their last three columns index.

@@ -83,12 +83,12 @@ def after(path: Derivatives, time: Derivatives) -> Derivatives:
     )
 
 
-def moved(by: float, one: Derivatives) -> Derivatives:
+def shifted(by: float, one: Derivatives) -> Derivatives:
     """`one` plus a constant."""
     return Derivatives(by + one.value, *one[1:])
 
 
-def times(factor: float, one: Derivatives) -> Derivatives:
+def scaled(factor: float, one: Derivatives) -> Derivatives:
     """`one` times a factor."""
     return Derivatives(*(factor * each for each in one))
 

@@ -18,10 +18,10 @@ from orchestration.signals.derivatives import (
     constant,
     eased,
     line,
-    moved,
     reference,
     rise,
-    times,
+    scaled,
+    shifted,
     wave,
 )
 
@@ -76,11 +76,11 @@ class Step:
         """The motion between the two points."""
         share = rise(t, self.start, self.duration, ops)
         ways = ((self.x, self.dx), (self.y, self.dy), (self.z, self.dz))
-        return reference(*(moved(begin, times(by, share)) for begin, by in ways))
+        return reference(*(shifted(begin, scaled(by, share)) for begin, by in ways))
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Around:
+class _Periodic:
     """A periodic motion at an angular rate ω."""
 
     x: float = 0.0
@@ -112,7 +112,7 @@ class _Around:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Circle(_Around):
+class Circle(_Periodic):
     """P + r [sin θ, 1 - cos θ, 0]: level, to the right; θ = ωσ(t), and `speed` is that along the circle."""
 
     def at(self, t: Scalar, ops: ScalarOps = FLOAT) -> Reference:
@@ -121,7 +121,7 @@ class Circle(_Around):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Helix(_Around):
+class Helix(_Periodic):
     """As the circle, and z + rate_z σ(t): it climbs or descends at the same time; `speed` is the level part."""
 
     rate_z: float = -0.2
@@ -134,7 +134,7 @@ class Helix(_Around):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Lemniscate(_Around):
+class Lemniscate(_Periodic):
     """P + r [sin θ, sin θ cos θ, 0], θ = ωσ(t): Gerono's figure of eight, from its crossing; 2 r long and r wide.
 
     `speed` is the largest, at the crossing: √2 r ω.
@@ -143,8 +143,8 @@ class Lemniscate(_Around):
     def at(self, t: Scalar, ops: ScalarOps = FLOAT) -> Reference:
         """The motion on the figure of eight."""
         time, rate = eased(t, self.ramp, ops), self.rate(math.sqrt(2.0) * self.radius)
-        along = moved(self.x, after(wave(self.radius, rate, time.value, ops), time))
-        across = moved(self.y, after(wave(0.5 * self.radius, 2.0 * rate, time.value, ops), time))
+        along = shifted(self.x, after(wave(self.radius, rate, time.value, ops), time))
+        across = shifted(self.y, after(wave(0.5 * self.radius, 2.0 * rate, time.value, ops), time))
         return reference(along, across, constant(self.z, t))
 
 
@@ -194,11 +194,11 @@ MOTIONS: dict[str, type[Motion]] = {
 }
 
 
-def _circle(motion: _Around, time: Derivatives, ops: ScalarOps) -> tuple[Derivatives, Derivatives]:
+def _circle(motion: _Periodic, time: Derivatives, ops: ScalarOps) -> tuple[Derivatives, Derivatives]:
     rate, radius = motion.rate(motion.radius), motion.radius
     sine = wave(radius, rate, time.value, ops)
     cosine = Derivatives(radius * ops.cos(rate * time.value), *(-rate * each for each in sine[:4]))  # cos' = -ω sin
-    return moved(motion.x, after(sine, time)), moved(motion.y + radius, times(-1.0, after(cosine, time)))
+    return shifted(motion.x, after(sine, time)), shifted(motion.y + radius, scaled(-1.0, after(cosine, time)))
 
 
 def _coordinates(one: Reference) -> list[Derivatives]:

@@ -106,9 +106,9 @@ def _read_rows(path: Path, lines: Any, columns: Sequence[str]) -> Rows:
         try:
             numbers.extend(map(float, row))
         except ValueError as error:
-            raise UsageError(f"{place}: {_wrong(header, row)}: expected numbers only") from error
+            raise UsageError(f"{place}: {_first_invalid(header, row)}: expected numbers only") from error
         if not all(map(math.isfinite, numbers[-len(header) :])):
-            raise UsageError(f"{place}: {_wrong(header, row)}: expected finite numbers only")
+            raise UsageError(f"{place}: {_first_invalid(header, row)}: expected finite numbers only")
         places.append(lines.line_num)
     if len(places) < 2:
         raise UsageError(f"{path}: expected at least two rows of numbers")
@@ -126,7 +126,7 @@ def _expect_columns(path: Path, header: Sequence[str], columns: Sequence[str]) -
     raise UsageError(f"{path}: no column {', '.join(missing)}; expected {', '.join(columns)}")
 
 
-def _wrong(header: Sequence[str], row: Sequence[str]) -> str:
+def _first_invalid(header: Sequence[str], row: Sequence[str]) -> str:
     """The first value of a row that is no finite number, with its column."""
     return next(f"{name} = {shown(text)}" for name, text in zip(header, row) if not _is_finite(text))
 

@@ -54,13 +54,13 @@ def _timed(rows: Rows, points: Floats, limits: Limits) -> Spline:
         if holds[first] > 0.0:
             curves.append(_at_rest(now, now + float(holds[first]), points[first]))
             now += float(holds[first])
-        curve = _within(points[first : last + 1], speeds[first + 1 : last + 1], limits.acceleration)
+        curve = _limited(points[first : last + 1], speeds[first + 1 : last + 1], limits.acceleration)
         curves.append(Spline(knots=now + curve.knots, coefficients=curve.coefficients))
         now = float(curves[-1].knots[-1])
     return _joined(curves)
 
 
-def _within(points: Floats, speeds: Floats, acceleration: float) -> Spline:
+def _limited(points: Floats, speeds: Floats, acceleration: float) -> Spline:
     """The curve from rest to rest. The time of each piece is its length by its speed, twice that for the first and the
     last, which accelerate and slow down; then all times are scaled so that speed or acceleration just reaches a limit.
     """

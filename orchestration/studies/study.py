@@ -18,7 +18,7 @@ from orchestration.studies.linked_settings import LinkedSettings
 from orchestration.studies.store_columns import is_column
 from orchestration.system.distribution_table import is_table, trace_path
 from orchestration.system.model import System
-from orchestration.system.paths import changed, names_table, value_at
+from orchestration.system.paths import changed, is_source_file, value_at
 from orchestration.system.request import Request, errors_in_own_terms, system_of
 
 
@@ -156,7 +156,7 @@ class Study:
         return files_of(
             self.origin,
             fmus_too=[native_twin(value) if self.native else value for path, value in values if names_fmu(path)],
-            tables_too=[value for path, value in values if names_table(path)] + _traces(values),
+            tables_too=[value for path, value in values if is_source_file(path)] + _traces(values),
         )
 
 

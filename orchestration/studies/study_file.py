@@ -13,7 +13,7 @@ from orchestration.requests.request import load_request, request_from_tables
 from orchestration.studies.axes import Axis, Scale, Value, span
 from orchestration.studies.study import Study, names_fmu
 from orchestration.system.distribution_table import as_text
-from orchestration.system.paths import names_table
+from orchestration.system.paths import is_source_file
 from orchestration.system.request import ControlLoop, Request
 
 
@@ -167,7 +167,7 @@ def axis_of(table: AxisTable, folder: Path) -> Axis:
 
 def _values(listed: list[Value | dict[str, Any]], targets: tuple[str, ...], folder: Path) -> tuple[Value, ...]:
     """Listed values: paths made relative to the study file, distributions as the text of their table."""
-    are_paths = all(names_fmu(target) or names_table(target) or target.endswith(".fmu") for target in targets)
+    are_paths = all(names_fmu(target) or is_source_file(target) or target.endswith(".fmu") for target in targets)
     plain = [as_text(value, folder) if isinstance(value, dict) else value for value in listed]
     return tuple(
         str(folder / str(value)) if are_paths and str(value).endswith((".fmu", ".csv")) else value for value in plain

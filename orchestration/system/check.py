@@ -28,15 +28,17 @@ def check(system: System, models: Mapping[str, Model]) -> None:
                 has_no = f"{place}.record: {models[name].name} has no variable {recorded}"
                 raise UsageError(f"{has_no}; {expected_name(recorded, names)}")
             if variable.kind not in NUMERIC or variable.causality not in ("output", "local"):
-                raise UsageError(f"{place}.record: {recorded} is {_article(variable)}; expected an output or a local")
+                raise UsageError(
+                    f"{place}.record: {recorded} is {_with_article(variable)}; expected an output or a local"
+                )
     for x in system.connections:
         for what, ends, causality in (("from", x.start, "output"), ("to", x.end, "input")):
             model = models[component_of(ends[0])]
             missing = [variable_of(end) for end in ends if variable_of(end) not in model.variables]
-            unfit = [variable_of(end) for end in ends if not _is(model, variable_of(end), causality)]
+            unfit = [variable_of(end) for end in ends if not _has_causality(model, variable_of(end), causality)]
             if missing or len(unfit) == len(ends) > 1:
                 missing = missing or unfit
-                raise UsageError(f"connections.{x.name}.{what}: {_lacks(model, causality, missing)}")
+                raise UsageError(f"connections.{x.name}.{what}: {_missing_variables(model, causality, missing)}")
         for start, end in zip(x.start, x.end):
             _check_pair(f"connections.{x.name}", x, _end(models, start), _end(models, end))
     for name, source in system.sources.items():
@@ -95,7 +97,7 @@ def _is_recordable(variable: Variable) -> bool:
     return variable.kind in NUMERIC and variable.causality in ("output", "local")
 
 
-def _is(model: Model, name: str, causality: str) -> bool:
+def _has_causality(model: Model, name: str, causality: str) -> bool:
     found = model.variables[name].causality if name in model.variables else None
     return found == causality or (found, causality) == ("local", "output")
 
@@ -111,7 +113,7 @@ End = tuple[str, Model, Variable | None]
 def _check_pair(place: str, x: Connection, start: End, end: End) -> None:
     _, model, output = start
     if output is None or output.causality not in ("output", "local"):
-        raise UsageError(f"{place}.from: {_wrong(start, 'output', model.names('output'))}")
+        raise UsageError(f"{place}.from: {_wrong_causality(start, 'output', model.names('output'))}")
     if output.kind not in NUMERIC:
         raise UsageError(f"{place}.from: {start[0]} is a {output.kind}; only {_list(NUMERIC)} can be connected")
     receiver = _expect_input(f"{place}.to", end[0], end)
@@ -144,13 +146,13 @@ def _check_kinds(place: str, start: str, output: Variable, end: str, receiver: V
 def _expect_input(place: str, end: str, found: End) -> Variable:
     _, model, variable = found
     if variable is None or variable.causality != "input":
-        raise UsageError(f"{place}: {_wrong(found, 'input', model.names('input'))}")
+        raise UsageError(f"{place}: {_wrong_causality(found, 'input', model.names('input'))}")
     if variable.kind not in NUMERIC:
         raise UsageError(f"{place}: {end} is a {variable.kind}; only {_list(NUMERIC)} can be connected")
     return variable
 
 
-def _lacks(model: Model, causality: str, missing: list[str]) -> str:
+def _missing_variables(model: Model, causality: str, missing: list[str]) -> str:
     """The variables that a model lacks as ends of a connection, with those that it has."""
     names = model.names(causality)
     near = difflib.get_close_matches(missing[0], names, n=1)
@@ -158,14 +160,14 @@ def _lacks(model: Model, causality: str, missing: list[str]) -> str:
     return f"{model.name} has no {causality} {', '.join(missing)}; its {causality}s are {_list(names)}{hint}"
 
 
-def _wrong(end: End, expected: str, valid: Iterable[str]) -> str:
+def _wrong_causality(end: End, expected: str, valid: Iterable[str]) -> str:
     name, model, variable = end
     if variable is None:
-        return _lacks(model, expected, [variable_of(name)])
-    return f"{name} is {_article(variable)}; expected an {expected}: {_list(valid)}"
+        return _missing_variables(model, expected, [variable_of(name)])
+    return f"{name} is {_with_article(variable)}; expected an {expected}: {_list(valid)}"
 
 
-def _article(variable: Variable) -> str:
+def _with_article(variable: Variable) -> str:
     return f"a{'n' if variable.causality[0] in 'aeiou' else ''} {variable.causality}"
 
 
@@ -174,7 +176,7 @@ def expect_parameter(place: str, model: Model, name: str, value: Parameter, *, i
     variable = model.variable(name, place)
     if not (variable.is_settable or variable.is_constant) or is_fed:
         expected = "a parameter or an input that nothing is connected to"
-        raise UsageError(f"{place}: is {'connected' if is_fed else _article(variable)}; expected {expected}")
+        raise UsageError(f"{place}: is {'connected' if is_fed else _with_article(variable)}; expected {expected}")
     if isinstance(convert_value(variable, value, place), float) and not is_finite(value):
         raise UsageError(f"{place} = {value}: expected a finite number")
     low, high = variable.minimum, variable.maximum

@@ -20,11 +20,14 @@ def as_text(system: System, units: Mapping[str, str] = {}, follows: str = "") ->
 
     `follows` describes the references and the components that follow them.
     """
-    components = [(name, _fmu(c), rate(c), _parameters(c)) for name, c in system.components.items()]
+    components = [(name, _fmu(c), describe_rate(c), _parameters(c)) for name, c in system.components.items()]
     connections = [
-        (x.name, f"{x.sender} -> {x.receiver}", timing(x) or "at once", signals(x)) for x in system.connections
+        (x.name, f"{x.sender} -> {x.receiver}", describe_faults(x) or "at once", describe_signals(x))
+        for x in system.connections
     ]
-    sources = [(name, what(s), ", ".join(_shortened(s.to)) or "(objectives)") for name, s in system.sources.items()]
+    sources = [
+        (name, describe_source(s), ", ".join(_shortened(s.to)) or "(objectives)") for name, s in system.sources.items()
+    ]
     named = [in_brackets(name, units.get(name)) for name in system.objectives]
     criterion = system.criterion
     criteria = [("good", criterion.good), ("diverged", criterion.diverged)]
@@ -45,7 +48,7 @@ def as_text(system: System, units: Mapping[str, str] = {}, follows: str = "") ->
     return "\n".join([head, *(line for title, rows in sections if rows for line in ("", title, *_table(rows)))])
 
 
-def rate(component: Component) -> str:
+def describe_rate(component: Component) -> str:
     """How a component is stepped."""
     if component.sampling is None:
         return f"continuous, step {seconds(component.step or 0.0)}" + (
@@ -55,13 +58,13 @@ def rate(component: Component) -> str:
         return component.sampling.task
     if isinstance(component.sampling, SamplingOnArrival):
         return f"on {component.sampling.on}"
-    return sampled(component.sampling)
+    return describe_sampling(component.sampling)
 
 
 def _task(of: PlacedTask) -> tuple[str, ...]:
     task, computer = of.task, of.computer
     how = [computer.scheduling.replace("-", " "), *([] if computer.preemptive else ["not preemptive"])]
-    how += [f"priority {task.priority}", f"{varying(task.execution)} by {seconds(task.due)}"]
+    how += [f"priority {task.priority}", f"{describe_varying(task.execution)} by {seconds(task.due)}"]
     how += [f"reads at {task.read}"] if task.read != "start" else []
     how += [f"writes at {task.write}"] if task.write != "end" else []
     how += [f"overruns {task.overrun}"] if task.overrun != "queue" else []
@@ -84,11 +87,11 @@ def _released(of: Task | Message) -> str:
         return f"{of.arrivals.poisson:g} a second at random"
     parts = [f"every {seconds(of.period or 0.0)}"]
     parts += [f"from {seconds(of.offset)}"] if of.offset else []
-    parts += [f"jitter {varying(of.jitter)}"] if of.jitter else []
+    parts += [f"jitter {describe_varying(of.jitter)}"] if of.jitter else []
     return ", ".join(parts)
 
 
-def sampled(sampling: Sampling) -> str:
+def describe_sampling(sampling: Sampling) -> str:
     """When a digital task runs."""
     parts = [f"every {seconds(sampling.period)}"]
     parts += [f"from {seconds(sampling.offset)}"] if sampling.offset else []
@@ -98,19 +101,19 @@ def sampled(sampling: Sampling) -> str:
     return ", ".join(parts)
 
 
-def signals(x: Connection) -> str:
+def describe_signals(x: Connection) -> str:
     """The variables that it carries, vectors as a whole; with the names at the receiver where they differ."""
     names, others = (list(map(variable_of, ends)) for ends in (x.start, x.end))
     carried = ", ".join(_shortened(names))
     return carried if names == others else f"{carried} -> {', '.join(_shortened(others))}"
 
 
-def timing(x: Connection) -> str:
+def describe_faults(x: Connection) -> str:
     """The faults of a connection; empty if its messages arrive unchanged, at once."""
-    parts = [f"delay {varying(x.delay)}"] if x.delay else []
+    parts = [f"delay {describe_varying(x.delay)}"] if x.delay else []
     parts += [f"delay jitter {_largest(x.delay_jitter, x.jitter_distribution)}"] if x.delay_jitter else []
     if isinstance(x.loss, Distribution):
-        parts.append(f"loss {varying(x.loss, '{:g}'.format)}")
+        parts.append(f"loss {describe_varying(x.loss, '{:g}'.format)}")
     elif x.loss:
         bursts = f" in bursts of {x.burst_length:g}" if x.burst_length is not None else ""
         parts.append(f"loss {100.0 * x.loss:g} %{bursts}")
@@ -126,7 +129,7 @@ def timing(x: Connection) -> str:
     return ", ".join(parts)
 
 
-def what(source: Source) -> str:
+def describe_source(source: Source) -> str:
     """The kind of a source, with its main parameter."""
     if source.constant is not None:
         return f"constant {source.constant:g}"
@@ -137,7 +140,7 @@ def what(source: Source) -> str:
     return source.signal or f"trajectory of {source.trajectory}"
 
 
-def varying(of: Varying, formatted: Callable[[float], str] | None = None) -> str:
+def describe_varying(of: Varying, formatted: Callable[[float], str] | None = None) -> str:
     """A number, or its distribution; default of `formatted`: as times."""
     formatted = formatted or seconds
     if not isinstance(of, Distribution):
@@ -152,14 +155,14 @@ def varying(of: Varying, formatted: Callable[[float], str] | None = None) -> str
     values = [formatted(value) for value in of.values or ()]
     if of.probabilities is not None:
         values = [f"{value} ({share:g})" for value, share in zip(values, of.probabilities, strict=True)]
-    return f"one of {', '.join(_few(values))}"
+    return f"one of {', '.join(_first_few(values))}"
 
 
 def _largest(jitter: Varying, spread: str) -> str:
-    return varying(jitter) if isinstance(jitter, Distribution) else f"{seconds(jitter)} {spread}"
+    return describe_varying(jitter) if isinstance(jitter, Distribution) else f"{seconds(jitter)} {spread}"
 
 
-def _few(names: list[str], most: int = 6) -> list[str]:
+def _first_few(names: list[str], most: int = 6) -> list[str]:
     return names if len(names) <= most else [*names[: most - 1], f"{len(names) - most + 1} more"]
 
 
@@ -189,7 +192,7 @@ def _shortened(names: Sequence[str], most: int = 6) -> list[str]:
         f"{stem}{parts[0]}" if len(parts) == 1 else f"{stem}.{{{','.join(part[1:] for part in parts)}}}"
         for stem, parts in groups.items()
     ]
-    return _few(named, most)
+    return _first_few(named, most)
 
 
 def _table(rows: Sequence[Sequence[str]]) -> list[str]:

@@ -12,12 +12,12 @@ from orchestration.system.component import Component
 from orchestration.system.computers import Computer, Network
 from orchestration.system.connection import Connection
 from orchestration.system.criterion import Criterion
+from orchestration.system.file_tables import tables_of
 from orchestration.system.placement import expect_placement, placed_messages, placed_tasks, with_tasks
 from orchestration.system.requirements import require, require_positive
 from orchestration.system.source import Source
 from orchestration.system.times import is_at_least
 from orchestration.system.variable_names import component_of
-from orchestration.system.written import tables_of
 
 
 @record()
@@ -145,10 +145,10 @@ class System:
             require(name not in self.components, f"sources.{name}", name, "another name than a component's")
         fed: dict[str, str] = {}
         for place, start, end in self._feeds():
-            for what, given in (("from", start), ("to", end)):
-                if given is not None and component_of(given) not in self.components:
+            for what, variable in (("from", start), ("to", end)):
+                if variable is not None and component_of(variable) not in self.components:
                     known = ", ".join(self.components)
-                    raise UsageError(f"{place}.{what}: {given}: no such component; expected one of {known}")
+                    raise UsageError(f"{place}.{what}: {variable}: no such component; expected one of {known}")
             if end in fed:
                 raise UsageError(f"{place}.to: {end} is fed by {fed[end]} already; expected one connection or source")
             fed[end] = place

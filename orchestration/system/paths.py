@@ -73,7 +73,7 @@ def _are_parameters(keys: Iterable[str]) -> bool:
     return all(key.startswith("parameters.") for key in keys)
 
 
-def names_table(path: str) -> bool:
+def is_source_file(path: str) -> bool:
     """Whether the value at a path is the file of a source."""
     return path.startswith("sources.") and path.endswith(".file")
 
@@ -83,7 +83,7 @@ def _converted(path: str, value: Any) -> Any:
     is_whole = path == "seed" or (path.startswith(tuple(f"{table}." for table in SHARED)) and path.endswith(_WHOLE))
     if is_whole and isinstance(value, float) and value.is_integer():
         return int(value)
-    return Path(value) if names_table(path) and isinstance(value, str) else value
+    return Path(value) if is_source_file(path) and isinstance(value, str) else value
 
 
 def value_at(system: System, path: str) -> Any:

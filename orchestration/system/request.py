@@ -102,7 +102,7 @@ class Ensemble(Protocol):
     def first(self) -> int:
         """The index of the first; those of an index are the same in every ensemble that has it."""
 
-    def some(self, first: int, count: int) -> "Ensemble":
+    def subset(self, first: int, count: int) -> "Ensemble":
         """The same ensemble with `count` members from index `first` on."""
 
     def initial_conditions(self, request: Any) -> Sequence[InitialConditions]:
@@ -137,7 +137,7 @@ class ControlLoop(Request, Protocol):
     def without_vehicle(self: Self) -> Self:
         """The same request without its vehicle, which is then given elsewhere."""
 
-    def craft(self, given: str | None, folder: Path, *, plant: Values, controller: Values) -> Craft:
+    def craft(self, name_or_path: str | None, folder: Path, *, plant: Values, controller: Values) -> Craft:
         """A vehicle by name, or by a path that starts at `folder`, with these parameters on top; None: only those."""
 
     def ensemble(self, table: Mapping[str, Any], beside: Sequence[str] = ()) -> Ensemble:

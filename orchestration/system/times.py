@@ -25,7 +25,7 @@ def nanoseconds(seconds: float) -> int:
     return round(exact_nanoseconds(seconds))
 
 
-def down_to_nanoseconds(seconds: float) -> float:
+def floor_to_nanoseconds(seconds: float) -> float:
     """A time [s] rounded down to a whole nanosecond [s]."""
     return math.floor(seconds * NANOSECONDS + 1e-6) / NANOSECONDS
 

@@ -50,7 +50,7 @@ class Tuning(TuningProblem):
     def first_run(self) -> tuple[System, Files]:
         """The system of one of the runs, and the files of all."""
         middle = self.values([0.5] * len(self.parameters))
-        return self.systems(self.periods[0], middle, self.starts.some(self.starts.first, 1))[0], self.files()
+        return self.systems(self.periods[0], middle, self.starts.subset(self.starts.first, 1))[0], self.files()
 
     def systems(self, period: float, values: Mapping[str, float], starts: Ensemble) -> list[System]:
         """The systems from an ensemble of initial conditions; raises `UsageError` for an invalid value."""
@@ -63,7 +63,7 @@ class Tuning(TuningProblem):
 
     def judging_ensemble(self) -> Ensemble:
         """The initial conditions that the result is judged on."""
-        return self.starts.some(self.starts.first + self.starts.count, self.judged)
+        return self.starts.subset(self.starts.first + self.starts.count, self.judged)
 
     def mean_cost(self, runs: Sequence[dict[str, Any]]) -> float:
         """The mean cost of runs by their metrics, `bad` for each that diverges: what a search minimises."""

@@ -65,7 +65,7 @@ def export_of(request: Request, announce: Callable[[str], None] | None = None) -
         located = fmus.of_components(system.fmus, announce)
         models = {name: read_model(path) for name, path in located.items()}
         check(system, models)
-        system = _held(connect_references(system, models))
+        system = _with_constants_at_rest(connect_references(system, models))
         plan = Plan(system)
         step, unequal = _common_step(system, models)
         unsupported = (*_unsupported(system), *unequal)
@@ -77,7 +77,7 @@ def export_of(request: Request, announce: Callable[[str], None] | None = None) -
         )
 
 
-def _held(system: System) -> System:
+def _with_constants_at_rest(system: System) -> System:
     """The system with a constant for each input that is fed a motion at rest."""
     sources: dict[str, Source] = {}
     for name, source in system.sources.items():
@@ -103,12 +103,12 @@ def complete_export(request: Request, announce: Callable[[str], None] | None = N
 def _unsupported(system: System) -> Iterator[str]:
     for name, component in system.components.items():
         if component.sampling is not None:
-            yield from _not_plain(f"components.{name}.sampling", component.sampling, ("jitter", "clock_ratio"))
+            yield from _unsupported_fields(f"components.{name}.sampling", component.sampling, ("jitter", "clock_ratio"))
     for table in ("computers", "networks"):
         for name in getattr(system, table):
             yield f"{table}.{name}: an SSP cannot express that; expected none"
     for x in system.connections:
-        yield from _not_plain(f"connections.{x.name}", x, FAULTS)
+        yield from _unsupported_fields(f"connections.{x.name}", x, FAULTS)
     for name, source in system.sources.items():
         if source.to and source.constant is None:
             kind = next(kind for kind in ("file", "noise", "signal") if getattr(source, kind) is not None)
@@ -119,7 +119,7 @@ FAULTS = ("delay", "delay_jitter", "loss", "hold", "noise", "quantisation")
 """The fields of a connection that an SSP lacks"""
 
 
-def _not_plain(place: str, of: Sampling | Connection, keys: tuple[str, ...]) -> Iterator[str]:
+def _unsupported_fields(place: str, of: Sampling | Connection, keys: tuple[str, ...]) -> Iterator[str]:
     defaults = {f.name: f.default for f in fields(of)}
     for key in keys:
         value = getattr(of, key)
@@ -185,16 +185,16 @@ def _constants(system: System, name: str) -> dict[str, Parameter]:
 
 
 def _values(component: Component, model: Model, constants: Mapping[str, Parameter]) -> dict[str, Parameter]:
-    """The values of a component in the order of the FMU: all numeric parameters, and others that are given."""
-    given = {**component.parameters, **constants}
+    """The values of a component in the order of the FMU: all numeric parameters, and others with a value."""
+    values = {**component.parameters, **constants}
     if component.sampling is not None and model.has_clock:
-        given |= {SAMPLE_PERIOD: component.sampling.period, SAMPLE_OFFSET: component.sampling.offset}
+        values |= {SAMPLE_PERIOD: component.sampling.period, SAMPLE_OFFSET: component.sampling.offset}
     found: dict[str, Parameter] = {}
     for variable in model.variables.values():
         if variable.is_constant:
             continue
-        if variable.name in given:
-            value = _typed(given[variable.name], variable)
+        if variable.name in values:
+            value = _typed(values[variable.name], variable)
             # A Boolean only if it is not the start value: fmpy reads the text false as true.
             if variable.kind != "Boolean" or str(value).lower() != variable.start:
                 found[variable.name] = value

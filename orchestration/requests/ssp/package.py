@@ -35,7 +35,7 @@ class Package:
         return path
 
 
-def opened(path: Path) -> Package:
+def open_package(path: Path) -> Package:
     """The SSP of an .ssp or .ssd file; raises `UsageError` for anything else."""
     if path.suffix.lower() == ".ssd":
         return Package(structure=path)

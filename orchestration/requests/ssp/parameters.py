@@ -35,9 +35,9 @@ def values_of(element: Read, package: Package, component: Path) -> Iterator[tupl
         else:
             sets = all_of(binding, "ssd:ParameterValues/ssv:ParameterSet")
         prefix = binding.get("prefix", "")
-        given = {prefix + name: value for found in sets for name, value in _in_set(found)}
+        values = {prefix + name: value for found in sets for name, value in _in_set(found)}
         mappings = all_of(binding, "ssd:ParameterMapping")
-        yield from (_mapped(given, mappings[0], package, component) if mappings else given.items())
+        yield from (_mapped(values, mappings[0], package, component) if mappings else values.items())
 
 
 def _in_set(root: Read) -> Iterator[tuple[str, Value]]:
@@ -62,7 +62,7 @@ def _value(name: str, kind: str, text: str) -> Parameter:
     raise UsageError(f"parameter {name}: is a {kind}; only Real, Integer, Boolean, Enumeration and String are read")
 
 
-def _mapped(given: dict[str, Value], mapping: Read, package: Package, component: Path) -> Iterator[tuple[str, Value]]:
+def _mapped(values: dict[str, Value], mapping: Read, package: Package, component: Path) -> Iterator[tuple[str, Value]]:
     """The values by the entries of a mapping; others are dropped."""
     if mapping.get("source") is not None:
         base = component if mapping.get("sourceBase") == "component" else None
@@ -71,9 +71,9 @@ def _mapped(given: dict[str, Value], mapping: Read, package: Package, component:
         roots = all_of(mapping, "ssm:ParameterMapping")
     for entry in (entry for root in roots for entry in all_of(root, "ssm:MappingEntry")):
         source, target = entry.get("source"), entry.get("target")
-        if source not in given:
+        if source not in values:
             raise UsageError(f"parameter mapping of {source}: the set has no such parameter")
-        value, change = given[source], transformation(entry)
+        value, change = values[source], transformation(entry)
         suppressed = entry.get("suppressUnitConversion", "false") in ("true", "1")
         number = value.value
         if not change.is_none:

@@ -11,7 +11,7 @@ from orchestration.basics.units import BaseUnits
 from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.fmi.model import Model, read_model
 from orchestration.requests.ssp.document import read
-from orchestration.requests.ssp.package import opened
+from orchestration.requests.ssp.package import open_package
 from orchestration.requests.ssp.parameters import Value
 from orchestration.requests.ssp.structure import Node, Path_, Structure, Wire, dotted, structure_of
 from orchestration.requests.ssp.timing import expect_tables, from_text
@@ -43,7 +43,7 @@ def tables_of(path: Path, timing: Mapping[str, Any] | None) -> dict[str, Any]:
     `timing` come first, in its order, which decides ties. Raises `UsageError` for unsupported elements, names that do
     not exist, and a missing step or end.
     """
-    package = opened(path)
+    package = open_package(path)
     structure = structure_of(read(package.structure, "ssd"), package)
     if timing is None:
         timing = {} if structure.timing is None else from_text(structure.timing)
@@ -103,13 +103,13 @@ def _components(
             )
     found = {}
     for place, name in names.items():
-        given = dict(timing.get(name, {}))
+        overrides = dict(timing.get(name, {}))
         parameters = _parameters(structure, place, models[place])
         parameters = {key: value for key, value in parameters.items() if f"{name}.{key}" not in fed}
-        if "sampling" in given or name in tasks:  # which overrides the clock of the SSP
+        if "sampling" in overrides or name in tasks:  # which overrides the clock of the SSP
             parameters = {key: value for key, value in parameters.items() if key not in CLOCK}
-        parameters |= dict(given.pop("parameters", {}))
-        table = {"fmu": str(structure.components[place]), "parameters": parameters, **given}
+        parameters |= dict(overrides.pop("parameters", {}))
+        table = {"fmu": str(structure.components[place]), "parameters": parameters, **overrides}
         if "step" not in table and "sampling" not in table and name not in tasks:
             if structure.step is None:
                 raise UsageError(
@@ -128,7 +128,7 @@ def _parameters(structure: Structure, place: Path_, model: Model) -> dict[str, P
         if node[0] == place and _source_of(structure, node) is None:
             found[node[1]] = _in_own_unit(structure, node, value, model)
     for node in [node for node in structure.wires if node[0] == place]:
-        wires = list(structure.way_to(node))
+        wires = list(structure.wires_to(node))
         for wire in reversed(wires):  # the outermost value
             if wire.start in structure.values and wire.start[0] not in structure.components:
                 outer = _in_own_unit(structure, wire.start, structure.values[wire.start], None)
@@ -139,7 +139,7 @@ def _parameters(structure: Structure, place: Path_, model: Model) -> dict[str, P
 
 def _source_of(structure: Structure, node: Node) -> Node | None:
     """The output of a component from which the wires lead to a connector; None if there is none."""
-    wires = list(structure.way_to(node))
+    wires = list(structure.wires_to(node))
     return wires[-1].start if wires and wires[-1].start[0] in structure.components else None
 
 
@@ -169,7 +169,7 @@ def _signals(structure: Structure, names: Mapping[Path_, str], models: Mapping[P
     for node in structure.kinds:
         source = _source_of(structure, node) if node[0] in names else None
         if source is not None:
-            wires = list(structure.way_to(node))
+            wires = list(structure.wires_to(node))
             conversion, stated = _along(wires, structure, models), not all(wire.converts_units for wire in wires)
             start, end = (f"{names[place]}.{variable}" for place, variable in (source, node))
             found.append(Signal(start=start, end=end, conversion=conversion, stated=stated))

@@ -54,7 +54,7 @@ class Structure:
     timing: str | None = None
     """the text of this project's annotation"""
 
-    def way_to(self, node: Node) -> Iterator[Wire]:
+    def wires_to(self, node: Node) -> Iterator[Wire]:
         """The wires that lead to a connector, from the last, through the connectors of systems."""
         seen = set()
         while (wire := self.wires.get(node)) is not None and node not in seen:

@@ -6,8 +6,8 @@ from typing import Any
 
 from orchestration.basics.documents import toml_of
 from orchestration.basics.errors import UsageError, shown
+from orchestration.system.file_tables import tables_of
 from orchestration.system.model import System
-from orchestration.system.written import tables_of
 
 ENDING = ".timing.toml"
 ANNOTATION = "quadcosim.timing"

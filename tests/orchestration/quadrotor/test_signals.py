@@ -15,9 +15,9 @@ from orchestration.runs.result import Result
 from orchestration.signals.dryden import DRAWS, Dryden
 from orchestration.signals.library import make_signal
 from orchestration.signals.waypoints import read_waypoints
+from orchestration.system.file_tables import tables_of
 from orchestration.system.paths import changed
 from orchestration.system.system_file import system_from_tables
-from orchestration.system.written import tables_of
 from quadcosim import DisturbanceChoice, ReferenceChoice, Scenario, UsageError, load_scenario
 from tests.commands import Main
 from tests.orchestration.engines.batch.lanes import assert_the_same_signals, in_lanes, located, shape_of

@@ -29,7 +29,7 @@ def test_events_are_the_same_in_parts_of_any_length_and_behind_any_time(
         if is_asked:
             found += run_events.with_messages(NO_MESSAGES, end)
             expected += [event for event in whole if begin < event.time <= end]
-        run_events.hand_over(end)
+        run_events.discard_until(end)
     assert found == expected
 
 

@@ -10,11 +10,11 @@ from orchestration.basics.errors import UsageError
 from orchestration.building.inputs import Files
 from orchestration.schedule.schedule_cache import timing
 from orchestration.studies.run_key import run_key
-from orchestration.system.chance import is_random
 from orchestration.system.computers import Message, Network
 from orchestration.system.frames import frame_nanoseconds
 from orchestration.system.paths import changed, value_at
 from orchestration.system.placement import SHARED, punctual
+from orchestration.system.randomness import is_random
 from orchestration.system.sampling import SamplingOnArrival, TaskSampling
 from orchestration.system.system_file import is_system, load_system
 

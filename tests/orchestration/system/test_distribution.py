@@ -11,7 +11,7 @@ import pytest
 from orchestration.basics.errors import UsageError
 from orchestration.schedule.drawing import times_from
 from orchestration.system.connection import Connection
-from orchestration.system.description import timing, varying
+from orchestration.system.description import describe_faults, describe_varying
 from orchestration.system.distribution import Distribution, content, highest, is_random, lowest, mean
 from orchestration.system.input_files import input_files
 from orchestration.system.sampling import Sampling
@@ -69,14 +69,14 @@ def folder(tmp_path: Path) -> Path:
 )
 def test_a_delay_has_the_distribution_of_its_file(folder: Path, text: str, expected: Distribution, words: str) -> None:
     assert read(folder, f"delay = {text}").delay == expected
-    assert timing(read(folder, f"delay_jitter = {text}")) == f"delay jitter {words}"
+    assert describe_faults(read(folder, f"delay_jitter = {text}")) == f"delay jitter {words}"
 
 
 def test_a_trace_is_found_beside_the_file_and_read_when_it_is_needed(folder: Path) -> None:
     delay = read(folder, 'delay = { file = "trace.csv", column = "delay" }').delay
     assert isinstance(delay, Distribution)
     assert (delay.file, lowest(delay), highest(delay)) == (folder / "trace.csv", 0.001, 0.004)
-    assert varying(delay) == "delay of trace.csv, drawn"
+    assert describe_varying(delay) == "delay of trace.csv, drawn"
     assert is_random(delay)
     assert not is_random(replace(delay, order="as recorded"))
 
