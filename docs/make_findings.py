@@ -18,8 +18,20 @@ import pandas as pd
 import quadcosim
 from docs import charts, comparisons, theory
 from docs import processor as processors
+from docs.finding_texts import (
+    all_in_ms,
+    changed_by_halving,
+    fates,
+    first_ends,
+    in_ms,
+    listed,
+    median_with_interval,
+    rank_correlation,
+    share,
+    up_to,
+)
 from docs.theory import PAPER
-from orchestration.basics.statistics import first_end, quantile, wilson
+from orchestration.basics.statistics import wilson
 from orchestration.comparison.survival import FATES, SETTLING, survived
 from orchestration.figures.style import DOCS, save
 from orchestration.flight.hover_loop import HoverLoop
@@ -97,7 +109,7 @@ def period() -> list[str]:
     return [
         shown[columns].to_string(index=False),
         fates(table),
-        *(f"{fate}: not at {_listed(table[~has(table)]['period'])}" for fate, has in FATES.items()),
+        *(f"{fate}: not at {listed(table[~has(table)]['period'])}" for fate, has in FATES.items()),
         f"without wind at 10 ms: residual {without:.3g} m",
     ]
 
@@ -109,8 +121,8 @@ def limits() -> list[str]:
         paper = PAPER.with_changes(parameters={"controller.coupling": kappa})
         found = limit.find(paper, "period", progress=None, announce=None)
         lines.append(
-            f"kappa {kappa:<4g} local {_ms(found.local_limit)}, settles up to {_ms(found.large_signal_limit)}, again "
-            f"at {found.flies_above}: {found.note}"
+            f"kappa {kappa:<4g} local {in_ms(found.local_limit)}, settles up to {in_ms(found.large_signal_limit)}, "
+            f"again at {found.flies_above}: {found.note}"
         )
         if kappa == 1.0:
             figure.draw_spectral_radius(paper, found, FIGURES, DOCS)
@@ -121,11 +133,11 @@ def continuous() -> list[str]:
     """The same flights near continuous time, and the settling of those with much coupling."""
     table = run_study_file("continuous")
     lines = [
-        f"kappa {flight.coupling:<4g} at {_ms(flight.period)}: {flight.outcome}, within 5 cm from "
+        f"kappa {flight.coupling:<4g} at {in_ms(flight.period)}: {flight.outcome}, within 5 cm from "
         f"{flight.settling_time:.5g} s, residual {flight.ultimate_bound:.4g} m"
         for flight in table.sort_values(["coupling", "period"], kind="stable").itertuples()
     ]
-    return [fates(table), _halving(table, "coupling"), *lines]
+    return [fates(table), changed_by_halving(table, "coupling", CONTINUOUS), *lines]
 
 
 def delay() -> list[str]:
@@ -145,9 +157,14 @@ def gains() -> list[str]:
     factors = np.array(sorted(set(next(iter(tables.values()))["gain_factor"])))
     local = np.array([about_hover(_uncoupled(factor), "period").limit for factor in factors])
     _save(lambda: charts.gain_limits(factors, ends, local), "gain_limits")
-    lines = [f"local limit, kappa = 0: {', '.join(f'{f:g}: {_ms(one)}' for f, one in zip(factors, local))}"]
+    lines = [f"local limit, kappa = 0: {', '.join(f'{f:g}: {in_ms(one)}' for f, one in zip(factors, local))}"]
     for label, table in tables.items():
-        lines += [label, fates(table), *up_to(table, "gain_factor", "period"), _halving(table, "gain_factor")]
+        lines += [
+            label,
+            fates(table),
+            *up_to(table, "gain_factor", "period"),
+            changed_by_halving(table, "gain_factor", CONTINUOUS),
+        ]
     return lines
 
 
@@ -160,11 +177,11 @@ def finite_time() -> list[str]:
         inside, rates = times[:, theory.BOUNDS.index(theory.LAYER)], theory.rates_of(times)
         reached = inside[~np.isnan(inside)]
         low, high = wilson(len(reached), len(inside))
-        line = f"beta_t {exponent:<4g} {_ms(period)}: {len(reached)} of {len(inside)} [{low:.0%}, {high:.0%}] stay "
+        line = f"beta_t {exponent:<4g} {in_ms(period)}: {len(reached)} of {len(inside)} [{low:.0%}, {high:.0%}] stay "
         line += f"inside 1 mm; largest error of the last 5 s: median {1e3 * group['remains'].median():.3g} mm"
-        whole = [_interval(column) for column in rates.T if not np.isnan(column).any()]
+        whole = [median_with_interval(column) for column in rates.T if not np.isnan(column).any()]
         if len(reached) == len(inside):
-            line += f"; median from {_interval(reached)} s, paper's from {inside[0]:.4g} s"
+            line += f"; median from {median_with_interval(reached)} s, paper's from {inside[0]:.4g} s"
         lines += [line, f"    rates: {'; '.join(whole)}; theory {theory.expected_rate(exponent):.3g} 1/s"]
         if period == theory.DECAY_PERIODS[0]:
             medians.append(np.median(rates, axis=0))
@@ -185,11 +202,11 @@ def bandwidth() -> list[str]:
         found = theory.limits_over_gains(kappa)
         for name, values in found.items():
             slope, low, high = theory.exponent_of(theory.FACTORS, values)
-            lines.append(f"kappa {kappa:g}, {name}: exponent {slope:.3f} [{low:.3f}, {high:.3f}]; {_all_ms(values)}")
+            lines.append(f"kappa {kappa:g}, {name}: exponent {slope:.3f} [{low:.3f}, {high:.3f}]; {all_in_ms(values)}")
         if kappa == 0.0:
             _save(lambda found=found: charts.loop_gains(found), "loop_gains")  # type: ignore[misc]
     alone = [theory.of_attitude_alone(15.0 * f, 15.0 * f, 15.0 * f) for f in theory.FACTORS]
-    return [*lines, f"attitude loop by itself: {_all_ms(alone)}"]
+    return [*lines, f"attitude loop by itself: {all_in_ms(alone)}"]
 
 
 def bounds() -> list[str]:
@@ -199,8 +216,8 @@ def bounds() -> list[str]:
                ("delay_limit", "certain_jitter", "breaking_jitter")]  # fmt: skip
     _save(lambda: charts.margins(*columns), "margins")
     return [
-        f"{_ms(one.period)}: constant {_ms(one.delay_limit)}, certain {_ms(one.certain_jitter)}, breaking "
-        f"{_ms(one.breaking_jitter)} by {one.breaking_sequence}"
+        f"{in_ms(one.period)}: constant {in_ms(one.delay_limit)}, certain {in_ms(one.certain_jitter)}, breaking "
+        f"{in_ms(one.breaking_jitter)} by {one.breaking_sequence}"
         for one in found
     ]
 
@@ -211,7 +228,7 @@ def certificates() -> list[str]:
     found = quadcosim.margin_region(slow, "components.controller.sampling.jitter", "connections.command.delay_jitter")
     _save(lambda: found.figure(DOCS), "margin_region")
     return [
-        f"{name}: " + ", ".join(f"{_ms(a)} with {_ms(b)}" for a, b in pairs)
+        f"{name}: " + ", ".join(f"{in_ms(a)} with {in_ms(b)}" for a, b in pairs)
         for name, pairs in (("certified", found.certified), ("breaking", found.breaking))
     ]
 
@@ -230,7 +247,7 @@ def wind() -> list[str]:
             exact = costs[name][theory.WIND_DELAYS.index(delay), theory.WIND_PERIODS.index(period)]
             found, width = np.sqrt(squares.mean()), 2.13 * squares.std(ddof=1) / np.sqrt(len(squares))
             simulated = f"{len(squares)} runs {found:.4g} +- {width / (2.0 * found):.2g}"
-            lines.append(f"{_ms(period)}, {_ms(delay)}: {name} {exact:.6g}; {simulated}")
+            lines.append(f"{in_ms(period)}, {in_ms(delay)}: {name} {exact:.6g}; {simulated}")
     return lines
 
 
@@ -243,14 +260,15 @@ def monte_carlo() -> list[str]:
     for axis, edge in RANDOM.items():
         groups |= {f"{axis} < {edge:g}": table[table[axis] < edge], f"{axis} >= {edge:g}": table[table[axis] >= edge]}
     for name, group in groups.items():
-        lines.append(f"{name}: " + "; ".join(f"{kind} {_share(has(group))}" for kind, has in kinds.items()))
+        lines.append(f"{name}: " + "; ".join(f"{kind} {share(has(group))}" for kind, has in kinds.items()))
     for name, group in {
         "survive": table[alive],
         "loss < 0.25": table[alive & (table["loss"] < RANDOM["loss"])],
     }.items():
         for metric in ("ultimate_bound", "position_rmse"):
-            lines.append(f"{name}: median {metric} {_interval(group[metric])}, rank correlations " + ", ".join(
-                f"{axis} {_rank_correlation(group[axis], group[metric])}" for axis in RANDOM
+            median = median_with_interval(group[metric])
+            lines.append(f"{name}: median {metric} {median}, rank correlations " + ", ".join(
+                f"{axis} {rank_correlation(group[axis], group[metric])}" for axis in RANDOM
             ))  # fmt: skip
     return lines
 
@@ -329,86 +347,6 @@ def _design(study: Study, seed: int) -> Study:
 def _uncoupled(factor: float) -> Any:
     """The paper's flight with κ = 0 and its attitude gains times a factor."""
     return theory.scaled(theory.ATTITUDE, factor, PAPER.with_changes(parameters={"controller.coupling": 0.0}))
-
-
-# -- texts ------------------------------------------------------------------------------------------------
-
-
-def fates(table: pd.DataFrame) -> str:
-    """How many survive and settle, and by when: whether another horizon would change the result."""
-    by = {name: "/".join(map(str, counts.values())) for name, counts in comparisons.by_horizon(table).items()}
-    alive = survived(table)
-    return (
-        f"{len(table)} flights, {alive.sum()} survive (diverged by {'/'.join(f'{t:g}' for t in comparisons.HORIZONS)} "
-        f"s: {by['diverged_by']}), {FATES['settle'](table).sum()} settle (by then: {by['settled_by']})"
-    )
-
-
-def up_to(table: pd.DataFrame, by: str, axis: str) -> list[str]:
-    """For each value of one axis: the value of the other up to which flights survive and settle, and those beyond."""
-    ends, lines = first_ends(table, by, axis), []
-    for i, (value, group) in enumerate(table.sort_values(axis).groupby(by, sort=True)):
-        texts = []
-        for fate, has in FATES.items():
-            end = ends[fate][i]
-            again = group[has(group) & ~(group[axis] <= end)][axis]
-            texts.append(f"{fate} up to {end:g}, again at {_listed(again)}")
-        lines.append(f"{by} {value:g}: {'; '.join(texts)}")
-    return lines
-
-
-def first_ends(table: pd.DataFrame, by: str, axis: str) -> dict[str, Any]:
-    """For each fate and value of `by`, upward, the last value along `axis` before the first without it; nan: none."""
-    groups = [group for _, group in table.sort_values(axis).groupby(by, sort=True)]
-    return {
-        fate: np.array([first_end(group[axis], has(group)) for group in groups], float) for fate, has in FATES.items()
-    }
-
-
-def _halving(table: pd.DataFrame, by: str) -> str:
-    """The outcomes that change when the period that approximates continuous time is halved."""
-    fine, coarse = (table[table["period"] == period].set_index(by) for period in CONTINUOUS)
-    changed = [f"{value:g}" for value in fine.index if fine["outcome"][value] != coarse["outcome"][value]]
-    settled = fine.index[FATES["settle"](fine)]
-    return f"{_all_ms(CONTINUOUS)}: outcomes differ at {by} {changed or 'none'}; settle at {_listed(settled)}"
-
-
-def _share(has: pd.Series) -> str:
-    """The number of runs that have a fate, and the share with its Wilson interval."""
-    low, high = wilson(int(has.sum()), len(has))
-    return f"{int(has.sum())} of {len(has)}, {has.mean():.0%} [{low:.0%}, {high:.0%}]"
-
-
-def _rank_correlation(x: pd.Series, y: pd.Series) -> str:
-    """Spearman's rank correlation, with its 95 % interval by the bootstrap."""
-    from scipy.stats import bootstrap, spearmanr
-
-    def of(x: Any, y: Any) -> float:
-        return float(spearmanr(x, y).statistic)
-
-    found = bootstrap(
-        (x.to_numpy(float), y.to_numpy(float)), of, paired=True, vectorized=False, n_resamples=1000,
-        method="percentile", random_state=np.random.default_rng(1),
-    ).confidence_interval  # fmt: skip
-    return f"{of(x, y):.2f} [{found.low:.2f}, {found.high:.2f}]"
-
-
-def _interval(values: Any) -> str:
-    """The median of some values, with its interval."""
-    median, low, high, _ = quantile(values)
-    return f"{median:.3g} [{low:.3g}, {high:.3g}]"
-
-
-def _listed(values: Any) -> str:
-    return ", ".join(f"{value:g}" for value in sorted(values)) or "none"
-
-
-def _all_ms(values: Any) -> str:
-    return ", ".join(_ms(value) for value in values)
-
-
-def _ms(seconds: float | None) -> str:
-    return "none" if seconds is None else f"{seconds * 1e3:.4g} ms"
 
 
 if __name__ == "__main__":

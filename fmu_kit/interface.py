@@ -244,7 +244,7 @@ class Declaration(property):
         raise TypeError(f"self.{self.attribute} = {value}: expected {self._kind.expected}")
 
     def variables(self) -> list[Variable]:
-        """The FMI variables that it stands for."""
+        """Its FMI variables."""
         return self._as(self.name, self.description, self.causality, self._variability)
 
     def _as(self, name: str, description: str, causality: Causality, variability: Variability) -> list[Variable]:

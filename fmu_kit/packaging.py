@@ -175,7 +175,7 @@ def slave_class(target: Target) -> Any:
         left = ", ".join(sorted(slave.__abstractmethods__))
         raise PackagingError(f"{target.module}:{target.model}: expected it to define {left}")
     if "description" not in vars(slave):
-        raise PackagingError(f"{target.module}:{target.model}: expected a docstring or a description of its own")
+        raise PackagingError(f"{target.module}:{target.model}: expected a docstring or a description")
     return slave if target.variant is None else _variant(slave, target.variant)
 
 

@@ -20,8 +20,8 @@ def generation_tool() -> str:
 
 def version_of(slave: type[Any]) -> str | None:
     """The version that a slave declares; else that of this project for a slave that comes with it; else None."""
-    said = getattr(slave, "version", None)
-    if said:
-        return str(said)
+    declared = getattr(slave, "version", None)
+    if declared:
+        return str(declared)
     own = importlib.metadata.distribution(PROJECT).read_text("top_level.txt") or ""
     return project_version() if slave.__module__.partition(".")[0] in own.split() else None

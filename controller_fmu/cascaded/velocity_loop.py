@@ -108,18 +108,18 @@ def limited_force(loop: VelocityLoop, acceleration: Vec3, model: Model, full_thr
 
 
 def error_without_windup(
-    loop: VelocityLoop, error: Vec3, wanted: Vec3, force: Force, model: Model, full_thrust: float
+    loop: VelocityLoop, error: Vec3, demand: Vec3, force: Force, model: Model, full_thrust: float
 ) -> Vec3:
     """The velocity error [m/s] to be integrated.
 
     Vertical: zero where it would drive a thrust at its limit further. Horizontal: where the acceleration is less than
-    `wanted` [m/s²], reduced so that the integral returns (tracking anti-windup, with the gain 2/P).
+    `demand` [m/s²], reduced so that the integral returns (tracking anti-windup, with the gain 2/P).
     """
     least, most = loop.least_thrust * full_thrust, loop.most_thrust * full_thrust
     at_least = (force.desired.z >= -least) & (error.z >= 0.0)
     at_most = (force.desired.z <= -most) & (error.z <= 0.0)
     z = FLOAT.where(at_least | at_most, 0.0, error.z)
     x, y = force.limited.x / model.mass, force.limited.y / model.mass
-    saturated = wanted.x * wanted.x + wanted.y * wanted.y > x * x + y * y
+    saturated = demand.x * demand.x + demand.y * demand.y > x * x + y * y
     gain = FLOAT.where(saturated, 2.0 / loop.proportional.x, 0.0)
-    return Vec3(error.x - gain * (wanted.x - x), error.y - gain * (wanted.y - y), z)
+    return Vec3(error.x - gain * (demand.x - x), error.y - gain * (demand.y - y), z)

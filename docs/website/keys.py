@@ -47,7 +47,7 @@ class _Key(NamedTuple):
     name: str
     kind: Any
     default: str
-    said: str
+    description: str
 
 
 def page() -> str:
@@ -68,7 +68,9 @@ def _section(places: Sequence[str], shape: Any, file: str) -> str:
     """The section of a table that occurs in one or several places of a file."""
     named = ", ".join(f"`{place}`" for place in places)
     heading = f"### {named} of a {file.lower()}\n\n{_summary(shape)}\n\n" if named != "``" else ""
-    rows = [(f"<code>{key.name}</code>", _kind(key.kind), key.default, inline_html(key.said)) for key in _keys(shape)]
+    rows = [
+        (f"<code>{key.name}</code>", _kind(key.kind), key.default, inline_html(key.description)) for key in _keys(shape)
+    ]
     return heading + table(rows, columns=("Key", "Value", "Without it", "Meaning"))
 
 
@@ -93,14 +95,17 @@ def _shapes(kind: Any) -> Iterator[tuple[Any, Any]]:
 
 def _keys(shape: Any) -> list[_Key]:
     """The keys of a table in order, with their descriptions."""
-    said = docs_of_keys(shape)
-    return [_Key(key, field.annotation, _default(field), said.get(key, "")) for key, field in fields_of(shape).items()]
+    descriptions = docs_of_keys(shape)
+    return [
+        _Key(key, field.annotation, _default(field), descriptions.get(key, ""))
+        for key, field in fields_of(shape).items()
+    ]
 
 
 def _summary(shape: Any) -> str:
     text = (shape.__doc__ or "").split("\n\n")[0]
-    said = text.split(": ", 1)[1] if text.startswith("`[") and ": " in text else text
-    return said[:1].upper() + said[1:]
+    summary = text.split(": ", 1)[1] if text.startswith("`[") and ": " in text else text
+    return summary[:1].upper() + summary[1:]
 
 
 def _default(field: Any) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pandas as pd
 
 import quadcosim
-from docs.make_findings import fates, up_to
+from docs.finding_texts import fates, up_to
 from docs.theory import ATTITUDE, PAPER, scaled
 from orchestration.quadrotor.scenario import Scenario
 

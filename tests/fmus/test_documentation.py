@@ -403,5 +403,5 @@ def test_a_second_controller_beside_the_first_has_nothing_of_its_page_icon_and_d
     done = python(tree, "-m", "fmu_kit.packaging", str(tmp_path), "controller_fmu.second:Second")
     assert (done.returncode, done.stderr) == (
         1,
-        "controller_fmu.second:Second: expected a docstring or a description of its own\n",
+        "controller_fmu.second:Second: expected a docstring or a description\n",
     )

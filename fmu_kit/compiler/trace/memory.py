@@ -89,10 +89,10 @@ class Memory:
             if name not in before and not may_add:
                 raise TraceError(f"self.{name} is first set {when}: expected it set by initialise")
             if name in before and shape(before[name]) != shape(value):
-                what = "what is kept" if name in BASE_STATE else f"self.{name}"
+                what = "the state" if name in BASE_STATE else f"self.{name}"
                 found = difference({name: before[name]}, {name: value}, self.name)
                 raise TraceError(
-                    f"{what} changes {when} in more than numbers: {found}; expected one form from the beginning on"
+                    f"{what} changes {when} in more than numbers: {found}; expected one structure from the start"
                 )
         for name in before.keys() - now.keys():
             raise TraceError(f"self.{name} is deleted {when}: expected it to stay")

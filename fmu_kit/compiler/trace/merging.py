@@ -37,8 +37,8 @@ class Merge:
         """The merged end."""
         version = a.version if a.version == b.version else self.memory.joined(self.condition, a.version, b.version)
         return PathEnd(
-            self.value(a.value, b.value, "what is returned"),
-            self.value(a.view, b.view, "what is kept"),
+            self.value(a.value, b.value, "the result"),
+            self.value(a.view, b.view, "the state"),
             {path: holder for path, holder in a.holders.items() if b.holders.get(path) == holder},
             {name: self.number(a.written[name], b.written[name]) for name in a.written.keys() & b.written.keys()},
             version,

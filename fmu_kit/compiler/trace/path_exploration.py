@@ -114,7 +114,7 @@ class Explorer:
     @property
     def _current(self) -> _Path:
         if self._path is None:
-            raise TraceError("a computed value is used outside of a call that is traced")
+            raise TraceError("a computed value is used outside of a traced call")
         return self._path
 
     def _decide(self, condition: Symbol) -> bool:
@@ -343,10 +343,10 @@ class Explorer:
             raise TraceError("a loop that always fails")
         if leaf.version != version:
             raise TraceError(
-                "repeat: its body calls a method that changes what the slave keeps, expected to get all by its state"
+                "repeat: its body calls a method that changes the slave, expected all changes in the returned state"
             )
         if not _is_same(leaf.view, kept):
-            raise TraceError("repeat: its body changes what the slave keeps, expected to get all by its state")
+            raise TraceError("repeat: its body changes the slave, expected all changes in the returned state")
         if shape(leaf.value) != shape(state):
             raise TraceError("repeat: expected the body to return what it is given, with other numbers")
         return block, [lifted(leaf) for _, leaf in leaves(leaf.value) if is_number(leaf)]

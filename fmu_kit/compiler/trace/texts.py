@@ -1,4 +1,4 @@
-"""Values within texts: a marker stands for each, until the text is split at them."""
+"""Values within texts: each is represented by a marker, at which the text is split later."""
 
 from __future__ import annotations
 

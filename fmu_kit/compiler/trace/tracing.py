@@ -130,14 +130,14 @@ def _traced(slave: type[Slave], modules: list[types.ModuleType], memory: Memory)
             lambda: Slave._initialise(instance), "enter_stepping", {}, catches=True
         )
         if after is None:
-            raise TraceError(f"{slave.__name__}.initialise fails whatever it is given")
+            raise TraceError(f"{slave.__name__}.initialise always fails")
         memory.expect_as_before(before, after, "when it is initialised", may_add=True)
         memory._set_attributes(after)
         instance._phase = Phase.STEPPING
         step = functools.partial(Slave._advance, instance)
         do_step, stepped, _ = explorer.function(lambda t, h: step(t, h), "do_step", {"t": 0.0, "h": 0.0}, catches=True)
         if stepped is None:
-            raise TraceError(f"{slave.__name__}.step fails whatever it is given")
+            raise TraceError(f"{slave.__name__}.step always fails")
         memory.expect_as_before(after, stepped, "in a step", may_add=False)
     variables = {place.reference: place for place in memory.places.values() if place.reference is not None}
     beside = [place for place in memory.places.values() if place.reference is None]

@@ -194,7 +194,7 @@ def expect_no_aliases(value: Any) -> None:
         ):
             if id(value) in places:
                 one, other = (f"self{path_text(each)}" for each in (places[id(value)], path))
-                raise TraceError(f"{one} and {other} are one {type(value).__name__}: expected one of its own")
+                raise TraceError(f"{one} and {other} are one {type(value).__name__}: expected separate objects")
             places[id(value)] = path
         for key, child in children(value):
             note(child, (*path, key))
@@ -209,7 +209,7 @@ def expect_unchanged(before: Sequence[tuple[Path, Any]], given: Any, name: str) 
         if one is None or other is None or one[0] != other[0] or not _are_same(one[1], other[1]):
             path = (one or other)[0]
             raise TraceError(
-                f"{name} changes {path[0]}, which it is given: expected it to return what is new, or to change self"
+                f"{name} changes its argument {path[0]}: expected it to return a new value, or to change self"
             )
 
 

@@ -70,12 +70,12 @@ class Refused(Slave):
 IN_A_STEP = [
     (
         "kept = [a, a]; self._filling(kept); self.y = kept[0]",
-        "_filling changes given, which it is given: expected it to",
+        "_filling changes its argument given: expected it to",
     ),
-    ("kept = {}; self._adding(kept); self.y = kept['new']", "_adding changes given, which it is given: expected it to"),
+    ("kept = {}; self._adding(kept); self.y = kept['new']", "_adding changes its argument given: expected it to"),
     (
         "kept = Helper(a); self._moving(kept); self.y = kept.value",
-        "_moving changes helper, which it is given: expected",
+        "_moving changes its argument helper: expected",
     ),
     ("self.y = '{}'.isdigit() + math.hypot(a, 1.0)", "a function that takes floats only was given a computed"),
     ("self.y = round(a)", "round() of a computed value: expected math.floor or math.ceil"),
@@ -93,7 +93,7 @@ IN_A_STEP = [
     ("self.hidden = a", "self.hidden hides the one of its class: expected another name, set by initialise"),
     ("self._kept = None", "self._kept changes in a step in more than numbers: self._kept is a number and None"),
     ("self._kept = [a]", "self._kept changes in a step in more than numbers: "),
-    ("if a > 1.0: self._kept = 'on'", "what is kept differs in more than numbers between two paths: "),
+    ("if a > 1.0: self._kept = 'on'", "the state differs in more than numbers between two paths: "),
     ("self.y = min([a, t], key=abs)", "min() of computed values with key: expected values only"),
     ("self.y = None", "self.y = None: expected a number"),
     ("if a > 1.0: self.count = 'on'", "self.count = on: expected a number"),
@@ -105,11 +105,11 @@ IN_A_STEP = [
     ("self.y = repeat(math.floor(a), lambda i, x: (x, x), a)", "repeat: expected the body to return what it is"),
     (
         "self.y = repeat(math.floor(a), lambda i, x: setattr(self, 'y', i * x) or x, a)",
-        "repeat: its body changes what the slave keeps",
+        "repeat: its body changes the slave",
     ),
     (
         "self.y = repeat(math.floor(a), lambda i, x: self._changing(x) * x, a)",
-        "repeat: its body calls a method that changes what the slave keeps",
+        "repeat: its body calls a method that changes the slave",
     ),
     ("self.y = any(self._speaking(x) for x in (a, t))", "any() of values of which a later one may fail"),
     ("self.y = all(self._changing(x) for x in (a, t))", "all() of values of which a later one may fail"),
@@ -117,9 +117,9 @@ IN_A_STEP = [
 ]
 IN_INITIALISE = [
     ("self._queue = deque([0.0])", "deque: expected numbers in tuples, lists, dictionaries and objects"),
-    ("self._one = self._other = Helper(t)", "self._one and self._other are one Helper: expected one of its own"),
+    ("self._one = self._other = Helper(t)", "self._one and self._other are one Helper: expected separate objects"),
     ("self._one = Helper(t); self._all = {'b.c': [self._one]}", "self._one and self._all['b.c'][0] are one Helper"),
-    ("raise ValueError(t)", "Refused.initialise fails whatever it is given"),
+    ("raise ValueError(t)", "Refused.initialise always fails"),
 ]
 
 
@@ -148,7 +148,7 @@ def test_what_a_step_may_not_do_is_said_in_a_line(
     assert words in message
     assert "\n" not in message
     if not re.match(
-        "Refused: (self.*(a step|its class)|what is kept.*a step|.*(between two paths|of its type))", message
+        "Refused: (self.*(a step|its class)|the state.*a step|.*(between two paths|of its type))", message
     ):  # of the slave as a whole
         assert message.startswith(f"Refused: {path}, line {line_of(path, statement)}: ")
 
