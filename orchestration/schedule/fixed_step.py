@@ -10,8 +10,8 @@ from orchestration.basics.simulator import Integers
 from orchestration.system.times import NANOSECONDS, Grid
 
 
-class Refusal(NamedTuple):
-    """An instant at which a run cannot continue."""
+class Misalignment(NamedTuple):
+    """An instant between two points of a component that may not move: the run ends there."""
 
     time: int
     """[ns], of that instant"""
@@ -26,15 +26,15 @@ class FixedStep:
     grid: Grid
     moves: bool
 
-    def aligned(self, times: Integers, what: str, refused: list[Refusal]) -> Integers:
-        """`times` [ns] on the grid; if they may not move, the first between two points is added to `refused`."""
+    def aligned(self, times: Integers, what: str, misaligned: list[Misalignment]) -> Integers:
+        """`times` [ns] on the grid; if they may not move, the first between two points is added to `misaligned`."""
         points: Integers = np.array([self.grid.from_(time) for time in times.tolist()], dtype=np.int64)
         between = np.flatnonzero(points != times)
         if len(between) and not self.moves:
             time, point = int(times[between[0]]), int(points[between[0]])
             before = max(point - self.grid[1], 0)
-            refused.append(
-                Refusal(
+            misaligned.append(
+                Misalignment(
                     time,
                     f"{what} at t = {seconds(time)} s falls between two points of components.{self.name}, "
                     f"{self._steps}: expected {seconds(before)} s or {seconds(point)} s; "

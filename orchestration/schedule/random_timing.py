@@ -9,7 +9,7 @@ import numpy as np
 from orchestration.basics.simulator import Integers
 from orchestration.computers.parts import Constant
 from orchestration.schedule.drawing import times
-from orchestration.schedule.fixed_step import FixedStep, Refusal, seconds
+from orchestration.schedule.fixed_step import FixedStep, Misalignment, seconds
 from orchestration.schedule.lookahead import NEVER, Lookahead
 from orchestration.schedule.message_times import lateness, losses
 from orchestration.schedule.plan import Plan
@@ -23,13 +23,13 @@ class Link:
     """A connection with its random streams."""
 
     def __init__(
-        self, index: int, x: Connection, streams: Streams, fixed: FixedStep | None, refused: list[Refusal]
+        self, index: int, x: Connection, streams: Streams, fixed: FixedStep | None, misaligned: list[Misalignment]
     ) -> None:
         """`fixed` is the component that is stepped to its messages, if it has a fixed step."""
         owner = f"connections.{x.name}"
         self.index, self.jacobi = index, x.order == "jacobi"
         self.longest = nanoseconds(highest(x.delay)) + nanoseconds(highest(x.delay_jitter))
-        self._name, self._fixed, self._refused = owner, fixed, refused
+        self._name, self._fixed, self._misaligned = owner, fixed, misaligned
         delay = times(x.delay, partial(streams.of, owner, DELAY))
         late = lateness(x.delay_jitter, x.jitter_distribution, partial(streams.of, owner, DELAY_JITTER))
         self._late = [each for each in (delay, late) if each != Constant(0)]
@@ -59,7 +59,7 @@ class Link:
         """The times `own`, delayed so that no message overtakes another."""
         times: Integers = np.maximum(np.maximum.accumulate(own), self._last)
         if self._fixed is not None:
-            times = self._fixed.aligned(times, f"{what} over {self._name}", self._refused)
+            times = self._fixed.aligned(times, f"{what} over {self._name}", self._misaligned)
         self._last = int(times[-1]) if len(times) else self._last
         return times
 
@@ -76,14 +76,14 @@ class TimedComponent:
         plan: Plan,
         links: Sequence[Link],
         fixed: Mapping[str, FixedStep],
-        refused: list[Refusal],
+        misaligned: list[Misalignment],
     ) -> None:
         connections = plan.system.connections
         self.index, self.rank = list(plan.system.components).index(name), plan.sampled.index(name)
         self.incoming = [links[i] for i in plan.measured if connections[i].receiver == name]
         self.outgoing = [links[i] for i in plan.commanded if connections[i].sender == name]
         self._ahead = max((link.longest for link in self.incoming), default=0)
-        self._name, self._refused, self._stop = f"components.{name}", refused, nanoseconds(plan.system.stop_time)
+        self._name, self._misaligned, self._stop = f"components.{name}", misaligned, nanoseconds(plan.system.stop_time)
         self._fixed = [fixed[x] for x in sorted({connections[link.index].sender for link in self.incoming} & {*fixed})]
         self._columns = [np.zeros(0, dtype=np.int64)] * (_OF_LINKS + 2 * len(self.incoming + self.outgoing))
 
@@ -150,7 +150,7 @@ class TimedComponent:
                     f"samples {k - 1} and {k} of {self._name} both move to t = {seconds(before)} s, the next point of "
                     f"components.{self._fixed[-1].name}: expected a period that leaves one for each"
                 )
-                self._refused.append(Refusal(before, text))
+                self._misaligned.append(Misalignment(before, text))
             before = found[-1]
         return np.array(found, dtype=np.int64)
 
@@ -160,7 +160,7 @@ class TimedComponent:
         while time < self._stop + self._ahead and time != before:
             before = time
             for fixed in self._fixed:
-                time = int(fixed.aligned(np.array([time]), f"a sample of {self._name}", self._refused)[0])
+                time = int(fixed.aligned(np.array([time]), f"a sample of {self._name}", self._misaligned)[0])
         return time
 
 
@@ -174,9 +174,9 @@ class SampledComponent(TimedComponent):
         links: Sequence[Link],
         streams: Streams,
         fixed: Mapping[str, FixedStep],
-        refused: list[Refusal],
+        misaligned: list[Misalignment],
     ) -> None:
-        super().__init__(name, plan, links, fixed, refused)
+        super().__init__(name, plan, links, fixed, misaligned)
         sampling = plan.system.components[name].sampling
         assert sampling is not None
         self._grid = _grid(sampling.offset, sampling.period, sampling.clock_ratio)
@@ -222,9 +222,9 @@ class ScheduledComponent(TimedComponent):
         links: Sequence[Link],
         lookahead: Lookahead,
         fixed: Mapping[str, FixedStep],
-        refused: list[Refusal],
+        misaligned: list[Misalignment],
     ) -> None:
-        super().__init__(name, plan, links, fixed, refused)
+        super().__init__(name, plan, links, fixed, misaligned)
         self._lookahead, self._samples = lookahead, lookahead.samples[name]
         names = [x.name for x in plan.system.connections]
         self._sent = [lookahead.messages.get(names[link.index]) for link in self.outgoing]

@@ -13,7 +13,7 @@ import numpy as np
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Booleans, Integers
-from orchestration.schedule.fixed_step import FixedStep, Refusal
+from orchestration.schedule.fixed_step import FixedStep, Misalignment
 from orchestration.schedule.frame import Frame
 from orchestration.schedule.lookahead import Lookahead
 from orchestration.schedule.random_timing import (
@@ -45,12 +45,12 @@ class Timetable:
         self._frame = frame = frame or Frame(system, fixed or {})
         self._plan, self._fixed, self.stop = frame.plan, frame.fixed, frame.stop
         self._begin, self._end = 0, self.stop + 1
-        self._refused: list[Refusal] = []
+        self._misaligned: list[Misalignment] = []
         self._connections = frame.system.connections
         self._links: list[Link] = []
         for i, x in enumerate(self._connections):
             stepped = self._fixed.get(x.sender if i in self._plan.measured else x.receiver)
-            self._links.append(Link(i, x, streams, stepped, self._refused))
+            self._links.append(Link(i, x, streams, stepped, self._misaligned))
         self._lookahead = Lookahead(frame.system, frame.resources, streams) if frame.uses_scheduler else None
         self._tasks = [self._timed(name, streams) for name in self._plan.sampled]
         self.first_samples = {
@@ -66,8 +66,8 @@ class Timetable:
 
     def _timed(self, name: str, streams: Streams) -> TimedComponent:
         if self._lookahead is not None and name in self._lookahead.samples:
-            return ScheduledComponent(name, self._plan, self._links, self._lookahead, self._fixed, self._refused)
-        return SampledComponent(name, self._plan, self._links, streams, self._fixed, self._refused)
+            return ScheduledComponent(name, self._plan, self._links, self._lookahead, self._fixed, self._misaligned)
+        return SampledComponent(name, self._plan, self._links, streams, self._fixed, self._misaligned)
 
     def next_schedule(self, most: int) -> Schedule | None:
         """The next instants, about `most` of them; None at the end.
@@ -80,7 +80,7 @@ class Timetable:
             self._ahead = self._window(most)
             found.times[-1] = self._end if self._ahead is None else self._ahead.times[0]
         elif self._end <= self.stop:
-            raise UsageError(min(self._refused).text)
+            raise UsageError(min(self._misaligned).text)
         return found
 
     def spans(self, most: int) -> Iterator[Span]:
@@ -99,8 +99,8 @@ class Timetable:
         """The schedule of the next window with instants."""
         while self._begin < self._end:
             schedule = self._span(most).schedule(self._frame.continuous)
-            if self._refused:
-                self._end = min(self._end, min(self._refused).time)
+            if self._misaligned:
+                self._end = min(self._end, min(self._misaligned).time)
                 schedule = schedule.part(0, int(np.searchsorted(schedule.times[:-1], self._end)))
             if len(schedule):
                 return schedule
@@ -169,7 +169,7 @@ class Timetable:
         sent, own = messages.take(count)
         stepped = self._fixed.get(self._connections[link.index].sender)
         if stepped is not None:
-            sent = stepped.aligned(sent, "a message", self._refused)
+            sent = stepped.aligned(sent, "a message", self._misaligned)
         return np.arange(first, first + count), sent, link.arrivals(np.where(own < 0, -1, np.maximum(own, sent)))
 
     def _measure(self, begin: int, end: int, found: InstantCollector) -> Integers:
