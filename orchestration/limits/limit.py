@@ -170,7 +170,7 @@ def _checked(request: Request, of: str, confidence: float) -> tuple[Varied, File
         raise UsageError(f"--confidence {confidence}: expected a number between 0 and 1")
     varied = Varied(request=request, of=of)
     if varied.system.criterion.good is None:
-        raise UsageError("criterion.good: expected in the system file, for it says what the limit is of")
+        raise UsageError("criterion.good: expected in the system file, since it defines the limit")
     return varied, files_of(varied.system)
 
 

@@ -26,7 +26,7 @@ _KEPT = 16_384
 """Bytes kept of the end of the process's output"""
 _LONGEST = 64.0
 """[MB] of one message from a process whose output is limited, at most"""
-_OUT_OF_PROCESSOR = "it takes more time of a processor than the system gives it (ulimit -t)"
+_OUT_OF_PROCESSOR = "it uses more processor time than the system allows (ulimit -t)"
 _PATIENCE = 60.0
 """[s] to wait for the exit of a process that has closed its channel"""
 

@@ -143,7 +143,7 @@ def test_an_existing_limit_of_processor_time_holds_for_a_confined_process(soft: 
 
 @linux_only
 def test_a_process_ended_by_an_existing_limit_of_processor_time_is_reported_so() -> None:
-    reached = "it takes more time of a processor than the system gives it (ulimit -t)"
+    reached = "it uses more processor time than the system allows (ulimit -t)"
     assert under_a_limit("while True: pass", soft=2, hard=2) == ["None", reached, ""]
 
 

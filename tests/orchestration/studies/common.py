@@ -1,4 +1,4 @@
-"""What the tests of studies share: short studies, the command as a process, and what goes on in processes."""
+"""Shared parts of the tests of studies: short studies, the command as a process, and observation of processes."""
 
 import contextlib
 import dataclasses
@@ -79,7 +79,7 @@ def short(stop_time: float = 0.1, **timing: Any) -> Scenario:
 
 
 def axis(target: str, *values: Any) -> Axis:
-    """An axis of listed values, named as what it sets."""
+    """An axis of listed values, named after its target."""
     return Axis(name=target, targets=(target,), values=values)
 
 
@@ -87,7 +87,7 @@ FAILS = 0.0
 """A mass that the description of the plant allows and the plant does not"""
 PERIODS = axis("timing.period", 0.01, 0.02)
 POLL = 0.02
-"""[s] between two looks at what another process does, each of which costs milliseconds itself"""
+"""[s] between two checks of another process, each of which costs milliseconds"""
 STORE = Path("results") / "study" / "study.sqlite"
 """Where the command keeps the study of `study.toml`"""
 
@@ -97,12 +97,12 @@ def study(*axes: Axis, base: Request | None = None, **fields: Any) -> Study:
 
 
 def sweep(chosen: Study, **options: Any) -> Swept:
-    """Flown by its FMUs as they are unless a test asks for another engine: then rows are those of `run` to the byte."""
+    """Sweep with the FMUs as they are, unless a test requests another engine: rows then equal those of `run`."""
     return sweeping.sweep(chosen, **{"engine": "compiled", **options})
 
 
 def swept(chosen: Study, folder: Path, **options: Any) -> Path:
-    """The store of a study, flown."""
+    """The store of a study after its sweep."""
     return sweep(chosen, folder=folder, **options).path
 
 
@@ -111,19 +111,19 @@ def starts() -> dict[str, float]:
 
 
 def files_in(scenario: Scenario | None = None) -> Files:
-    """The files that a flight needs, the paper's unless told."""
+    """The files that a flight needs, default: the paper's."""
     return files_of((scenario or short()).as_system())
 
 
 def at(system: System, target: str) -> Any:
-    """What a system has where a scenario says `timing.KEY`, `controller.NAME` or `plant.NAME`."""
+    """The value in a system at `timing.KEY`, `controller.NAME` or `plant.NAME` of a scenario."""
     found = [value_at(system, path) for path in paths_of(target)]
     assert found.count(found[0]) == len(found)
     return found[0]
 
 
 def row(index: int = 0, **fields: Any) -> Row:
-    """A row that was never flown."""
+    """A row that was never run."""
     given: dict[str, Any] = {
         "index": index, "key": f"key {index}", "settings": {"timing.period": 0.001 * index}, "seed": index,
         "metrics": {"outcome": "settled", "good": True, "position_rmse": 0.5, "diverged": False, "steps": 3},
@@ -150,7 +150,7 @@ def bits(path: Path) -> list[dict[str, Any]]:
 
 
 def start(*arguments: str | Path, cwd: Path, temporary: Path | None = None) -> "subprocess.Popen[str]":
-    """The installed script in a process of its own, with a temporary folder of its own where one is given."""
+    """The installed script as a separate process, with its own temporary folder if one is given."""
     assert SCRIPT is not None, "expected the script beside this Python: pip install -e ."
     return subprocess.Popen(
         [SCRIPT, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, encoding="utf-8",
@@ -268,7 +268,7 @@ class Cluster:
 
 
 def reference_store(folder: Path, text: str = NOISY) -> Path:
-    """The store of a study flown without interruption by one worker, through the command."""
+    """The store of a study run without interruption by one worker, through the command."""
     (folder / "study.toml").write_text(text)
     quadcosim("sweep", "study.toml", "--engine", "compiled", cwd=folder)
     return store_path("study", folder / "results" / "study")

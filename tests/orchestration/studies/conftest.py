@@ -15,7 +15,7 @@ from tests.orchestration.studies.common import (
 
 @pytest.fixture(scope="session")
 def reference(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
-    """The rows of the noisy study, flown by one worker without interruption."""
+    """The rows of the noisy study, run by one worker without interruption."""
     found = bits(reference_store(tmp_path_factory.mktemp("reference")))
     assert len(found) == RUNS
     return found

@@ -27,11 +27,11 @@ from tests.patience import PATIENCE
 
 TEMPORARY = "temporary"
 LONGEST = 1.5
-"""[s] from one kill to the next: into the start of workers, their flights and the end"""
+"""[s] from one kill to the next: during the start of workers, their runs and the end"""
 
 
 class Tally:
-    """What was killed, and how often a sweep came to its end and was compared."""
+    """Counts of kills, and of sweeps that finished and were compared."""
 
     def __init__(self) -> None:
         self.coordinators = self.workers = self.compared = 0
@@ -58,7 +58,7 @@ def sweep_in(folder: Path, workers: int) -> "subprocess.Popen[str]":
 
 
 def disturbed(folder: Path, reference: list[dict[str, Any]], *, workers: int, kills: int, seed: int = 0) -> Tally:
-    """Fly the noisy study again and again until so many processes have been killed, and once to its end.
+    """Run the noisy study repeatedly until so many processes have been killed, and once to its end.
 
     Raises `AssertionError` for a table that differs, a process that is left, or a file in the temporary folder.
     """

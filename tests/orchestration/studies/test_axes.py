@@ -56,7 +56,7 @@ def test_a_design_is_counted_before_it_is_expanded() -> None:
         Points([LISTED, MASS], "saltelli", 2**40, 0)
 
 
-def test_a_design_of_the_largest_size_is_there_at_once_point_by_point() -> None:
+def test_points_of_the_largest_design_are_computed_on_access() -> None:
     axes = [Axis(name=f"x{i}", targets=("seed",), values=tuple(range(100))) for i in range(3)]
     found = Points(axes, "sobol", 0, 0)
     assert len(found) == MOST_POINTS
@@ -164,14 +164,12 @@ def test_a_logarithmic_axis_is_uniform_in_the_logarithm() -> None:
     [(1.0, 1.0, 3, "linear"), (2.0, 1.0, 3, "linear"), (math.nan, 1.0, 3, "linear"), (0.0, math.inf, 3, "linear"),
      (0.0, 1.0, 3, "logarithmic"), (-1.0, 1.0, 3, "logarithmic"), (0.0, 1.0, 1, "linear"), (0.0, 1.0, -2, "linear")],
 )  # fmt: skip
-def test_a_span_that_cannot_be_is_refused_with_what_was_expected(
-    low: float, high: float, number: int, scale: str
-) -> None:
+def test_an_invalid_span_is_refused_with_what_was_expected(low: float, high: float, number: int, scale: str) -> None:
     with pytest.raises(UsageError, match=r"axis mass: .*expected"):
         span("mass", low, high, number, scale)  # type: ignore[arg-type]
 
 
-def test_an_axis_that_cannot_be_is_refused() -> None:
+def test_an_invalid_axis_is_refused() -> None:
     with pytest.raises(UsageError, match="axis mass: expected at least one value"):
         Axis(name="mass", targets=("plant.mass",), values=())
     with pytest.raises(UsageError, match=r"axis mass: .*positive number on a logarithmic scale"):
@@ -183,6 +181,6 @@ def test_an_axis_that_cannot_be_is_refused() -> None:
     [("random", 0, "at least 1"), ("sobol", -1, "at least 1"), ("sobol", 6, "power of two"),
      ("saltelli", 6, "power of two")],
 )  # fmt: skip
-def test_a_number_of_samples_that_cannot_be_is_refused(method: Method, samples: int, expected: str) -> None:
+def test_an_invalid_number_of_samples_is_refused(method: Method, samples: int, expected: str) -> None:
     with pytest.raises(UsageError, match=rf"design.samples = {samples}: expected .*{expected}"):
         sampled(method, samples=samples)

@@ -1,4 +1,4 @@
-"""Which objective is drawn where nobody names one."""
+"""The objective that is drawn by default."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Figures of studies: there, not empty, and what is drawn is what was flown."""
+"""Figures of studies: written, not empty, and showing the runs."""
 
 import dataclasses
 import json
@@ -40,7 +40,7 @@ DELAYS = axis("timing.delay", 0.0, 0.005, 0.01)
 
 
 def invented(folder: Path, chosen: Study) -> Study:
-    """Fills a store with runs that fly below an edge, fail at one place and else diverge."""
+    """Fills a store with runs that are good below an edge, fail at one point and diverge elsewhere."""
     names = [each.name for each in chosen.axes]
     rows = []
     for index, point in enumerate(chosen.points):
@@ -62,7 +62,7 @@ def invented(folder: Path, chosen: Study) -> Study:
 
 
 def table(number: int = 5) -> pd.DataFrame:
-    """A study of one axis in which the last run does not fly."""
+    """A study of one axis whose last run is not good."""
     bounds = [0.01 * (i + 1) for i in range(number)]
     return pd.DataFrame(
         {
@@ -75,7 +75,7 @@ def table(number: int = 5) -> pd.DataFrame:
 
 
 def judged(runs: pd.DataFrame) -> pd.DataFrame:
-    """With what a run's metrics say beside its outcome."""
+    """Adds the metrics that follow from the outcome."""
     return runs.assign(good=(runs["outcome"] == "settled").astype("boolean").where(runs["outcome"].notna()))
 
 
@@ -114,7 +114,7 @@ def test_more_axes_are_drawn_as_dots_over_each(tmp_path: Path) -> None:
     expect_picture(picture)
 
 
-def test_a_metric_that_does_not_exist_is_told_with_those_that_do(tmp_path: Path) -> None:
+def test_an_unknown_metric_is_reported_with_the_known_ones(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="metric beauty: expected one of good, horizon, position_rmse"):
         draw_study(invented(tmp_path, study(PERIODS)), tmp_path, "beauty")
 
@@ -124,12 +124,12 @@ def test_a_metric_that_does_not_exist_is_told_with_those_that_do(tmp_path: Path)
     [(axis("timing.order", "jacobi", "gauss-seidel", "jacobi"),),
      (PERIODS, axis("controller.use_reference_inputs", True, False))],
 )  # fmt: skip
-def test_axes_that_no_figure_is_for_are_told(tmp_path: Path, axes: tuple[Axis, ...]) -> None:
+def test_axes_without_a_figure_are_refused(tmp_path: Path, axes: tuple[Axis, ...]) -> None:
     with pytest.raises(UsageError, match="study: expected axes of numbers to draw"):
         draw_study(invented(tmp_path, study(*axes)), tmp_path, "ultimate_bound")
 
 
-def test_a_study_that_was_never_flown_is_told(tmp_path: Path) -> None:
+def test_a_study_that_was_never_run_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="there is no such file"):
         draw_study(study(PERIODS), tmp_path, "ultimate_bound")
 
@@ -137,13 +137,13 @@ def test_a_study_that_was_never_flown_is_told(tmp_path: Path) -> None:
 # -- what is drawn ----------------------------------------------------------------------------------------
 
 
-def test_what_flies_has_settled() -> None:
+def test_good_runs_have_settled() -> None:
     runs = table(4)
     runs["outcome"] = ["settled", "bounded", "diverged", None]  # the last of a run that failed
     assert figures.good_runs(judged(runs)).tolist() == [True, False, False, False]
 
 
-def test_a_line_goes_through_what_flies_in_order_and_the_rest_is_crossed() -> None:
+def test_a_line_connects_the_good_runs_in_order_and_the_others_are_crosses() -> None:
     line, crosses, *_ = lines_of(
         figures.lines(judged(table()), (axis("timing.period", 0.01),), "ultimate_bound", WORDS, units={})
     )
@@ -163,7 +163,7 @@ def test_there_is_a_line_for_each_value_of_the_second_axis() -> None:
     assert legend.get_title().get_text() == "delay [ms]"
 
 
-def test_axes_have_names_for_people_and_their_unit() -> None:
+def test_axes_have_display_names_and_units() -> None:
     for target, label in (("timing.period", "period [ms]"), ("plant.mass", "mass [kg]"),
                           ("timing.measurement_loss", "loss of measurements")):  # fmt: skip
         runs = table().rename(columns={"timing.period": target})
@@ -183,7 +183,7 @@ def test_a_metric_has_its_unit_wherever_it_is_drawn() -> None:
     assert scattered.get_supylabel() == "largest position error, last third [m]"
 
 
-def test_what_diverged_is_marked_in_a_row_for_each_line_below_all_values() -> None:
+def test_diverged_runs_are_marked_in_a_row_for_each_line_below_all_values() -> None:
     runs = pd.concat([table().assign(**{"timing.delay": delay}) for delay in (0.0, 0.01)])
     runs.loc[runs["timing.period"] > 0.03, ["outcome", "ultimate_bound"]] = ["diverged", np.nan]
     axes = (axis("timing.period", 0.01), axis("timing.delay", 0.01))
@@ -204,7 +204,7 @@ def test_without_a_metric_the_first_objective_that_varies_is_drawn(tmp_path: Pat
     assert picture.name == "position_rmse.png"
 
 
-def test_a_map_has_a_cell_for_each_run_and_the_boundary_of_what_flies() -> None:
+def test_a_map_has_a_cell_for_each_run_and_the_boundary_of_good_runs() -> None:
     runs = pd.concat([table().assign(**{"timing.delay": delay}) for delay in (0.0, 0.01, 0.02)])
     figure = heat_map(
         judged(runs), (axis("timing.period", 0.01), axis("timing.delay", 0.01)), "ultimate_bound", WORDS, units={}
@@ -234,7 +234,7 @@ def test_the_limit_of_a_map_runs_along_edges_of_cells_and_not_beside_missing_one
     assert missing.get_paths()[0].get_extents().bounds == (1.0, 1.0, 1.0, 1.0)
 
 
-def test_a_map_tells_bounded_from_diverged_with_the_horizon_beside_them() -> None:
+def test_a_map_distinguishes_bounded_from_diverged_and_shows_the_horizon() -> None:
     runs = pd.concat([table().assign(**{"timing.delay": delay}) for delay in (0.0, 0.01)])
     runs["outcome"] = ["settled", "bounded", "diverged", None, "settled"] * 2  # periods from 0.05 down
     runs.loc[runs["outcome"] == "diverged", "ultimate_bound"] = np.nan
@@ -251,7 +251,7 @@ def told_of(figure: matplotlib.figure.Figure) -> list[str]:
     return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
-def test_outcomes_are_told_where_they_occur() -> None:
+def test_the_legend_lists_the_outcomes_that_occur() -> None:
     runs = judged(pd.concat([table(4).assign(**{"timing.delay": delay}) for delay in (0.0, 0.01)]))
     axes = (axis("timing.period", 0.01), axis("timing.delay", 0.01))
     assert told_of(heat_map(runs, axes, "ultimate_bound", WORDS, units={})) == ["settled"]
@@ -261,7 +261,7 @@ def test_outcomes_are_told_where_they_occur() -> None:
     assert "8 runs: 8 settled (dots)\n" in figures.scatter(runs, axes, "ultimate_bound", WORDS, units={}).get_suptitle()
 
 
-def test_a_line_marks_what_diverged_where_it_has_no_value() -> None:
+def test_a_line_marks_diverged_runs_without_a_value() -> None:
     runs = table()
     runs["outcome"] = ["diverged", *runs["outcome"][1:]]
     runs.loc[runs["outcome"] == "diverged", "ultimate_bound"] = np.nan
@@ -269,7 +269,7 @@ def test_a_line_marks_what_diverged_where_it_has_no_value() -> None:
     assert (down.get_marker(), down.get_xdata().tolist()) == ("v", pytest.approx([50.0]))
 
 
-def test_where_everything_flies_a_map_has_no_boundary() -> None:
+def test_a_map_of_good_runs_has_no_boundary() -> None:
     runs = pd.concat([table(4).assign(**{"timing.delay": delay}) for delay in (0.0, 0.01)])
     figure = heat_map(
         judged(runs), (axis("timing.period", 0.01), axis("timing.delay", 0.01)), "ultimate_bound", WORDS, units={}
@@ -278,7 +278,7 @@ def test_where_everything_flies_a_map_has_no_boundary() -> None:
 
 
 @pytest.mark.parametrize(("local", "large", "marks"), [(0.08, 0.05, 2), (None, 0.05, 1), (0.08, None, 1)])
-def test_the_spectral_radius_is_drawn_with_the_limits_that_there_are(
+def test_the_spectral_radius_is_drawn_with_the_known_limits(
     tmp_path: Path, local: float | None, large: float | None, marks: int
 ) -> None:
     periods = np.linspace(0.001, 0.1, 50)
@@ -315,7 +315,7 @@ def test_a_limit_is_drawn_with_the_radius_that_crosses_one_there(tmp_path: Path,
         expect_picture(picture)
 
 
-def test_a_limit_that_linear_theory_does_not_have_is_drawn_without_the_radius(tmp_path: Path) -> None:
+def test_a_limit_without_linear_theory_is_drawn_without_the_radius(tmp_path: Path) -> None:
     assert draw_limit(short(), limit("timing.loss"), tmp_path, PNG) == [tmp_path / "limit_timing_loss.png"]
 
 
@@ -345,7 +345,7 @@ def ys(line: Line2D) -> list[float]:
     return [float(y) for y in np.asarray(line.get_ydata())]
 
 
-def test_a_limit_shows_each_value_that_was_tried_where_it_was_measured() -> None:
+def test_a_limit_shows_each_evaluated_value_with_its_measurement() -> None:
     figure = limit_figure.limit_figure(limit("components.pilot.sampling.period", judged_bound=0.06))
     (axes,) = figure.axes
     marks = {line.get_label(): line for line in axes.get_lines()}
@@ -359,7 +359,7 @@ def test_a_limit_shows_each_value_that_was_tried_where_it_was_measured() -> None
     assert axes.get_title(loc="left") == "Good up to 50 ms: period of pilot, in runs of 30 s"
 
 
-def test_a_limit_of_many_seeds_shows_their_share_and_how_well_it_is_known() -> None:
+def test_a_limit_of_many_seeds_shows_their_share_with_its_interval() -> None:
     tried = tuple(
         Evaluation(value=v, outcome="settled", divergence_time=None, flew=n, runs=29, share=wilson(n, 29, 0.95))
         for v, n in ((0.1, 29), (0.2, 20))
@@ -398,13 +398,13 @@ def test_the_axes_of_a_study_have_the_units_of_its_store(tmp_path: Path) -> None
         assert (found["timing.period"].unit, found["timing.period"].factor) == ("ms", 1e3)
 
 
-def test_a_limit_that_nothing_in_the_range_has_says_so() -> None:
+def test_a_range_without_a_limit_is_stated_in_the_title() -> None:
     good = tuple(one for one in limit("delay").tried if one.flew)
     figure = limit_figure.limit_figure(limit("delay", tried=good, large_signal_limit=None))
     assert figure.axes[0].get_title(loc="left") == "delay: good throughout, in runs of 30 s"
 
 
-def test_dots_of_many_axes_are_apart_by_what_flies() -> None:
+def test_dots_of_many_axes_distinguish_good_runs() -> None:
     runs = table().assign(**{"plant.mass": 1.0, "timing.delay": 0.0})
     axes = (axis("timing.period", 0.01), axis("plant.mass", 1), axis("timing.delay", 0.01))
     figure = figures.scatter(judged(runs), axes, "ultimate_bound", WORDS, units={})

@@ -1,4 +1,4 @@
-"""What vouches for lanes: FMUs flown alone, and FMUs in Python for the beginning of the same runs."""
+"""Agreement of runs in SIMD lanes with native FMUs, and of their beginning with FMUs in Python."""
 
 import math
 from collections.abc import Callable, Generator, Iterable
@@ -19,7 +19,7 @@ from tests.orchestration.studies.common import axis, short, study
 pytestmark = needs_compiler
 LENGTH = 5.0
 Error = Callable[[RunTask, bool], float]
-"""Of a task, in a chunk or alone, by which its metric is off"""
+"""The error in the metric of a task, in a chunk or alone"""
 
 
 @pytest.fixture
@@ -29,7 +29,7 @@ def chosen() -> Study:
 
 
 def agreement(chosen: Study, error: Error) -> Agreement | None:
-    """What two runs are lane_agreement for by, if each way to fly is off by so much."""
+    """The agreement of two runs if each kind of run has this error."""
     files = with_python_twins(chosen.files())
 
     def row(task: RunTask, chunk: bool) -> Row:
@@ -39,13 +39,13 @@ def agreement(chosen: Study, error: Error) -> Agreement | None:
     def task(index: int, key: str) -> RunTask:
         return RunTask(index=index, key=key, settings={}, system=chosen.system(index, {}), keep_signals=False)
 
-    def fly(tasks: Iterable[RunTask | Chunk]) -> Generator[list[Outcome], None, None]:
+    def run(tasks: Iterable[RunTask | Chunk]) -> Generator[list[Outcome], None, None]:
         for each in tasks:
             for one in each.tasks if isinstance(each, Chunk) else (each,):
                 assert files.fmus.keys() >= {*one.system.fmus.values()}
                 yield [Outcome(row=row(one, isinstance(each, Chunk)))]
 
-    return lane_agreement({str(i): row(task(i, str(i)), True) for i in range(2)}, files, task, fly)
+    return lane_agreement({str(i): row(task(i, str(i)), True) for i in range(2)}, files, task, run)
 
 
 def in_python(task: RunTask) -> bool:
@@ -69,7 +69,7 @@ def test_whole_runs_are_compared_with_native_fmus_and_their_beginning_with_pytho
     assert Agreement.from_text(found.as_text()) == found
 
 
-def test_what_was_compiled_wrongly_contradicts_python(chosen: Study) -> None:
+def test_an_error_of_compilation_disagrees_with_python(chosen: Study) -> None:
     found = agreement(chosen, lambda task, chunk: 1e-6 * in_python(task))
     assert found is not None
     assert found.difference == 0.0
@@ -77,7 +77,7 @@ def test_what_was_compiled_wrongly_contradicts_python(chosen: Study) -> None:
         found.expect()
 
 
-def test_a_chaotic_run_which_its_own_last_bits_change_contradicts_nothing(chosen: Study) -> None:
+def test_a_chaotic_run_that_its_last_bits_change_is_not_compared_with_python(chosen: Study) -> None:
     def error(task: RunTask, chunk: bool) -> float:
         nudged = task.key.startswith("nudged ")
         return 1e-6 * (in_python(task) + 2.0 * nudged) * (task.index == 0)
@@ -89,7 +89,7 @@ def test_a_chaotic_run_which_its_own_last_bits_change_contradicts_nothing(chosen
     found.expect()
 
 
-def test_a_nudged_run_has_each_real_parameter_of_its_fmus_beside_itself_but_zeros(chosen: Study) -> None:
+def test_a_nudged_run_has_each_real_parameter_changed_in_its_last_bit_except_zeros(chosen: Study) -> None:
     given = {"plant.mass": 1, "controller.coupling": True, "plant.drag.x": 0.0}
     base = chosen.base.with_changes(parameters=given)  # type: ignore[attr-defined]
     seen: dict[str, System] = {}

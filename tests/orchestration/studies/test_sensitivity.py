@@ -1,4 +1,4 @@
-"""Sensitivity indices of functions whose indices are known, and of a study that was flown."""
+"""Sensitivity indices of functions whose indices are known, and of a study that was run."""
 
 import math
 from pathlib import Path
@@ -98,7 +98,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
     return chosen, folder
 
 
-def test_a_screening_that_was_flown_gives_a_table_and_a_figure(flown: tuple[Study, Path]) -> None:
+def test_a_finished_screening_gives_a_table_and_a_figure(flown: tuple[Study, Path]) -> None:
     chosen, folder = flown
     assert len(chosen.points) == 4 * 3
     table, figure, _ = draw_study(chosen, folder, "position_rmse")
@@ -112,7 +112,7 @@ def test_a_screening_that_was_flown_gives_a_table_and_a_figure(flown: tuple[Stud
     assert figure.read_bytes().startswith(b"\x89PNG")
 
 
-def test_the_indices_belong_to_the_design_that_was_flown(flown: tuple[Study, Path]) -> None:
+def test_the_indices_belong_to_the_design_that_was_run(flown: tuple[Study, Path]) -> None:
     chosen, _ = flown
     values = np.array([point["mass"] for point in chosen.points], dtype=float)
     found = {(index.kind, index.axis): index.value for index in indices_of(chosen, values, "mass itself")}
@@ -120,7 +120,7 @@ def test_the_indices_belong_to_the_design_that_was_flown(flown: tuple[Study, Pat
     assert found["mu_star", "delay"] == pytest.approx(0.0, abs=1e-12)
 
 
-def test_a_study_that_is_not_done_has_no_indices() -> None:
+def test_an_unfinished_study_has_no_indices() -> None:
     with pytest.raises(UsageError, match="study: 5 of 12 runs are there, expected all"):
         indices_of(screening(MASS, DELAY), np.ones(5), "metric")
 
@@ -130,7 +130,7 @@ def test_listed_axes_have_no_indices() -> None:
         indices_of(screening(MASS, axis("seed", 1, 2)), np.ones(12), "metric")
 
 
-def test_a_design_that_is_not_for_it_has_no_indices() -> None:
+def test_a_design_for_another_purpose_has_no_indices() -> None:
     with pytest.raises(UsageError, match=r"design.method = random, expected morris or saltelli"):
         indices_of(screening(MASS, DELAY, method="random"), np.ones(4), "metric")
 
@@ -141,13 +141,13 @@ def test_a_metric_that_some_runs_do_not_have_is_refused(flown: tuple[Study, Path
         draw_study(chosen, folder, "divergence_time")
 
 
-def test_the_outcome_has_indices_of_whether_a_run_flies(flown: tuple[Study, Path]) -> None:
+def test_the_outcome_has_indices_of_whether_a_run_is_good(flown: tuple[Study, Path]) -> None:
     chosen, folder = flown
     table, figure, _ = draw_study(chosen, folder, "outcome")
     assert (table.name, figure.name) == ("sensitivity_outcome.csv", "sensitivity_outcome.png")
     assert (pd.read_csv(table)["value"] == 0.0).all()  # in this short a flight none has settled
 
 
-def test_the_outcome_is_one_for_a_run_that_flies_and_missing_for_one_that_failed() -> None:
+def test_the_outcome_is_one_for_a_good_run_and_missing_for_one_that_failed() -> None:
     runs = pd.DataFrame({"outcome": ["settled", "bounded", "diverged", None], "good": [1.0, 0.0, 0.0, None]})
     assert numbers(runs, "outcome").tolist() == pytest.approx([1.0, 0.0, 0.0, math.nan], nan_ok=True)

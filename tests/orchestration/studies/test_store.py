@@ -92,7 +92,7 @@ def test_a_value_at_the_edge_comes_back_to_the_bit(path: Path, value: float | No
     assert {repr(found[name]) for name in NUMBERS} == {repr(value)}
 
 
-def test_everything_else_of_a_row_comes_back_too(path: Path) -> None:
+def test_all_other_fields_of_a_row_are_read_back(path: Path) -> None:
     settings = {"period": 0.1 + 0.2, "order": "jacobi", "flag": True, "whole": 3}
     (found,) = rows_of(written(path, row(7, key="abc", settings=settings, seed=2**62, message='it\'s "κ"\nso')))
     assert found["settings"] == settings
@@ -124,7 +124,7 @@ def test_a_row_of_the_same_run_is_replaced_and_one_of_another_run_takes_its_plac
     assert kept(path) == ["key 0", "key 1", "new"]
 
 
-def test_a_design_that_changes_keeps_the_rows_of_its_runs_wherever_they_are_in_it_now(path: Path) -> None:
+def test_a_changed_design_keeps_the_rows_of_its_runs_at_their_new_indices(path: Path) -> None:
     with open_for_writing(path, OBJECTIVES) as store:
         store.add([row(0, seed=10), row(1, seed=11, metrics=None)])
         places = [DesignPoint(index=i, key=key, settings={}) for i, key in enumerate(["new", "key 1", "key 0", "new"])]
@@ -135,7 +135,7 @@ def test_a_design_that_changes_keeps_the_rows_of_its_runs_wherever_they_are_in_i
         assert store.counts() == {"done": 1, "failed": 1}
 
 
-def test_what_a_store_is_about_is_replaced_by_name(path: Path) -> None:
+def test_entries_about_a_study_are_replaced_by_name(path: Path) -> None:
     with open_for_writing(path, OBJECTIVES) as store:
         store.describe({"a": "1", "b": "2"})
         store.describe({"b": "3"})
@@ -254,7 +254,7 @@ def read_only_place(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
     return opened
 
 
-def test_a_store_where_nothing_can_be_written_is_read_with_what_is_still_in_its_log(
+def test_a_store_without_write_access_is_read_with_the_content_of_its_log(
     tmp_path: Path, path: Path, read_only_place: list[Path]
 ) -> None:
     frozen = tmp_path / "frozen" / "study.sqlite"
@@ -271,7 +271,7 @@ def test_a_store_where_nothing_can_be_written_is_read_with_what_is_still_in_its_
     assert not read_only_place[1].exists(), "expected the copy to be gone"
 
 
-def test_a_store_without_a_log_is_read_where_nothing_can_be_written(path: Path, read_only_place: list[Path]) -> None:
+def test_a_store_without_a_log_is_read_without_write_access(path: Path, read_only_place: list[Path]) -> None:
     written(path, row(0))
     Path(f"{path}-wal").unlink(missing_ok=True)
     assert indices(path) == [0]
@@ -301,7 +301,7 @@ def integrity(path: Path) -> str:
         return str(connection.execute("PRAGMA integrity_check").fetchone()[0])
 
 
-def test_a_full_disk_is_one_line_and_the_store_is_as_it_was(path: Path) -> None:
+def test_a_full_disk_is_reported_in_one_line_and_the_store_is_unchanged(path: Path) -> None:
     written(path, *(row(index) for index in range(20)))
     pages = path.stat().st_size // 4096 + 2
     with connections(f"PRAGMA max_page_count = {pages}"), open_for_writing(path, OBJECTIVES) as store:
@@ -313,7 +313,7 @@ def test_a_full_disk_is_one_line_and_the_store_is_as_it_was(path: Path) -> None:
     assert indices(written(path, row(20))) == list(range(21))
 
 
-def test_a_full_disk_at_the_start_is_one_line(path: Path) -> None:
+def test_a_full_disk_at_the_start_is_reported_in_one_line(path: Path) -> None:
     with connections("PRAGMA max_page_count = 1"), pytest.raises(QuadcosimError, match="full") as caught:
         written(path, row(0))
     one_line(caught.value)
@@ -321,7 +321,7 @@ def test_a_full_disk_at_the_start_is_one_line(path: Path) -> None:
 
 
 @pytest.mark.parametrize("pages", range(1, 10))
-def test_a_disk_that_is_full_while_a_store_is_made_leaves_one_that_can_be_used(path: Path, pages: int) -> None:
+def test_a_full_disk_while_a_store_is_created_leaves_a_usable_one(path: Path, pages: int) -> None:
     with (
         connections(f"PRAGMA max_page_count = {pages}"),
         contextlib.suppress(QuadcosimError),
@@ -357,7 +357,9 @@ with open_for_writing(Path(sys.argv[1]), sys.argv[3:]):
 
 
 @pytest.mark.parametrize("table", [1, 2, 3])
-def test_a_store_whose_making_is_killed_between_two_tables_is_made_by_the_next_sweep(path: Path, table: int) -> None:
+def test_a_store_whose_creation_is_killed_between_two_tables_is_created_by_the_next_sweep(
+    path: Path, table: int
+) -> None:
     ended = subprocess.run([sys.executable, "-c", KILLED, str(path), str(table), *OBJECTIVES], check=False)
     assert ended.returncode == -signal.SIGKILL
     with pytest.raises(QuadcosimError, match="nothing has been written into it yet"), open_for_reading(path):
@@ -365,7 +367,7 @@ def test_a_store_whose_making_is_killed_between_two_tables_is_made_by_the_next_s
     assert indices(written(path, row(0))) == [0]
 
 
-def test_a_store_that_is_about_no_study_yet_takes_the_objectives_of_the_next_one(path: Path) -> None:
+def test_a_store_without_a_study_takes_the_objectives_of_the_next_one(path: Path) -> None:
     with open_for_writing(path, ["of_the_first"]):
         pass
     with open_for_writing(path, ["of_the_next"]) as store:
@@ -375,7 +377,7 @@ def test_a_store_that_is_about_no_study_yet_takes_the_objectives_of_the_next_one
         assert store.metrics == metrics_with(["of_the_next"])
 
 
-def test_a_locked_store_is_one_line_and_is_whole_afterwards(path: Path) -> None:
+def test_a_locked_store_is_reported_in_one_line_and_remains_intact(path: Path) -> None:
     written(path, row(0))
     with contextlib.closing(sqlite3.connect(path)) as other, connections(timeout=0.05):
         other.execute("BEGIN EXCLUSIVE")
@@ -397,7 +399,7 @@ def test_a_locked_store_is_still_read(path: Path) -> None:
 
 
 @pytest.mark.parametrize("open_it", [open_for_reading, functools.partial(open_for_writing, objectives=OBJECTIVES)])
-def test_a_file_that_is_no_store_is_one_line_and_stays_as_it_is(tmp_path: Path, open_it: Any) -> None:
+def test_a_file_that_is_no_store_is_reported_in_one_line_and_unchanged(tmp_path: Path, open_it: Any) -> None:
     path = tmp_path / "study.sqlite"
     path.write_bytes(b"this is no database, but it is long enough to be looked at. " * 20)
     before = path.read_bytes()
@@ -407,7 +409,7 @@ def test_a_file_that_is_no_store_is_one_line_and_stays_as_it_is(tmp_path: Path, 
     assert path.read_bytes() == before
 
 
-def test_a_database_of_something_else_is_one_line_for_a_reader(tmp_path: Path) -> None:
+def test_another_database_is_reported_in_one_line(tmp_path: Path) -> None:
     path = tmp_path / "other.sqlite"
     with contextlib.closing(sqlite3.connect(path)) as connection, connection:
         connection.execute("CREATE TABLE music (name TEXT)")
@@ -419,14 +421,14 @@ def test_a_database_of_something_else_is_one_line_for_a_reader(tmp_path: Path) -
     one_line(caught.value)
 
 
-def test_a_store_that_is_not_there_is_one_line_and_is_not_made(path: Path) -> None:
+def test_a_missing_store_is_reported_in_one_line_and_not_created(path: Path) -> None:
     with pytest.raises(UsageError, match="there is no such file") as caught, open_for_reading(path):
         pass
     one_line(caught.value)
     assert not path.exists()
 
 
-def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_created_is_reported_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(QuadcosimError, match="the store cannot be used") as caught:
         written(tmp_path / "file" / "study.sqlite", row(0))
@@ -477,7 +479,7 @@ def test_the_key_differs_with_everything_that_determines_a_run(tmp_path: Path) -
     assert len(set(found)) == len(found)
 
 
-def test_the_key_differs_with_a_distribution_and_with_what_is_in_a_trace_but_not_with_where_it_lies(
+def test_the_key_differs_with_a_distribution_and_the_content_of_a_trace_but_not_its_path(
     tmp_path: Path,
 ) -> None:
     def key(delay: Distribution) -> str:
@@ -499,7 +501,7 @@ def test_the_key_differs_with_the_versions_of_the_software(monkeypatch: pytest.M
     assert key_of(BASE) != before
 
 
-def test_the_key_is_the_same_for_an_fmu_or_a_reference_that_lies_elsewhere(tmp_path: Path) -> None:
+def test_the_key_does_not_depend_on_the_path_of_an_fmu_or_a_reference(tmp_path: Path) -> None:
     found = []
     for folder in (tmp_path / "one", tmp_path / "two"):
         folder.mkdir()
@@ -512,17 +514,17 @@ def test_the_key_is_the_same_for_an_fmu_or_a_reference_that_lies_elsewhere(tmp_p
     assert found[0] == found[1]
 
 
-def test_the_key_does_not_hang_on_whether_a_wrong_model_is_meant() -> None:
+def test_the_key_does_not_depend_on_whether_a_model_mismatch_is_intended() -> None:
     assert key_of(BASE.with_changes(model_mismatch=True)) == key_of(BASE)
 
 
-def test_the_key_does_not_hang_on_the_order_in_which_parameters_are_given() -> None:
+def test_the_key_does_not_depend_on_the_order_of_parameters() -> None:
     one = BASE.with_changes(parameters={"plant.mass": 1.0, "plant.gravity": 9.0})
     two = BASE.with_changes(parameters={"plant.gravity": 9.0, "plant.mass": 1.0})
     assert key_of(one) == key_of(two)
 
 
-def test_a_parameter_given_as_its_fmu_has_it_is_the_same_run() -> None:
+def test_a_parameter_set_to_its_start_value_is_the_same_run() -> None:
     assert key_of(BASE.with_changes(parameters={"plant.mass": 1.0, "controller.coupling": 1})) == key_of(BASE)
     heavy = BASE.with_changes(parameters={"plant.mass": 1.2})
     assert key_of(heavy.with_changes(parameters={"plant.mass": 1.0})) == key_of(BASE) != key_of(heavy)
@@ -533,14 +535,14 @@ def test_a_parameter_given_as_its_fmu_has_it_is_the_same_run() -> None:
                "fmu_kit.trajectory", "orchestration.fmi.native", "orchestration.workers.task",
                "orchestration.quadrotor.wiring"],
 )  # fmt: skip
-def test_an_edited_source_on_the_path_of_the_flight_is_other_software(module: str, tmp_path: Path) -> None:
+def test_an_edited_source_of_the_simulation_is_other_software(module: str, tmp_path: Path) -> None:
     sources = simulation_sources()
     edited = tmp_path / "edited.py"
     edited.write_bytes(sources[module].read_bytes() + b"\n")
     assert sources_hash({**sources, module: edited}) != sources_hash(sources) == versions()["sources"]
 
 
-def test_sources_are_read_again_where_one_was_edited_since(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_sources_are_read_again_after_an_edit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "one.py"
     file.write_text("1")
     monkeypatch.setattr(provenance, "simulation_sources", lambda: {"one": file})
@@ -551,7 +553,7 @@ def test_sources_are_read_again_where_one_was_edited_since(tmp_path: Path, monke
     assert read.current().hash == sources_hash({"one": file}) != read.hash
 
 
-def test_every_header_that_c_on_the_path_of_the_flight_includes_is_one_of_its_sources() -> None:
+def test_every_header_that_c_of_the_simulation_includes_is_one_of_its_sources() -> None:
     sources = simulation_sources()
     written = {"operators.h", "sizes.h", "expressions.h"}  # by Python, for a system
     texts = [path.read_text(encoding="utf-8") for path in sources.values() if path.suffix in (".c", ".h")]
@@ -559,17 +561,17 @@ def test_every_header_that_c_on_the_path_of_the_flight_includes_is_one_of_its_so
     assert {"lanes.h", "mathematics.h"} < included <= written | {*sources}
 
 
-def test_what_is_started_by_its_name_is_one_of_the_flights_sources() -> None:
+def test_modules_started_by_name_are_among_the_sources_of_the_simulation() -> None:
     sources = simulation_sources()
     texts = [path.read_text(encoding="utf-8") for path in sources.values() if path.suffix == ".py"]
     started = {
         name for text in texts for name in re.findall(r'(?:command|Module\.of)\(\s*"(orchestration\.[\w.]+)"', text)
     }
     assert {"orchestration.fmi.isolated_process", "orchestration.runs.apart_process"} <= started
-    assert started - {"orchestration.fmi.repeatability_process"} <= {*sources}  # which flies nothing that is kept
+    assert started - {"orchestration.fmi.repeatability_process"} <= {*sources}  # makes no kept runs
 
 
-def test_every_import_of_the_flights_sources_is_seen() -> None:
+def test_every_import_in_the_sources_of_the_simulation_is_found() -> None:
     for path in simulation_sources().values():
         if path.suffix == ".py":
             text = path.read_text(encoding="utf-8")
@@ -580,7 +582,7 @@ def test_every_import_of_the_flights_sources_is_seen() -> None:
             assert {*imported(text)} >= names | {str(node.module) for node in froms}, path
 
 
-def test_sources_that_only_show_or_keep_results_are_not_on_the_path_of_the_flight() -> None:
+def test_sources_that_only_show_or_keep_results_are_not_sources_of_the_simulation() -> None:
     aside = (
         "orchestration.figures.style",
         "orchestration.command.cli",
@@ -619,7 +621,7 @@ def open_to_write(path: Path) -> None:
 
 @pytest.mark.parametrize("statement", DAMAGE)
 @pytest.mark.parametrize("use", [rows_of, counts_of, open_to_write])
-def test_a_value_that_was_not_written_by_the_store_is_noticed(
+def test_a_value_that_was_not_written_by_the_store_is_detected(
     path: Path, statement: str, use: Callable[[Path], Any]
 ) -> None:
     written(path, row(0), row(1), row(2))

@@ -1,4 +1,4 @@
-"""Study files: what they say, and what is said of those that cannot be."""
+"""Study files: their content, and errors for invalid ones."""
 
 from pathlib import Path
 
@@ -79,7 +79,7 @@ def test_sets_puts_the_value_into_each_target(tmp_path: Path) -> None:
     assert at(system, "timing.offset") == 0.25
 
 
-def test_multiplies_scales_what_the_base_has_or_else_what_the_fmu_has(tmp_path: Path) -> None:
+def test_multiplies_scales_the_value_of_the_base_or_else_the_start_value_of_the_fmu(tmp_path: Path) -> None:
     text = (
         "[base.timing]\nperiod = 0.03\n[base.controller]\ngain.eta = 4.0\n[[axes]]\nname = 'f'\nvalues = [2]\n"
         "multiplies = ['controller.gain.eta', 'controller.gain.theta', 'timing.period']\n"
@@ -89,7 +89,7 @@ def test_multiplies_scales_what_the_base_has_or_else_what_the_fmu_has(tmp_path: 
     assert at(system, "timing.period") == 0.06
 
 
-def test_what_is_no_number_cannot_be_multiplied(tmp_path: Path) -> None:
+def test_only_numbers_can_be_multiplied(tmp_path: Path) -> None:
     for target, values in (("timing.order", "[2]"), ("plant.mass", '["heavy"]'), ("plant.nonsense", "[2]")):
         text = f'[[axes]]\nname = "x"\nmultiplies = ["{target}"]\nvalues = {values}\n'
         with pytest.raises(UsageError, match=rf"{target}: expected a number"):
@@ -101,7 +101,7 @@ def test_loss_sets_both_losses(tmp_path: Path) -> None:
     assert [x.loss for x in system.connections] == [0.25, 0.25]
 
 
-def test_an_axis_has_tables_of_what_is_drawn_with_their_traces(tmp_path: Path) -> None:
+def test_an_axis_may_have_distributions_with_their_traces(tmp_path: Path) -> None:
     (tmp_path / "trace.csv").write_text("delay\n0.001\n0.002\n")
     tables = '{ uniform = [0, 0.002] }, { file = "trace.csv", column = "delay" }'
     study = load(tmp_path, f'[[axes]]\nname = "timing.delay"\nvalues = [{tables}]\n')
@@ -128,7 +128,7 @@ def test_each_run_has_the_seed_of_the_base_unless_seeds_vary(tmp_path: Path) -> 
     assert flown(tmp_path, varied.replace("seed = 7", "seed = 8")).seed not in seeds
 
 
-def test_an_axis_of_seeds_wins_over_seeds_that_vary(tmp_path: Path) -> None:
+def test_an_axis_of_seeds_overrides_varying_seeds(tmp_path: Path) -> None:
     text = '[[axes]]\nname = "seed"\nvalues = [5, 5, 9]\n[design]\nvary_seed = true\n'
     assert [flown(tmp_path, text, i).seed for i in range(3)] == [5, 5, 9]
 
@@ -168,13 +168,13 @@ def test_without_a_base_it_is_the_flight_of_the_paper(tmp_path: Path) -> None:
         ("[base.timing]\nrate = 3\n" + ONE, "timing.rate", ", ".join(TIMING_KEYS)),
     ],
 )
-def test_an_unknown_key_is_told_with_those_that_there_are(tmp_path: Path, text: str, place: str, valid: str) -> None:
+def test_an_unknown_key_is_reported_with_the_known_ones(tmp_path: Path, text: str, place: str, valid: str) -> None:
     line = refused(tmp_path, text)
     assert f"{place}: no such key; expected one of {valid}" in line
 
 
 @pytest.mark.parametrize("target", ["timing.rate", "nonsense", "wind.amplitude.x", "timing", "plant", ""])
-def test_a_target_that_does_not_exist_is_told_with_those_that_there_are(tmp_path: Path, target: str) -> None:
+def test_an_unknown_target_is_reported_with_the_known_ones(tmp_path: Path, target: str) -> None:
     line = refused(tmp_path, f'[[axes]]\nname = "x"\nsets = ["{target}"]\nvalues = [1]\n')
     assert f"{target}: expected controller.NAME, plant.NAME, reference.NAME, disturbance.NAME, seed, " in line
     assert ", ".join(key for key in TIMING_KEYS if key not in ("noise", "quantisation")) in line
@@ -188,7 +188,7 @@ def test_a_target_that_does_not_exist_is_told_with_those_that_there_are(tmp_path
         ('[[axes]]\nname = "seed"\nsets = ["timing.period"]\nvalues = [0.1]\n', "axis seed: the table of runs has"),
         ('[[axes]]\nname = "x"\nsets = ["seed"]\nvalues = [1, true]\n', "axis x: expected values of one kind"),
         ('name = "../evil"\n' + ONE, "name = '../evil': expected the name of a folder"),
-        (ONE + ONE, "axes = seed, seed: expected at least one axis, each with a name of its own"),
+        (ONE + ONE, "axes = seed, seed: expected at least one axis, each with its own name"),
         (ONE + "sets = ['seed']\nmultiplies = ['seed']\n", "axis seed: expected sets or multiplies, not both"),
         (ONE + "start = 1\nstop = 2\n", "axis seed: expected values, or start and stop"),
         (ONE + "number = 2\n", "axis seed: expected values, or start and stop"),
@@ -204,17 +204,17 @@ def test_a_target_that_does_not_exist_is_told_with_those_that_there_are(tmp_path
         ("[[axes\n", "expected TOML"),
     ],
 )  # fmt: skip
-def test_a_file_that_cannot_be_is_refused_in_one_line(tmp_path: Path, text: str, said: str) -> None:
+def test_an_invalid_file_is_refused_in_one_line(tmp_path: Path, text: str, said: str) -> None:
     assert said in refused(tmp_path, text)
 
 
-def test_a_missing_file_is_told(tmp_path: Path) -> None:
+def test_a_missing_file_is_reported(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"nowhere.toml: expected a readable study file") as caught:
         load_study(tmp_path / "nowhere.toml")
     one_line(caught.value)
 
 
-def test_a_file_that_is_no_text_is_told(tmp_path: Path) -> None:
+def test_a_file_that_is_no_text_is_reported(tmp_path: Path) -> None:
     (tmp_path / "study.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(UsageError, match="expected a readable study file"):
         load_study(tmp_path / "study.toml")
@@ -227,5 +227,5 @@ def test_the_stop_time_may_be_an_axis(tmp_path: Path) -> None:
     assert [chosen.system(i, {}).stop_time for i in range(2)] == [0.1, 0.2]
 
 
-def test_noise_without_a_measurement_is_no_target(tmp_path: Path) -> None:
+def test_noise_without_a_measurement_is_refused_as_a_target(tmp_path: Path) -> None:
     assert "timing.noise: expected" in refused(tmp_path, '[[axes]]\nname = "timing.noise"\nvalues = [0.1]\n')

@@ -1,4 +1,4 @@
-"""Sweeps of the real FMUs: the same bits whoever flies, whatever is killed, and nothing flown twice."""
+"""Sweeps of the real FMUs: the same bits with any workers, whatever is killed, and no run repeated."""
 
 import dataclasses
 import json
@@ -80,7 +80,7 @@ def test_a_row_has_the_metrics_of_a_direct_run(folder: Path, reference: list[dic
 # -- what a store holds -----------------------------------------------------------------------------------
 
 
-def test_a_finished_study_is_not_flown_again_and_progress_counts_from_what_is_there_to_all(tmp_path: Path) -> None:
+def test_a_finished_study_is_not_run_again_and_progress_starts_at_the_existing_rows(tmp_path: Path) -> None:
     heard: list[tuple[int, int]] = []
     first, second = (
         sweep(study(PERIODS), folder=tmp_path, progress=lambda done, total: heard.append((done, total)))
@@ -93,7 +93,7 @@ def test_a_finished_study_is_not_flown_again_and_progress_counts_from_what_is_th
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a study that is done."""
+    """The folder of a finished study."""
     folder = tmp_path_factory.mktemp("finished")
     swept(study(PERIODS), folder)
     return folder
@@ -114,7 +114,7 @@ CHANGES: list[tuple[Study, str]] = [
 
 
 @pytest.mark.parametrize(("changed", "said"), CHANGES, ids=[said.partition(" was")[0] for _, said in CHANGES])
-def test_a_changed_study_is_refused_and_says_what_changed(finished: Path, changed: Study, said: str) -> None:
+def test_a_changed_study_is_refused_with_the_changes(finished: Path, changed: Study, said: str) -> None:
     before = bits(store_path("study", finished))
     with pytest.raises(UsageError, match=rf"holds another study \({said}") as caught:
         sweep(changed, folder=finished)
@@ -160,9 +160,7 @@ GROWN = [
 
 
 @pytest.mark.parametrize(("grown", "flown"), GROWN)
-def test_a_store_grows_and_keeps_the_rows_that_are_there(
-    finished: Path, tmp_path: Path, grown: Study, flown: int
-) -> None:
+def test_a_store_grows_and_keeps_its_rows(finished: Path, tmp_path: Path, grown: Study, flown: int) -> None:
     shutil.copytree(finished, tmp_path, dirs_exist_ok=True)
     path = store_path("study", tmp_path)
     before = {row["key"]: row["duration"] for row in all_rows(path)}
@@ -179,7 +177,7 @@ def test_a_store_grows_and_keeps_the_rows_that_are_there(
     assert sweep(study(PERIODS), folder=tmp_path).flown == 0, "expected what was taken out to be kept"
 
 
-def test_more_samples_keep_those_that_are_there_also_where_each_has_its_seed(tmp_path: Path) -> None:
+def test_more_samples_keep_the_existing_ones_also_with_varying_seeds(tmp_path: Path) -> None:
     mass = Axis(name="mass", targets=("plant.mass",), low=0.9, high=1.1)
     for samples, flown in ((2, 2), (4, 2)):
         chosen = study(mass, base=short(noise={"position": 0.01}), samples=samples, vary_seed=True)
@@ -191,7 +189,7 @@ def test_the_name_of_a_study_and_the_signals_that_it_keeps_may_change(finished: 
     assert sweep(renamed, folder=finished).total == 2
 
 
-def test_axes_of_seeds_fly_those_seeds(tmp_path: Path) -> None:
+def test_axes_of_seeds_run_those_seeds(tmp_path: Path) -> None:
     noisy = short(noise={"position": 0.01})
     rows = bits(swept(study(axis("seed", 4, 9, 4), base=noisy), tmp_path))
     assert [row["seed"] for row in rows] == [4, 9, 4]
@@ -202,7 +200,7 @@ def test_axes_of_seeds_fly_those_seeds(tmp_path: Path) -> None:
 # -- runs that fail and runs that diverge -----------------------------------------------------------------
 
 
-def test_a_run_that_fails_is_a_row_with_its_message_and_is_flown_again_on_request_only(tmp_path: Path) -> None:
+def test_a_run_that_fails_is_a_row_with_its_message_and_is_repeated_on_request_only(tmp_path: Path) -> None:
     chosen = study(axis("plant.mass", 1.0, FAILS, 2.0))
     path = swept(chosen, tmp_path)
     rows = bits(path)
@@ -214,7 +212,7 @@ def test_a_run_that_fails_is_a_row_with_its_message_and_is_flown_again_on_reques
     assert bits(path) == rows
 
 
-def test_runs_that_fail_and_diverge_among_others_are_with_two_workers_as_alone(tmp_path: Path) -> None:
+def test_runs_that_fail_and_diverge_have_the_same_rows_with_two_workers(tmp_path: Path) -> None:
     base = short(stop_time=20.0, plant_interval=0.1)
     chosen = study(axis("plant.mass", 1.0, FAILS, 1.1), axis("timing.period", 0.05, 0.2), base=base)
     rows = bits(swept(chosen, tmp_path, workers=2))
@@ -244,9 +242,7 @@ def test_runs_that_fail_and_diverge_among_others_are_with_two_workers_as_alone(t
         (study(PERIODS, base=dataclasses.replace(short(), record=Record(plant=("speed",)))), "record.plant: Quadrotor"),
     ],
 )  # fmt: skip
-def test_a_design_with_a_run_that_cannot_be_is_refused_before_anything_is_flown(
-    tmp_path: Path, chosen: Study, said: str
-) -> None:
+def test_a_design_with_an_invalid_run_is_refused_before_any_run(tmp_path: Path, chosen: Study, said: str) -> None:
     with pytest.raises(UsageError) as caught:
         sweep(chosen, folder=tmp_path)
     assert said in one_line(caught.value)
@@ -280,7 +276,7 @@ def test_signals_of_the_chosen_runs_are_kept_and_are_those_of_a_direct_run(tmp_p
         assert np.array_equal(kept_rows, direct.rows)
 
 
-def test_no_signals_are_kept_unless_told_and_those_that_are_asked_for_later_are_flown_for(tmp_path: Path) -> None:
+def test_no_signals_are_kept_by_default_and_runs_are_repeated_for_signals_requested_later(tmp_path: Path) -> None:
     chosen = study(axis("timing.period", 0.01, 0.02))
     swept(chosen, tmp_path)
     assert not (tmp_path / "signals").exists()
@@ -292,7 +288,7 @@ def test_no_signals_are_kept_unless_told_and_those_that_are_asked_for_later_are_
 # -- a few runs at a time ---------------------------------------------------------------------------------
 
 
-def test_a_pool_flies_in_order_up_to_the_first_that_stops_it_and_two_workers_in_some_order() -> None:
+def test_an_evaluator_runs_in_order_up_to_the_first_that_stops_it_with_any_number_of_workers() -> None:
     scenarios = [short(period=period).as_system() for period in (0.01, 0.02, 0.03)]
     with engine.RunEvaluator(files_in(), 1) as pool:
         everything = pool.run_until(scenarios, stop=lambda metrics: False)
@@ -305,7 +301,7 @@ def test_a_pool_flies_in_order_up_to_the_first_that_stops_it_and_two_workers_in_
     assert sorted(repr(metrics["position_rmse"]) for metrics in by_two) == sorted(map(repr, expected))
 
 
-def test_a_pool_raises_what_a_run_failed_with() -> None:
+def test_an_evaluator_raises_the_error_of_a_failed_run() -> None:
     bad = short().with_changes(parameters={"plant.mass": -1.0}).as_system()
     with engine.RunEvaluator(files_in(), 1) as pool, pytest.raises(QuadcosimError, match=r"mass = -1.0: expected"):
         pool.run_until([bad], stop=lambda metrics: False)
@@ -314,12 +310,12 @@ def test_a_pool_raises_what_a_run_failed_with() -> None:
 # -- usage ------------------------------------------------------------------------------------------------
 
 
-def test_without_a_worker_nothing_is_flown(tmp_path: Path) -> None:
+def test_without_workers_a_sweep_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="workers = 0: expected at least 1"):
         sweep(study(PERIODS), folder=tmp_path, workers=0)
 
 
-def test_the_store_says_what_it_is_about(finished: Path) -> None:
+def test_the_store_describes_its_study(finished: Path) -> None:
     models = files_in().models_of(short().as_system())
     with open_for_reading(store_path("study", finished)) as store:
         about = store.about()

@@ -48,7 +48,7 @@ def test_a_dask_cluster_makes_the_same_rows(
 
 
 @needs_compiler
-def test_a_run_that_hangs_in_a_dask_worker_is_a_failed_row_that_says_so(tmp_path: Path, cluster: Cluster) -> None:
+def test_a_run_that_hangs_in_a_dask_worker_is_a_failed_row_with_the_reason(tmp_path: Path, cluster: Cluster) -> None:
     fmu = small(tmp_path, "ENDS=if (m->s.gain == 3.0) for (;;) usleep(1000)")
     gain = "components.it.parameters.gain"
     system = System(stop_time=0.1, components={"it": Component(fmu=str(fmu), step=0.01)})
@@ -64,7 +64,7 @@ def test_a_run_that_hangs_in_a_dask_worker_is_a_failed_row_that_says_so(tmp_path
 def test_the_death_of_a_dask_worker_loses_nothing(
     folder: Path, reference: list[dict[str, Any]], cluster: Cluster
 ) -> None:
-    """The last that flies there: one worker is left."""
+    """The last test on this cluster: one worker is left."""
     with start("sweep", "study.toml", "--engine", "compiled", "--dask", cluster.address, cwd=folder) as coordinator:
         wait_for_rows(folder / STORE, 1)
         cluster.workers[0].kill()
@@ -76,7 +76,7 @@ def test_the_death_of_a_dask_worker_loses_nothing(
 
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A client that waits less than ten seconds for what is not there."""
+    """A client that waits less than ten seconds for a missing scheduler."""
     import distributed
 
     class Impatient(distributed.Client):  # type: ignore[misc]
@@ -96,20 +96,20 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
      *((wrong, r"expected the address of a scheduler, as in tcp://host:8786")
        for wrong in ("nonsense://127.0.0.1:1", "nonsense", "tcp://host", "host:99999", ""))],
 )  # fmt: skip
-def test_a_scheduler_that_is_not_there_is_one_line(tmp_path: Path, address: str, said: str) -> None:
+def test_a_missing_scheduler_is_reported_in_one_line(tmp_path: Path, address: str, said: str) -> None:
     with pytest.raises(QuadcosimError, match=rf"dask = {address}: {said}") as caught:
         sweep(study(PERIODS), folder=tmp_path, dask=address)
     one_line(caught.value)
 
 
-def test_the_store_is_of_use_after_a_scheduler_that_was_not_there(tmp_path: Path) -> None:
+def test_the_store_can_be_used_after_a_missing_scheduler(tmp_path: Path) -> None:
     with pytest.raises(QuadcosimError, match="dask = nonsense: "):
         sweep(study(PERIODS), folder=tmp_path, dask="nonsense")
     assert sweep(study(PERIODS), folder=tmp_path).flown == 2
 
 
 @pytest.mark.usefixtures("impatient")
-def test_a_scheduler_without_workers_is_one_line(tmp_path: Path) -> None:
+def test_a_scheduler_without_workers_is_reported_in_one_line(tmp_path: Path) -> None:
     said = "expected a dask scheduler with workers there"
     with closing(Cluster(tmp_path, workers=0)) as deserted, pytest.raises(QuadcosimError, match=said) as caught:
         sweep(study(PERIODS), folder=tmp_path / "out", dask=deserted.address)

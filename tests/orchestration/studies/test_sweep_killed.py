@@ -1,4 +1,4 @@
-"""Whatever is killed in a sweep, a process or the place where it is flown, no row is lost and none is wrong."""
+"""Whatever is killed or missing in a sweep, no row is lost and none is wrong."""
 
 import dataclasses
 import os
@@ -44,7 +44,7 @@ from tests.patience import PATIENCE
 # -- killed -----------------------------------------------------------------------------------------------
 
 
-def test_a_killed_sweep_leaves_no_workers_flies_only_what_is_missing_and_ends_with_the_same_rows(
+def test_a_killed_sweep_leaves_no_workers_runs_only_what_is_missing_and_ends_with_the_same_rows(
     folder: Path, reference: list[dict[str, Any]], main: Main, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with start("sweep", "study.toml", "--engine", "compiled", "--workers", "2", cwd=folder) as coordinator:
@@ -109,7 +109,7 @@ def test_whatever_is_killed_the_table_is_that_of_an_undisturbed_sweep(
 
 
 @pytest.mark.parametrize("whom", ["the coordinator", "a worker"])
-def test_an_interrupt_is_one_line_that_says_how_far_the_sweep_is(
+def test_an_interrupt_is_reported_in_one_line_with_the_progress(
     folder: Path, reference: list[dict[str, Any]], whom: str
 ) -> None:
     with start("sweep", "study.toml", "--engine", "compiled", cwd=folder) as coordinator:
@@ -136,7 +136,7 @@ def test_a_run_that_ends_its_process_fails_and_no_other_run_does(tmp_path: Path,
     assert told[0].startswith("run 1 (plant.mass = 1.11) failed: its worker process ended by SIGABRT, 3 times")
 
 
-def test_a_run_that_is_killed_over_and_over_stops_the_sweep_without_a_row(tmp_path: Path) -> None:
+def test_a_run_that_is_killed_repeatedly_stops_the_sweep_without_a_row(tmp_path: Path) -> None:
     base = dataclasses.replace(short(), plant=FmuChoice(fmu=str(sick_plant(tmp_path))))
     with pytest.raises(QuadcosimError, match=r"run 1 ended by SIGKILL 3 times: not caused by the run") as caught:
         sweep(study(axis("plant.mass", 1.0, KILLED), base=base), folder=tmp_path)
@@ -148,7 +148,7 @@ def test_a_run_that_is_killed_over_and_over_stops_the_sweep_without_a_row(tmp_pa
 
 
 @pytest.mark.parametrize("what", ["no space", "no file"])
-def test_a_place_where_nothing_can_be_flown_stops_the_sweep_without_a_row(
+def test_a_failure_of_the_environment_stops_the_sweep_without_a_row(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
     genuine = Pool._unpack
@@ -170,7 +170,7 @@ def test_a_place_where_nothing_can_be_flown_stops_the_sweep_without_a_row(
     assert sweep(study(PERIODS), folder=tmp_path).flown == 2
 
 
-def test_other_software_where_it_is_flown_stops_the_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_other_software_in_a_worker_stops_the_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     other = {**versions(), "sources": "other"}
     monkeypatch.setattr("orchestration.workers.pool.versions", lambda: other)
     with pytest.raises(QuadcosimError, match="has another version of sources than the coordinator; expected the same"):

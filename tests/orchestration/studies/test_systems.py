@@ -81,7 +81,7 @@ def test_rows_of_a_system_have_its_objectives_and_its_outcomes(swept: tuple[Stud
     assert {"guid.plant", "guid.controller", "horizon", "steps"} <= set(table.columns)
 
 
-def test_a_study_of_a_system_is_not_flown_again_unless_an_objective_changes(swept: tuple[Study, Path]) -> None:
+def test_a_study_of_a_system_is_not_run_again_unless_an_objective_changes(swept: tuple[Study, Path]) -> None:
     chosen, folder = swept
     assert sweep(chosen, folder=folder).flown == 0
     other = dataclasses.replace(chosen.origin, objectives={**chosen.origin.objectives, "late": "max(plant.x)"})
@@ -98,7 +98,7 @@ def test_the_figure_of_a_system_is_of_its_first_objective_that_varies(swept: tup
         draw_study(chosen, folder, "ultimate_bound")
 
 
-def test_a_study_file_names_a_system_file_and_may_multiply_what_an_fmu_has(system: System, tmp_path: Path) -> None:
+def test_a_study_file_names_a_system_file_and_may_multiply_start_values_of_fmus(system: System, tmp_path: Path) -> None:
     file = tmp_path / "study.toml"
     file.write_text(f'scenario = "{FILE}"\n[[axes]]\nname = "gain"\nmultiplies = ["{K_D}"]\nvalues = [1.0, 3]\n')
     chosen = load_study(file)
@@ -109,7 +109,7 @@ def test_a_study_file_names_a_system_file_and_may_multiply_what_an_fmu_has(syste
 
 
 def test_an_fmu_may_be_an_axis(system: System, tmp_path: Path) -> None:
-    """The controller by its file, and the same file under another name: two runs with equal bits but their places."""
+    """The controller by its file and by a copy of it: two runs with equal bits but different indices."""
     fmu = Study(name="s", base=system, axes=(axis("seed", 1),)).files().fmus[system.components["controller"].fmu]
     copy = tmp_path / "other.fmu"
     copy.write_bytes(fmu.read_bytes())
@@ -152,7 +152,7 @@ def test_an_axis_that_a_system_does_not_have_is_refused_in_one_line(system: Syst
         ("components.controller.fmu", 3.0, "fmu = 3.0: expected"),
     ],
 )
-def test_a_run_that_cannot_be_refuses_the_study_of_a_system(
+def test_an_invalid_run_refuses_the_study_of_a_system(
     system: System, tmp_path: Path, target: str, value: Any, said: str
 ) -> None:
     with pytest.raises(UsageError) as caught:
@@ -161,7 +161,7 @@ def test_a_run_that_cannot_be_refuses_the_study_of_a_system(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_objectives_that_cannot_be_columns_are_refused() -> None:
+def test_objectives_that_are_invalid_as_columns_are_refused() -> None:
     for names in (["status"], ["GOOD"], ["peak", "Peak"], [""], ["guid.x"]):
         with pytest.raises(UsageError, match=f"objectives.{names[-1]}: the table of runs has a column of that name"):
             expect_columns(names)
@@ -199,14 +199,14 @@ def theory(period: float, delay: float) -> float:
 @pytest.mark.parametrize(
     ("period", "delay"), [(1.5, 0.0), (2.01, 0.0), (0.5, 0.3), (0.5, 0.7), (0.05, 0.68), (0.05, 0.69)]
 )
-def test_the_twins_part_as_the_eigenvalues_of_the_loop_say(
+def test_the_twins_diverge_as_the_eigenvalues_of_the_loop_predict(
     system: System, instances: Instances, period: float, delay: float
 ) -> None:
     varied = changed(system, {PERIOD: period, DELAY: delay})
     assert growth_of(varied, instances).rate == pytest.approx(theory(period, delay), abs=1e-8)
 
 
-def test_the_twins_part_as_the_loop_that_is_linearised_through_saved_states(instances: Instances) -> None:
+def test_the_twins_diverge_as_the_loop_linearised_through_saved_states_predicts(instances: Instances) -> None:
     period = 0.081
     scenario = Scenario(stop_time=8.0, timing=Timing(period=period, plant_interval=0.02))
     expected = math.log(HoverLoop.of(scenario).spectral_radius(period, 0.0)) / period
@@ -243,7 +243,7 @@ def test_the_largest_period_of_the_double_integrator_is_two_seconds(system: Syst
     assert found.confidence is None
 
 
-def test_without_an_operating_point_there_is_no_local_limit_and_it_is_said(system: System) -> None:
+def test_without_an_operating_point_there_is_no_local_limit_with_the_reason_noted(system: System) -> None:
     nowhere = dataclasses.replace(system, operating_point={}, stop_time=5.0)
     found = find(nowhere, K_D, first=1.0, last=2.0, scan=1.0)
     assert (found.local_limit, found.local_method) == (None, None)
@@ -266,7 +266,7 @@ def test_without_an_operating_point_there_is_no_local_limit_and_it_is_said(syste
         ({"of": DELAY, "first": 0.0, "last": 0.5, "continuous": True}, "continuous: for the quadrotor only"),
     ],
 )
-def test_what_cannot_be_asked_of_a_system_is_refused_in_one_line(
+def test_invalid_requests_for_a_system_are_refused_in_one_line(
     system: System, options: dict[str, Any], said: str
 ) -> None:
     with pytest.raises(UsageError) as caught:

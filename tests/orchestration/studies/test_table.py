@@ -26,7 +26,7 @@ GRIDDED = {"timing.period": [0.02, 0.01], "timing.delay": [0.0, 0.01, 0.005]}
 
 @pytest.fixture(scope="module")
 def grid(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
-    """A study of two periods by three delays, flown, and its store."""
+    """A study of two periods by three delays, run, and its store."""
     folder = tmp_path_factory.mktemp("grid")
     (folder / "study.toml").write_text(GRID.replace('"period"', '"timing.period"').replace('"delay"', '"timing.delay"'))
     chosen = load_study(folder / "study.toml")
@@ -34,7 +34,7 @@ def grid(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
 
 
 def stored(path: Path, rows: list[Row], grid: dict[str, list[Any]] | None) -> Path:
-    """A store of rows that were never flown."""
+    """A store of rows that were never run."""
     with open_for_writing(path, OBJECTIVES) as store:
         about = {"axes": ["timing.period"], "grid": grid, "guids": {"plant": "{p}"}, "versions": {"numpy": "1"}}
         store.describe({name: json.dumps(value) for name, value in about.items()})
@@ -85,7 +85,7 @@ def test_a_frame_has_the_metrics_of_direct_runs(grid: tuple[Study, Path]) -> Non
             assert pd.isna(value) if direct[name] is None else value == direct[name], name
 
 
-def test_whole_numbers_and_truths_are_such_in_a_frame(tmp_path: Path) -> None:
+def test_integers_and_booleans_keep_their_types_in_a_frame(tmp_path: Path) -> None:
     rows = [row(0), row(1, metrics=None, message="no"), row(2, metrics={"diverged": True, "steps": 7})]
     table = frame(stored(tmp_path / "study.sqlite", rows, None))
     assert table["diverged"].tolist() == [False, pd.NA, True]
@@ -151,7 +151,7 @@ def as_text(value: Any) -> str:
         return str(value)
 
 
-def test_what_is_exported_reads_back_equal(grid: tuple[Study, Path], tmp_path: Path) -> None:
+def test_exports_read_back_equal(grid: tuple[Study, Path], tmp_path: Path) -> None:
     _, path = grid
     table = frame(path)
     parquet, csv = export(path, tmp_path / "new")
@@ -163,7 +163,7 @@ def test_what_is_exported_reads_back_equal(grid: tuple[Study, Path], tmp_path: P
         assert [as_text(value) for value in table[name]] == [as_text(value) for value in read[name]], name
 
 
-def test_metrics_say_their_units_in_the_parquet_file_and_in_the_dataset(
+def test_metrics_have_their_units_in_the_parquet_file_and_in_the_dataset(
     grid: tuple[Study, Path], tmp_path: Path
 ) -> None:
     _, path = grid
@@ -189,7 +189,7 @@ def test_a_failed_run_is_exported_with_its_message(tmp_path: Path) -> None:
     assert read["status"].tolist() == ["done", "failed"]
 
 
-def test_more_rows_than_are_read_at_once_open_count_and_export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_more_rows_than_one_block_are_counted_and_exported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Store, "blocks", functools.partialmethod(Store.blocks, most=2000))
     number = 4500  # two blocks and a half of them
     measured = dict.fromkeys(METRICS, 0.1 + 0.2) | {"good": True, "diverged": False, "steps": 30000}

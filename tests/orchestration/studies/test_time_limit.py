@@ -1,4 +1,4 @@
-"""A run that takes longer than it may has failed, and says so; the others are flown."""
+"""A run that exceeds its time limit fails with the reason; the others are run."""
 
 import sys
 from pathlib import Path
@@ -35,7 +35,7 @@ step = 0.01
 
 
 @pytest.mark.parametrize("waits", ["for (;;)", "for (;;) usleep(1000)"])
-def test_a_run_that_hangs_is_a_failed_row_that_says_so(waits: str, tmp_path: Path) -> None:
+def test_a_run_that_hangs_is_a_failed_row_with_the_reason(waits: str, tmp_path: Path) -> None:
     path = small(tmp_path, f"ENDS=if (m->s.gain == 3.0) {waits}")
     system = System(
         stop_time=0.1, components={"it": Component(fmu=str(path), step=0.01)}, objectives={"last": "max(it.y)"}
