@@ -455,10 +455,10 @@ class Batch:
         found: list[Any] = []
         for name, source in system.sources.items():
             if name in self._shape.seen or source.to:
-                found += [source, system.seed if source.is_random else None]
+                found += [vars(source), system.seed if source.is_random else None]
             if source.trajectory is not None:
-                found.append(tuple(numbers[each] for each in self._trajectories[source.trajectory]))
-        return tuple(map(repr, found))
+                found.append([numbers[each] for each in self._trajectories[source.trajectory]])
+        return repr(found)  # of a source itself only the beginning would be shown
 
     def _next_span(self, number: int, track: Track, runs: Sequence[Run]) -> None:
         """Give the next span of a track to C."""

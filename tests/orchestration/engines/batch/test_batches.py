@@ -123,6 +123,19 @@ def test_what_is_held_is_not_summed_up_anew_where_nothing_but_a_step_happens(fmu
             assert_the_same_numbers(found.metrics, ran(what, "compiled", load=kept.load).metrics)
 
 
+def test_runs_follow_sources_of_their_own_whatever_parameter_differs(fmu: Path, kept: Kept) -> None:
+    parameters = dict.fromkeys(("duration", "dx", "dy", "dz", "start", "x", "y", "z"), 0.5)
+    first = replace(
+        of(LOOP, fmu),
+        sources={"reference": Source(signal="step", parameters=parameters)},
+        objectives={f"highest_{axis}": f"max(reference.position.{axis})" for axis in "xyz"},
+    )
+    crowd = [changed(first, {f"sources.reference.parameters.{name}": 2.0}) for name in parameters]
+    for what, found in zip(crowd, Batches().run(crowd)):
+        assert found is not None
+        assert found.metrics == ran(what, "compiled", load=kept.load).metrics
+
+
 CONDITIONS = ("plant.y > 0.9", "norm(plant.y, controller.y) >= 1.2 and time > 0.1", "plant.y < -5")
 
 
