@@ -128,6 +128,7 @@ typedef struct {
     /* of kernels */
     double *memory;
     const int64_t *places; /* of the connected outputs in it */
+    const bool *wanted;    /* of each variable, whether it is read, if it is an output */
     const Fed *fed;
     int64_t fed_count;
 } Component;

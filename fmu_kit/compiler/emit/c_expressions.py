@@ -183,8 +183,12 @@ class ExpressionWriter:
             if id(both) in scope:
                 return scope[id(both)]
         name = self.scopes[-1][id(both)] = self._name("p")
-        self._line(f"const q_sines {name} = q_sin_cos({self._lanes(angle)});")
+        self._line(f"const q_sines {name} = {self._sines(self._lanes(angle))};")
         return name
+
+    def _sines(self, angle: str) -> str:
+        """The sine and cosine of an angle."""
+        return f"q_sin_cos({angle})"
 
 
 def _constant(symbol: Symbol) -> str:

@@ -7,6 +7,7 @@ number of its error behind. Nothing is said: texts are for instances.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Set
 from typing import ClassVar
 
 from fmu_kit.compiler.emit.c_code import ERRORS, FunctionWriter
@@ -19,10 +20,13 @@ from fmu_kit.compiler.trace.tracing import Program
 def lane_code(program: Program, line: Function | None = None) -> str:
     """The functions of a program in lanes, each after those that it calls, and its step as a straight line."""
     names = place_names(program.places)
-    written = [LaneWriter(function, program, names).text() for function in program.functions]
-    if line is not None:
-        written += [LineWriter(line, program, names).text(), f"#define STRAIGHT_STEP {c_name(line.name)}"]
-    return "\n\n".join(written) + "\n"
+    writers: list[LaneWriter] = [LaneWriter(function, program, names) for function in program.functions]
+    if line is None:
+        return "\n\n".join(writer.text() for writer in writers) + "\n"
+    read = {symbol.data[0] for writer in writers for symbol in writer.used.values() if symbol.op == "load"}
+    unread = {variable.name for variable in program.slave.variables} - read
+    writers.append(LineWriter(line, program, names, unread))
+    return "\n\n".join([*(writer.text() for writer in writers), f"#define STRAIGHT_STEP {c_name(line.name)}"]) + "\n"
 
 
 class LaneWriter(FunctionWriter):
@@ -183,14 +187,61 @@ class LaneWriter(FunctionWriter):
 
 
 class LineWriter(LaneWriter):
-    """Writes a step that is a straight line: nothing is stored where a guard holds in a lane, and 0 returned."""
+    """Writes a step that is a straight line: nothing is stored where a guard holds in a lane, and 0 returned.
 
-    always: ClassVar[tuple[str, ...]] = ("v",)
-    first: ClassVar[tuple[str, ...]] = ("q_place *v", "q_mask live")
+    All that a next step needs is computed before the guards are looked at, without any branch: a compiler then orders
+    operations so that they wait least for one another. Variables that are `unread` by the slave come last, if they are
+    wanted.
+    """
 
-    def _check(self, checks: list[Statement]) -> None:
-        guards = " | ".join(self.value(each.symbols[0]) for each in checks)
-        self._line(f"Q_IF_EVER(q_any(live & ({guards}))) return q_known(0);")
+    type: ClassVar = "Q_FLAT q_mask"
+    always: ClassVar[tuple[str, ...]] = ("v", "wanted")
+    first: ClassVar[tuple[str, ...]] = ("q_place *v", "q_mask live", "const uint8_t *wanted")
+
+    def __init__(self, function: Function, program: Program, places: dict[str, str], unread: Set[str]) -> None:
+        super().__init__(function, program, places)
+        self.unread = unread
+        self.declared.append("q_mask rare = q_known(0);")
+        self.is_guarded = True
+        """whether lanes in which functions have no usual value still leave the line"""
+
+    def _block(self, block: Block) -> None:
+        stores = [each for each in block if each.op == "store"]
+        needed = [each for each in stores if each.data not in self.unread]
+        guards = [self.value(each.symbols[0]) for each in block if each.op == "if"]
+        for each in needed:
+            self._lanes(each.symbols[0])
+        self._line(f"Q_IF_EVER(q_any(live & ({' | '.join(['rare', *guards])}))) return q_known(0);")
+        self.is_guarded = False
+        for each in needed:
+            self._store(each, ())
+        for _, some in itertools.groupby((each for each in stores if each.data in self.unread), _vector):
+            self._wanted(list(some))
+        self._line(self.through)
+
+    def _wanted(self, stores: list[Statement]) -> None:
+        """Those of one vector, if any of them is wanted."""
+        self._line(f"if ({' || '.join(f'Q_WANTED({self.places[each.data]})' for each in stores)}) {{")
+        self.scopes.append({})
+        for each in stores:
+            self._store(each, ())
+        self.scopes.pop()
+        self._line("}")
+
+    def _of_reals(self, symbol: Symbol) -> str:
+        if self.is_guarded and symbol.op in ("sin", "cos"):
+            return f"{self._pair(symbol.args[0])}.{symbol.op}"
+        if self.is_guarded and symbol.op == "pow":
+            return f"q_usual_pow({', '.join(map(self._lanes, symbol.args))}, &rare)"
+        return super()._of_reals(symbol)
+
+    def _sines(self, angle: str) -> str:
+        return f"q_usual_sin_cos({angle}, &rare)" if self.is_guarded else super()._sines(angle)
+
+
+def _vector(store: Statement) -> str:
+    name: str = store.data
+    return name.rpartition(".")[0] or name
 
 
 def _returns(block: Block) -> bool:

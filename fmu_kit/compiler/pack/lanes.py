@@ -77,6 +77,6 @@ class Lanes:
         """Initialise from the values that were set, and compute the outputs at the start time [s]."""
         self._library.quadcosim_initialise(*map(ctypes.c_void_p, (memory, active, start_time, status)))
 
-    def do_step(self, memory: int, active: int, t: int, h: int, status: int) -> None:
-        """Advance from t by h [s]."""
-        self._library.quadcosim_do_step(*map(ctypes.c_void_p, (memory, active, t, h, status)))
+    def do_step(self, memory: int, active: int, t: int, h: int, status: int, wanted: int | None = None) -> None:
+        """Advance from t by h [s]; `wanted` as lanes.c has it."""
+        self._library.quadcosim_do_step(*map(ctypes.c_void_p, (memory, active, t, h, status, wanted)))

@@ -8,7 +8,8 @@
    double[places][lanes], aligned to 64 bytes; the first places are the variables by their value references, of
    Integers and Booleans as doubles, those behind them are the slave's own. `active` has all bits of a lane that is
    meant, or none; others stay as they are. `status` becomes 0 in an active lane, or the number of the error that an
-   instance would have failed with; such a lane is not to be used any more.
+   instance would have failed with; such a lane is not to be used any more. `wanted` has for each variable whether anybody
+   reads it: of those that a step changes, others may keep the value of an earlier one. NULL: all are read.
 
    What an instance refuses when a value is set is not looked at here. Whoever writes into the memory makes sure that
    Reals, the start time too, are finite, Integers whole numbers of 32 bits, Booleans 0 or 1; that nothing is written
@@ -33,6 +34,8 @@ typedef q_real q_place __attribute__((aligned(QUADCOSIM_LANES < 8 ? 8 * QUADCOSI
 #define Q_IF_EVER(condition) if (condition)
 typedef q_real q_place;
 #endif
+
+#define Q_WANTED(place) (!wanted || wanted[place])
 
 #include "lane_functions.h"
 
@@ -108,31 +111,36 @@ void quadcosim_line(int64_t *tried, int64_t *left) { *tried = line.tried, *left 
 
 enum { TRIALS = 256, OF_WHICH_ONE = 20 }; /* may leave the line, in the long run */
 
-static int step_straight(q_place *v, q_mask live, q_real t, q_real h)
+static int step_straight(q_place *v, q_mask live, const uint8_t *wanted, q_real t, q_real h)
 {
     if (line.tried >= TRIALS && line.left * OF_WHICH_ONE > line.tried)
         return 0;
     line.tried++;
-    if (q_any(STRAIGHT_STEP(v, live, t, h)))
+    if (q_any(STRAIGHT_STEP(v, live, wanted, t, h)))
         return 1;
     line.left++;
     return 0;
 }
 
 #else
-#define step_straight(v, live, t, h) 0
+#define step_straight(v, live, wanted, t, h) ((void)(wanted), 0)
 #endif
 
 /* Advance from t by h [s], which may differ from lane to lane. */
-EXPORT void quadcosim_do_step(double *memory, const uint64_t *active, const double *t, const double *h, int32_t *status);
-void quadcosim_do_step(double *memory, const uint64_t *active, const double *t, const double *h, int32_t *status)
+EXPORT void quadcosim_do_step(double *memory, const uint64_t *active, const double *t, const double *h, int32_t *status,
+                              const uint8_t *wanted);
+void quadcosim_do_step(double *memory, const uint64_t *active, const double *t, const double *h, int32_t *status,
+                       const uint8_t *wanted)
 {
     q_place *const v = (q_place *)memory;
     const q_mask live = lanes_of(active);
     q_real failed = q_all(0.0);
-    q_mask through = live;
-    if (!step_straight(v, live, values_of(t), values_of(h)))
-        through = model_do_step(v, live, &failed, values_of(t), values_of(h));
+    if (step_straight(v, live, wanted, values_of(t), values_of(h))) {
+        for (int lane = 0; lane < LANES; lane++)
+            status[lane] = active[lane] ? 0 : status[lane];
+        return;
+    }
+    const q_mask through = model_do_step(v, live, &failed, values_of(t), values_of(h));
     tell_status(active, through, failed, status);
 }
 

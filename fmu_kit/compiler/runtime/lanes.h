@@ -29,6 +29,10 @@
 #elif defined(__GNUC__)
 /* gcc heeds no FP_CONTRACT. That nothing traps lets it compute both sides of a choice, so loops become vectors. */
 #pragma GCC optimize("fp-contract=off", "no-trapping-math")
+#if QUADCOSIM_LANES > 1
+/* Operations on vectors are put in order before registers are given out: they wait less for one another. */
+#pragma GCC optimize("schedule-insns")
+#endif
 #pragma GCC diagnostic ignored "-Wpsabi" /* lanes are passed within one file only */
 #elif defined(_MSC_VER)
 #pragma fp_contract(off)
@@ -36,11 +40,14 @@
 
 #define Q_ONE static inline __attribute__((unused))
 #define Q_SELDOM static __attribute__((unused, noinline, cold))
+#define Q_FLAT __attribute__((flatten)) /* what it calls is put into its place */
 #if defined(_MSC_VER) && !defined(__clang__)
 #undef Q_ONE
 #undef Q_SELDOM
+#undef Q_FLAT
 #define Q_ONE static __inline
 #define Q_SELDOM static
+#define Q_FLAT
 #endif
 
 #define Q_WHOLE ((int64_t)1 << DBL_MANT_DIG) /* whole numbers smaller than it are exact, and so is what rounds to one */

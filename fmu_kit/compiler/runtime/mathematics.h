@@ -310,14 +310,21 @@ Q_SELDOM q_real q_any_power(q_real x, q_real y, q_pair log) {
     return q_select(q_eq(y, 0.0) | q_eq(x, 1.0), one, number);
 }
 
-/* Of a positive x, and without overflow, there is nothing else to be thought of. */
-Q_ONE q_real q_own_pow(q_real x, q_real y) {
+/* The same for a positive x, where nothing overflows; `rare` gains the lanes in which that is not so, and which have no
+   result. */
+Q_ONE q_real q_usual_power(q_real x, q_real y, q_mask *rare) {
     const q_real head = q_head(y);
     const q_pair log = q_log_pair(q_fabs(x));
     const q_real product = head * log.high;
     const q_mask usual = q_gt(x, 0.0) & q_le(x, DBL_MAX) & q_lt(q_fabs(y), 0x1p66) & q_lt(q_fabs(product), 708.0);
-    if (!q_every(usual)) return q_any_power(x, y, log);
+    *rare |= q_not(usual);
     return q_exp_of_small_sum(product, (y - head) * log.high + y * log.low);
+}
+
+Q_ONE q_real q_own_pow(q_real x, q_real y) {
+    q_mask rare = q_known(0);
+    const q_real power = q_usual_power(x, y, &rare);
+    return q_any(rare) ? q_any_power(x, y, q_log_pair(q_fabs(x))) : power;
 }
 
 /* -- angles --------------------------------------------------------------------------------------------------------- */
@@ -331,7 +338,7 @@ typedef struct {
 #define Q_NEAR 0x1.921fb54442d18p20 /* 2^20 pi/2: to here the products below are exact, or as good as */
 
 /* Far from zero: 192 bits of 2/pi from where they begin to count, times the 53 bits of x, lane by lane. */
-static q_turn q_far_turn(q_real x, q_turn turn) {
+Q_SELDOM q_turn q_far_turn(q_real x, q_turn turn) {
     static const uint32_t two_over_pi[] = {
         0x00000000u, 0x00000000u, 0xa2f9836eu, 0x4e441529u, 0xfc2757d1u, 0xf534ddc0u, 0xdb629599u, 0x3c439041u,
         0xfe5163abu, 0xdebbc561u, 0xb7246e3au, 0x424dd2e0u, 0x06492eeau, 0x09d1921cu, 0xfe1deb1cu, 0xb129a73eu,
@@ -386,13 +393,19 @@ static q_turn q_far_turn(q_real x, q_turn turn) {
 }
 
 /* pi/2 is taken away in parts of 33 bits (Cody and Waite), the rest of each difference kept. */
-Q_ONE q_turn q_in_quadrants(q_real x) {
+Q_ONE q_turn q_near_turn(q_real x) {
     const q_real n = (x * 0x1.45f306dc9c883p-1 + Q_INTEGER) - Q_INTEGER;
     const q_pair first = q_exact_sum(x - n * 0x1.921fb544p+0, -(n * 0x1.0b4611a6p-34));
     const q_pair second = q_exact_sum(first.high, -(n * 0x1.3198a2ep-69));
     const q_pair r = q_fast_sum(second.high, second.low + (first.low - n * 0x1.b839a252049c1p-104));
-    const q_turn turn = {q_to_bits(n + Q_INTEGER), r};
-    return q_any(q_gt(q_fabs(x), Q_NEAR)) ? q_far_turn(x, turn) : turn;
+    return (q_turn){q_to_bits(n + Q_INTEGER), r};
+}
+
+Q_ONE q_mask q_is_far(q_real x) { return q_gt(q_fabs(x), Q_NEAR); }
+
+Q_ONE q_turn q_in_quadrants(q_real x) {
+    const q_turn turn = q_near_turn(x);
+    return q_any(q_is_far(x)) ? q_far_turn(x, turn) : turn;
 }
 
 /* sin r and cos r, for |r| < 0.7855. */
@@ -415,8 +428,7 @@ typedef struct {
     q_real sin, cos;
 } q_sines;
 
-Q_ONE q_sines q_own_sin_cos(q_real x) {
-    const q_turn turn = q_in_quadrants(x);
+Q_ONE q_sines q_sines_of(q_real x, q_turn turn) {
     const q_pair sin_pair = q_sin_pair(turn.r), cos_pair = q_cos_pair(turn.r);
     const q_real near_zero = sin_pair.high + sin_pair.low, near_one = cos_pair.high + cos_pair.low;
     const q_mask odd = q_is_odd(turn.quadrant);
@@ -425,6 +437,7 @@ Q_ONE q_sines q_own_sin_cos(q_real x) {
     return (q_sines){q_select(q_eq(x, 0.0), x, sine), cosine};
 }
 
+Q_ONE q_sines q_own_sin_cos(q_real x) { return q_sines_of(x, q_in_quadrants(x)); }
 Q_ONE q_real q_own_sin(q_real x) { return q_own_sin_cos(x).sin; }
 Q_ONE q_real q_own_cos(q_real x) { return q_own_sin_cos(x).cos; }
 
@@ -621,11 +634,16 @@ Q_FUNCTION(atan)
 Q_FUNCTION2(atan2)
 Q_FUNCTION2(pow)
 
-/* Both for little more than one. */
+/* Sine and cosine for little more than one of them; and what is usual of functions with branches, without those: `rare`
+   gains the lanes in which another branch would be taken, and which have no result. */
 #ifdef QUADCOSIM_LIBM
 Q_ONE q_sines q_sin_cos(q_real x) { return (q_sines){q_sin(x), q_cos(x)}; }
+Q_ONE q_sines q_usual_sin_cos(q_real x, q_mask *rare) { return (void)rare, q_sin_cos(x); }
+Q_ONE q_real q_usual_pow(q_real x, q_real y, q_mask *rare) { return (void)rare, q_pow(x, y); }
 #else
 Q_ONE q_sines q_sin_cos(q_real x) { return q_own_sin_cos(x); }
+Q_ONE q_sines q_usual_sin_cos(q_real x, q_mask *rare) { return *rare |= q_is_far(x), q_sines_of(x, q_near_turn(x)); }
+Q_ONE q_real q_usual_pow(q_real x, q_real y, q_mask *rare) { return q_usual_power(x, y, rare); }
 #endif
 
 #endif

@@ -294,13 +294,14 @@ EXPORT int run(Loop *l) {
 
 EXPORT const Size sizes[] = {SIZES, {0}};
 
-typedef void Step(double *, const uint64_t *, const double *, const double *, int32_t *);
+typedef void Step(double *, const uint64_t *, const double *, const double *, int32_t *, const bool *);
 
 static Lanes failed_steps(Loop *l, int64_t index, Lanes lanes, q_real begin, q_real length) {
     const Component *c = &l->components[index];
     q_bits active = bits_of(lanes);
     int32_t any = 0;
-    ((Step *)c->step)(c->memory, (const uint64_t *)&active, (const double *)&begin, (const double *)&length, l->status);
+    ((Step *)c->step)(
+        c->memory, (const uint64_t *)&active, (const double *)&begin, (const double *)&length, l->status, c->wanted);
     for (int lane = 0; lane < L; lane++) any |= l->status[lane];
     if (!any) return 0;
     Lanes failed = 0;

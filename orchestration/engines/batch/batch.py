@@ -123,6 +123,9 @@ class Batch:
         kernels = list(shape.kernels.values())
         self.memories = [self._array(kernel.lanes.places) for kernel in kernels]
         """of the components, shape (places, lanes)"""
+        self._read = [shape.read(name) for name in shape.names]
+        self._wanted = [read.copy() for read in self._read]
+        """the same with what is recorded in the runs at hand"""
         self._ends: list[Ends] = [ends_of(shape, x) for x in shape.system.connections]
         self._c = c = structures(self._lanes)
         connections = shape.system.connections
@@ -381,7 +384,7 @@ class Batch:
             wrong |= self._exchange(group, received)
         for index, name in enumerate(shape.names):
             wrong |= self._compute(index)
-            wrong |= ~np.isfinite(self.memories[index][shape.connected(name)]).all(axis=0)
+            wrong |= ~np.isfinite(self.memories[index][shape.connected[name]]).all(axis=0)
         for i, first in enumerate(received):
             if self._channels[i].extrapolates:
                 self._of_channels[i]["applied"][: len(first)] = first
@@ -512,9 +515,13 @@ class Batch:
         """Room for the rows of some columns; None: no rows are kept."""
         batch = self._batch
         batch.recorded_count, batch.record_limit = len(columns or ()), 0 if columns is None else MOST_ROWS
+        places = [self._shape.place(column) for column in columns or ()]
+        for wanted, read in zip(self._wanted, self._read):
+            wanted[:] = read
+        for i, place in places:
+            self._wanted[i][place] = True
         if columns is None:
             return []
-        places = [self._shape.place(column) for column in columns]
         self._recorded = np.array(
             [address(self.memories[i]) + 8 * self._lanes * place for i, place in places], dtype=np.int64
         )
@@ -564,12 +571,13 @@ class Batch:
 
     def _component(self, index: int) -> Any:
         shape, name = self._shape, self._shape.names[index]
-        into, places, lasting = shape.wires.into(name), shape.connected(name), self._memory.lasting
+        into, places, lasting = shape.wires.into(name), shape.connected[name], self._memory.lasting
         changing = shape.fed[name] if shape.fed_changes else []
         fed = self._structures(self._c.Fed, (self._c.Fed(source=s, place=p) for s, p in changing))
         return self._c.Component(
             step=shape.kernels[name].step, memory=address(self.memories[index]), places=lasting(places),
-            connected=len(places), fed=ctypes.addressof(fed), fed_count=len(changing), held=self._indices(into.held),
-            ahead=self._indices(into.ahead), behind=self._indices(into.behind), ratio=address(self._ratios[index]),
+            connected=len(places), wanted=address(self._wanted[index]), fed=ctypes.addressof(fed),
+            fed_count=len(changing), held=self._indices(into.held), ahead=self._indices(into.ahead),
+            behind=self._indices(into.behind), ratio=address(self._ratios[index]),
             by_itself=shape.wires.is_by_itself(name), rank=shape.wires.rank(index),
         )  # fmt: skip

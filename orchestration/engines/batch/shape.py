@@ -1,5 +1,6 @@
 """What runs have in common that are flown in lanes of one batch: their components, connections and expressions."""
 
+import re
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orchestration.basics.identity import IdentityCache
+from orchestration.basics.simulator import Booleans
 from orchestration.engines import initial
 from orchestration.engines.batch.code import Written, written
 from orchestration.engines.batch.kernels import Kernel, batch, component, preferred_lanes
@@ -36,6 +38,8 @@ Places = npt.NDArray[np.int64]
 c = structures(1)
 _TAKES = {"Boolean": c.TRUTH, "Integer": c.WHOLE, "Enumeration": c.WHOLE}
 """By kind of an input that is no Real"""
+_SIGNAL = re.compile(r"SIGNAL\((\d+), (\d+)\)")
+"""As expressions name the place of a variable, after the index of its component"""
 
 
 def outline(system: System) -> Hashable:
@@ -129,9 +133,20 @@ class Shape:
                 number += 1
         return found
 
-    def connected(self, name: str) -> Places:
-        """The places of a component's connected outputs in its memory."""
-        return np.array([self.place(output)[1] for output in self.wires.connected(name)], dtype=np.int64)
+    @cached_property
+    def connected(self) -> Mapping[str, Places]:
+        """By component, the places of its connected outputs in its memory."""
+        return {
+            name: np.array([self.place(output)[1] for output in self.wires.connected(name)], dtype=np.int64)
+            for name in self.names
+        }
+
+    def read(self, name: str) -> Booleans:
+        """Whether a connection or an expression reads each variable of a component."""
+        index, found = self.names.index(name), np.zeros(self.kernels[name].lanes.variables, dtype=np.bool_)
+        found[self.connected[name]] = True
+        found[[int(place) for of, place in _SIGNAL.findall(self.written.text) if int(of) == index]] = True
+        return found
 
     @property
     def fed_changes(self) -> bool:
@@ -168,7 +183,7 @@ class Shape:
                 found[call] = with_signals
         return dict(sorted(found.items(), key=lambda pair: _passes(pair[0])))
 
-    @property
+    @cached_property
     def passes(self) -> int:
         """How often a run is to be flown: what is inside another reduction has to be known before."""
         return max(map(_passes, self.calls), default=1)

@@ -10,7 +10,7 @@ static __noinline__ int general_step(q_place *v, q_real t, q_real h) {
 
 static __noinline__ int step(q_place *v, q_real t, q_real h) {
 #ifdef STRAIGHT_STEP
-    if (STRAIGHT_STEP(v, 1, t, h)) return 0;
+    if (STRAIGHT_STEP(v, 1, NULL, t, h)) return 0;
 #endif
     return general_step(v, t, h);
 }

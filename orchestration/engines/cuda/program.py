@@ -22,7 +22,9 @@ _OWN = ("flights.cu", "threads.h", "component.h")
 _INCLUDE = re.compile(r'(?m)^#include "(.+)"\n')
 _LITERAL = re.compile(r"\((q_\w+|[A-Z]\w+)\)\{")
 """A structure of known values, as C has it: C++ has no parentheses there"""
-_STRAIGHT = re.compile(r"static q_mask (\w+)\([^)]*\)\n\{\n.*?\n\}\n(?=\s*#define STRAIGHT_STEP \1\n)", re.DOTALL)
+_STRAIGHT = re.compile(
+    r"static Q_FLAT q_mask (\w+)\([^)]*\)\n\{\n.*?\n\}\n(?=\s*#define STRAIGHT_STEP \1\n)", re.DOTALL
+)
 _METHOD = re.compile(r"static (?=q_mask (?!model_do_step)\w+\()")
 """That is called; one that NVRTC puts wherever it is called takes it twice as long, and more registers"""
 _FUNCTION = re.compile(r"static q_mask (\w+)\([^)]*\)\n\{\n(.*?)\n\}\n", re.DOTALL)
@@ -32,7 +34,7 @@ _TAKES_PARAMETERS = "model_take_parameters"
 _READ, _STORED = re.compile(r"v\[(\w+)\]"), re.compile(r"v\[(\w+)\] = ")
 _LINE = """
 extern "C" __global__ void line(q_place *v, q_real t, q_real h, int *through) {
-    through[threadIdx.x] = component::STRAIGHT_STEP(v + threadIdx.x, 1, t, h);
+    through[threadIdx.x] = component::STRAIGHT_STEP(v + threadIdx.x, 1, NULL, t, h);
 }
 """
 

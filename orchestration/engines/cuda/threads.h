@@ -11,6 +11,7 @@
 #define EXPORT static
 #define Q_HARDWARE_SQRT(x) __dsqrt_rn(x)
 #define Q_IF_EVER(condition) if (__builtin_expect(condition, 0))
+#define Q_WANTED(place) ((void)wanted, 1)
 #define __builtin_ctzll(bits) (__ffsll((long long)(bits)) - 1)
 
 #include <stdint.h>

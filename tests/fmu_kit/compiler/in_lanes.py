@@ -107,10 +107,17 @@ class Together:
         given = (self.memory, self._mask(active), start, self.status)
         self.lanes.initialise(*(a.ctypes.data for a in given))
 
-    def step(self, active: NDArray[np.bool_], t: NDArray[np.float64], h: NDArray[np.float64]) -> None:
-        """A step."""
+    def step(
+        self,
+        active: NDArray[np.bool_],
+        t: NDArray[np.float64],
+        h: NDArray[np.float64],
+        wanted: NDArray[np.bool_] | None = None,
+    ) -> None:
+        """A step; `wanted`: for each variable, whether it is read."""
         given = (self.memory, self._mask(active), t, h, self.status)
-        self.lanes.do_step(*(a.ctypes.data for a in given))
+        memory, live, begin, length, status = (a.ctypes.data for a in given)
+        self.lanes.do_step(memory, live, begin, length, status, None if wanted is None else wanted.ctypes.data)
 
     def _mask(self, active: NDArray[np.bool_]) -> NDArray[np.uint64]:
         return np.where(active, ~np.uint64(0), np.uint64(0))

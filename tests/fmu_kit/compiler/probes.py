@@ -183,6 +183,23 @@ class Zeros(Slave):
         self.large = max(self.a, self.b)
 
 
+class Rare(Probe):
+    """Functions that a few arguments make go another way, far from zero or at it, of what is kept."""
+
+    description = "Rare arguments."
+
+    def initialise(self, t: float) -> None:
+        """Nothing is there yet."""
+        self._turned, self._power = 0.0, 0.0
+
+    def step(self, t: float, h: float) -> None:
+        """A power of a, and sines."""
+        require(self.b != -1.0, "b", self.b, "another number")
+        self._power = 0.5 * self._power + abs(self.a) ** self.p
+        self._turned = 0.5 * self._turned + math.sin(self.b) + math.cos(self.b) + math.cos(self.a)
+        self.y0, self.y1 = self._power, self._turned
+
+
 # -- whole numbers -------------------------------------------------------------------------------------------------
 
 

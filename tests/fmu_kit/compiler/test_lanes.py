@@ -1,5 +1,6 @@
 """A slave in lanes has, in every lane, the bits of an instance alone, whatever the others do."""
 
+import itertools
 import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -26,7 +27,7 @@ from tests.fmu_kit.compiler.compiled import compiler
 from tests.fmu_kit.compiler.in_lanes import Alone, Together, Values, bits
 from tests.fmu_kit.compiler.twins import GUID, compiled
 
-PROBES = {"Arithmetic": 4, "Branches": 8, "Integers": 8, "Kept": 4, "Loops": 4, "Memory": 1}
+PROBES = {"Arithmetic": 4, "Branches": 8, "Integers": 8, "Kept": 4, "Loops": 4, "Memory": 1, "Rare": 8}
 """Slaves that do what slaves may do, and in how many lanes"""
 FMU_ERROR, DIVERGENCE = (1 + ERRORS.index(name) for name in ("FmuError", "DivergenceError"))
 STRANGE = (0.0, -0.0, 1.0, -1.0, 3.0, 1e3, 1e200, -1e308)
@@ -162,6 +163,35 @@ def _expect_alike(together: Together, alone: list[Alone], active: NDArray[np.boo
             assert bits(together.memory[:, lane]) == bits(instance.memory())
         else:
             assert together.held()[lane] == held
+
+
+@pytest.mark.parametrize("model", ["QuadrotorPlant", "UnifiedController"])
+def test_what_nobody_reads_is_left_out_and_changes_nothing_else(model: str, tmp_path: Path) -> None:
+    compiler("cc")
+    path = Path(fmpy.extract(str(fmus.locate(f"native/{model}")), str(tmp_path)))
+    in_lanes({file.name: file.read_bytes() for file in (path / "sources").iterdir()}, 8, tmp_path)
+    slave, rng = slave_class(Target.parse(MODELS[model])), np.random.default_rng(1)
+    all_read, some_read = (Together(tmp_path / "lanes.so") for _ in range(2))
+    variables, active, left_out = list(slave.variables), np.ones(8, dtype=np.bool_), 0
+    usual = {k: slave.usual_parameters[v.name] for k, v in enumerate(variables) if v.name in slave.usual_parameters}
+    for each in (all_read, some_read):
+        each.begin()
+        for lane in range(8):
+            each.put(lane, usual)
+        each.initialise(active, np.zeros(8))
+    for k in range(40):
+        inputs = _given(rng, variables, "input", 0.5, 0.0)
+        wanted = rng.random(all_read.lanes.variables) < (1.0 if k % 10 == 9 else 0.3)
+        for each, read in ((all_read, None), (some_read, wanted)):
+            for lane in range(8):
+                each.put(lane, inputs)
+            each.step(active, np.full(8, 0.001 * k), np.full(8, 0.001), read)
+            assert not each.status.any()
+        same = [bits(a) == bits(b) for a, b in zip(all_read.memory, some_read.memory)]
+        others = [*wanted, *[True] * (len(same) - len(wanted))]  # what is the slave's own is read by itself
+        assert all(itertools.compress(same, others))
+        left_out += same.count(False)
+    assert left_out > 0, "what is not read is not computed"
 
 
 def test_lanes_are_refused_by_name() -> None:
