@@ -89,20 +89,14 @@ Q_ONE Lanes lanes_of(q_mask mask) {
         for (Track *track = &l->tracks[__builtin_ctzll(tracks_)], *end_ = track + 1; track < end_; track++)
 #endif
 
-/* What lanes have at a place of a memory; `in_lanes` of an array that need not be aligned as memories are. */
+/* What lanes have at a place of a memory. */
 #ifdef QUADCOSIM_THREADS
 #define AT(memory, place) ((memory)[(place) * L + LANE])
 #define READ(memory, place) AT(memory, place)
-Q_ONE q_real in_lanes(const double *values) { return values[LANE]; }
 #else
 typedef q_real Place __attribute__((may_alias));
 #define AT(memory, place) (*(Place *)((memory) + (place) * L))
 #define READ(memory, place) (*(const Place *)((memory) + (place) * L))
-Q_ONE q_real in_lanes(const double *values) {
-    q_real x;
-    memcpy(&x, values, sizeof x);
-    return x;
-}
 #endif
 
 static void end_some(Loop *l, Lanes lanes, int64_t outcome, int64_t component, const Instant *now) {
@@ -128,20 +122,24 @@ INLINED const int64_t *row_of(Rows *rows, int64_t track, int64_t width) {
     return row;
 }
 
+/* Lanes have reached a time [ns]. */
+INLINED void reach_time(Instant *now, Lanes lanes, int64_t time) {
+    now->lanes |= lanes;
+    now->t = q_select(mask_of(lanes), q_all((double)time / NANOSECONDS), now->t);
+    if (lanes == EVERY)
+        for (int lane = 0; lane < L; lane++) now->time[lane] = time;
+    else
+        EACH(lane, lanes) now->time[lane] = time;
+}
+
 /* Tracks have reached their next instant. */
 INLINED void reach(Loop *l, Instant *now, Lanes tracks) {
     now->tracks = tracks, now->lanes = 0;
     now->stepped.tracks = now->samples.tracks = now->arrivals.tracks = now->posted.tracks = now->measured.tracks = 0;
     TRACKS(track, tracks) {
         const Schedule *s = &track->schedule;
-        int64_t time = time_of(track), at = track->at, number = track - l->tracks;
-        Lanes lanes = track->lanes & l->alive;
-        now->lanes |= lanes;
-        now->t = q_select(mask_of(lanes), q_all((double)time / NANOSECONDS), now->t);
-        if (lanes == EVERY)
-            for (int lane = 0; lane < L; lane++) now->time[lane] = time;
-        else
-            EACH(lane, lanes) now->time[lane] = time;
+        int64_t at = track->at, number = track - l->tracks;
+        reach_time(now, track->lanes & l->alive, time_of(track));
         add(&now->stepped, number, s->stepped, 1, s->stepped_at[at], s->stepped_at[at + 1]);
         add(&now->arrivals, number, s->arrivals, WIDTH(Message), s->arrivals_at[at], s->arrivals_at[at + 1]);
         add(&now->posted, number, s->posted, WIDTH(Message), s->posted_at[at], s->posted_at[at + 1]);

@@ -208,19 +208,18 @@ static void record(Loop *l, const Instant *now, Lanes lanes) {
    as `reach` and `pass` have it, without looking for anything else. */
 static void only_step(Loop *l, Instant *now, Lanes tracks) {
     int64_t index = l->continuous.items[0], until = 0;
-    double t[L] = {0}, begin[L] = {0}, length[L] = {0};
+    q_real begin = q_all(0.0), length = q_all(0.0);
     now->tracks = tracks, now->lanes = 0, now->still = l->stays;
     TRACKS(track, tracks) {
-        int64_t time = until = time_of(track), before = track->now[index];
-        track->now[index] = time, now->lanes |= track->lanes & l->alive;
-        EACH(lane, track->lanes & l->alive)
-            now->time[lane] = time, t[lane] = (double)time, begin[lane] = (double)before,
-            length[lane] = (double)(time - before);
+        Lanes lanes = track->lanes & l->alive;
+        int64_t before = track->now[index];
+        track->now[index] = until = time_of(track);
+        reach_time(now, lanes, until);
+        begin = q_select(mask_of(lanes), q_all((double)before / NANOSECONDS), begin);
+        length = q_select(mask_of(lanes), q_all((double)(until - before) / NANOSECONDS), length);
     }
-    q_real from = in_lanes(begin) / NANOSECONDS, by = in_lanes(length) / NANOSECONDS;
-    now->t = q_select(mask_of(now->lanes), in_lanes(t) / NANOSECONDS, now->t);
     hear(l, now);
-    Lanes moved = move(l, index, now->lanes, from, by, until, now);
+    Lanes moved = move(l, index, now->lanes, begin, length, until, now);
     if (moved & l->alive) look(l, moved & l->alive, now);
     if (l->settles) hold(l, index, now->lanes & l->alive, now);
 }
