@@ -52,7 +52,7 @@ def means_of(node: Node) -> list[Call]:
             raise UsageError(_not_a_mean(f"{call.function}(…)"))
         if isinstance(call.arguments[0], Sampled):
             raise UsageError("over arrivals: expected a mean over time")
-        if any(True for part in reductions(call.arguments[0])):
+        if reductions(call.arguments[0]):
             raise UsageError("of other numbers of the run: expected a mean of signals")
     if not found:
         raise UsageError(_not_a_mean(text(node)))

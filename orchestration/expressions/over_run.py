@@ -1,6 +1,7 @@
 """Evaluates expressions over a whole run."""
 
 import difflib
+import functools
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -76,9 +77,10 @@ def inlined(node: Node, known: Mapping[str, Node]) -> Node:
     return node
 
 
-def reductions(node: Node) -> Iterator[Call]:
+@functools.lru_cache(maxsize=1024)
+def reductions(node: Node) -> tuple[Call, ...]:
     """The functions over a run in an expression, including nested ones."""
-    return (part for part in _all(node) if isinstance(part, Call) and is_over_run(part))
+    return tuple(part for part in _all(node) if isinstance(part, Call) and is_over_run(part))
 
 
 def _depth(node: Node) -> int:

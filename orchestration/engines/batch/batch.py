@@ -270,7 +270,7 @@ class Batch:
         folds = self._written.folds
         count = len(next(iter(values.values())))
         numbers = dict(zip((*self._shape.numbers, STOP_TIME), self._numbers[:, :count]))
-        floor, none = combined(call.arguments[1], values, numbers, count)
+        ((floor, none),) = combined([call.arguments[1]], values, numbers, count)
         self._floor[0, :count] = np.where(none, np.nan, floor)
         self._library.grown(self.address, folds.kept[own], address(self._floor), address(self._grown))
         steps = self._state[folds.steps[own], :count]

@@ -117,8 +117,8 @@ def _groups(indices: Sequence[int], timings: Mapping[int, Hashable], lanes: int)
 def _told(shape: Shape, batch: Batch, result: BatchResult, systems: Sequence[System]) -> Iterator[RunSummary | None]:
     count, c = len(systems), structures(shape.lanes)
     numbers = batch.numbers(systems)
-    values = {name: combined(node, result.reductions, numbers, count) for name, node in shape.nodes.items()}
-    found = {name: (np.isfinite(value) & ~none, value.tolist()) for name, (value, none) in values.items()}
+    values = zip(shape.nodes, combined([*shape.nodes.values()], result.reductions, numbers, count))
+    found = {name: ((np.isfinite(value) & ~none).tolist(), value.tolist()) for name, (value, none) in values}
     for lane, system in enumerate(systems):
         steps = int(result.steps[lane])
         if result.outcome[lane] == c.RUNNING and not result.doubtful[lane]:
