@@ -23,7 +23,7 @@ def export_c(
         ),
     ] = "UnifiedController",
     single: Annotated[
-        bool, typer.Option("--single", help="In single precision, with the functions of libm; else double, without.")
+        bool, typer.Option("--single", help="Single precision, with functions of libm; default: double, without.")
     ] = False,
     *,
     variant: VariantFlags,
@@ -48,7 +48,8 @@ def ssp(
     read_back: Annotated[
         bool,
         typer.Option(
-            "--read-back", help="Begin to fly it in libcosim, ecos and fmpy, where installed, and tell what each says."
+            "--read-back",
+            help="Load it in libcosim, ecos and fmpy, where installed, run the first steps, and report each.",
         ),
     ] = False,
     *,

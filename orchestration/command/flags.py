@@ -39,7 +39,7 @@ def _of_record(
     **options: Any,
 ) -> Any:  # fmt: skip
     doc = attribute_docs(f"orchestration.quadrotor.{module}", name).get(key, FieldDoc("", ""))
-    text = doc.text.replace(" [s]", "")  # the flag says SECONDS
+    text = doc.text.replace(" [s]", "")  # the metavar is SECONDS
     text = f"{text[:-1]}; default: {doc.default}." if tells_default else text
     if words is not None:
         options["metavar"] = "|".join(get_args(words))

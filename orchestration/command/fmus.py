@@ -22,7 +22,7 @@ def build(
         typer.Argument(
             metavar="[FOLDER]",
             help="Folder of modules that define slaves, FOLDER/NAME for one, or the name of a slave of this project; "
-            "default: all of this project, with --name UnifiedController.",
+            "default: all of this project, or UnifiedController with --name.",
             show_default=False,
         ),
     ] = None,

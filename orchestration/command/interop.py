@@ -34,9 +34,9 @@ def interop(
     *,
     flags: FlightFlags,
 ) -> CommandResult:
-    """Run a system in third-party masters and compare every signal with this one's.
+    """Run a system in third-party masters and compare every signal with this master's.
 
-    Exit code 1 if a tool is farther than 1e-9 in a state, its own first inputs given to this master too.
+    Exit code 1 if a state of a tool differs by more than 1e-9 from this master's with the same first inputs.
     """
     from orchestration.interop import table
     from orchestration.interop.catalogue import chosen

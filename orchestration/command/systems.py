@@ -83,12 +83,12 @@ def show(
     from orchestration.system.file_tables import tables_of
     from orchestration.system.request import system_of
 
-    meant = system_of(request_from(system, flags, timing))
+    shown = system_of(request_from(system, flags, timing))
     if out is not None:
         from orchestration.figures import diagram
 
-        inform(str(diagram.write(meant, out)))
-    return CommandResult(document=tables_of(meant), lines=as_text(meant, *_from_fmus(meant)).splitlines())
+        inform(str(diagram.write(shown, out)))
+    return CommandResult(document=tables_of(shown), lines=as_text(shown, *_from_fmus(shown)).splitlines())
 
 
 def _from_fmus(system: "System") -> tuple[dict[str, str], str]:

@@ -46,19 +46,18 @@ class Timing:
     order: Order = "gauss-seidel"
     """Whether a command can be applied at the instant of its sample (gauss-seidel) or at the next one (jacobi)."""
     hold: Hold = "zero"
-    """What the plant gets between arrivals: the last command (zero), or the line through the last two (first)."""
+    """The command of the plant between arrivals: the last one (zero), or the line through the last two (first)."""
     clock: Clock = "master"
     """What decides when the controller samples: the master, or the FMU by its own sample_period."""
     delay: Varying = 0.0
-    """The time d from a sample to the application of its command [s], or how it is distributed; it may exceed the
-    period."""
+    """The time d from a sample to the application of its command [s], or its distribution; it may exceed the period."""
     delay_jitter: Varying = 0.0
-    """The largest random addition J_d to the delay [s], drawn for each command, or how it is itself distributed."""
+    """The largest random addition J_d to the delay of each command [s], or the distribution of the addition."""
     jitter: Varying = 0.0
-    """The largest lateness J of a sampling instant [s], drawn for each, or how it is itself distributed; it is less
-    than the period."""
+    """The largest random lateness J of each sampling instant [s], or the distribution of the lateness; it is less than
+    the period."""
     jitter_distribution: Spread = "uniform"
-    """How both are drawn over [0, J]; normal is centred at J/2 with standard deviation J/6, cut to the range."""
+    """The distribution of both over [0, J]; normal is centred at J/2 with standard deviation J/6, truncated to it."""
     measurement_loss: Varying = 0.0
     """The probability that a measurement is lost, or a trace of 0 and 1, 1 for one that is lost."""
     command_loss: Varying = 0.0

@@ -40,12 +40,12 @@ function signalsOf(run) {
   return run.signals;
 }
 
-/** Who has its computers and networks when; null for a run without any. */
+/** The timeline of its computers and networks; null for a run without any. */
 function barsOf({ bars }) {
   return bars && { rows: bars.rows, row: numbersOf(bars.row), begin: numbersOf(bars.begin), end: numbersOf(bars.end) };
 }
 
-/** Roll, pitch and yaw [deg] about the body's axes, from the quaternion; of the attitude that it should have too. */
+/** Roll, pitch and yaw [deg] about the body's axes, from the quaternion; also those of the desired attitude. */
 function addAngles(signals) {
   const scene = signals.layout.scene;
   if (!scene) return;
@@ -122,7 +122,7 @@ function kindOf(outcome) {
   return outcome === "diverged" ? "diverged" : "bad";
 }
 
-/** The run whose flight is in the file, of a row of the table; undefined without one. */
+/** The run of a row of the table whose signals are in the file; undefined without one. */
 function runOfRow(row) {
   const place = report.table.tracks[row];
   return place === undefined ? undefined : report.runs[place];

@@ -4,7 +4,7 @@ const NOT_GOOD = { bad: "#c9ced4", diverged: "#5f666d" };
 const MARKS = { good: "circle", bad: "x-thin-open", diverged: "triangle-down-open" };
 const MOST_SYMBOLS = 2500;
 const VALUE = "value";
-const [OUTER, MOST, LEAST, WIDE] = [0.02, 2.5, 0.05, 50]; // as in figures: figures/shades.py says what each is
+const [OUTER, MOST, LEAST, WIDE] = [0.02, 2.5, 0.05, 50]; // as in figures: figures/shades.py
 
 const map = { x: null, y: null, metric: null, fixed: {}, row: null, rows: [], isGrid: false, shades: null };
 
@@ -98,7 +98,7 @@ function rowOfPoint(point) {
   return Array.isArray(point.customdata) ? point.customdata[0] : point.customdata;
 }
 
-/** What hovering over a run says. */
+/** The hover text of a run. */
 function hoverOf(row) {
   const lines = axes.map((axis) => lineOf(axis, row));
   const index = cellOf(columnsByName.get("design_index"), row);
@@ -123,7 +123,7 @@ function isWide(values) {
   return low > 0 && high > WIDE * low;
 }
 
-/** What the first colour and the last stand for, as their logarithms where that is wide. */
+/** The values of the first and the last colour, as logarithms if the range is wide. */
 function shadesOf(values) {
   const known = values.filter(Number.isFinite).sort((a, b) => a - b);
   if (!known.length) return { low: 0, high: 1, isLogarithmic: false, isClipped: false };

@@ -1,4 +1,4 @@
-// Begins: what is seen first is drawn first, the rest when the browser has time.
+// The entry point: draws the visible part first, the rest when the browser is idle.
 
 function noteFirstPlot() {
   if (performance.getEntriesByName("first plot").length) return;
@@ -29,7 +29,7 @@ function startPage() {
   });
 }
 
-/** The run that is open at first: one that is good and has its flight here, if there is one. */
+/** The run that is open at first: a good one with signals in the file, if there is one. */
 function openFirst() {
   if (report.compared) return openCell(cellsHere()[0]);
   return openRow(firstOf([...Array(report.table.count).keys()]));

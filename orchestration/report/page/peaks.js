@@ -1,5 +1,5 @@
-// Short peaks that would flatten all else: left out of their panel, which says so, and shown whole in an inset, as in
-// figures (figures/lines.py says what the numbers are).
+// Short peaks that would flatten the rest: clipped in their panel, with a note, and shown in full in an inset, as in
+// figures (the constants: figures/lines.py).
 
 const [OUTSIDE, CLIPPED] = [0.015, 3];
 
@@ -19,7 +19,7 @@ function withoutPeaks({ x, y }) {
   return [at(OUTSIDE), at(1 - OUTSIDE)];
 }
 
-/** Of traces in one panel: what is seen of them, and the peak that is not; null where no peak hides all else. */
+/** The visible range of the traces of a panel, and the clipped peak; null if no peak hides the rest. */
 function peakOf(traces) {
   const known = traces.filter(({ y }) => y.some(Number.isFinite));
   if (!known.length) return null;
@@ -54,7 +54,7 @@ function tracesOfInset(traces, { span: [first, last] }, number) {
   });
 }
 
-/** Where an inset lies in the panel whose upper edge is at `top` of a plot so many pixels high, and what it says. */
+/** The place and the note of an inset in the panel whose upper edge is at `top` of a plot of this height in pixels. */
 function layoutOfInset({ peak, time }, unit, number, top, inner) {
   const left = gap() > 46 ? 0.42 : 0.58;
   const [low, high] = [top - (0.54 * PANEL) / inner, top - (0.2 * PANEL) / inner];

@@ -12,12 +12,12 @@ function startRun() {
   buildRunControls();
 }
 
-/** Runs that the slider goes over: those with a flight, in a comparison those of the open cell. */
+/** The runs of the slider: those with signals, in a comparison those of the open cell. */
 function sliderRuns() {
   return cells.open ? map.rows.map(runOfRow).filter(Boolean) : report.runs;
 }
 
-/** The slider over the runs that there are now. */
+/** The slider over the current runs. */
 function measureSlider() {
   if (!controlsOf.slider) return;
   const count = sliderRuns().length;
@@ -60,7 +60,7 @@ function buildRunControls() {
   }
 }
 
-/** The runs that may be beside the open one: never itself, for which the one before takes its place. */
+/** The runs that may be drawn beside the open one, which is replaced by the one before it. */
 function offerBeside(opened) {
   const before = player.run;
   if (player.beside === opened && opened) player.beside = before === opened ? null : before;
@@ -103,7 +103,7 @@ function openRow(row) {
   else markOnMap(row);
 }
 
-/** Open a run; of one whose flight is not here, what the table has of it. */
+/** Open a run; without its signals, show its row of the table. */
 function openRun(run, row) {
   stop();
   offerBeside(run);
@@ -135,7 +135,7 @@ function runText(run, row, index) {
   return parts;
 }
 
-/** The run with a flight that is nearest on the axes, each by its range. */
+/** The run with signals that is nearest on the axes, each scaled by its range. */
 function nearestFlight(row) {
   const numeric = axes.filter((axis) => !axis.words);
   const words = axes.filter((axis) => axis.words);
@@ -162,7 +162,7 @@ function showMetrics(run, row) {
 
 let pending = 0;
 
-/** Draw the replay at once and the time plots when there is time: the slider may be on its way. */
+/** Draw the replay immediately and the time plots when idle: the slider may be moving. */
 function showSignals() {
   const signals = signalsOf(player.run);
   const beside = player.beside === player.run ? null : signalsOf(player.beside);
@@ -256,7 +256,7 @@ function nameButton() {
   controlsOf.play.setAttribute("aria-pressed", String(player.isPlaying));
 }
 
-/** The next picture; for those who want no motion one every second. */
+/** The next picture; with reduced motion one every second. */
 function advance(now) {
   if (!player.isPlaying) return;
   const passed = (now - player.last) / 1000;
@@ -283,7 +283,7 @@ function setTime(t) {
   if (timePlot.isDrawn) moveCursor();
 }
 
-/** A number with so many digits behind the point, and no sign on a zero. */
+/** A number with a fixed number of decimals, and no sign on a zero. */
 function fixed(value, digits) {
   return value.toFixed(digits).replace(/^-(0\.?0*)$/, "$1");
 }

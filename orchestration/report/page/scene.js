@@ -68,7 +68,7 @@ function showInScene(tracks) {
   drawScene();
 }
 
-/** The box that holds the paths; what diverges does not make it endless. */
+/** The box that contains the paths, limited for a run that diverges. */
 function boxOf(tracks) {
   const low = [Infinity, Infinity, Infinity];
   const high = [-Infinity, -Infinity, -Infinity];
@@ -103,7 +103,7 @@ function sampled({ space, columns, time }, low, high) {
   });
 }
 
-/** What turns a point (north, east, down) into a place on the screen, with its depth: all that is drawn fills it. */
+/** The projection of a point (north, east, down) to the screen, with its depth, scaled to fill the picture. */
 function camera(width, height) {
   const raw = projection(width, height, { scale: 1, right: 0, top: 0 });
   const floor = floorOf(scene.box);
@@ -117,7 +117,7 @@ function camera(width, height) {
   return projection(width, height, { scale, right: (left + right) / 2 - width / 2, top: (high + low) / 2 - height / 2 });
 }
 
-/** The floor: a grid of round numbers below all that is to be seen. */
+/** The floor: a grid of round numbers below everything visible. */
 function floorOf({ low, high, size }) {
   const step = niceStep(size);
   const from = [0, 1].map((i) => Math.floor(low[i] / step) * step);
@@ -342,7 +342,7 @@ function drawVehicle(context, project, here, q, color, force) {
   if (force > 0) drawArrow(context, project(at([0, 0, 0])), project(at([0, 0, -3 * size * force])), paint("thrust"));
 }
 
-/** The attitude that it should have, where it should be. */
+/** The desired attitude at the desired position. */
 function drawGhost(context, project, here, q) {
   const size = sizeOfVehicle();
   const at = (point) => rotated(q, point).map((value, i) => here[i] + value);

@@ -64,7 +64,7 @@ function drawSharesOfCells() {
   byId("shares-table").replaceChildren(tableOf(rows, ["cell", "survive", "95 % interval", "settle", "95 % interval"]));
 }
 
-/** Names on the lines of those that survive, each at another height: the sooner a line falls, the lower, as in figures. */
+/** Names on the lines of survival at different heights: the earlier a line falls, the lower, as in figures. */
 function namesOnLines(groups) {
   const mean = (group) => group.reduce((sum, cell) => sum + cell.survives.good / cell.survives.runs, 0) / group.length;
   const ordered = groups.filter((group) => group.length).sort((a, b) => mean(a) - mean(b));
@@ -84,7 +84,7 @@ function namesOnLines(groups) {
 
 const cells = { place: 0, open: null };
 
-/** Vehicles and conditions that there are, as pairs. */
+/** The existing pairs of vehicle and condition. */
 function placesOfCells() {
   const names = report.compared.cells.map((cell) => JSON.stringify([cell.vehicle, cell.condition]));
   return [...new Set(names)].map((text) => JSON.parse(text));
@@ -162,7 +162,7 @@ function stepOverCells(event) {
   if (next) openCell(next);
 }
 
-/** Show the runs of a cell over the size of their start, and open the first that has its flight in the file. */
+/** Show the runs of a cell over the size of their initial error, and open the first with signals in the file. */
 function openCell(cell) {
   if (!cell) return;
   cells.open = cell;
@@ -179,7 +179,7 @@ function openCell(cell) {
   drawRunsOfCell().then(() => openRow(firstOf(map.rows)));
 }
 
-/** Of some rows the first that is good and has its flight in the file, or else that has it. */
+/** The first of some rows that is good and has signals in the file, or else that has signals. */
 function firstOf(rows) {
   const there = rows.filter((row) => runOfRow(row));
   return there.find((row) => kindOf(outcomeOf(row)) === "good") ?? there[0] ?? rows[0];

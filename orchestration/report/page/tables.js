@@ -1,4 +1,4 @@
-// What stands in tables and sentences.
+// Tables and sentences of the page.
 
 function startHeader() {
   byId("title").textContent = { runs: "", study: "Study ", comparison: "Comparison " }[report.kind] + report.title;

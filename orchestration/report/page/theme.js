@@ -1,4 +1,4 @@
-// Light and dark: as the reader's system has it until a button says otherwise; on paper always light.
+// Light and dark: as the reader's system until a button is used; in print always light.
 
 const root = document.documentElement;
 const prefersDark = window.matchMedia("(prefers-color-scheme: dark)");

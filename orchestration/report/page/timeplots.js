@@ -7,7 +7,7 @@ const BARS = "who has computers and networks";
 
 const timePlot = { signals: null, beside: null, shownPanels: new Map(), isDrawn: false };
 
-/** Room between panels: on a narrow page the legend has a line of its own under the title. */
+/** Room between panels: on a narrow page the legend has a separate line under the title. */
 function gap() {
   return byId("time-plot").clientWidth < NARROW ? 66 : 46;
 }
@@ -163,7 +163,7 @@ function wholeSpan() {
   return [time[0], time[time.length - 1]];
 }
 
-/** Show the signals from one time to another, within the run, each panel as high as what is seen there. */
+/** Show the signals from one time to another, within the run, each panel scaled to its visible part. */
 function showSpan(from, to) {
   const [first, last] = wholeSpan();
   if (from <= first && to >= last) return redrawSignals();
@@ -179,7 +179,7 @@ function showSpan(from, to) {
   return Plotly.relayout(byId("time-plot"), update);
 }
 
-/** The range of what traces have in a span of time, with some air; null where that is nothing. */
+/** The range of the traces in a span of time, with some margin; null without values. */
 function seenRange(traces, [from, to], isLogarithmic) {
   let [low, high] = [Infinity, -Infinity];
   for (const { x, y } of traces) {
@@ -195,7 +195,7 @@ function seenRange(traces, [from, to], isLogarithmic) {
   return [low - air, high + air];
 }
 
-/** Save what is seen as a picture. */
+/** Save the visible part as a picture. */
 function saveSignals() {
   const holder = byId("time-plot");
   return Plotly.downloadImage(holder, { format: "svg", width: holder.clientWidth, height: holder.clientHeight, filename: "signals" });

@@ -282,17 +282,17 @@ def test_plot_zooms_on_a_window(main: Main, here: Path) -> None:
 @pytest.mark.parametrize("out", [[], ["--out", "stopped", "--no-figures"]], ids=["nothing kept", "kept"])
 def test_ctrl_c_ends_a_flight_with_one_line_and_130(here: Path, out: list[str]) -> None:
     code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n" + (
-        "from orchestration.basics import terminal; terminal.SPARSE = 0.0\n"  # says when it flies
+        "from orchestration.basics import terminal; terminal.SPARSE = 0.0\n"  # reports when it runs
         "from orchestration.command.cli import main; main()"
     )
     with subprocess.Popen(
         [sys.executable, "-c", code, "run", "--stop-time", "1000", *out], stderr=subprocess.PIPE, text=True
     ) as process:
         assert process.stderr is not None
-        while "flying" not in process.stderr.readline():
+        while "running" not in process.stderr.readline():
             assert process.poll() is None
         process.send_signal(signal.SIGINT)
-        lines = [line for line in process.stderr if not line.startswith("flying")]
+        lines = [line for line in process.stderr if not line.startswith("running")]
     assert process.returncode == 130
     assert len(lines) == 1
     assert lines[0].startswith("quadcosim: interrupted at t = ")
@@ -324,7 +324,9 @@ def test_divergence_is_a_result(main: Main) -> None:
         (["controller.gain.translation.x=1e308"], "controller (UnifiedController): fmi2GetReal: ", 0.0),
     ],
 )
-def test_an_fmu_that_says_it_diverged_gives_a_result(parameters: list[str], text: str, time: float, main: Main) -> None:
+def test_an_fmu_that_reports_divergence_gives_a_result(
+    parameters: list[str], text: str, time: float, main: Main
+) -> None:
     flags = [flag for parameter in parameters for flag in ("--set", parameter)]
     done = main("run", *SHORT, *flags)
     assert f"diverged: {text}" in done.stdout
@@ -418,7 +420,7 @@ def test_a_value_that_an_fmu_refuses_is_wrong_usage_in_its_own_words(main: Main,
     assert error_line(main("run", *SHORT, "--set", parameter, code=2)) == line
 
 
-def test_an_fmu_on_the_wrong_side_is_told_what_it_lacks(main: Main, here: Path) -> None:
+def test_an_fmu_on_the_wrong_side_is_refused_with_what_it_lacks(main: Main, here: Path) -> None:
     (here / "s.toml").write_text('[plant]\nfmu = "UnifiedController"')
     line = error_line(main("run", "s.toml", code=2))
     assert line.startswith("plant.fmu: UnifiedController has no output position.x, position.y, ")
@@ -463,7 +465,7 @@ def test_debug_shows_where(main: Main, parameter: str, code: int, text: str) -> 
 # -- build and validate -----------------------------------------------------------------------------------
 
 
-def test_build_writes_all_fmus_where_it_is_told(here: Path, main: Main) -> None:
+def test_build_writes_all_fmus_where_it_is_reported(here: Path, main: Main) -> None:
     done = main("build", "--out", "mine")
     assert {Path(line).resolve() for line in done.stdout.splitlines()} == {
         here.resolve() / "mine" / f"{model}.fmu" for model in MODELS
@@ -475,7 +477,7 @@ def test_validate_finds_nothing_wrong_with_an_fmu(built: dict[str, Path], main: 
     assert main("validate", built["QuadrotorPlant"]).stdout.count(": no problems found") == 1
 
 
-def test_validate_takes_all_fmus_of_the_project_unless_told(main: Main) -> None:
+def test_validate_takes_all_fmus_of_the_project_by_default(main: Main) -> None:
     done = main("validate", "--time-limit", "0.001", code=1)  # that of a process each: it finds that it is too short
     assert all(f"{model}.fmu" in done.stdout for model in MODELS)
 
@@ -524,7 +526,7 @@ def test_fmus_are_built_into_the_project_when_they_are_missing_or_old(project: P
         )  # fmt: skip
         assert json.loads(done.stdout)["steps"] == 50
         others = (
-            "flying:",
+            "running:",
             "building:",
             "not good:",
             "follows ",

@@ -49,7 +49,7 @@ def test_every_command_has_the_same_manners_and_a_group_in_the_help(command: str
     assert inspect.unwrap(of_it.callback).__annotations__["return"] in (CommandResult, "CommandResult")
 
 
-def test_help_says_what_each_exit_code_means(main: Main) -> None:
+def test_help_explains_each_exit_code(main: Main) -> None:
     text = " ".join(main("--help").stdout.split())
     assert all(f"{code} " in text.partition("Exit codes:")[2] for code in (0, 1, 2, 130, 141))
 
@@ -100,13 +100,13 @@ def test_flags_before_a_command_hold_with_those_behind_it(main: Main) -> None:
     assert "--quiet --verbose" in main("-q", "show", "-v", code=2).stderr
 
 
-def test_verbose_says_what_is_done(main: Main) -> None:
+def test_verbose_reports_each_step(main: Main) -> None:
     more, usual = (main(*SHORT, *flags).stderr for flags in (["-v"], []))
     assert "UnifiedController.fmu" in more
     assert "UnifiedController.fmu" not in usual
 
 
-def test_the_log_has_what_was_said_and_done_with_times_and_where_an_error_came_from(main: Main, here: Path) -> None:
+def test_the_log_has_output_and_steps_with_times_and_the_traceback_of_an_error(main: Main, here: Path) -> None:
     main(*SHORT, "--log", "notes/flight.log", "-q")
     main("run", "--preset", "px5", "--log", "notes/flight.log", code=2)
     log = (here / "notes" / "flight.log").read_text()

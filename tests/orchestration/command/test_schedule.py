@@ -74,7 +74,7 @@ def test_the_document_has_each_task_and_message_by_the_names_that_are_fixed(main
     assert document["messages"]["bus.status"]["bound"] is None
 
 
-def test_the_table_has_a_row_for_each_and_says_what_is_not_known(main: Main, file: Path) -> None:
+def test_the_table_has_a_row_for_each_and_marks_unknown_values(main: Main, file: Path) -> None:
     lines = main("schedule", str(file), "--until", "0.1").stdout.splitlines()
     cells = lines[0].split()
     assert cells[0] == "task"

@@ -36,7 +36,7 @@ def test_a_system_is_shown_as_text_without_any_large_package() -> None:
     assert not LARGE & loaded("show")
 
 
-def test_processes_that_fly_load_what_flies_alone() -> None:
+def test_processes_that_run_load_only_what_runs_need() -> None:
     imports = "import json, sys, orchestration.workers.worker_process, orchestration.runs.apart_process"
     code = f"{imports}; print(json.dumps(list(sys.modules)))"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
@@ -44,5 +44,5 @@ def test_processes_that_fly_load_what_flies_alone() -> None:
     assert not (LARGE | unused) & set(json.loads(found))
 
 
-def test_the_version_is_said_without_a_command_line() -> None:
+def test_the_version_is_printed_without_loading_the_command_line() -> None:
     assert not (LARGE | {"numpy", "pydantic", "typer"}) & loaded("--version")

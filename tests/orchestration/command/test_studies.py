@@ -56,7 +56,7 @@ def flown(swept: tuple[Path, Done], folder: Path) -> Path:
 # -- sweep, status, export, draw --------------------------------------------------------------------------
 
 
-def test_a_study_is_flown_looked_at_and_exported(flown: Path, swept: tuple[Path, Done], main: Main) -> None:
+def test_a_study_is_run_inspected_and_exported(flown: Path, swept: tuple[Path, Done], main: Main) -> None:
     assert swept[1].stdout == f"{STORE}: 6 runs, 6 of them new\n"
     told = [line for line in swept[1].stderr.splitlines() if " of 6 runs" not in line]  # or how far, if slow
     assert told == ["follows the trajectory that UnifiedController has built in"]
@@ -68,7 +68,7 @@ def test_a_study_is_flown_looked_at_and_exported(flown: Path, swept: tuple[Path,
     assert len(pd.read_csv(flown / exported[1])) == 6
 
 
-def test_a_store_goes_where_it_is_told_and_figures_beside_it(folder: Path, main: Main) -> None:
+def test_a_store_goes_to_the_given_folder_and_figures_beside_it(folder: Path, main: Main) -> None:
     text = (folder / "study.toml").read_text().partition('[[axes]]\nname = "delay"')[0]
     (folder / "study.toml").write_text(text)
     main("sweep", "study.toml", "--out", "elsewhere", "--workers", "1")
@@ -94,7 +94,7 @@ def test_status_tells_how_far_a_sweep_in_another_process_is(folder: Path, main: 
     assert done + missing == RUNS
 
 
-def test_failed_runs_are_told_at_once_and_fail_the_command(folder: Path, main: Main) -> None:
+def test_failed_runs_are_reported_immediately_and_fail_the_command(folder: Path, main: Main) -> None:
     (folder / "study.toml").write_text(GRID + '[[axes]]\nname = "plant.mass"\nvalues = [1.0, 0.0]\n')
     done = main("sweep", "study.toml", "--engine", "compiled", code=1)
     assert "12 runs, 12 of them new, 6 failed (quadcosim export shows why; --retry-failed)" in done.stdout
@@ -124,7 +124,7 @@ def test_a_changed_study_is_wrong_usage(flown: Path, main: Main) -> None:
 
 
 @pytest.mark.parametrize("command", ["status", "export", "draw"])
-def test_a_changed_study_file_is_told_and_its_old_rows_are_not_shown_for_its_own(
+def test_a_changed_study_file_is_refused_and_old_rows_are_not_shown_for_it(
     flown: Path, command: str, main: Main
 ) -> None:
     for text, said in (
@@ -152,7 +152,7 @@ def test_a_study_file_that_is_not_there_is_wrong_usage(command: str, main: Main)
 
 
 @pytest.mark.parametrize("command", ["status", "export", "draw"])
-def test_a_study_that_was_never_flown_is_wrong_usage(folder: Path, command: str, main: Main) -> None:
+def test_a_study_without_runs_is_wrong_usage(folder: Path, command: str, main: Main) -> None:
     line = error_line(main(command, "study.toml", code=2))
     assert line == f"{STORE}: expected the store of a study; there is no such file"
 
@@ -207,7 +207,7 @@ def test_limit_takes_the_flags_of_a_flight(main: Main) -> None:
     assert len(done.stderr.splitlines()) == 22  # what flies, and 21 values
 
 
-def test_limit_prints_both_figures_says_that_they_differ_and_draws_them_on_request(tmp_path: Path, main: Main) -> None:
+def test_limit_prints_both_figures_notes_that_they_differ_and_draws_them_on_request(tmp_path: Path, main: Main) -> None:
     done = main(*LIMIT, "--out", "drawn")
     names = ("limit_period.png", "limit_period.svg", "spectral_radius_period.png", "spectral_radius_period.svg")
     pictures = [Path("drawn") / name for name in names]

@@ -102,7 +102,7 @@ def test_tables_tell_each_cell_and_pictures_are_drawn(table: str, folder: Path) 
     assert json.loads((folder / "out" / "comparison.json").read_text())["starts"] == 6
 
 
-def test_nothing_is_flown_twice_and_the_result_stays(table: str, folder: Path, main: Main) -> None:
+def test_nothing_is_run_twice_and_the_result_stays(table: str, folder: Path, main: Main) -> None:
     before = (folder / "out" / "cells.csv").read_bytes()
     done = main("compare", folder / "small.toml", "--native", "--out", folder / "out", "--no-figures", "--json")
     assert "48 runs, 0 of them new" in done.stderr
@@ -110,7 +110,7 @@ def test_nothing_is_flown_twice_and_the_result_stays(table: str, folder: Path, m
     assert (folder / "out" / "cells.csv").read_bytes() == before
 
 
-def test_one_cell_flown_again_is_what_is_in_the_store(table: str, folder: Path, main: Main) -> None:
+def test_a_rerun_of_one_cell_is_what_is_in_the_store(table: str, folder: Path, main: Main) -> None:
     command = ("compare", folder / "small.toml", "--native", "--cell", "6", "--json", "--out", folder / "out")
     found = json.loads(main(*command).stdout)
     assert (found["controller"], found["condition"], found["value"]) == ("uncoupled", "noise", 0.02)
@@ -155,7 +155,7 @@ def test_a_start_without_its_cell_is_wrong_usage(folder: Path, main: Main) -> No
         assert done.stderr.count("\n") == 1
 
 
-def test_a_parameter_that_cannot_be_is_said_of_the_controller_that_has_it(folder: Path, main: Main) -> None:
+def test_an_invalid_parameter_is_reported_with_its_controller(folder: Path, main: Main) -> None:
     wrong = folder / "wrong.toml"
     wrong.write_text(FILE.replace("coupling = 0.0", 'discretisation = "meen"'))
     line = main("compare", wrong, "--native", "--out", folder / "wrong", code=2).stderr
@@ -204,7 +204,9 @@ position = 0.1
 """
 
 
-def test_a_run_that_takes_longer_than_the_time_limit_is_a_failed_row_that_says_so(tmp_path: Path, main: Main) -> None:
+def test_a_run_that_takes_longer_than_the_time_limit_is_a_failed_row_with_the_reason(
+    tmp_path: Path, main: Main
+) -> None:
     (tmp_path / "long.toml").write_text(LONG)
     file, out = tmp_path / "long.toml", tmp_path / "out"
     limited = ("compare", file, "--out", out, "--no-figures", "--native", "--engine", "compiled", "--time-limit")

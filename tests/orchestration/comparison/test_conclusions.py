@@ -114,7 +114,9 @@ def test_what_survives_farther_than_it_settles_has_two_limits(comparison: Compar
     }
 
 
-def test_what_flies_again_further_up_has_its_limit_before(comparison: Comparison, table: pd.DataFrame) -> None:
+def test_a_limit_lies_before_the_first_failure_even_if_later_values_are_good(
+    comparison: Comparison, table: pd.DataFrame
+) -> None:
     rows = table[table["controller"] == "slow"].copy()
     rows.loc[(rows["start"] == 0) & (rows["period"] == 0.02), "outcome"] = "diverged"
     rows.loc[(rows["start"] == 1) & (rows["period"] == 0.01), "outcome"] = "diverged"
@@ -149,7 +151,7 @@ def test_within_a_peak_torque_only_what_needs_no_more_counts(comparison: Compari
     assert any(one.share == 0.0 for one in found if one.controller == "fast")
 
 
-def test_the_front_is_taken_on_the_starts_that_all_fly_and_leaves_out_what_hardly_flies(
+def test_the_front_is_over_initial_conditions_that_all_survive_and_omits_controllers_that_survive_few(
     comparison: Comparison, table: pd.DataFrame
 ) -> None:
     found = [*fronts.points(comparison, table)]

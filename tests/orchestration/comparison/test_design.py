@@ -77,7 +77,7 @@ def systems(comparison: Comparison, **of: object) -> list[System]:
     return [comparison.study.system(i, {}) for cell in chosen for i in comparison.runs_of(cell)]
 
 
-def test_every_controller_flies_every_vehicle_condition_and_value_from_every_start(comparison: Comparison) -> None:
+def test_every_controller_is_run_on_every_vehicle_condition_value_and_initial_condition(comparison: Comparison) -> None:
     cells = [*comparison.cells()]
     assert len(cells) == CELLS
     assert len(comparison.study.points) == CELLS * 5
@@ -197,7 +197,7 @@ def test_scheduled_parameters_follow_the_axis_on_top_of_all_others(file: Path) -
         ("[[vehicles]]", 'scheduled.gain.eta = "1 / (period - period)"\n[[vehicles]]', "at period = 0.01; expected a"),
     ],
 )
-def test_what_cannot_be_is_said_in_one_line_with_the_file(before: str, after: str, words: str, file: Path) -> None:
+def test_invalid_values_are_refused_in_one_line_with_the_file(before: str, after: str, words: str, file: Path) -> None:
     assert before in FILE
     file.write_text(FILE.replace(before, after, 1))
     with pytest.raises(UsageError) as refused:

@@ -27,7 +27,7 @@ def drawn(*titles: str) -> Figure:
     return shares(dict.fromkeys(titles, found), Quantity(name="axis"), colors_of([*SURVIVORS]))
 
 
-def test_controllers_are_told_apart_by_dashes_and_named_on_their_lines_the_sooner_they_fall_the_lower() -> None:
+def test_controllers_differ_by_dashes_and_are_named_on_their_lines_the_earlier_they_fall_the_lower() -> None:
     (panel,) = drawn("one").axes
     assert len({line.get_linestyle() for line in panel.get_lines()}) == len(SURVIVORS)
     places = {text.get_text(): text.xy for text in panel.texts}  # type: ignore[attr-defined]

@@ -98,7 +98,7 @@ def test_writing_a_figure_leaves_it_to_be_laid_out_anew(tmp_path: Path) -> None:
         ({"font_size": 0.0}, "font_size = 0: expected 1 to 100 points"),
     ],
 )
-def test_what_cannot_be_drawn_is_told(flags: dict[str, Any], expected: str) -> None:
+def test_what_cannot_be_drawn_is_reported(flags: dict[str, Any], expected: str) -> None:
     with pytest.raises(UsageError, match=re.escape(expected)):
         FigureFlags(**flags)
 

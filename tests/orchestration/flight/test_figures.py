@@ -233,7 +233,7 @@ def test_the_spectrum_is_of_the_window_alone(flight: Result) -> None:
 # -- peaks, limits, surfaces ------------------------------------------------------------------------------
 
 
-def test_a_peak_that_the_axis_clips_is_said_and_shown_in_an_inset(flight: Result) -> None:
+def test_a_clipped_peak_is_noted_and_shown_in_an_inset(flight: Result) -> None:
     t = np.linspace(0.0, 10.0, 2001)
     peaked, calm = 0.5 * np.sin(t) - 100.0 * np.exp(-20.0 * t), np.sin(t) + 1.0
     for values, clips in ((peaked, True), (calm, False)):
@@ -268,7 +268,7 @@ def test_the_time_at_a_limit_of_the_plant_is_marked_and_no_other(flight: Result)
     assert commands.AT_LIMIT in [text.get_text() for text in figure.legends[0].get_texts()]
 
 
-def test_the_sliding_surface_of_the_portrait_is_where_the_law_says_s_is_0(flight: Result) -> None:
+def test_the_sliding_surface_of_the_portrait_is_where_s_of_the_law_is_0(flight: Result) -> None:
     e = np.array([-0.5, -1e-4, 0.0, 1e-4, 0.5])
     assert surface(e, flight.parameters) == pytest.approx([5 * 0.5**0.99, 5e-4, 0.0, -5e-4, -5 * 0.5**0.99])
     assert surface(e, {}) is None

@@ -36,7 +36,7 @@ def test_a_film_has_twenty_pictures_a_second_in_which_the_vehicle_moves(flight: 
     assert heard[-1] == 1.0
 
 
-def test_a_rotation_turns_the_axes_of_the_body_as_its_quaternion_says() -> None:
+def test_a_rotation_turns_the_axes_of_the_body_by_its_quaternion() -> None:
     half = np.sqrt(0.5)
     turned = filming._rotation(2.0 * np.array([0.0, 0.0, half, half]))
     assert turned @ [1.0, 0.0, 0.0] == pytest.approx([0.0, 1.0, 0.0])

@@ -64,7 +64,7 @@ def libcosim_that(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[
 
 def messages_of(done: subprocess.CompletedProcess[str]) -> list[str]:
     """Its lines on standard error but for those that a slow machine has, about how far it is."""
-    return [line for line in done.stderr.splitlines() if not line.startswith("flying in other masters: ")]
+    return [line for line in done.stderr.splitlines() if not line.startswith("running other masters: ")]
 
 
 # -- what it prints ---------------------------------------------------------------------------------------

@@ -72,7 +72,7 @@ def test_a_value_of_the_wrong_kind_is_refused(timing: dict[str, Any]) -> None:
         Timing(**timing)
 
 
-def test_changing_a_key_that_does_not_exist_says_which_do() -> None:
+def test_changing_an_unknown_key_lists_the_known_ones() -> None:
     with pytest.raises(UsageError, match=r"timing.foo: no such key; expected one of period"):
         Scenario().with_changes(timing={"foo": 1})
     with pytest.raises(UsageError, match=r"foo: no such key; expected one of stop_time"):

@@ -195,7 +195,7 @@ def write_reference(path: Path, times: np.ndarray, trajectory: Trajectory) -> Pa
     return path
 
 
-def test_a_table_of_the_built_in_trajectory_flies_like_it(tmp_path: Path) -> None:
+def test_a_table_of_the_built_in_trajectory_gives_the_same_flight(tmp_path: Path) -> None:
     table = write_reference(tmp_path / "reference.csv", np.arange(0, 201) / 100, Trajectory())
     flight = quadcosim.run(native(stop_time=2.0, reference=ReferenceChoice(file=table)))
     for name in (*MEASUREMENT, *COMMAND):
@@ -272,7 +272,7 @@ def test_a_flight_that_has_not_come_close_by_its_horizon_is_bounded() -> None:
     assert "wall_time" not in plain().metrics
 
 
-def test_a_flight_that_does_not_diverge_says_so() -> None:
+def test_a_flight_that_does_not_diverge_reports_so() -> None:
     assert plain().divergence is None
     assert (plain().metrics["diverged"], plain().metrics["divergence_time"]) == (False, None)
 
@@ -438,7 +438,7 @@ def test_axes_of_one_side_are_warned_of_however_they_are_set() -> None:
     assert quadcosim.run(one_side.with_changes(parameters={"controller.frame": "enu"})).warnings == ()
 
 
-def test_progress_and_announcements_are_heard() -> None:
+def test_progress_and_announcements_are_received() -> None:
     heard: list[float] = []
     quadcosim.run(native(stop_time=1.0), progress=heard.append)
     assert heard == sorted(heard)

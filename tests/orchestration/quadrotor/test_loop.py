@@ -329,7 +329,7 @@ def test_in_jacobi_order_nothing_is_sent_or_lost_after_a_run_has_diverged(loss: 
     assert max(event[0] for event in run.all_events()) == 10 * MS < (run.master.divergence_time or 0)
 
 
-def test_what_is_just_inside_the_region_flies_on() -> None:
+def test_a_state_just_inside_the_region_does_not_diverge() -> None:
     plant = Straying(time=0.012, position__x=60.0, position__y=79.9, position__z=0.0, angular_velocity__z=FASTEST)
     run = StubRun(Timing(period=0.01), 0.05, plant)
     assert run.master.divergence is None
@@ -345,7 +345,7 @@ def test_the_distance_is_that_to_the_reference() -> None:
 
 
 @pytest.mark.parametrize("side", ["plant", "controller"])
-def test_a_simulator_that_says_it_diverged_ends_the_run_with_its_time(side: str) -> None:
+def test_a_simulator_that_reports_divergence_ends_the_run_with_its_time(side: str) -> None:
     error = SimulatorError("state not finite", divergence=True)
     run = StubRun(Timing(), 0.1, Straying(time=0.012, error=error) if side == "plant" else None, failing(side, error))
     assert run.over is True

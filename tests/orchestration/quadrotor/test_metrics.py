@@ -158,14 +158,14 @@ def test_the_outcome_is_settled_below_5_cm_in_the_last_third_and_else_bounded(er
     assert found["good"] is (outcome == "settled")
 
 
-def test_of_a_diverged_run_nothing_is_told_that_rests_on_the_time_that_it_lasted() -> None:
+def test_a_diverged_run_has_no_metric_that_depends_on_its_duration() -> None:
     found = measured(0.01, divergence_time=2.5)
     assert {name: value for name, value in found.items() if value is not None} == {
         "outcome": "diverged", "good": False, "horizon": 3.0, "diverged": True, "divergence_time": 2.5, "steps": 0,
     }  # fmt: skip
 
 
-def test_of_an_interrupted_run_the_last_third_is_that_of_what_was_flown() -> None:
+def test_the_last_third_of_an_interrupted_run_is_that_of_its_rows() -> None:
     found = measured(np.where(TIME < 1.9, 1.0, 0.2), planned=30.0)
     assert (found["outcome"], found["horizon"], found["ultimate_bound"]) == ("bounded", 3.0, pytest.approx(0.2))
 

@@ -349,7 +349,7 @@ def test_loss_in_a_file_means_both_losses_and_the_particular_one_goes_before_it(
     assert (timing.measurement_loss, timing.command_loss) == (0.2, 0.1)
 
 
-def test_a_preset_in_a_file_is_the_timing_of_that_stack_below_what_the_file_says(tmp_path: Path) -> None:
+def test_a_preset_in_a_file_is_the_timing_of_that_stack_below_the_keys_of_the_file(tmp_path: Path) -> None:
     file = tmp_path / "s.toml"
     file.write_text('[timing]\npreset = "crazyflie"\ndelay = 0.0\n')
     timing = load_scenario(file).timing

@@ -59,7 +59,7 @@ def test_the_controller_is_fed_the_motion_at_its_samples_and_its_error_is_record
     assert flight.signals["controller.position_error.x"][990] == pytest.approx(error, abs=1e-12)
 
 
-def test_way_points_are_flown_through(points: Path) -> None:
+def test_a_flight_passes_its_way_points(points: Path) -> None:
     flight, curve = simulated(reference=ReferenceChoice(file=points)), read_waypoints(points, {})
     found = [flight.signals[f"reference.position.{axis}"][500] for axis in "xyz"]
     assert found == curve.at(np.array([0.5]))[0, 0].tolist()
@@ -128,7 +128,7 @@ def test_about_hover_there_is_neither_reference_nor_disturbance() -> None:
 # -- how it is written -------------------------------------------------------------------------------------------
 
 
-def test_a_scenario_file_says_it_and_comes_back(tmp_path: Path, points: Path) -> None:
+def test_a_scenario_file_round_trips(tmp_path: Path, points: Path) -> None:
     text = f"""
     [reference]
     file = "{points.name}"

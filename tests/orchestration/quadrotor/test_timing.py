@@ -153,7 +153,7 @@ def test_an_offset_beyond_the_end_leaves_no_samples() -> None:
     assert not any(instant.sample or instant.arrivals for instant in instants)
 
 
-def test_a_fast_clock_samples_when_its_own_time_says_so() -> None:
+def test_a_fast_clock_samples_by_its_own_time() -> None:
     times = [sample.time for sample in samples_of(Case(Timing(period=0.01, clock_ratio=1.25), 0.1, 0))]
     assert times == [k * 8_000_000 for k in range(13)]
 

@@ -87,7 +87,7 @@ def test_vehicles_by_name_are_those_that_are_shipped() -> None:
 
 
 @pytest.mark.parametrize("name", names())
-def test_a_controller_is_told_the_body_that_its_plant_is(name: str) -> None:
+def test_a_controller_has_the_parameters_of_the_body_of_its_plant(name: str) -> None:
     plant, controller = parameters(Scenario(vehicle=load_vehicle(name, Path())))
     values_by_target = {
         f"{side}.{key}": values[key]

@@ -55,7 +55,7 @@ def test_the_page_forbids_itself_to_load_anything() -> None:
     ("stop_time", "period", "said"),
     [(9.0, 0.01, "r: settled in 4.98 s"), (1.0, 0.01, "r: bounded in a run of 1 s"), (3.0, 0.2, "r: diverged at ")],
 )
-def test_the_summary_says_what_became_of_a_run_and_when(stop_time: float, period: float, said: str) -> None:
+def test_the_summary_has_the_outcome_of_a_run_and_its_time(stop_time: float, period: float, said: str) -> None:
     flown = run(dataclasses.replace(NATIVE, stop_time=stop_time, timing=Timing(period=period)))
     assert of_runs.report_of({"r": flown}, "").summary.startswith(said)
 

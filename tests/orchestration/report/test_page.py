@@ -222,7 +222,7 @@ def turned(signals: Mapping[str, Floats]) -> dict[str, Floats]:
     return found
 
 
-def test_a_flight_in_other_axes_is_turned_for_the_replay_and_told_as_it_was(show: Show, tmp_path: Path) -> None:
+def test_a_flight_in_other_axes_is_converted_for_the_replay_only(show: Show, tmp_path: Path) -> None:
     flown = run(scenario().with_changes(parameters={"plant.frame": "enu", "controller.frame": "enu"}))
     twin = dataclasses.replace(flown, system=changed(flown.system, {"components.plant.parameters.frame": "ned"}))
     vars(twin)["signals"] = turned(flown.signals)
@@ -240,7 +240,7 @@ def test_a_flight_in_other_axes_is_turned_for_the_replay_and_told_as_it_was(show
     assert np.mean(np.abs(one - other) > 8.0) < 1e-4
 
 
-def test_hovering_over_a_plot_says_the_value_with_its_unit(of_runs: Any) -> None:
+def test_hovering_over_a_plot_shows_the_value_with_its_unit(of_runs: Any) -> None:
     plot = of_runs.locator("#time-plot .nsewdrag").nth(3)
     plot.scroll_into_view_if_needed()
     box = plot.bounding_box()
@@ -261,7 +261,7 @@ def test_zooming_by_button_narrows_all_panels(of_runs: Any) -> None:
     of_runs.wait_for_function(f"{span} > {0.9 * whole}")
 
 
-def test_a_short_peak_is_clipped_said_and_shown_in_an_inset_until_one_looks_closer(show: Show, tmp_path: Path) -> None:
+def test_a_short_peak_is_clipped_noted_and_shown_in_an_inset_until_zoomed(show: Show, tmp_path: Path) -> None:
     page = show(report(run(dataclasses.replace(scenario(), stop_time=12.0)), out=tmp_path / "report.html"))
     found = """(() => {
         const { data, layout } = document.getElementById('time-plot');
@@ -319,7 +319,7 @@ def test_the_lines_of_a_comparison_have_the_names_of_their_controllers(of_compar
     assert of_comparison.evaluate("document.getElementById('shares-plot').layout.annotations[0].text") == "own"
 
 
-def test_hovering_over_a_cell_says_settings_and_metric(of_study: Any) -> None:
+def test_hovering_over_a_cell_shows_settings_and_metric(of_study: Any) -> None:
     box = of_study.locator("#map-plot .nsewdrag").bounding_box()
     of_study.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 0.7 * box["height"])
     of_study.wait_for_function("document.querySelector('#map-plot .hovertext')?.textContent.includes('run 0: ')")
@@ -339,7 +339,7 @@ def test_a_run_whose_flight_is_not_in_the_file_shows_its_metrics_and_the_nearest
     assert of_study.is_visible("#scene")
 
 
-def test_the_page_says_what_is_in_it_and_how_it_was_made(of_study: Any) -> None:
+def test_the_page_states_its_contents_and_how_it_was_made(of_study: Any) -> None:
     contents = of_study.inner_text("#contents")
     assert "Metrics of all 4 runs are in this file, and the signals of 3 of them" in contents
     assert "All reruns agree with the store." in contents
@@ -347,7 +347,7 @@ def test_the_page_says_what_is_in_it_and_how_it_was_made(of_study: Any) -> None:
     assert "GUID of the plant" in contents
 
 
-def test_the_page_is_dark_where_the_system_is_and_plots_with_it_until_a_button_says_otherwise(of_runs: Any) -> None:
+def test_the_page_and_its_plots_are_dark_where_the_system_is_until_a_button_is_used(of_runs: Any) -> None:
     colors = """[getComputedStyle(document.querySelector('main section')).backgroundColor,
         ...['layout.paper_bgcolor', 'data.0.line.color'].map((path) =>
             path.split('.').reduce((found, key) => found[key], document.getElementById('time-plot')))]"""
@@ -371,7 +371,7 @@ def test_on_a_phone_nothing_is_wider_than_the_page_and_signals_come_before_metri
         page.set_viewport_size({"width": 1400, "height": 900})
 
 
-def test_nobody_who_wants_no_motion_gets_more_than_a_picture_a_second(of_runs: Any) -> None:
+def test_with_reduced_motion_the_replay_shows_a_picture_a_second(of_runs: Any) -> None:
     of_runs.emulate_media(reduced_motion="reduce")
     of_runs.get_by_label("Time", exact=True).fill("0")
     of_runs.get_by_role("button", name="Play").click()

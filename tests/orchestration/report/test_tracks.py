@@ -90,7 +90,7 @@ def test_runs_that_are_alike_share_a_layout() -> None:
 
 
 @pytest.mark.parametrize("given", [{"frame": "enu"}, {"frame_index": 2}])
-def test_a_flight_told_east_north_up_is_replayed_and_shown_as_any_other(given: dict[str, Any]) -> None:
+def test_a_flight_in_east_north_up_is_replayed_and_shown_as_any_other(given: dict[str, Any]) -> None:
     turned = changed(quadrotor(), {f"components.plant.parameters.{name}": value for name, value in given.items()})
     columns = [*flight(), POSITION_ERROR]
     known, other = (layout_of(system, columns, {}) for system in (quadrotor(), turned))

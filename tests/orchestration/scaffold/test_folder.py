@@ -51,7 +51,7 @@ def test_five_commands_lead_to_the_limit_plot_of_ones_own_controller(here: Path,
     assert drawn.read_bytes().startswith(b"\x89PNG")
 
 
-def test_each_passes_its_own_tests_and_a_mistake_in_one_is_said_with_its_line(here: Path, main: Main) -> None:
+def test_each_passes_its_own_tests_and_a_mistake_is_reported_with_its_line(here: Path, main: Main) -> None:
     for name, kind in KINDS.items():
         write(kind, name, here, author="Ada", license="MIT")
     law = write("controller", "hover_pd", here, author="", license="")[0]
