@@ -56,7 +56,7 @@ class Basin:
 
 
 @needs("flint", "clarabel")
-def basin(asked: RequestLike, connection: str, limit: float) -> Basin:
+def basin(request: RequestLike, connection: str, limit: float) -> Basin:
     """A proved basin of a system's loop about its operating point, if each signal of a connection is cut to ±`limit`.
 
     The loop is otherwise linear, without jitter, and has one sampled component, which has no memory. The limit applies
@@ -67,7 +67,7 @@ def basin(asked: RequestLike, connection: str, limit: float) -> Basin:
     """
     if not limit > 0.0:
         raise UsageError(f"limit {limit:g}: expected a positive number")
-    request = request_of(asked)
+    request = request_of(request)
     loop = linear_loop_of(request)
     sampled = [name for name in loop.components if loop.is_sampled(name)]
     sent = [x.name for x in loop.system.connections if x.sender in sampled]

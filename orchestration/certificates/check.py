@@ -46,7 +46,7 @@ class Checked:
 
 
 @needs("flint")
-def check(path: str | Path, asked: RequestLike | None = None) -> Checked:
+def check(path: str | Path, request: RequestLike | None = None) -> Checked:
     """Verify the certificate of a file, and, with a system, that its matrices are those of that system's loop.
 
     Raises `QuadcosimError` for a certificate that proves nothing, `UsageError` for a file that is none and for one of
@@ -56,8 +56,8 @@ def check(path: str | Path, asked: RequestLike | None = None) -> Checked:
 
     certificate = read_certificate(Path(path))
     proof, up_to = verified(certificate), None
-    if asked is not None:
-        request = request_of(asked)
+    if request is not None:
+        request = request_of(request)
         cause = cause_in(request, certificate.of[0]) if len(certificate.of) == 1 else None
         if cause is None:
             expect_without_scheduler(request)
@@ -70,7 +70,7 @@ def check(path: str | Path, asked: RequestLike | None = None) -> Checked:
         expect_same_family(certificate, family)
     return Checked(
         ranges=proof.ranges, runs=proof.runs, states=proof.states, radius=proof.radius,
-        of=() if asked is None else certificate.of, up_to=up_to,
+        of=() if request is None else certificate.of, up_to=up_to,
     )  # fmt: skip
 
 

@@ -75,7 +75,7 @@ class Certified:
 
 
 @needs("flint", "clarabel")
-def margin(asked: RequestLike, of: str, *, progress: ShareProgress = None) -> Certified:
+def margin(request: RequestLike, of: str, *, progress: ShareProgress = None) -> Certified:
     """How far a quantity of a system may vary from draw to draw, the loop linearised about its operating point.
 
     `of` is the path of a sampled component's `sampling.jitter`, of a connection's `delay_jitter`, or of its `loss`,
@@ -85,7 +85,7 @@ def margin(asked: RequestLike, of: str, *, progress: ShareProgress = None) -> Ce
 
     Raises `UsageError` where the loop has no linear form or the path is unsupported, saying why.
     """
-    request = request_of(asked)
+    request = request_of(request)
     cause = cause_in(request, of)
     if cause is not None:
         with share_reporter(progress, "certifying") as report:

@@ -81,14 +81,14 @@ class Region:
 
 @needs("flint", "clarabel")
 def region(
-    asked: RequestLike, of: str, and_of: str, *, columns: int = COLUMNS, progress: ShareProgress = None
+    request: RequestLike, of: str, and_of: str, *, columns: int = COLUMNS, progress: ShareProgress = None
 ) -> Region:
     """How far two quantities of a system may vary at once, as `margin`; both are paths of times.
 
     Raises `UsageError` as `margin` does, for two quantities of different sampled components, and for a loop that is
     unstable without either.
     """
-    request = request_of(asked)
+    request = request_of(request)
     pair = [varying_of(request, each) for each in (of, and_of)]
     if any(each.kind == LOSS for each in pair) or pair[0] == pair[1]:
         raise UsageError(f"--of {of} --and {and_of}: expected two different jitters or delay jitters")

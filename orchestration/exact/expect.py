@@ -46,7 +46,7 @@ class Expected:
         return f"<Expected: {listed or 'no objectives'}; mean-square radius {self.mean_square_radius:.6g}>"
 
 
-def expect(asked: RequestLike, *, as_simulated: bool = False, horizon: float | None = None) -> Expected:
+def expect(request: RequestLike, *, as_simulated: bool = False, horizon: float | None = None) -> Expected:
     """The stationary expectation of each objective that consists of means of quadratic expressions of signals.
 
     The system is linearised about its operating point, or its initial state. Noise of sources is white; delays, jitter
@@ -58,7 +58,7 @@ def expect(asked: RequestLike, *, as_simulated: bool = False, horizon: float | N
     """
     if horizon is not None and not 1e-9 <= horizon < math.inf:
         raise UsageError(f"horizon = {horizon:g} s: expected a finite time above 0")
-    request = request_of(asked)
+    request = request_of(request)
     if horizon is not None and LOOPS.of(request.kind) is not None:
         raise UsageError("horizon: expected a system file, which has an initial state")
     with errors_in_own_terms(request):

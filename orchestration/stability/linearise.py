@@ -31,7 +31,7 @@ class Linearised:
     sample, with holds, delays and the other components in between."""
 
 
-def linearise(asked: RequestLike, component: str | None = None) -> Linearised:
+def linearise(request: RequestLike, component: str | None = None) -> Linearised:
     """The loop of a system, or a scenario, about its operating point, cut open at a sampled component.
 
     Default `component`: the only sampled one. A system rests at the `[operating_point]` of its file, else at its
@@ -42,7 +42,7 @@ def linearise(asked: RequestLike, component: str | None = None) -> Linearised:
     Raises `UsageError` for a system that does not rest there, for FMUs that cannot save their state, and for a
     component that is not sampled, or is sampled more often than another one.
     """
-    request = request_of(asked)
+    request = request_of(request)
     instances = Instances()
     try:
         with errors_in_own_terms(request):
