@@ -104,11 +104,12 @@ def _with_longest_jobs(system: System) -> System:
     """The system in which every job takes its longest time, without jitter."""
     punctual, most = deterministic(system), {}
     for name, computer in system.computers.items():
-        of_calm = punctual.computers[name]
+        without_jitter = punctual.computers[name]
         tasks = {
-            key: replace(task, execution=highest(computer.tasks[key].execution)) for key, task in of_calm.tasks.items()
+            key: replace(task, execution=highest(computer.tasks[key].execution))
+            for key, task in without_jitter.tasks.items()
         }
-        most[name] = replace(of_calm, tasks=tasks)
+        most[name] = replace(without_jitter, tasks=tasks)
     return replace(punctual, computers=most)
 
 

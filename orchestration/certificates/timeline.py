@@ -197,10 +197,10 @@ class Timeline:
         if len(draws.largest) == 1:
             (limit,) = draws.largest
             cuts = {Fraction(0), limit}
-            cuts |= {-apart / slope for apart, (slope,) in pairs if slope and 0 < -apart / slope < limit}
+            cuts |= {-distance / slope for distance, (slope,) in pairs if slope and 0 < -distance / slope < limit}
             return [[each] for each in itertools.pairwise(sorted(cuts))] or [[(Fraction(0), Fraction(0))]]
-        for apart, slopes in pairs:
-            ends = [apart + sum(s * x for s, x in zip(slopes, corner)) for corner in draws.corners()]
+        for distance, slopes in pairs:
+            ends = [distance + sum(s * x for s, x in zip(slopes, corner)) for corner in draws.corners()]
             if min(ends) < 0 < max(ends):
                 raise UsageError(f"{self._paths_text()}: expected values that do not change the order of events")
         return draws.boxes()

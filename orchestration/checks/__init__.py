@@ -1,1 +1,1 @@
-"""What is wrong with an FMU, and what it needs."""
+"""The problems of an FMU, and its requirements."""

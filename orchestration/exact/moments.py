@@ -255,8 +255,8 @@ def _symmetric_square(Z: Floats) -> Floats:
     """The map z z' -> Z z z' Z' as a matrix over upper triangles: (i, j) by (k, m)."""
     (i, j), (k, m) = np.triu_indices(Z.shape[0]), np.triu_indices(Z.shape[1])
     found: Floats = Z[np.ix_(i, k)] * Z[np.ix_(j, m)]
-    apart = k != m
-    found[:, apart] += (Z[np.ix_(i, m)] * Z[np.ix_(j, k)])[:, apart]
+    off_diagonal = k != m
+    found[:, off_diagonal] += (Z[np.ix_(i, m)] * Z[np.ix_(j, k)])[:, off_diagonal]
     return found
 
 

@@ -98,8 +98,8 @@ class RandomTime:
             return nodes.tolist(), ((b - a) * weights).tolist()
         nodes, weights = _legendre(FINE)
         mean, deviation = self.normal
-        apart = (a + (b - a) * nodes - mean) / deviation
-        return gauss_of(nodes, (b - a) * weights * np.exp(-0.5 * apart**2), order)
+        normalised = (a + (b - a) * nodes - mean) / deviation
+        return gauss_of(nodes, (b - a) * weights * np.exp(-0.5 * normalised**2), order)
 
 
 FEW = 40

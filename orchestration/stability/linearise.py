@@ -23,7 +23,7 @@ class Linearised:
     """A loop about its operating point, as two linear systems in feedback."""
 
     name: str
-    """Of the component at which it is cut open."""
+    """The component at which it is cut open."""
     component: StateSpace
     """That component: inputs are its measurements, outputs its commands."""
     rest: StateSpace

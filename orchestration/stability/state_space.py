@@ -23,13 +23,13 @@ class StateSpace:
     """Deviations from an operating point: x(k+1) = A x(k) + B u(k), y(k) = C x(k) + D u(k), every `dt` seconds."""
 
     A: Floats
-    """Of the states by the states a sample before."""
+    """States by the states of the sample before."""
     B: Floats
-    """Of the states by the inputs a sample before."""
+    """States by the inputs of the sample before."""
     C: Floats
-    """Of the outputs by the states."""
+    """Outputs by the states."""
     D: Floats
-    """Of the outputs by the inputs at the same sample."""
+    """Outputs by the inputs of the same sample."""
     dt: float
     """From sample to sample [s]."""
     inputs: tuple[str, ...]

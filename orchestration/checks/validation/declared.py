@@ -1,4 +1,4 @@
-"""What a description declares: variables, and the entries of its model structure."""
+"""The declarations of a description: variables, and the entries of its model structure."""
 
 import itertools
 import math

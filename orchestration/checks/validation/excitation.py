@@ -12,22 +12,22 @@ from orchestration.checks.validation.variables import limits
 from orchestration.fmi.values import INTEGERS
 
 STEPS = 100
-"""Communication steps of a run"""
+"""communication steps of a run"""
 UNEVEN = (0.4, 0.6, 1.0, 0.3, 0.7)
-"""Lengths of variable steps, of that of the default experiment: between samples, on them and across them"""
+"""lengths of variable steps, of that of the default experiment: between samples, on them and across them"""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Plan:
-    """What happens to an instance in a run."""
+    """The inputs, parameters and steps of a run."""
 
     parameters: Values = field(default_factory=dict)
     moving: bool = False
-    """Whether the inputs move from step to step; else they stay at their starts"""
+    """whether the inputs move from step to step; else they stay at their starts"""
     uneven: bool = False
-    """Whether the steps are of different lengths"""
+    """whether the steps are of different lengths"""
     times_set: int = 1
-    """How often the inputs are set before a step"""
+    """how many times the inputs are set before a step"""
     steps: int = STEPS
 
 

@@ -107,8 +107,8 @@ def test_the_command_prints_what_it_found(main: Main) -> None:
 
 
 def as_simulated(**changes: Any) -> float:
-    given = {key.replace("__", "."): value for key, value in changes.items()}
-    found = expect(example("minimum_variance", given), as_simulated=True).objectives["variance"]
+    settings = {key.replace("__", "."): value for key, value in changes.items()}
+    found = expect(example("minimum_variance", settings), as_simulated=True).objectives["variance"]
     assert found is not None
     return found
 

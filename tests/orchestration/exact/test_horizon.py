@@ -80,7 +80,7 @@ def test_it_is_finite_where_the_stationary_cost_is_not() -> None:
     ids=["prompt", "late", "bursts"],
 )
 def test_far_away_it_comes_to_the_stationary_value(changes: dict[str, Any]) -> None:
-    """What a start costs more is the same at any horizon from some on: two of them tell the limit."""
+    """The extra cost of the initial state is constant from some horizon on: two horizons determine the limit."""
     first, second = variance(200.0, **changes), variance(400.0, **changes)
     stationary = expect(example("minimum_variance", {k.replace("__", "."): v for k, v in changes.items()}))
     assert 2.0 * second - first == pytest.approx(stationary.objectives["variance"], rel=1e-8)

@@ -86,7 +86,7 @@ def test_the_mean_square_limit_of_losses_is_that_of_theory(burst: float | None, 
 
 
 @pytest.mark.parametrize(
-    "given",
+    "changes",
     [
         {"delay": 0.3, "delay_jitter": 0.9},
         {"delay": 0.2, "sampling": {"jitter": 0.3}},
@@ -95,8 +95,8 @@ def test_the_mean_square_limit_of_losses_is_that_of_theory(burst: float | None, 
     ],
     ids=["over a period", "jitter of samples", "the end of the step", "normal"],
 )
-def test_twice_the_order_of_gauss_s_rule_changes_nothing_where_no_message_can_overtake(given: dict[str, Any]) -> None:
-    low, high = (integrator(nodes=nodes, **given) for nodes in (10, 20))
+def test_twice_the_order_of_gauss_s_rule_changes_nothing_where_no_message_can_overtake(changes: dict[str, Any]) -> None:
+    low, high = (integrator(nodes=nodes, **changes) for nodes in (10, 20))
     assert low.radius == pytest.approx(high.radius, rel=1e-10)
     if low.radius < 1.0:
         assert low.costs()[0] == pytest.approx(high.costs()[0], rel=1e-10)

@@ -126,16 +126,18 @@ def test_over_a_horizon_it_is_what_a_run_prints(
 ) -> None:
     """Without noise, to rounding: jobs and frames are late by what differs from one to the next."""
 
-    def begun(system: System) -> System:
+    def from_an_angle(system: System) -> System:
         angle = "components.servo.parameters.initial.angle"
         system = changed(system, {angle: 1.0, "sources.disturbance.noise": 0.0, "stop_time": 0.05})
         return replace(system, operating_point={angle: 0.0})
 
     task = {"period": 0.006, "execution": 0.001, "priority": 2, **keys}
-    system = begun(on_a_computer("distributed_servo", computer, network, **task))
+    system = from_an_angle(on_a_computer("distributed_servo", computer, network, **task))
     printed = run(system).metrics["J"]
     assert expect(system, as_simulated=True, horizon=0.05).objectives["J"] == pytest.approx(printed, rel=1e-9)
-    assert printed != pytest.approx(run(begun(example("distributed_servo", {DELAY: 0.0}))).metrics["J"], rel=1e-3)
+    assert printed != pytest.approx(
+        run(from_an_angle(example("distributed_servo", {DELAY: 0.0}))).metrics["J"], rel=1e-3
+    )
 
 
 def test_a_stationary_mean_is_what_means_over_long_horizons_come_to() -> None:

@@ -30,17 +30,17 @@ def flight() -> tuple[Floats, Floats]:
 
 
 def replayed(flight: tuple[Floats, Floats], point: Point) -> float:
-    """How far the plant alone, given the flight's commands at the steps of `point`, is from the flight."""
+    """How far the plant alone, with the flight's commands at the steps of `point`, is from the flight."""
     states, commands = flight
-    given, found, farthest = np.zeros(len(COMMAND)), np.zeros(len(MEASUREMENT)), 0.0
+    command, found, farthest = np.zeros(len(COMMAND)), np.zeros(len(MEASUREMENT)), 0.0
     with Fmi2Instance(fmus.locate(NATIVE.plant.fmu), "plant") as plant:
-        write, read = plant.writer(COMMAND, given), plant.reader(MEASUREMENT, found)
+        write, read = plant.writer(COMMAND, command), plant.reader(MEASUREMENT, found)
         plant.enter_initialization(0.0, H * STEPS)
-        given[:] = commands[0]
+        command[:] = commands[0]
         write()
         plant.exit_initialization()
         for k in range(STEPS):
-            given[:] = commands[k]
+            command[:] = commands[k]
             write()
             plant.step(*point(k))
             read()

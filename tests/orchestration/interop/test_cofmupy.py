@@ -21,18 +21,18 @@ COORDINATOR = """
 import json
 
 class Coordinator:
-    def start(self, given):
-        self.given, self.master = given, self
+    def start(self, configuration):
+        self.configuration, self.master = configuration, self
 
     def run_simulation(self, step_size, end_time):
         self.times = [k * step_size for k in range(round(end_time / step_size))]
 
     def get_results(self):
-        print(json.dumps([self.given, self.sequence_order]))
-        outputs = {(c["source"]["id"], c["source"]["variable"]) for c in self.given["connections"]}
+        print(json.dumps([self.configuration, self.sequence_order]))
+        outputs = {(c["source"]["id"], c["source"]["variable"]) for c in self.configuration["connections"]}
         return {"time": self.times, **{output: [7.0] * len(self.times) for output in outputs}}
 """
-"""As cofmupy's, without a flight: it prints what it was given."""
+"""A stub of cofmupy's: it prints its configuration."""
 
 RUN = "import runpy, sys; sys.path.insert(0, sys.argv.pop(1)); runpy.run_path(sys.argv.pop(1), run_name='__main__')"
 
@@ -53,9 +53,9 @@ def run_by(name: str, folder: Path) -> tuple[dict[str, Any], list[list[str]], An
     )
     (folder / "job.json").write_text(job.to_json())
     script, function = Path(str(tools.__path__[0])) / "cofmupy.py", TOOLS[name].call.partition(":")[2]
-    given = [folder, script, function, folder / "job.json", folder / "rows.npy"]
+    arguments = [folder, script, function, folder / "job.json", folder / "rows.npy"]
     done = subprocess.run(
-        [sys.executable, "-I", "-c", RUN, *map(str, given)], capture_output=True, text=True, check=True
+        [sys.executable, "-I", "-c", RUN, *map(str, arguments)], capture_output=True, text=True, check=True
     )
     configuration, order = json.loads(done.stdout)
     return configuration, order, np.load(folder / "rows.npy")
@@ -87,16 +87,18 @@ def test_its_rows_have_the_time_at_the_end_of_each_step(tmp_path: Path) -> None:
 
 def part(name: str, **parameters: float) -> Part:
     """A component of the paper's flight, with some parameters of its own."""
-    asked = Scenario().with_changes(parameters={f"{name}.{variable}": value for variable, value in parameters.items()})
-    return next(part for part in export_of(asked).parts if part.name == name)
+    scenario = Scenario().with_changes(
+        parameters={f"{name}.{variable}": value for variable, value in parameters.items()}
+    )
+    return next(part for part in export_of(scenario).parts if part.name == name)
 
 
 def test_a_parameter_that_is_no_real_is_left_where_it_starts() -> None:
-    given = part("controller", coupling=2.0)
-    assert given.parameters["stages"] == 3
-    assert parameters_for(TOOLS["ecos"], given) == given.parameters
-    reals = parameters_for(TOOLS["cofmupy"], given)
-    assert given.parameters.keys() - reals.keys() == {
+    controller = part("controller", coupling=2.0)
+    assert controller.parameters["stages"] == 3
+    assert parameters_for(TOOLS["ecos"], controller) == controller.parameters
+    reals = parameters_for(TOOLS["cofmupy"], controller)
+    assert controller.parameters.keys() - reals.keys() == {
         "stages",
         "discretisation_index",
         "gain_scaling_index",

@@ -75,9 +75,9 @@ def carried(name: str) -> System:
 def test_an_example_equals_other_masters_in_the_order_that_each_has(name: str) -> None:
     system = carried(name)
     announced: list[str] = []
-    asked = ORDERS if name == ALL else {tool: ORDERS[tool] for tool in ("libcosim", "fmucontainer -sequential")}
-    found = agreements(system, chosen(list(asked), system.components), announce=announced.append)
-    expected = {tool: order for tool, order in asked.items() if TOOLS[tool].converts or name != "water_tank"}
+    orders = ORDERS if name == ALL else {tool: ORDERS[tool] for tool in ("libcosim", "fmucontainer -sequential")}
+    found = agreements(system, chosen(list(orders), system.components), announce=announced.append)
+    expected = {tool: order for tool, order in orders.items() if TOOLS[tool].converts or name != "water_tank"}
     assert {agreement.tool.name: agreement.trace.order for agreement in found} == expected
     assert any(line.startswith("left out libcosim") for line in announced) == (name == "water_tank")
     for agreement in found:

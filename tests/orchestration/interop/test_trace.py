@@ -30,7 +30,7 @@ class Logs:
         self.times = [STEP * k for k in range(5)]
 
     def read(self, controller: list[Values] | None = None, plant: list[Values] | None = None) -> Trace:
-        """The trace of steps with these inputs; unless told, each gets what the other has computed before it."""
+        """The trace of steps with these inputs; default: each has what the other has computed before it."""
         controller = controller or self.measurements[:-1]
         plant = plant or self.commands[1:]
         self.write("controller", controller, self.commands)
@@ -39,8 +39,8 @@ class Logs:
 
     def write(self, component: str, inputs: list[Values], outputs: list[Values]) -> None:
         lines: list[dict[str, Any]] = [{"inputs": [7.0] * len(inputs[0]), "outputs": outputs[0]}]
-        for t, given, put in zip(self.times, inputs, outputs[1:]):
-            lines.append({"t": t, "h": STEP, "inputs": given, "outputs": put})
+        for t, values, put in zip(self.times, inputs, outputs[1:]):
+            lines.append({"t": t, "h": STEP, "inputs": values, "outputs": put})
         log_of(component, self.folder).write_text("".join(json.dumps(line) + "\n" for line in lines))
 
 
@@ -160,8 +160,8 @@ def traced(short: Scenario, tmp_path_factory: pytest.TempPathFactory) -> tuple[P
     paths = {side: traced_copy(Path(getattr(short, side).fmu), side, LOOP.ports[side], folder) for side in LOOP.ports}
     scenario = short.with_fmus(**paths).with_changes(timing={"clock": "fmu"})
     (folder / "flight.toml").write_text(scenario.to_toml(), encoding="utf-8")
-    quadcosim("run", "flight.toml", "--out", "flown", "--no-figures", cwd=folder)
-    return folder, load_run(folder / "flown")
+    quadcosim("run", "flight.toml", "--out", "recorded", "--no-figures", cwd=folder)
+    return folder, load_run(folder / "recorded")
 
 
 def test_a_traced_copy_flies_to_the_same_bits(short: Scenario, traced: tuple[Path, Result]) -> None:
@@ -174,8 +174,8 @@ def test_a_traced_copy_writes_down_what_it_is_given_and_what_it_gives(traced: tu
     folder, result = traced
     motion = np.column_stack([result.signals[f"plant.{name}"] for name in MEASUREMENT])
     command = np.column_stack([result.signals[f"controller.{name}"] for name in COMMAND])
-    flown = {"controller": (motion[:-1], command[:-1]), "plant": (command[:-1], motion[1:])}
-    for component, (inputs, outputs) in flown.items():
+    recorded = {"controller": (motion[:-1], command[:-1]), "plant": (command[:-1], motion[1:])}
+    for component, (inputs, outputs) in recorded.items():
         start, *steps = map(json.loads, log_of(component, folder).read_text().splitlines())
         assert [(step["t"], step["h"]) for step in steps] == [(k / 100, 0.01) for k in range(20)]
         assert np.array([step["inputs"] for step in steps]).tobytes() == inputs.tobytes()

@@ -103,15 +103,17 @@ def test_what_no_input_moves_and_no_output_shows_is_left_out() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "component", "said"),
+    ("name", "component", "expected"),
     [
         ("double_integrator", "plant", r"^component: plant: expected a sampled component$"),
         ("double_integrator", "contoller", r"^component: contoller: did you mean controller\?"),
         ("four_components", None, r"^component: expected the one at which to cut the loop open, as 3 are"),
     ],
 )  # fmt: skip
-def test_a_component_at_which_no_loop_can_be_cut_open_is_refused(name: str, component: str | None, said: str) -> None:
-    with pytest.raises(UsageError, match=said):
+def test_a_component_at_which_no_loop_can_be_cut_open_is_refused(
+    name: str, component: str | None, expected: str
+) -> None:
+    with pytest.raises(UsageError, match=expected):
         linearise(example(name), component)
 
 

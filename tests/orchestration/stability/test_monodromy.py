@@ -142,14 +142,14 @@ def test_the_quadrotor_s_loop_is_that_of_its_own_linearisation(instances: Instan
 
 
 @pytest.mark.parametrize(
-    ("velocity", "said"),
+    ("velocity", "expected"),
     [(1.0, r"the operating point is not at rest: \S+ moves by"), (1e9, "the run leaves the operating point: ")],
 )
 def test_a_point_that_is_not_at_rest_is_refused_naming_what_moves(
-    system: System, instances: Instances, velocity: float, said: str
+    system: System, instances: Instances, velocity: float, expected: str
 ) -> None:
     moving = {**system.operating_point, "components.plant.parameters.initial.v": velocity}
-    with pytest.raises(UsageError, match=said) as caught:
+    with pytest.raises(UsageError, match=expected) as caught:
         growth_of_loop(dataclasses.replace(system, operating_point=moving), instances)
     one_line(caught.value)
 
@@ -176,7 +176,7 @@ def test_the_local_limit_is_through_saved_states_and_as_accurate_as_it_says(syst
 
 def by_rule(limit: float) -> Callable[..., Growth]:
     """In place of runs: what is small grows above a period."""
-    return lambda system, *given: Growth(rate=system.components["controller"].sampling.period - limit, horizon=1.0)
+    return lambda system, *arguments: Growth(rate=system.components["controller"].sampling.period - limit, horizon=1.0)
 
 
 def test_where_an_fmu_saves_no_state_twin_runs_are_used_and_it_is_said(
@@ -196,7 +196,7 @@ SPAN = Range(first=0.05, step=0.01, last=0.09, tolerance=0.001)
 def test_the_quadrotor_with_a_hold_that_the_hover_loop_has_not_is_linearised_as_any_other_system(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(local, "growth_of_loop", lambda *given: by_rule(0.072)(*given).rate)
+    monkeypatch.setattr(local, "growth_of_loop", lambda *arguments: by_rule(0.072)(*arguments).rate)
     found = local_limits(Varied(request=Scenario(timing=Timing(hold="first")), of="period"), SPAN)
     assert found.limit == pytest.approx(0.072, abs=1e-5)
     assert found.method == f"{LOOP} (the loop about hover is for zero-order hold only)"

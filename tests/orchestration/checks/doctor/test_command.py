@@ -41,7 +41,7 @@ def report(built: dict[str, Path]) -> Report:
 
 
 def examined(fmu: Path) -> dict[str, Any]:
-    """What is said of one FMU."""
+    """The report on one FMU."""
     return only(as_tables(examine([fmu], Limits())))
 
 
@@ -69,13 +69,13 @@ def code_of(report: Report) -> int:
 
 
 def test_all_fmus_of_the_project_load_here(report: Report, main: Main) -> None:
-    told = json.loads(main("doctor", "--json", code=code_of(report)).stdout)
-    assert [Path(table["path"]).name for table in told["fmus"]] == [f"{model}.fmu" for model in MODELS]
-    for table in told["fmus"]:
+    document = json.loads(main("doctor", "--json", code=code_of(report)).stdout)
+    assert [Path(table["path"]).name for table in document["fmus"]] == [f"{model}.fmu" for model in MODELS]
+    for table in document["fmus"]:
         assert table["loads"]
         assert table["problems"] == []
         assert table["hosts"]["python"] == {"ready": True, "needs": [], "start": None, "note": None}
-        assert table["hosts"]["other"]["ready"] == bool(told["machine"]["python_libraries"])
+        assert table["hosts"]["other"]["ready"] == bool(document["machine"]["python_libraries"])
 
 
 def test_the_text_has_a_block_for_the_machine_and_one_for_each_fmu(built: dict[str, Path], report: Report) -> None:
@@ -93,8 +93,8 @@ def test_the_machine_is_this_one(report: Report) -> None:
     assert machine["executable"] == sys.executable
     assert machine["python"] == ".".join(map(str, sys.version_info[:3]))
     # of a process of its own: a test before this one may have loaded a libpython into this one
-    asked = [sys.executable, "-c", "print('libpython' in open('/proc/self/maps').read())"]
-    assert str(machine["shared"]) == subprocess.run(asked, capture_output=True, text=True, check=True).stdout.strip()
+    command = [sys.executable, "-c", "print('libpython' in open('/proc/self/maps').read())"]
+    assert str(machine["shared"]) == subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
 
 
 def test_a_binary_for_another_machine_is_found_out(plant: Path, tmp_path: Path) -> None:
@@ -227,10 +227,10 @@ def test_an_fmu_of_another_version_of_fmi_is_said_and_the_others_are_looked_at(t
     assert [block.splitlines()[0] for block in blocks] == ["this machine", *map(str, both)]
     assert blocks[1].splitlines()[1:] == [f"! file         {why}"]
     assert blocks[2].splitlines()[-1].split() == ["tried", "here", "loads"]
-    told = json.loads(main("doctor", *both, "--json", code=1).stdout)
-    assert told["fmus"][0] == {"path": str(one), "failure": why, "loads": False, "good": False}
-    assert [table["loads"] for table in told["fmus"]] == [False, True]
-    assert not told["good"]
+    document = json.loads(main("doctor", *both, "--json", code=1).stdout)
+    assert document["fmus"][0] == {"path": str(one), "failure": why, "loads": False, "good": False}
+    assert [table["loads"] for table in document["fmus"]] == [False, True]
+    assert not document["good"]
 
 
 @needs_compiler
@@ -242,9 +242,9 @@ def test_a_foreign_pythonhome_or_pythonpath_is_what_the_doctor_finds(tmp_path: P
     start = (sys.executable, "-m", "orchestration.command.start")
     done = run(*start, "doctor", str(path), environment=environment)
     assert done.returncode == 1, done.stderr
-    said = done.stdout.splitlines()[-1]
-    assert said.startswith(f"! tried here   loads without PYTHONPATH={tmp_path}:{ROOT}, not with it: ")
-    assert said.endswith("ImportError: of another Python")
+    last_line = done.stdout.splitlines()[-1]
+    assert last_line.startswith(f"! tried here   loads without PYTHONPATH={tmp_path}:{ROOT}, not with it: ")
+    assert last_line.endswith("ImportError: of another Python")
     done = run(*start, "--help", environment=environment)
     assert (done.returncode, done.stderr) == (
         1, f"quadcosim: it does not start with PYTHONPATH={tmp_path}:{ROOT}: ImportError: of another Python\n",

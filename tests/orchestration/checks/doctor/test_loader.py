@@ -43,7 +43,7 @@ def linux(*first: Path, **others: tuple[Path, ...]) -> Loader:
 
 
 def test_folders_are_searched_in_order(elf: bytes, tmp_path: Path) -> None:
-    paths = [put(elf, tmp_path, folder, "lib.so") for folder in ("first", "asked", "cached", "last")]
+    paths = [put(elf, tmp_path, folder, "lib.so") for folder in ("first", "requested", "cached", "last")]
     loader = Loader(
         system=LINUX,
         architecture="x86-64",
@@ -52,7 +52,7 @@ def test_folders_are_searched_in_order(elf: bytes, tmp_path: Path) -> None:
         last=(tmp_path / "last",),
     )
     for path in paths:
-        assert loader.find("lib.so", [str(tmp_path / "asked")]) == path
+        assert loader.find("lib.so", [str(tmp_path / "requested")]) == path
         path.unlink()
     assert loader.find("lib.so") is None
 
