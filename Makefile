@@ -1,21 +1,21 @@
 # make demo: build the FMUs, fly the paper's scenario, draw it. make test: lint and run all tests.
-# make check: lint and the tests that say most in least time, under a minute, for while you work.
+# make check: lint and the most informative fast tests, under a minute, for while you work.
 # make coverage: all tests, and which lines they run. make site: the documentation as a site, in site/.
-# make bench: time the loop. make figures, make findings, make interop: what docs/ and examples/ show, and the icons of the FMUs.
+# make bench: time the loop. make figures, make findings, make interop: figures, tables and icons of docs/ and examples/.
 # make release: wheel, sources, native FMUs, SSP and their checksums, in dist/.
-# make newcomer: follow every block of every page in a copy of what is committed; an hour or more.
+# make newcomer: run every block of every page in a clone of the last commit; an hour or more.
 # Each makes its own environment first.
 PYTHON ?= python3
 BIN := .venv/bin
 COFMUPY := .venv-cofmupy/bin/python
-# Processes that test at once: one more than two cores, for tests wait for processes of their own, and for limits of time.
+# Parallel test processes: one more than two cores, since tests wait for child processes and time limits.
 WORKERS ?= 3
 export CI
-# Tests start many processes: each finds the modules compiled that another has compiled.
+# Tests start many processes, which share compiled modules.
 unexport PYTHONDONTWRITEBYTECODE
-# In each, threads of numpy's BLAS would take 0.1 s and be of no use.
+# Threads of numpy's BLAS would cost each 0.1 s without benefit.
 export OPENBLAS_NUM_THREADS ?= 1
-# Other people's masters that need an environment of their own are flown where they are: make interop makes it.
+# Third-party masters that need a separate environment are run if it exists: make interop makes it.
 export QUADCOSIM_COFMUPY ?= $(abspath $(wildcard $(COFMUPY)))
 
 .PHONY: demo newcomer check test tests coverage lint bench figures findings interop release site clean
@@ -25,7 +25,7 @@ demo: .venv/.base
 	$(BIN)/quadcosim run --period 0.01 --out results/demo
 	@echo "figures: results/demo/path.png errors.png components.png commands.png"
 
-# Laws, plant, algebra, expressions, timetable, master with stubs, files of systems and scenarios; one FMU, built and flown.
+# Laws, plant, algebra, expressions, timetable, master with stubs, files of systems and scenarios; one FMU, built and run.
 QUICK := $(addprefix tests/,controller_fmu plant_fmu fmus/test_one_fmu.py fmu_kit/test_algebra.py fmu_kit/test_trajectory.py fmu_kit/test_units.py) \
 	$(addprefix tests/orchestration/,expressions schedule/test_timetable.py engines/test_master.py schedule/test_order.py \
 	quadrotor/test_loop.py quadrotor/test_scenario.py quadrotor/test_timing.py \
@@ -34,7 +34,7 @@ QUICK := $(addprefix tests/,controller_fmu plant_fmu fmus/test_one_fmu.py fmu_ki
 check: lint
 	$(BIN)/pytest --numprocesses 2 --dist load --hypothesis-profile quick --ignore-glob '*/test_flight.py' --ignore-glob '*/test_show.py' $(QUICK)
 
-# Both at once: each says what is wrong, and waits for the other.
+# Both in parallel: a failure of one does not stop the other.
 test: .venv/.test
 	+@$(MAKE) --no-print-directory --jobs 2 lint tests
 
