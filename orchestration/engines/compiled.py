@@ -80,6 +80,8 @@ class CompiledLoop:
         self.backlog = Backlog(running, self._tables, recorder)
         program, watched = condition(running.board)
         self._watched = list(watched)
+        if self._watched == [values for _, values in running.sources]:
+            loop.in_rows = sum(len(signals) for signals, _ in running.sources)
         self._feed_table = (c.Feed * len(running.feeds))(
             *(structures.feed(names.index(feed.component), feed) for feed in running.feeds)
         )

@@ -197,7 +197,10 @@ static void record(Loop *l, const Instant *now) {
     memcpy(l->events + 4 * l->event_count, l->arrived, (size_t)l->arrived_count * 4 * sizeof(int64_t));
     l->event_count += l->arrived_count;
     l->row[0] = now->t;
-    memcpy(l->rows + l->row_count++ * l->stride, l->row, (size_t)l->width * sizeof(double));
+    double *row = l->rows + l->row_count++ * l->stride;
+    memcpy(row, l->row, (size_t)l->width * sizeof(double));
+    if (l->in_rows)
+        memcpy(row + l->width, l->watched + l->tracks->at * l->watched_size, (size_t)l->in_rows * sizeof(double));
 }
 
 /* Pass through instants of the schedule up to the count of the track; the code says why it ended. */

@@ -19,7 +19,7 @@ class SharedTables:
         self._running, self._loop, self._room = running, loop, room
         self._most_rows, self._most_events = rows_of_a_chunk(running), events_of_a_chunk()
         self.content: Floats = self._new_rows()
-        """memory for the rows of a chunk; the columns of sources are filled in when it is handed over"""
+        """memory for the rows of a chunk; the columns of sources are filled in when it is handed over, if not by C"""
         self._noted: Integers = self._new_events(0)
         loop.row, loop.rows = address(running.board.row), address(self.content)
         loop.width, loop.stride = len(running.board.columns), len(running.columns)
@@ -35,11 +35,16 @@ class SharedTables:
 
     def rows_with_sources(self) -> Floats:
         """As `Tables`."""
-        rows, first = self.content[: self._loop.row_count], self._loop.width
+        rows = self.content[: self._loop.row_count]
+        if not self._loop.in_rows:
+            self._fill_in_sources(rows)
+        return rows
+
+    def _fill_in_sources(self, rows: Floats) -> None:
+        first = self._loop.width
         for signals, values in self._running.sources:
             rows[:, first : first + len(signals)] = values.over(rows[:, 0])
             first += len(signals)
-        return rows
 
     def events(self) -> Integers:
         """As `Tables`."""
@@ -50,6 +55,8 @@ class SharedTables:
         table = np.frombuffer(rows, dtype=np.float64).reshape(-1, self._loop.width)
         self.content = self._new_rows()
         self.content[: len(table), : table.shape[1]] = table
+        if self._loop.in_rows and len(table):
+            self._fill_in_sources(self.content[: len(table)])
         self._loop.rows, self._loop.row_count = address(self.content), len(table)
 
     def replace_events(self, events: Integers) -> None:

@@ -193,7 +193,7 @@ typedef struct {
     const void *condition; /* steps of condition.h; NULL: ask `look` each time */
     int64_t condition_length;
     const double *watched; /* sources of the condition at each instant */
-    int64_t watched_size;
+    int64_t watched_size, in_rows; /* how many, and how many of them rows end with: all or none */
     int64_t calling; /* the component whose FMU is called; -1: none */
     int64_t mode;    /* how numbers are rounded in this run */
     const void *environment;
