@@ -87,7 +87,7 @@ class Limit(LimitResult):
 
 @explains_missing
 def find(
-    asked: RequestLike,
+    request: RequestLike,
     of: str | None = None,
     *,
     first: float | None = None,
@@ -111,15 +111,15 @@ def find(
 
     Raises `UsageError` for an invalid quantity, range, tolerance, step or confidence.
     """
-    request, execution = single_run_execution(request_of(asked), engine)
-    of = of or default_quantity(request)
-    varied, files = _checked(request, of, confidence)
-    near = request.near_continuous(CONTINUOUS) if continuous else None
+    loop, execution = single_run_execution(request_of(request), engine)
+    of = of or default_quantity(loop)
+    varied, files = _checked(loop, of, confidence)
+    near = loop.near_continuous(CONTINUOUS) if continuous else None
     if continuous and near is None:
         raise UsageError("--continuous: for the quadrotor only")
     models = files.models_of(varied.system)
     span = search_range(varied, models, first=first, last=last, tolerance=tolerance, scan=scan)
-    with errors_in_own_terms(request):
+    with errors_in_own_terms(loop):
         bound = [check_against_fmus(varied.at(value), models) for value in span.values()]
     units, metric = bound[0].units, judged_objective(varied.system)
     random = is_random(varied.at(span.last))

@@ -95,8 +95,8 @@ def _become(channel: socket.socket, streams: list[int], names: NamesInPlace) -> 
 
 if __name__ == "__main__":
     name, descriptor = sys.argv[1:]
-    asked = main(name, socket.socket(fileno=int(descriptor)))
-    if asked is not None:
+    request = main(name, socket.socket(fileno=int(descriptor)))
+    if request is not None:
         module = importlib.import_module(name)
-        sys.argv = [str(module.__file__), *asked.arguments]
-        sys.exit(module.main(*asked.arguments))
+        sys.argv = [str(module.__file__), *request.arguments]
+        sys.exit(module.main(*request.arguments))
