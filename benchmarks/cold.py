@@ -53,10 +53,11 @@ def cost(*arguments: str, **environment: str) -> tuple[float, float]:
         for runs in (RUNS, FEWER_RUNS):
             (Path(folder) / f"{runs}.toml").write_text(STUDY.format(runs=runs), encoding="utf-8")
         before = _used()
+        users = subprocesses.environment(**environment)
+        users.pop("PYTHONDONTWRITEBYTECODE", None)  # else modules are compiled anew in each process
         subprocess.run(
             [sys.executable, "-c", _START, *arguments],
-            check=True, cwd=folder, env=subprocesses.environment(**environment), stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
+            check=True, cwd=folder, env=users, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
         return _used() - before, float((Path(folder) / "own").read_text(encoding="utf-8"))
 

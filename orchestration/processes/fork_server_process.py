@@ -23,10 +23,11 @@ from orchestration.processes.fork_server import LENGTH, NUMBER, Request, exactly
 def main(module: str, connection: socket.socket) -> Request | None:
     """Serve; returns its request in each forked process, and None in the server at its end."""
     names = NamesInPlace()
+    gc.disable()  # takes a tenth of the time of importing
     with contextlib.suppress(Exception):  # a forked process imports it again, and reports what is wrong
         importlib.import_module(module)
-    gc.collect()
     gc.freeze()  # what garbage collection does not touch is not copied by a forked process
+    gc.enable()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGCHLD, lambda *_: None)
     woken, waking = os.pipe()
