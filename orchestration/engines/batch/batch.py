@@ -323,7 +323,7 @@ class Batch:
     def _number(self, lane: int, system: System, name: str) -> float:
         if name in self._own:
             return float(self._own[name][lane])
-        if names_job_measure(name):
+        if name not in self._starts:
             return self._of_jobs(system)[name]
         owner, parameter, variable, start = self._starts[name]
         given = system.components[owner].parameters.get(parameter)
@@ -342,6 +342,7 @@ class Batch:
         shape = self._shape
         for index, (name, kernel) in enumerate(shape.kernels.items()):
             memory, variables = self.memories[index], shape.models[name].variables
+            has_clock = shape.models[name].has_clock
             kernel.lanes.begin(address(memory))
             for lane, system in enumerate(systems):
                 component = system.components[name]
@@ -351,7 +352,7 @@ class Batch:
                 sampling = component.sampling
                 if sampling is not None:
                     self._ratios[index][0, lane] = sampling.clock_ratio
-                    if shape.models[name].has_clock:
+                    if has_clock:
                         own = sampling.clock == "fmu"
                         memory[variables[SAMPLE_PERIOD].reference, lane] = sampling.period if own else 0.0
                         memory[variables[SAMPLE_OFFSET].reference, lane] = sampling.offset if own else 0.0
@@ -420,10 +421,9 @@ class Batch:
 
     def _begin(self, lane: int, system: System, first_samples: Mapping[str, int]) -> None:
         """When the own time of each component begins, as `Master` has it: 0 unless it begins with a later sample."""
-        waits = {name for name, model in self._shape.models.items() if model.waits}
         for index, name in enumerate(self._shape.names):
             ratio, sample = clock_of(system, name, first_samples)
-            self._begins[index][lane] = 0.0 if name in waits else ratio * sample
+            self._begins[index][lane] = 0.0 if name in self._shape.waits else ratio * sample
 
     def _compute(self, index: int) -> Booleans:
         """The outputs of a component in initialisation mode; lanes in which that fails."""

@@ -1,7 +1,7 @@
 """What runs have in common that are flown in lanes of one batch: their components, connections and expressions."""
 
 import re
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -93,6 +93,11 @@ class Shape:
     def kernels(self) -> Mapping[str, Kernel]:
         """Of each component; raises `UsageError` naming one that has none."""
         return {name: component(name, model, self.lanes) for name, model in self.models.items()}
+
+    @cached_property
+    def waits(self) -> Set[str]:
+        """The components whose own time begins with their first sample."""
+        return {name for name, model in self.models.items() if model.waits}
 
     @cached_property
     def wires(self) -> Wires:
