@@ -61,19 +61,21 @@ def bare_step(shape: Shape, batch: Batch, period: float, stop_time: float) -> fl
     lanes, steps, each = shape.lanes, round(stop_time / 0.001), round(period / 0.001)
     active, status = np.full(lanes, 2**64 - 1, dtype=np.uint64), np.zeros(lanes, dtype=np.int32)
     times, step, longer = np.zeros(lanes), np.full(lanes, 0.001), np.full(lanes, period)
-    calls = [ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 5)(kernel.step) for kernel in (plant, law)]
+    step_type = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 6)
+    calls = [step_type(kernel.step) for kernel in (plant, law)]
+    read = {name: shape.read(name) for name in shape.names}
+    of_plant, of_law = (
+        tuple(map(address, (memory[name], active, times, length, status, read[name])))
+        for name, length in (("plant", step), ("controller", longer))
+    )
     begin = time.process_time()
-    of_plant = (address(memory["plant"]), address(active), address(times), address(step), address(status))
-    of_law = (address(memory["controller"]), address(active), address(times), address(longer), address(status))
     for k in range(steps):
         calls[0](*of_plant)
         if k % each == 0:
             calls[1](*of_law)
     called = time.process_time() - begin
     begin = time.process_time()
-    empty = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 5)(
-        ctypes.cast(ctypes.CDLL(None).abs, ctypes.c_void_p).value or 0
-    )
+    empty = step_type(ctypes.cast(ctypes.CDLL(None).abs, ctypes.c_void_p).value or 0)
     for k in range(steps):
         empty(*of_plant)
         if k % each == 0:

@@ -1,5 +1,5 @@
-/* Times a slave in lanes: lane_steps LIBRARY STEP_SIZE STEPS prints the CPU time of one step a lane [ns], smallest of 9,
-   all lanes active and alike. */
+/* Times a slave in lanes: lane_steps LIBRARY STEP_SIZE STEPS [PLACE=VALUE ...] prints the CPU time of one step a lane
+   [ns], smallest of 9, all lanes active and alike. */
 
 #include <dlfcn.h>
 #include <stdint.h>
@@ -25,8 +25,8 @@ int main(int count, char **given)
     static int32_t status[MOST];
     int (*lanes_of)(void), (*places_of)(void);
     void (*begin)(double *), (*initialise)(double *, const uint64_t *, const double *, int32_t *);
-    void (*do_step)(double *, const uint64_t *, const double *, const double *, int32_t *);
-    if (count != 4)
+    void (*do_step)(double *, const uint64_t *, const double *, const double *, int32_t *, const uint8_t *);
+    if (count < 4)
         return 2;
     void *library = dlopen(given[1], RTLD_NOW);
     if (!library)
@@ -42,12 +42,18 @@ int main(int count, char **given)
         begin(memory);
         for (int lane = 0; lane < lanes; lane++)
             t[lane] = 0.0, h[lane] = strtod(given[2], NULL), active[lane] = ~(uint64_t)0;
+        for (int k = 4; k < count; k++) {
+            char *value;
+            const long place = strtol(given[k], &value, 10);
+            for (int lane = 0; lane < lanes; lane++)
+                memory[place * lanes + lane] = strtod(value + 1, NULL);
+        }
         initialise(memory, active, t, status);
         const clock_t start = clock();
         for (int k = 0; k < steps; k++) {
             for (int lane = 0; lane < lanes; lane++)
                 t[lane] = k * h[lane];
-            do_step(memory, active, t, h, status);
+            do_step(memory, active, t, h, status, NULL);
         }
         const double taken = (double)(clock() - start) / CLOCKS_PER_SEC / steps / lanes * 1e9;
         shortest = taken < shortest ? taken : shortest;

@@ -2,7 +2,7 @@
 
 CPU time of fmi2DoStep, called from C, the smallest of nine repetitions: of the controller with a sample in every step,
 of the plant with one internal step in every step, each with both mathematics. Then a step in SIMD lanes, compiled for
-this processor from the sources in the FMU.
+this processor from the sources in the FMU, of all variables: with the parameters for which there is a straight line.
 """
 
 import shutil
@@ -13,7 +13,9 @@ from pathlib import Path
 
 import fmpy
 
+from fmu_kit.bundle import Target
 from fmu_kit.compiler.pack.lanes import compiled_lanes
+from fmu_kit.packaging import slave_class
 from orchestration.building.models import MODELS
 from orchestration.processes import subprocesses
 
@@ -40,6 +42,14 @@ def program(name: str, folder: Path) -> Path:
     return path
 
 
+def usual_values(name: str, folder: Path) -> list[str]:
+    """The parameters that a model usually has, other than at the start: VALUE_REFERENCE=VALUE."""
+    variables = fmpy.read_model_description(str(folder)).modelVariables
+    references = {variable.name: variable.valueReference for variable in variables}
+    usual = slave_class(Target.parse(MODELS[name])).usual_parameters
+    return [f"{references[parameter]}={float(value)!r}" for parameter, value in usual.items()]
+
+
 def output_of(*command: str | Path) -> str:
     """What a program prints."""
     return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
@@ -59,10 +69,11 @@ def main() -> None:
                 print(f"{what}, {mathematics} mathematics: {taken} us a step")
         for name, (what, h) in CASES.items():
             sources = {file.name: file.read_bytes() for file in (folder / "own" / name / "sources").iterdir()}
+            usual = usual_values(name, folder / "own" / name)
             for lanes in LANES:
                 library = folder / f"{name}_{lanes}.so"
                 library.write_bytes(compiled_lanes(sources, lanes))
-                taken = output_of(in_lanes, library, repr(h), str(STEPS // lanes))
+                taken = output_of(in_lanes, library, repr(h), str(STEPS // lanes), *usual)
                 print(f"{what}, {lanes} lanes: {taken} ns a step and lane")
 
 
