@@ -120,8 +120,8 @@ def find(
     models = files.models_of(varied.system)
     span = search_range(varied, models, first=first, last=last, tolerance=tolerance, scan=scan)
     with errors_in_own_terms(loop):
-        bound = [check_against_fmus(varied.at(value), models) for value in span.values()]
-    units, metric = bound[0].units, judged_objective(varied.system)
+        checks = [check_against_fmus(varied.at(value), models) for value in span.values()]
+    units, metric = checks[0].units, judged_objective(varied.system)
     random = is_random(varied.at(span.last))
     seeds = math.ceil(math.log(1.0 - confidence) / math.log(RELIABILITY)) if random else 1
     local = _local(varied, span, files)
@@ -156,7 +156,7 @@ def find(
         local_limit=local.limit, local_limit_outside=local.outside, local_method=local.method,
         local_accuracy=local.accuracy, mean_square_limit=mean_square.limit,
         large_signal_limit=None if bracket is None else bracket.good,
-        refuted_limit=refuted, follows=bound[0].follows, horizon=varied.system.stop_time, tolerance=span.tolerance,
+        refuted_limit=refuted, follows=checks[0].follows, horizon=varied.system.stop_time, tolerance=span.tolerance,
         scan=span.step, confidence=confidence if random else None, seeds=seeds,
         flies_above=tuple(
             one.value for one in tried if bracket is not None and one.value > bracket.bad and one.flew == seeds

@@ -69,7 +69,7 @@ def _report(running: dict[int, socket.socket]) -> None:
         pid, status = os.waitpid(-1, os.WNOHANG)
         if pid == 0:
             return
-        with running.pop(pid) as channel, contextlib.suppress(OSError):  # nobody may be left to read it
+        with running.pop(pid) as channel, contextlib.suppress(OSError):  # the reader may have ended
             channel.sendall(NUMBER.pack(os.waitstatus_to_exitcode(status)))
 
 
