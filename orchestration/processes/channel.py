@@ -15,6 +15,10 @@ _POLL = 0.5
 """[s] between two checks whether the parent lives"""
 
 
+parent_id = os.getppid()
+"""The process that started this one, or the server that forked it: it may end before this one looks"""
+
+
 class LongError(EOFError):
     """A frame is longer than allowed."""
 
@@ -73,7 +77,7 @@ class Parent:
         os.close(nothing)
         os.dup2(2, 1)
         self._on_orphaned, self._leaving = on_orphaned, threading.Lock()
-        threading.Thread(target=self._leave_after, args=(os.getppid(),), daemon=True).start()
+        threading.Thread(target=self._leave_with_parent, daemon=True).start()
 
     def send(self, content: object) -> None:
         """Send one message; raises what `pickle` raises."""
@@ -101,7 +105,7 @@ class Parent:
         self._on_orphaned()
         os._exit(1)
 
-    def _leave_after(self, parent: int) -> None:
-        while os.getppid() == parent:
+    def _leave_with_parent(self) -> None:
+        while os.getppid() == parent_id:
             time.sleep(_POLL)
         self.leave()

@@ -16,13 +16,14 @@ import socket
 import sys
 import tempfile
 
+from orchestration.processes import channel as parent_channel
 from orchestration.processes.family import NamesInPlace
 from orchestration.processes.fork_server import LENGTH, NUMBER, Request, exactly
 
 
 def main(module: str, connection: socket.socket) -> Request | None:
     """Serve; returns its request in each forked process, and None in the server at its end."""
-    names = NamesInPlace()
+    names, own = NamesInPlace(), os.getpid()
     gc.disable()  # takes a tenth of the time of importing
     with contextlib.suppress(Exception):  # a forked process imports it again, and reports what is wrong
         importlib.import_module(module)
@@ -52,6 +53,7 @@ def main(module: str, connection: socket.socket) -> Request | None:
             channel.close()
         else:
             if pid == 0:
+                parent_channel.parent_id = own
                 signal.set_wakeup_fd(-1)
                 for each in (woken, waking):
                     os.close(each)

@@ -4,9 +4,11 @@ import os
 import signal
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 from orchestration.processes.channel import Parent
+from tests.patience import PATIENCE
 
 IMPORTED_BY = os.getpid()
 """The process that has imported this module"""
@@ -14,7 +16,13 @@ tempfile.gettempdir()  # which is remembered
 
 
 def main(what: str, *arguments: str) -> None:
-    """`look`, `fail`, `exit`, `kill` or `print`."""
+    """`look`, `fail`, `exit`, `kill`, `print` or `look late`."""
+    if what == "look late":
+        while os.getppid() == IMPORTED_BY:
+            time.sleep(0.01)
+        for _ in Parent():
+            pass
+        time.sleep(PATIENCE)
     if what == "look":
         shown = Path("/proc/self/environ").read_bytes().split(b"\0")
         Parent().send(

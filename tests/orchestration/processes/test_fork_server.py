@@ -108,6 +108,14 @@ def test_what_a_killed_server_has_forked_ends_and_it_is_replaced() -> None:
         assert servers(waiting.name) != [server]
 
 
+def test_it_ends_with_its_server_though_that_ended_before_it_looked() -> None:
+    child = Child(module("look late"))
+    for server in servers(MODULE):
+        os.kill(server, signal.SIGKILL)
+    assert gone(child.pid)
+    child.close()
+
+
 def gone_now(pid: int) -> bool:
     return not Path(f"/proc/{pid}").exists()
 
