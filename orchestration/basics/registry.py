@@ -16,6 +16,10 @@ class Registry(Generic[Entry]):
         """Make the result of `load` the entry of a kind."""
         self._loaders[kind] = load
 
+    def __contains__(self, kind: str) -> bool:
+        """Whether a kind has an entry, without loading it."""
+        return kind in self._loaders
+
     def of(self, kind: str) -> Entry | None:
         """The entry of a kind; None if it has none."""
         load = self._loaders.get(kind)

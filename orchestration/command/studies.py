@@ -61,7 +61,7 @@ def _warn_if_means_are_infinite(study: "Study") -> None:
     """Warn before the sweep, so that later changes of its files have no influence."""
     from orchestration.stability.known_loops import LOOPS
 
-    if LOOPS.of(study.base.kind) is None:
+    if study.base.kind not in LOOPS:
         files = study.files()
         first = range(min(len(study.points), FIRST))
         exact.warn_if_means_are_infinite(

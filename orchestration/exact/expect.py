@@ -59,7 +59,7 @@ def expect(request: RequestLike, *, as_simulated: bool = False, horizon: float |
     if horizon is not None and not 1e-9 <= horizon < math.inf:
         raise UsageError(f"horizon = {horizon:g} s: expected a finite time above 0")
     request = request_of(request)
-    if horizon is not None and LOOPS.of(request.kind) is not None:
+    if horizon is not None and request.kind in LOOPS:
         raise UsageError("horizon: expected a system file, which has an initial state")
     with errors_in_own_terms(request):
         system = rested(request)

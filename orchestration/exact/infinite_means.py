@@ -28,7 +28,7 @@ def infinite_means_warning(request: Request, systems: Sequence[System], files: F
     Examined are systems with something random and an objective that is a mean of squares, unless their kind has its
     own loop: those are not linear where they run.
     """
-    if LOOPS.of(request.kind) is not None:
+    if request.kind in LOOPS:
         return None
     chosen: dict[str, System] = {}
     for system in systems:
