@@ -18,7 +18,7 @@ def cached_library(folder: str, sources: Mapping[str, bytes], how: Any, compiled
     """
     path = _cache_path(folder, sources, how)
     if not path.is_file():
-        _write(path, compiled())
+        write_atomically(path, compiled())
     return path
 
 
@@ -29,7 +29,7 @@ def cached_content(folder: str, sources: Mapping[str, bytes], how: Any, compiled
         return path.read_bytes()
     library = compiled()
     with contextlib.suppress(OSError):
-        _write(path, library)
+        write_atomically(path, library)
     return library
 
 
@@ -51,8 +51,8 @@ def _processor() -> tuple[str, ...]:
     return platform.machine(), *sorted({line for line in lines if line.lower().startswith(("flags", "features"))})
 
 
-def _write(path: Path, content: bytes) -> None:
-    """Write a library atomically, since other processes may write it at the same time."""
+def write_atomically(path: Path, content: bytes) -> None:
+    """Write a file and its folders, which other processes may write at the same time; raises `OSError`."""
     path.parent.mkdir(parents=True, exist_ok=True)
     fresh = path.with_name(f"{path.name}.{os.getpid()}")
     fresh.write_bytes(content)

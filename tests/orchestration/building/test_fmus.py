@@ -269,6 +269,32 @@ def test_a_variant_is_built_again_with_its_values_when_its_sources_change(packin
     assert (read_model(path).variables["share"].is_constant, read_model(path).variables["share"].start) == (True, "0.5")
 
 
+def test_the_hash_of_sources_is_kept_for_other_processes_while_no_file_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = tmp_path / "own_law" / "__init__.py"
+    source.parent.mkdir()
+    source.write_text("GAIN = 1\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    computed: list[str] = []
+
+    def hash_now(target: Target) -> str:
+        computed.append(source.read_text())
+        return f"{len(computed):064x}"
+
+    def in_another_process() -> str:
+        builder._cached_source_hash.cache_clear()
+        return builder._source_hash(replace(builder.IN_PYTHON, source_hash=hash_now), Target("own_law", "Law"))
+
+    assert in_another_process() == in_another_process() == f"{1:064x}"
+    before = source.stat()
+    source.write_text("GAIN = 2\n")
+    os.utime(source, ns=(before.st_atime_ns, before.st_mtime_ns))
+    assert in_another_process() == f"{2:064x}"
+    assert computed == ["GAIN = 1\n", "GAIN = 2\n"]
+
+
 def with_another_hash(path: Path) -> bytes:
     """An FMU as if it were of other sources; its new content."""
     with zipfile.ZipFile(path) as archive:
