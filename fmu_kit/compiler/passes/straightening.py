@@ -25,6 +25,7 @@ from fmu_kit.compiler.trace.symbols import (
     node,
     select,
     truth,
+    value_of,
 )
 from fmu_kit.compiler.trace.tracing import Program
 
@@ -83,8 +84,8 @@ class _Line:
         self.memory: dict[str, Symbol] = {}
         """what lies in each place now, as far as it was written"""
         self.guards: list[Symbol] = []
-        self.decided: dict[Symbol, bool] = {}
-        """conditions that have a guard"""
+        self.decided: dict[Symbol, bool | float] = {}
+        """values that a guard makes sure of: of conditions, and of how often loops go round"""
         self.fixed = fixed_places(program)
 
     def call(self, function: Function, given: Sequence[Symbol], under: Symbol | None) -> list[Symbol]:
@@ -221,6 +222,8 @@ class _Frame:
             raise _NoLineError
         if times.op != "constant":
             self.line.expect_not(node("ne", (times, constant(least)), "bool"), under)
+            if under is None:
+                self.line.decided[times] = least
         for k in range(int(least)):
             self.rounds[each.data], self.known = (k, states), {}
             if self.block(each.blocks[0], under) is not None:
@@ -257,6 +260,8 @@ class _Frame:
 
     def _made(self, symbol: Symbol, args: list[Symbol]) -> Symbol:
         op, data = symbol.op, symbol.data
+        if op == "add" and symbol.kind == "int" and args[0].op == "constant" and value_of(args[0]) == 0.0:
+            return args[1]  # whole numbers have no zero with a sign
         if op == "select":
             return lifted(select(self.line.settle(args[0]), *args[1:]))
         if op in _SETTLED:
