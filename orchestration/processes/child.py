@@ -181,7 +181,8 @@ def _started(
 ) -> Process:
     """In a new session; `piped` as in `forked`."""
     if isinstance(what, Module) and sys.platform == "linux":
-        return forked(what, environment=environment, folder=folder, piped=piped)
+        with contextlib.suppress(ConnectionError):  # a new Python shows what is wrong with the module
+            return forked(what, environment=environment, folder=folder, piped=piped)
     unpiped = (subprocess.DEVNULL, subprocess.DEVNULL, None)
     stdin, stdout, stderr = (subprocess.PIPE if pipe else other for pipe, other in zip(piped, unpiped))
     return subprocess.Popen(

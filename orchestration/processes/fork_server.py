@@ -16,7 +16,7 @@ import subprocess
 import sys
 import threading
 import weakref
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
@@ -26,10 +26,12 @@ from orchestration.processes.subprocesses import Module
 
 LENGTH = struct.Struct("<Q")
 """of a request, before it"""
-NUMBER = struct.Struct("<q")
-"""The answers: the process's id, or minus the error number if there is none; then, at its end, its exit code"""
+ANSWER = struct.Struct("<?q")
+"""False and the process's id, or minus the error number if it cannot start; True and its exit code, at its end"""
 _READ_AT_START = ("PYTHON", "LD_", "LC_", "LANG", "OPENBLAS_", "OMP_", "MKL_", "MALLOC_", "GLIBC_", "COVERAGE_")
 """How the names of variables begin that a process reads when it starts, or when it loads a library"""
+_PATIENCE = 10.0
+"""[s] in which a server must end that nobody needs any more"""
 _Pipes = tuple[IO[bytes] | None, IO[bytes] | None, IO[bytes] | None]
 
 
@@ -53,6 +55,7 @@ class ForkedProcess:
         self.stdin, self.stdout, self.stderr = pipes
         self.returncode: int | None = None
         self._channel, self._reading = channel, threading.Lock()
+        weakref.finalize(self, channel.close)  # not before: another thread may wait for it
 
     def poll(self) -> int | None:
         """Its exit code; None while it runs."""
@@ -67,10 +70,9 @@ class ForkedProcess:
         with self._reading:
             if self.returncode is None:
                 try:
-                    self.returncode = _answer(self._channel)
+                    _, self.returncode = _answer(self._channel)
                 except (EOFError, ConnectionError):  # the server has ended, and this process with it
                     self.returncode = -signal.SIGKILL
-                self._channel.close()
         return self.returncode
 
     def send_signal(self, sig: int) -> None:
@@ -84,48 +86,52 @@ class ForkServer:
     """The process that has imported a module."""
 
     def __init__(self, module: str, environment: Mapping[str, str]) -> None:
-        own, its = socket.socketpair()
-        with its:
+        with contextlib.ExitStack() as stack:
+            own, its = (stack.enter_context(end) for end in socket.socketpair())
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "orchestration.processes.fork_server_process", module, str(its.fileno())],
+                [sys.executable, "-m", "orchestration.processes.fork_server_process", module],
                 env={**environment, **room_for_names()},
-                stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-                pass_fds=[its.fileno()], start_new_session=True,
+                stdin=its.fileno(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
             )  # fmt: skip
+            stack.pop_all()
+        its.close()
         self.pid = self._process.pid
-        self._connection, self._owner = own, os.getpid()
-        self.close: Callable[[], None] = weakref.finalize(self, _end, own, self._process, self._owner)
+        self._connection = own
+        self.close = weakref.finalize(self, _end, own, self._process, os.getpid())
 
     @property
-    def is_usable(self) -> bool:
-        """Whether it serves this process, which may be a fork of the one that has started it."""
-        return self._owner == os.getpid() and self._process.poll() is None
+    def is_alive(self) -> bool:
+        """Whether it can fork."""
+        return self.close.alive and self._process.poll() is None
 
     def fork(self, request: Request, piped: tuple[bool, bool, bool]) -> ForkedProcess:
         """A process; `piped` as in `forked`.
 
         Raises `ConnectionError` or `EOFError` if the server has ended, `OSError` if it cannot fork.
         """
-        channel, its = socket.socketpair()  # of this process alone: an interrupt here disturbs no other
-        ends = [_ends(stream, is_piped) for stream, is_piped in enumerate(piped)]
-        stdin, stdout, stderr = (own for _, own in ends)
-        try:
-            with its:
-                socket.send_fds(self._connection, [b"!"], [*(end for end, _ in ends), its.fileno()])
+        with contextlib.ExitStack() as own, contextlib.ExitStack() as its:
+            channel, answering = socket.socketpair()  # of this process alone: an interrupt here disturbs no other
+            own.enter_context(channel)
+            descriptors = [its.enter_context(answering).fileno()]
+            pipes: list[IO[bytes] | None] = []
+            for stream, is_piped in enumerate(piped):
+                end, pipe = _ends(stream, is_piped)
+                its.callback(os.close, end)
+                descriptors.append(end)
+                pipes.append(None if pipe is None else own.enter_context(pipe))
+            socket.send_fds(self._connection, [b"!"], descriptors)
+            its.close()
             content = pickle.dumps(request)
-            channel.sendall(LENGTH.pack(len(content)) + content)
-            pid = _answer(channel)
-            if pid < 0:
-                raise OSError(-pid, os.strerror(-pid))
-        except BaseException:
-            for own in (channel, stdin, stdout, stderr):
-                if own is not None:
-                    own.close()
-            raise
-        finally:
-            for end, _ in ends:
-                os.close(end)
-        return ForkedProcess(pid, (stdin, stdout, stderr), channel)
+            with contextlib.suppress(ConnectionError):  # if it could not fork, it has answered why
+                channel.sendall(LENGTH.pack(len(content)) + content)
+            has_ended, number = _answer(channel)
+            if has_ended:
+                raise OSError(f"a process has ended before it could start, with exit code {number}")
+            if number < 0:
+                raise OSError(-number, os.strerror(-number))
+            own.pop_all()
+        stdin, stdout, stderr = pipes
+        return ForkedProcess(number, (stdin, stdout, stderr), channel)
 
 
 servers: dict[tuple[object, ...], ForkServer] = {}
@@ -139,24 +145,29 @@ def forked(
     """A process in a new session that runs `main` of a module.
 
     `piped` states which of its standard streams are pipes to this process; of the others, input is empty, output is
-    discarded, and errors go where those of this process go. Raises `OSError` if it cannot be started.
+    discarded, and errors go where those of this process go. Raises `OSError` if it cannot be started, as
+    `ConnectionError` if the server ends, perhaps because importing the module ends it.
     """
     request = Request(
         arguments=module.arguments, environment=dict(environment), folder=str(folder or os.getcwd()), umask=_umask()
     )
     for _ in range(2):  # the server may just have been killed
         server = _server_for(module.name, environment)
-        with contextlib.suppress(ConnectionError, EOFError):
+        try:
             return server.fork(request, piped)
-        server.close()
-    raise OSError(f"the process from which {module.name} is forked has ended")
+        except (ConnectionError, EOFError):
+            server.close()
+        except OSError:
+            if server.close.alive:  # else another thread has closed it meanwhile
+                raise
+    raise ConnectionError(f"the process from which {module.name} is forked has ended")
 
 
 def _server_for(module: str, environment: Mapping[str, str]) -> ForkServer:
     key = (module, *sorted(item for item in environment.items() if item[0].startswith(_READ_AT_START)))
     with _lock:
         server = servers.get(key)
-        if server is None or not server.is_usable:
+        if server is None or not server.is_alive:
             server = servers[key] = ForkServer(module, environment)
         return server
 
@@ -164,10 +175,26 @@ def _server_for(module: str, environment: Mapping[str, str]) -> ForkServer:
 def _end(connection: socket.socket, process: "subprocess.Popen[bytes]", owner: int) -> None:
     """Close the connection to a server, which ends then; a fork of its owner only forgets it."""
     connection.close()
-    if os.getpid() == owner:
-        process.wait()
-    else:
+    if os.getpid() != owner:
         process.returncode = 0
+        return
+    try:
+        process.wait(_PATIENCE)
+    except subprocess.TimeoutExpired:  # it is stopped
+        process.kill()
+        process.wait()
+
+
+def _forget() -> None:
+    """In a fork of this process: it starts servers of its own, and does not keep those of this process from ending."""
+    for server in servers.values():
+        server.close()
+    servers.clear()
+    _lock.release()
+
+
+if sys.platform != "win32":
+    os.register_at_fork(before=_lock.acquire, after_in_parent=_lock.release, after_in_child=_forget)
 
 
 def exactly(connection: socket.socket, count: int) -> bytes:
@@ -181,9 +208,9 @@ def exactly(connection: socket.socket, count: int) -> bytes:
     return content
 
 
-def _answer(channel: socket.socket) -> int:
-    (number,) = NUMBER.unpack(exactly(channel, NUMBER.size))
-    return int(number)
+def _answer(channel: socket.socket) -> tuple[bool, int]:
+    has_ended, number = ANSWER.unpack(exactly(channel, ANSWER.size))
+    return has_ended, number
 
 
 def _ends(stream: int, is_piped: bool) -> tuple[int, IO[bytes] | None]:
@@ -191,18 +218,24 @@ def _ends(stream: int, is_piped: bool) -> tuple[int, IO[bytes] | None]:
     if is_piped:
         reading, writing = os.pipe()
         return (reading, open(writing, "wb")) if stream == 0 else (writing, open(reading, "rb"))
-    return os.dup(2) if stream == 2 else os.open(os.devnull, os.O_RDONLY if stream == 0 else os.O_WRONLY), None
+    if stream == 2:
+        with contextlib.suppress(OSError):  # it may be closed
+            if os.get_inheritable(2):  # else it is not for errors: it was closed, and another file was opened
+                return os.dup(2), None
+    return os.open(os.devnull, os.O_RDONLY if stream == 0 else os.O_WRONLY), None
 
 
 def _umask() -> int:
     """Of this process, from where the system shows it: `os.umask` cannot read it without changing it."""
-    return int(Path("/proc/self/status").read_text().partition("Umask:")[2].split()[0], 8)
+    try:
+        return int(Path("/proc/self/status").read_text().partition("Umask:")[2].split()[0], 8)
+    except OSError:  # there is no /proc
+        umask = os.umask(0o077)
+        os.umask(umask)
+        return umask
 
 
 def _readable(channel: socket.socket, timeout: float | None) -> bool:
-    try:
-        poll = select.poll()
-        poll.register(channel, select.POLLIN)
-        return bool(poll.poll(None if timeout is None else 1000.0 * timeout))
-    except ValueError:  # another thread has read the answer and closed it
-        return True
+    poll = select.poll()
+    poll.register(channel, select.POLLIN)
+    return bool(poll.poll(None if timeout is None else 1000.0 * timeout))

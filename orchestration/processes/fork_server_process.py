@@ -1,11 +1,12 @@
 """A server of `fork_server`: imports a module, and forks processes that run its `main`.
 
-`python -m orchestration.processes.fork_server_process MODULE SOCKET` serves until the other end of the socket (a file
-descriptor) is closed. With each byte come four file descriptors: the standard streams of the new process, and the
-channel from which it reads its `Request` and on which its id and its exit code are answered.
+`python -m orchestration.processes.fork_server_process MODULE` serves until the other end of the socket that is its
+standard input is closed. With each byte come four file descriptors: the channel from which a new process reads its
+`Request` and on which its id and its exit code are answered, and its standard streams.
 """
 
 import contextlib
+import errno
 import gc
 import importlib
 import os
@@ -18,7 +19,7 @@ import tempfile
 
 from orchestration.processes import channel as parent_channel
 from orchestration.processes.family import NamesInPlace
-from orchestration.processes.fork_server import LENGTH, NUMBER, Request, exactly
+from orchestration.processes.fork_server import ANSWER, LENGTH, Request, exactly
 
 
 def main(module: str, connection: socket.socket) -> Request | None:
@@ -35,8 +36,11 @@ def main(module: str, connection: socket.socket) -> Request | None:
     os.set_blocking(waking, False)
     signal.set_wakeup_fd(waking)
     running: dict[int, socket.socket] = {}
+    events = select.poll()
+    for descriptor in (connection.fileno(), woken):
+        events.register(descriptor, select.POLLIN)
     while True:
-        readable, _, _ = select.select([connection.fileno(), woken], [], [])
+        readable = [descriptor for descriptor, _ in events.poll()]
         if woken in readable:
             os.read(woken, 4096)
             _report(running)
@@ -45,12 +49,11 @@ def main(module: str, connection: socket.socket) -> Request | None:
         byte, descriptors, _, _ = socket.recv_fds(connection, 1, 4)
         if not byte:
             return None
-        streams, channel = descriptors[:3], socket.socket(fileno=descriptors[3])
+        channel, streams = socket.socket(fileno=descriptors[0]), descriptors[1:]
         try:
             pid = os.fork()
         except OSError as error:
-            channel.sendall(NUMBER.pack(-(error.errno or 1)))
-            channel.close()
+            _report_failure(channel, error)
         else:
             if pid == 0:
                 parent_channel.parent_id = own
@@ -59,7 +62,11 @@ def main(module: str, connection: socket.socket) -> Request | None:
                     os.close(each)
                 for other in (connection, *running.values()):
                     other.close()
-                return _become(channel, streams, names)
+                try:
+                    return _become(channel, streams, names)
+                except (OSError, EOFError) as error:  # also if nobody waits for it any more
+                    _report_failure(channel, error)
+                    sys.exit(1)
             running[pid] = channel
         for stream in streams:
             os.close(stream)
@@ -72,7 +79,13 @@ def _report(running: dict[int, socket.socket]) -> None:
         if pid == 0:
             return
         with running.pop(pid) as channel, contextlib.suppress(OSError):  # the reader may have ended
-            channel.sendall(NUMBER.pack(os.waitstatus_to_exitcode(status)))
+            channel.sendall(ANSWER.pack(True, os.waitstatus_to_exitcode(status)))
+
+
+def _report_failure(channel: socket.socket, error: Exception) -> None:
+    """Answer that a process cannot start."""
+    with channel, contextlib.suppress(OSError):
+        channel.sendall(ANSWER.pack(False, -(getattr(error, "errno", None) or errno.EIO)))
 
 
 def _become(channel: socket.socket, streams: list[int], names: NamesInPlace) -> Request:
@@ -89,16 +102,17 @@ def _become(channel: socket.socket, streams: list[int], names: NamesInPlace) -> 
     names.write()
     os.umask(request.umask)
     os.chdir(request.folder)
-    sys.path[0] = request.folder
+    if not getattr(sys.flags, "safe_path", False):  # it is that of the server
+        sys.path[0] = request.folder
     tempfile.tempdir = None
     with channel:  # whoever knows the id may end the process, with its session and its family
-        channel.sendall(NUMBER.pack(os.getpid()))
+        channel.sendall(ANSWER.pack(False, os.getpid()))
     return request
 
 
 if __name__ == "__main__":
-    name, descriptor = sys.argv[1:]
-    request = main(name, socket.socket(fileno=int(descriptor)))
+    (name,) = sys.argv[1:]
+    request = main(name, socket.socket(fileno=os.dup(0)))
     if request is not None:
         module = importlib.import_module(name)
         sys.argv = [str(module.__file__), *request.arguments]

@@ -116,6 +116,97 @@ def test_it_ends_with_its_server_though_that_ended_before_it_looked() -> None:
     child.close()
 
 
+def test_a_stopped_server_does_not_keep_its_process_from_ending(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fork_server, "_PATIENCE", 0.1)
+    server = fork_server.ForkServer(MODULE, subprocesses.environment())
+    os.kill(server.pid, signal.SIGSTOP)
+    server.close()
+    assert gone(server.pid)
+
+
+@pytest.mark.parametrize("environment", [{"QUADCOSIM_FAMILY": "its own"}, {}], ids=["no folder", "no family"])
+def test_what_cannot_start_is_no_process(environment: dict[str, str], tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError if environment else OSError):
+        fork_server.forked(
+            module("look"),
+            environment=subprocesses.environment(**environment),
+            folder=tmp_path / "none" if environment else None,
+            piped=(True, True, True),
+        )
+
+
+def written(folder: Path, text: str) -> dict[str, str]:
+    """The variables with which a module `written` of this text can be imported."""
+    (folder / "written.py").write_text(text)
+    return subprocesses.environment(PYTHONPATH=os.pathsep.join((subprocesses.ROOT, str(folder))))
+
+
+def test_a_server_that_cannot_fork_remains(tmp_path: Path) -> None:
+    cannot = "import os\ndef fork(): raise BlockingIOError(11, 'too many processes')\nos.fork = fork"
+    environment = written(tmp_path, cannot) | {f"LONG_{i}": 100_000 * "x" for i in range(4)}
+    with pytest.raises(BlockingIOError):
+        Child(subprocesses.Module.of("written"), environment=environment)
+    assert not gone_now(servers("written")[-1])
+
+
+def test_a_module_that_ends_what_imports_it_ends_a_python_of_its_own(tmp_path: Path) -> None:
+    environment = written(tmp_path, "raise SystemExit('not here')")
+    with Child(subprocesses.Module.of("written"), environment=environment, limits=Limits()) as child:
+        found = child.ending()
+    assert (found.code, found.last_line) == (1, "not here")
+
+
+@pytest.mark.skipif(sys.version_info < (3, 11), reason="Python has no safe path")
+def test_its_folder_is_not_on_a_safe_path(tmp_path: Path) -> None:
+    assert seen(folder=tmp_path, PYTHONSAFEPATH="1")["path"] != str(tmp_path)
+
+
+def test_it_starts_where_the_system_shows_no_processes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Path, "read_text", lambda _: Path("/no/proc").stat())
+    assert seen()["imported by"] in servers(MODULE)
+
+
+FILES = """
+import os, resource
+from orchestration.processes.child import Child
+from orchestration.processes.subprocesses import Module
+def limit(files):
+    resource.setrlimit(resource.RLIMIT_NOFILE, (files, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))
+def look():
+    with Child(Module.of("tests.orchestration.processes.forked_module", "look")) as child:
+        child.receive()
+    return len(os.listdir("/proc/self/fd"))
+"""
+MANY = "limit(2000); files = [os.dup(0) for _ in range(1100)]; look()"
+FEW = """
+before = look()
+limit(before + 2)
+try:
+    look()
+except OSError as error:
+    print(error.strerror)
+limit(before + 10)
+print(look() - before)
+"""
+
+
+@pytest.mark.parametrize(("program", "printed"), [(MANY, []), (FEW, ["Too many open files", "0"])])
+def test_many_files_may_be_open_and_few_allowed(program: str, printed: list[str]) -> None:
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", FILES + program],
+        env=subprocesses.environment(),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.stdout.splitlines(), done.stderr) == (printed, "")
+
+
+def test_the_standard_streams_may_be_closed() -> None:
+    closed = ["sh", "-c", 'exec "$0" -c "$1" <&- >&- 2>&-', sys.executable, f"{FILES}\nos._exit(look() and 7)"]
+    assert subprocess.run(closed, env=subprocesses.environment(), check=False).returncode == 7
+
+
 def gone_now(pid: int) -> bool:
     return not Path(f"/proc/{pid}").exists()
 
@@ -123,11 +214,13 @@ def gone_now(pid: int) -> bool:
 PROGRAM = """
 import os, sys
 from orchestration.processes.child import Child
+from orchestration.processes.fork_server import servers
 from orchestration.processes.subprocesses import Module
 child = Child(Module.of("tests.orchestration.processes.forked_module", "look"))
 server = child.receive()["imported by"]
 waiting = Child(Module.of("orchestration.fmi.foreign_process"))
 if sys.argv[1] == "forks" and os.fork() == 0:
+    print(servers == {}, flush=True)  # it would keep them from ending
     other = Child(Module.of("tests.orchestration.processes.forked_module", "look")).receive()["imported by"]
     print(other != server, flush=True)
     os._exit(0)
@@ -150,5 +243,5 @@ def test_servers_and_what_they_forked_end_with_the_process(how: str) -> None:
     )
     assert (done.returncode, done.stderr) == (-signal.SIGKILL if how == "killed" else 0, "")
     *before, pids = done.stdout.splitlines()
-    assert before == (["True"] if how == "forks" else [])
+    assert before == (["True", "True"] if how == "forks" else [])
     assert all(gone(int(pid)) for pid in pids.split())
