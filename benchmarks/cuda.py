@@ -50,7 +50,7 @@ def print_resources(architecture: str) -> None:
     """Print the resources of straight-line code on a processor."""
     shape, (one, *_) = systems(0.01, STOP_TIME)
     batch = Batch(shape, ScheduleCache())
-    next(batch.going(Group(systems=[one], timings=[timing(one)])))
+    next(batch.stepwise(Group(systems=[one], timings=[timing(one)])))
     codes = {name: Code.of(name, model) for name, model in shape.models.items()}
     numbers = {
         name: {place: float(memory[i, 0]) for place, i in code.constant.items()}

@@ -1,1 +1,1 @@
-"""Whole studies as lanes of runs in vector registers: what the engine `batch` flies by."""
+"""The engine `batch`: many runs at once, one in each SIMD lane."""

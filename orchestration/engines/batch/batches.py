@@ -1,4 +1,4 @@
-"""Flies many systems as lanes of runs, and says of each what it came to, or that it is to be flown alone."""
+"""Runs many systems in SIMD lanes; the result of each is a summary, or that the run must be done alone."""
 
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from orchestration.basics.simulator import Floats
-from orchestration.engines.batch.batch import NOTHING, Batch, BatchResult, Columns, Group
+from orchestration.engines.batch.batch import NO_COLUMNS, Batch, BatchResult, Group, ParameterColumns
 from orchestration.engines.batch.combining import combined
 from orchestration.engines.batch.kernels import preferred_lanes
 from orchestration.engines.batch.shape import Shape, outline
@@ -26,81 +26,81 @@ from orchestration.system.times import NANOSECONDS, nanoseconds
 
 @dataclass(frozen=True, kw_only=True)
 class RunSummary:
-    """What a run came to."""
+    """The results of a run."""
 
     metrics: Metrics
     message: str | None
-    """what diverged"""
+    """how it diverged; None if it did not"""
 
 
-Landed = tuple[int, RunSummary | None, Floats]
-"""The place of a run among those that were asked for, what it came to, its rows"""
+BatchOutcome = tuple[int, RunSummary | None, Floats]
+"""The place of a run among the requested ones, its summary, its rows"""
 _NO_ROWS: Floats = np.zeros((0, 0))
 
 
-class Flier(Protocol):
-    """Flies groups of runs of a shape, one after another or many at once."""
+class BatchRunner(Protocol):
+    """Runs groups of runs of a shape, one after another or many at once."""
 
     def each(self, groups: Sequence[Group], record: Sequence[str] | None) -> Iterator[tuple[Batch, BatchResult]]:
-        """The groups in their order, each with the batch that has flown it."""
+        """The results of groups in their order, each with the batch that has run it."""
 
 
 class Batches:
-    """The batches of this process, by the shape of what they run; their FMUs are files."""
+    """The batches of this process by the shape of their systems, whose FMUs are files."""
 
-    def __init__(self, flier: Callable[[Shape, ScheduleCache], Flier] = Batch) -> None:
+    def __init__(self, runner: Callable[[Shape, ScheduleCache], BatchRunner] = Batch) -> None:
         self._schedules = ScheduleCache()
         self._lanes = preferred_lanes()
-        self._flier = flier
-        self._shapes: dict[Hashable, tuple[Shape, Flier]] = {}
+        self._new_runner = runner
+        self._shapes: dict[Hashable, tuple[Shape, BatchRunner]] = {}
 
     def run(self, systems: Sequence[System]) -> list[RunSummary | None]:
-        """What runs came to, in their order; None for one that is to be flown alone. Raises as `each`."""
+        """The summaries of runs, in their order; None for one that must be run alone. Raises as `each`."""
         found: list[RunSummary | None] = [None] * len(systems)
         for place, summary, _ in self.each(systems):
             found[place] = summary
         return found
 
     def each(
-        self, systems: Sequence[System], record: Sequence[str] | None = None, own: Columns = NOTHING
-    ) -> Iterator[Landed]:
-        """Runs as they end: their places among `systems`, what they came to, and the rows of columns, if to `record`.
+        self, systems: Sequence[System], record: Sequence[str] | None = None, parameters: ParameterColumns = NO_COLUMNS
+    ) -> Iterator[BatchOutcome]:
+        """Runs as they end: their places among `systems`, their summaries, and the rows of the columns in `record`.
 
-        What it came to is None for one that is to be flown alone, by what flies anything; rows have the time [s] first,
-        and are there until the next run. `own` are parameters of each run on top of those of its system, which many
-        may share. Raises `UsageError` for what cannot be flown in lanes.
+        The summary is None for a run that must be repeated alone, by an engine for any FMUs; rows have the time [s]
+        first and are valid until the next run. `parameters` of each run override those of its system, which many may
+        share. Raises `UsageError` for systems that cannot be run in lanes.
         """
         known = {id(system): (outline(system), timing(system)) for system in systems}
         shapes: dict[Hashable, list[int]] = {}
         for place, system in enumerate(systems):
             shapes.setdefault(known[id(system)][0], []).append(place)
         for key, places in shapes.items():
-            shape, flier = self._flier_of(key, systems[places[0]])
+            shape, runner = self._runner_of(key, systems[places[0]])
             timings = {place: known[id(systems[place])][1] for place in places}
             several = {id(systems[place]): systems[place] for place in places}
-            fed = {key: connect_references(system, shape.models) for key, system in several.items()}
+            connected = {key: connect_references(system, shape.models) for key, system in several.items()}
             groups = [*_groups(places, timings, self._lanes)]
-            given = [
+            group_runs = [
                 Group(
-                    systems=[fed[id(systems[i])] for i in group], timings=[timings[i] for i in group],
-                    own={name: values[group] for name, values in own.items()},
+                    systems=[connected[id(systems[i])] for i in group], timings=[timings[i] for i in group],
+                    parameters={name: values[group] for name, values in parameters.items()},
                 )
                 for group in groups
             ]  # fmt: skip
-            for group, runs, (batch, result) in zip(groups, given, flier.each(given, record)):
+            for group, runs, (batch, result) in zip(groups, group_runs, runner.each(group_runs, record)):
                 rows = result.signals or [_NO_ROWS] * len(group)
-                yield from zip(group, [*_told(shape, batch, result, runs.systems)], rows)
+                yield from zip(group, [*_summaries(shape, batch, result, runs.systems)], rows)
 
-    def _flier_of(self, key: Hashable, system: System) -> tuple[Shape, Flier]:
+    def _runner_of(self, key: Hashable, system: System) -> tuple[Shape, BatchRunner]:
         if key not in self._shapes:
             models = {name: read_model(Path(component.fmu)) for name, component in system.components.items()}
             shape = Shape(system=check_against_fmus(system, models).system, models=models, lanes=self._lanes)
-            self._shapes[key] = shape, self._flier(shape, self._schedules)
+            self._shapes[key] = shape, self._new_runner(shape, self._schedules)
         return self._shapes[key]
 
 
 def _groups(indices: Sequence[int], timings: Mapping[int, Hashable], lanes: int) -> Iterator[list[int]]:
-    """Runs that go together: of one timing as far as that goes."""
+    """Runs that are simulated together, of one timing as far as possible."""
     alike: dict[Hashable, list[int]] = {}
     for index in indices:
         alike.setdefault(timings[index], []).append(index)
@@ -114,7 +114,9 @@ def _groups(indices: Sequence[int], timings: Mapping[int, Hashable], lanes: int)
         yield rest[first : first + lanes]
 
 
-def _told(shape: Shape, batch: Batch, result: BatchResult, systems: Sequence[System]) -> Iterator[RunSummary | None]:
+def _summaries(
+    shape: Shape, batch: Batch, result: BatchResult, systems: Sequence[System]
+) -> Iterator[RunSummary | None]:
     count, c = len(systems), structures(shape.lanes)
     numbers = batch.numbers(systems)
     values = zip(shape.nodes, combined([*shape.nodes.values()], result.reductions, numbers, count))
@@ -123,7 +125,7 @@ def _told(shape: Shape, batch: Batch, result: BatchResult, systems: Sequence[Sys
         steps = int(result.steps[lane])
         if result.outcome[lane] == c.RUNNING and not result.doubtful[lane]:
             end = nanoseconds(system.stop_time) / NANOSECONDS
-            metrics = {name: value[lane] if there[lane] else None for name, (there, value) in found.items()}
+            metrics = {name: value[lane] if valid[lane] else None for name, (valid, value) in found.items()}
             yield RunSummary(
                 metrics=metrics_of(
                     shape.system, metrics, end=end, stop_time=system.stop_time, divergence_time=None, steps=steps
@@ -132,7 +134,7 @@ def _told(shape: Shape, batch: Batch, result: BatchResult, systems: Sequence[Sys
             )
         elif result.outcome[lane] == c.DIVERGED:
             time = int(result.time[lane]) / NANOSECONDS
-            message = _complaint(shape, batch, system, lane, time)
+            message = _divergence_message(shape, batch, system, lane, time)
             metrics = metrics_of(
                 shape.system, None, end=time, stop_time=system.stop_time, divergence_time=time, steps=steps
             )
@@ -141,14 +143,14 @@ def _told(shape: Shape, batch: Batch, result: BatchResult, systems: Sequence[Sys
             yield None
 
 
-def _complaint(shape: Shape, batch: Batch, system: System, lane: int, t: float) -> str | None:
-    """How the values of a lane have diverged, as the look-out of a single run says it; None: it says they have not."""
+def _divergence_message(shape: Shape, batch: Batch, system: System, lane: int, t: float) -> str | None:
+    """How the values of a lane have diverged, as reported by the monitor of a single run; None if it disagrees."""
     streams, parameters = Streams(system.seed, system.streams), batch.parameters(lane, system)
     sources = {name: source_values(system, name, parameters, streams) for name in system.sources}
     signals = {name: system.sources[name].signals(name) for name in sources}
-    look = watch(system.criterion.diverged, shape.board, sources, signals, parameters)
+    monitor = watch(system.criterion.diverged, shape.board, sources, signals, parameters)
     shape.board.row[0] = t
     for column, place in shape.board.place.items():
         if column != "time":
             shape.board.row[place] = batch.value(column, lane)
-    return look(t)
+    return monitor(t)

@@ -10,19 +10,19 @@ from orchestration.expressions.syntax import Call, Name, Node
 
 
 @dataclass(frozen=True, kw_only=True)
-class Written:
-    """Expressions in C, and how their numbers are found in what it leaves behind."""
+class ExpressionCode:
+    """Expressions in C, and how their values follow from its final states."""
 
     text: str
     folds: Folds
 
     @property
     def states(self) -> Sequence[float]:
-        """What each state is at the beginning."""
+        """The initial value of each state."""
         return self.folds.writer.states
 
 
-def written(
+def expression_code(
     leaves: Mapping[str, Leaf],
     lines: Mapping[str, int],
     reductions: Mapping[Node, str],
@@ -30,11 +30,11 @@ def written(
     condition: Node | None,
     *,
     connections: Sequence[str],
-) -> Written:
+) -> ExpressionCode:
     """The C for reductions and the condition of divergence over `leaves`.
 
-    `lines` are signals on a line, by the connection that they come by; `reductions` what those that are inside others
-    are in C. Raises `UsageError` for what cannot be evaluated.
+    `lines` are the connections of signals that are extrapolated linearly, by signal; `reductions` the C of those inside
+    others. Raises `UsageError` for expressions that cannot be evaluated.
     """
     writer = ExpressionWriter(leaves, reductions)
     time = writer.before(Name(TIME))
@@ -64,7 +64,7 @@ def written(
             "q_mask doubtful = q_known(0);", *unused]  # fmt: skip
     done = [*writer.remembered(writer.now), "if (q_any(doubtful)) b->doubtful |= lanes_of(doubtful);", "return 1;"]
     step = [f"const q_real dt = q_select(m, t - {time}, q_all(0.0));"]
-    return Written(
+    return ExpressionCode(
         text="\n".join([
             *_function("void constants(Batch *b)", [*writer.once.lines, *constants]),
             *_function("q_mask holds(const Batch *b, q_real t)", [*known, *unused, *watched.lines, f"return {over};"]),
@@ -82,7 +82,7 @@ def written(
 
 
 class _Slopes:
-    """Of signals on a line: what arrived last, when, and how steep it goes on."""
+    """The last value, its time, and the slope of signals that are extrapolated linearly."""
 
     def __init__(self, writer: ExpressionWriter, lines: Mapping[str, int]) -> None:
         self.first: list[str] = []

@@ -1,4 +1,4 @@
-"""What reductions come to in objectives, for many runs at once: the functions of expressions over arrays of runs."""
+"""The values of objectives from those of their reductions, for many runs at once, as arrays over runs."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -15,15 +15,17 @@ from orchestration.expressions.syntax import Call, Node
 def combined(
     nodes: Sequence[Node], known: Mapping[Call, Floats], numbers: Mapping[str, Floats], count: int
 ) -> list[tuple[Floats, Booleans]]:
-    """The values of expressions in each of `count` runs, and where they have none.
+    """The values of expressions in each of `count` runs, and the runs in which they have none.
 
-    `known` are the reductions in them, NaN where there is none; `numbers` parameters and the stop time by name.
+    `known` are the values of the reductions in them, NaN for none; `numbers` are parameters and the stop time by name.
     """
-    of_all: Any = numbers
-    of_each: Any = known
-    at_rows = SpanValues(Recorded(time=np.zeros(0), signals={}, numbers=of_all, stop_time=0.0), of_each).at_rows
+    number_arrays: Any = numbers
+    reduction_arrays: Any = known
+    at_rows = SpanValues(
+        Recorded(time=np.zeros(0), signals={}, numbers=number_arrays, stop_time=0.0), reduction_arrays
+    ).at_rows
     unknown = {call: np.isnan(values) for call, values in known.items()}
-    found = []
+    results = []
     with np.errstate(all="ignore"):
         for node in nodes:
             values: Floats = np.empty(count)
@@ -32,5 +34,5 @@ def combined(
             for call in reductions(node):
                 if call in unknown:
                     none |= unknown[call]
-            found.append((values, none))
-    return found
+            results.append((values, none))
+    return results

@@ -1,7 +1,7 @@
-"""The functions over a run, such as max and integral, as C that goes from row to row: those of `reductions.py`.
+"""The functions over a run, such as max and integral, as C that processes row after row: those of `reductions.py`.
 
-Each is a number, in the end, of what its states have become. What has a value in continuous time alone has it just
-before the next row as at that row; what is held has there that of the row before.
+The value of each is computed from its final states. A signal in continuous time alone has the same value just before a
+row as at that row; a held signal has there the value of the row before.
 """
 
 from collections.abc import Callable
@@ -16,14 +16,12 @@ from orchestration.engines.batch.writing import ExpressionWriter, Kind, Moment, 
 from orchestration.expressions.syntax import Call, Name, Node, Sampled
 
 Value: TypeAlias = Callable[[Floats, Floats], Floats]
-"""From states, shape (states, lanes), and the time at the end, shape (lanes,), a number for each lane; NaN for none"""
+"""Computes a number for each lane, NaN for none, from states, shape (states, lanes), and end times, shape (lanes,)"""
 
 
 @dataclass(kw_only=True)
 class Rows:
-    """What is done at the rows of one kind: all, those at which messages of a connection arrive, or at which something
-    that is held may have changed.
-    """
+    """The C for rows of one kind: all, those with messages of a connection, those at which held values may change."""
 
     section: Section
     mask: str
@@ -36,7 +34,7 @@ class Rows:
 
 
 class Folds:
-    """Writes reductions, and knows what they come to."""
+    """Writes reductions, and how their values follow from states."""
 
     def __init__(self, writer: ExpressionWriter) -> None:
         self.writer = writer
@@ -45,12 +43,12 @@ class Folds:
         self.held = Rows(section=writer.held, mask="m")
         self.values: dict[Call, Value] = {}
         self.kept: dict[Call, int] = {}
-        """of growth_share, where its values are kept"""
+        """the numbers of the calls of growth_share whose values are kept"""
         self.steps: dict[Call, int] = {}
-        """and the state that counts them"""
+        """the states that count them"""
 
     def add(self, call: Call) -> None:
-        """Write one; raises `UsageError` for what is none."""
+        """Write a reduction; raises `UsageError` for an invalid argument."""
         argument = call.arguments[0]
         connection = argument.connection if isinstance(argument, Sampled) else None
         node = argument.argument if isinstance(argument, Sampled) else argument
@@ -100,7 +98,7 @@ class _Fold:
 
     @property
     def _is_mixed(self) -> bool:
-        """Whether it is something of its own just before the next row."""
+        """Whether its value just before a row is neither that of the row nor of the one before."""
         return not self.sampled and not (self._moves <= {"continuous"} or self._moves <= {"held"})
 
     # -- functions -------------------------------------------------------------------------------------------------
@@ -138,7 +136,7 @@ class _Fold:
         return self._rooted(lambda states, end: states[i] / end)
 
     def _mean_of_step(self) -> str:
-        """Over the step that ends at this row."""
+        """The C of the mean over the step that ends at this row."""
         writer = self.folds.writer
         before = writer.before(self.node)
         start = self._of_value(before, self.node)
@@ -176,7 +174,7 @@ class _Fold:
         return lambda states, end: states[i]
 
     def peak_time(self) -> Value:
-        """When the largest value is there first."""
+        """The time of the first largest value."""
         best, _ = self._state(-np.inf)
         time, i = self._state(np.nan)
         more = f"q_gt({self.x}, {best})"
@@ -185,7 +183,7 @@ class _Fold:
         return lambda states, end: states[i]
 
     def settling_time(self) -> Value:
-        """From when on |x| stays within the band."""
+        """The time from which |x| stays within the band."""
         since, i = self._state(-1.0)
         band = self.folds.writer.value(self.call.arguments[1], "row", self.rows.section)
         inside = f"q_le(q_fabs({self.x}), {band})"
@@ -194,7 +192,7 @@ class _Fold:
         return lambda states, end: np.where(states[i] < 0.0, np.nan, states[i])
 
     def total_variation(self) -> Value:
-        """How far x moves in all, along its course and where it jumps."""
+        """The sum of the changes of x, including jumps."""
         total, i = self._state()
         if self.sampled:
             last, _ = self._state(np.nan)
@@ -204,7 +202,7 @@ class _Fold:
                 self._set(last, self.x),
             ]
             return lambda states, end: states[i]
-        if self.rows is self.folds.held:  # one that is not a number would stay none at other rows
+        if self.rows is self.folds.held:  # NaN would be kept although other rows have numbers
             self.rows.always.append(f"doubtful |= m & q_isnan({self.x} - {self.x});")
         before = self.folds.writer.before(self.node)
         step = f"q_fabs({self.x} - {before})"
@@ -215,7 +213,7 @@ class _Fold:
         return lambda states, end: states[i]
 
     def growth_share(self) -> Value:
-        """Of the steps from one value to the next, the share that grows and ends above the floor: values are kept."""
+        """The share of the steps between values that grow and end above the floor: the values are kept."""
         last, _ = self._state(np.nan)
         steps, i = self._state(-1.0)
         number = self.folds.kept.setdefault(self.call, len(self.folds.kept))
@@ -224,7 +222,7 @@ class _Fold:
             self._set(last, self.x), self._set(steps, f"{steps} + q_all(1.0)"),
             f"if (!keep(&b->kept[{number}], {last})) return 0;",
         ]  # fmt: skip
-        return lambda states, end: np.full(len(end), np.nan)  # its floor is known when the run is over
+        return lambda states, end: np.full(len(end), np.nan)  # its floor is known at the end of the run
 
 
 def _has_time(node: Node) -> bool:

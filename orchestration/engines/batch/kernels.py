@@ -1,4 +1,4 @@
-"""What a batch calls: components in lanes, out of the sources of FMUs, and batch.c with a system's expressions."""
+"""Compiles what a batch calls: components in SIMD lanes, from the sources of FMUs, and batch.c for a system."""
 
 import ctypes
 import functools
@@ -20,12 +20,12 @@ from orchestration.engines.structures import HEADER, expect_same_sizes, shared
 from orchestration.fmi.model import Model
 
 FILES = (Path(__file__).with_name("batch.c"), INSTANTS, HEADER, FOLDER / "lanes.h", FOLDER / "mathematics.h")
-"""What it is made of, beside what is written for a system"""
+"""The sources of a batch, besides those that are generated for a system"""
 _SOURCES = "sources/"
 
 
 def preferred_lanes() -> int:
-    """How many runs this machine flies at once in one thread; raises `QuadcosimError` without a compiler."""
+    """How many runs this machine computes at once in a thread; raises `QuadcosimError` without a compiler."""
     try:
         return lanes_of_fmus()
     except PackagingError as error:
@@ -46,12 +46,12 @@ class Kernel:
 
 
 def component(name: str, model: Model, lanes: int) -> Kernel:
-    """The FMU of a component in lanes; raises `UsageError` naming it for one that has none."""
+    """The kernel of a component; raises `UsageError` naming it if its FMU has no sources for lanes."""
     return _compiled(tuple(sorted(sources_of(name, model).items())), lanes)
 
 
 def sources_of(name: str, model: Model) -> Mapping[str, bytes]:
-    """The sources of a component for lanes, by name; raises `UsageError` naming it for an FMU that has none."""
+    """The sources of a component for lanes, by name; raises `UsageError` naming it if its FMU has none."""
     sources = _sources_in(model.path, model.path.stat().st_mtime_ns)
     if MAIN not in sources or model.version != 2:
         raise UsageError(
@@ -70,14 +70,14 @@ def _sources_in(path: Path, changed: int) -> Mapping[str, bytes]:
 
 @functools.lru_cache(maxsize=64)
 def _compiled(sources: tuple[tuple[str, bytes], ...], lanes: int) -> Kernel:
-    how = (OPTIONS, FOR_THIS_PROCESSOR, lanes)
-    path = cached_library("lanes", dict(sources), how, lambda: compiled_lanes(dict(sources), lanes))
+    key = (OPTIONS, FOR_THIS_PROCESSOR, lanes)
+    path = cached_library("lanes", dict(sources), key, lambda: compiled_lanes(dict(sources), lanes))
     return Kernel(Lanes(path), path)
 
 
 @functools.lru_cache(maxsize=256)
 def batch(sizes: str, expressions: str, lanes: int) -> Any:
-    """The functions of batch.c with the expressions of a system."""
+    """The functions of batch.c, compiled with the expressions of a system."""
     sources = {path.name: path.read_bytes() for path in FILES}
     sources |= {"sizes.h": sizes.encode(), "expressions.h": expressions.encode()}
     options = (*FOR_THIS_PROCESSOR, f"-DQUADCOSIM_LANES={lanes}", "-Wno-psabi")

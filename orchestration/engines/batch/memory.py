@@ -1,4 +1,4 @@
-"""Where runs have their numbers: in memory of this process, unless they are flown where that does not reach."""
+"""Memory for the numbers of runs: of this process, unless a GPU computes them."""
 
 import ctypes
 import math
@@ -11,14 +11,14 @@ from orchestration.basics.simulator import Floats, Integers
 from orchestration.engines.structures import address
 
 _ALIGNED = 64
-"""[byte], as vector registers and the lines of caches like it"""
+"""[byte], the size of the largest vector registers and of cache lines"""
 
 
 class Memory:
-    """Gives room for numbers and structures that lasts as long as this, and addresses by which C finds them."""
+    """Provides memory for numbers and structures, which exists as long as this object, and addresses for C."""
 
     def __init__(self) -> None:
-        self._lasting: list[Any] = []
+        self._kept: list[Any] = []
 
     def numbers(self, *shape: int) -> Floats:
         """Zeros."""
@@ -29,22 +29,22 @@ class Memory:
         return self._room(*shape).view(np.int64)
 
     def structures(self, kind: Any, count: int) -> Any:
-        """So many structures of a kind, of zeros; of none there is one too, to have an address."""
+        """`count` structures of a kind, zeroed; for a count of 0 there is one, to have an address."""
         words = -(-ctypes.sizeof(kind) * max(1, count) // 8)
         return (kind * max(1, count)).from_buffer(self._room(words))
 
-    def lasting(self, array: npt.NDArray[Any]) -> int:
-        """Where C finds an array that does not change."""
-        self._lasting.append(array)
+    def permanent_address(self, array: npt.NDArray[Any]) -> int:
+        """The address, for C, of an array that does not change and is kept here."""
+        self._kept.append(array)
         return address(array)
 
-    def passing(self, array: npt.NDArray[Any]) -> int:
-        """The same, for as long as some runs take; whoever asks keeps the array."""
+    def temporary_address(self, array: npt.NDArray[Any]) -> int:
+        """The address of an array for the duration of some runs; the caller keeps the array."""
         return address(array)
 
     def _room(self, *shape: int) -> Integers:
         count = math.prod(shape)
         whole = np.zeros(count + _ALIGNED // 8, dtype=np.int64)
-        self._lasting.append(whole)
+        self._kept.append(whole)
         first = (-address(whole) // 8) % (_ALIGNED // 8)
         return whole[first : first + count].reshape(shape)

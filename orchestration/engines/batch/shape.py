@@ -1,4 +1,4 @@
-"""What runs have in common that are flown in lanes of one batch: their components, connections and expressions."""
+"""What the runs of one batch have in common: their components, connections and expressions."""
 
 import re
 from collections.abc import Hashable, Mapping, Sequence, Set
@@ -12,7 +12,7 @@ import numpy.typing as npt
 from orchestration.basics.identity import IdentityCache
 from orchestration.basics.simulator import Booleans
 from orchestration.engines import initial
-from orchestration.engines.batch.code import Written, written
+from orchestration.engines.batch.code import ExpressionCode, expression_code
 from orchestration.engines.batch.kernels import Kernel, batch, component, preferred_lanes
 from orchestration.engines.batch.writing import Kind, Leaf
 from orchestration.engines.board import Board
@@ -37,13 +37,13 @@ from orchestration.system.variable_names import component_of, variable_of
 Places = npt.NDArray[np.int64]
 c = structures(1)
 _TAKES = {"Boolean": c.TRUTH, "Integer": c.WHOLE, "Enumeration": c.WHOLE}
-"""By kind of an input that is no Real"""
+"""By kind of an input that is not a Real"""
 _SIGNAL = re.compile(r"SIGNAL\((\d+), (\d+)\)")
-"""As expressions name the place of a variable, after the index of its component"""
+"""The index of a component, and the place of a variable in its memory, in the C of expressions"""
 
 
 def outline(system: System) -> Hashable:
-    """What two systems must have in common to be flown in lanes of one batch."""
+    """The key that systems must have in common to be run in one batch."""
     components = tuple(
         (name, c.fmu, c.record, c.sampling and c.sampling.clock) for name, c in system.components.items()
     )
@@ -81,7 +81,7 @@ def _kind(source: Source) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class Shape:
-    """A structure of systems, made from one of them that fits its FMUs."""
+    """The common structure of systems, made from one of them that was checked against its FMUs."""
 
     system: System
     models: Mapping[str, Model]
@@ -91,7 +91,7 @@ class Shape:
 
     @cached_property
     def kernels(self) -> Mapping[str, Kernel]:
-        """Of each component; raises `UsageError` naming one that has none."""
+        """The kernel of each component; raises `UsageError` naming one that has none."""
         return {name: component(name, model, self.lanes) for name, model in self.models.items()}
 
     @cached_property
@@ -101,17 +101,17 @@ class Shape:
 
     @cached_property
     def wires(self) -> Wires:
-        """What reaches what, and what is read of the components."""
+        """How the components are connected, and which variables are read."""
         return Wires(self.system, recorded_variables(self.system, self.models))
 
     @property
     def board(self) -> Board:
-        """What is read of the components."""
+        """The variables that are read."""
         return self.wires.board
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the components."""
+        """The names of the components."""
         return self.wires.names
 
     def variable(self, end: str) -> Variable:
@@ -129,7 +129,7 @@ class Shape:
 
     @cached_property
     def fed(self) -> Mapping[str, list[tuple[int, int]]]:
-        """By component, what sources feed: which of all their signals, into which place of its memory."""
+        """By component, its inputs from sources: the index among all their signals, and the place in its memory."""
         found: dict[str, list[tuple[int, int]]] = {name: [] for name in self.names}
         number = 0
         for source in self.system.sources.values():
@@ -150,19 +150,19 @@ class Shape:
         """Whether a connection or an expression reads each variable of a component."""
         index, found = self.names.index(name), np.zeros(self.kernels[name].lanes.variables, dtype=np.bool_)
         found[self.connected[name]] = True
-        found[[int(place) for of, place in _SIGNAL.findall(self.written.text) if int(of) == index]] = True
+        found[[int(place) for owner, place in _SIGNAL.findall(self.expressions.text) if int(owner) == index]] = True
         return found
 
     @property
     def fed_changes(self) -> bool:
-        """Whether what is fed is not the same in the whole run."""
+        """Whether an input from a source may change in a run."""
         return any(source.to and source.constant is None for source in self.system.sources.values())
 
     # -- expressions -----------------------------------------------------------------------------------------------
 
     @cached_property
     def nodes(self) -> Mapping[str, Node]:
-        """Objectives and what is good, by name, with those that they name in place of their names."""
+        """Objectives and the condition of a good run, by name, with the objectives that they name inlined."""
         found: dict[str, Node] = {}
         texts = dict(self.system.objectives)
         if self.system.criterion.good is not None:
@@ -173,13 +173,13 @@ class Shape:
 
     @cached_property
     def condition(self) -> Node | None:
-        """By which a run has diverged."""
+        """The condition of divergence."""
         text = self.system.criterion.diverged
         return None if text is None else parse(text)
 
     @cached_property
     def calls(self) -> Mapping[Call, Call]:
-        """Reductions in the objectives, by themselves over signals alone; those inside others first."""
+        """The reductions in the objectives, each over signals alone; those inside others first."""
         found = {}
         for node in self.nodes.values():
             for call in sorted(reductions(node), key=_passes):
@@ -190,18 +190,18 @@ class Shape:
 
     @cached_property
     def passes(self) -> int:
-        """How often a run is to be flown: what is inside another reduction has to be known before."""
+        """How often a run is simulated: a reduction inside another one must be known before."""
         return max(map(_passes, self.calls), default=1)
 
     @cached_property
     def inner(self) -> tuple[Call, ...]:
-        """Reductions that others need to know at every row."""
+        """Reductions whose values others need at every row."""
         return tuple(dict.fromkeys(part for call in self.calls for node in _at_rows(call) for part in reductions(node)))
 
     @cached_property
     def numbers(self) -> tuple[str, ...]:
         """Parameters that expressions name, as COMPONENT.NAME."""
-        wanted = self._wanted
+        wanted = self._expression_names
         return tuple(name for name in sorted(wanted) if names_job_measure(name) or self._is_parameter(name))
 
     @cached_property
@@ -211,20 +211,21 @@ class Shape:
             name: source.signals(name)
             for name, source in self.system.sources.items()
             if any(
-                signal in self._wanted or signal.rpartition(".")[0] in self._wanted for signal in source.signals(name)
+                signal in self._expression_names or signal.rpartition(".")[0] in self._expression_names
+                for signal in source.signals(name)
             )
         }
 
     @cached_property
-    def written(self) -> Written:
-        """The expressions in C; raises `UsageError` for what cannot be evaluated."""
+    def expressions(self) -> ExpressionCode:
+        """The expressions in C; raises `UsageError` for those that cannot be evaluated."""
         known = {
             scalars(call, self._vectors)[0]: f"NUMBER({len(self.numbers) + 1 + i})" for i, call in enumerate(self.inner)
         }
         condition = None
         if self.condition is not None:
             (condition,) = scalars(self.condition, self._vectors)
-        return written(
+        return expression_code(
             self._leaves,
             self._lines,
             known,
@@ -235,23 +236,23 @@ class Shape:
 
     @cached_property
     def texts(self) -> Mapping[str, str]:
-        """What is written for it of what flies it, by the names that batch.c includes."""
+        """The texts that are generated for it, by the names that batch.c includes."""
         bits = ", ".join(f"1ull << {lane}" for lane in range(self.lanes))
-        sizes = {  # rounded up, so that systems that come to the same are flown by the same
+        sizes = {  # rounded up, so that similar systems share a library
             "COMPONENTS": -8 * (-len(self.names) // 8), "CHANNELS": -8 * (-len(self.system.connections) // 8) or 8,
-            "HAS_CONDITION": int(self.condition is not None), "KEPT": len(self.written.folds.kept),
+            "HAS_CONDITION": int(self.condition is not None), "KEPT": len(self.expressions.folds.kept),
             "LANE_BITS": f"{{{bits}}}",
         }  # fmt: skip
         lines = "".join(f"#define {name} {value}\n" for name, value in sizes.items())
-        return {"sizes.h": lines, "expressions.h": self.written.text}
+        return {"sizes.h": lines, "expressions.h": self.expressions.text}
 
     @cached_property
     def library(self) -> Any:
-        """What flies them in lanes of vector registers."""
+        """The functions that run its systems in SIMD lanes."""
         return batch(self.texts["sizes.h"], self.texts["expressions.h"], self.lanes)
 
     @cached_property
-    def _wanted(self) -> set[str]:
+    def _expression_names(self) -> set[str]:
         nodes = [*self.nodes.values(), *([] if self.condition is None else [self.condition])]
         return {name for node in nodes for name in names(node)}
 
@@ -262,7 +263,7 @@ class Shape:
 
     @cached_property
     def _signals(self) -> dict[str, Leaf]:
-        """What is recorded, and the signals of sources."""
+        """The recorded signals, and those of sources."""
         held = {end: self._kind_of(x) for x in self.system.connections for end in x.end}
         found = {}
         for signal in self.board.columns[1:]:
@@ -298,18 +299,18 @@ class Shape:
 
 
 def _at_rows(call: Call) -> tuple[Node, ...]:
-    """What of a reduction has to be known row by row."""
+    """The arguments of a reduction that must be known row by row."""
     return call.arguments[:1] if call.function == "growth_share" else call.arguments
 
 
 def _passes(call: Call) -> int:
-    """In which pass over the run a reduction can be found, counted from 1."""
+    """The pass over the run in which a reduction can be computed, counted from 1."""
     return 1 + max((_passes(inner) for node in _at_rows(call) for inner in reductions(node)), default=0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Ends:
-    """The ends of a connection in memories, and what its receiver takes."""
+    """The places of the ends of a connection, and the kinds and bounds of its receiver's inputs."""
 
     start: Places
     end: Places
@@ -319,7 +320,7 @@ class Ends:
 
 
 def ends_of(shape: Shape, x: Connection) -> Ends:
-    """The places of what a connection carries."""
+    """The ends of a connection."""
     receivers = [shape.variable(end) for end in x.end]
     bounds = np.iinfo(np.int32)
     return Ends(
@@ -336,9 +337,9 @@ def changes_of(x: Connection) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.f
 
 
 def expect_lanes(system: System, models: Mapping[str, Model]) -> None:
-    """Compile what flies a system in lanes, after it was checked against its models.
+    """Compile what runs a system in SIMD lanes, after it was checked against its models.
 
-    Raises `UsageError` for one that cannot be, naming what it lacks; `QuadcosimError` without a compiler.
+    Raises `UsageError` if it cannot be run in lanes, naming what it lacks; `QuadcosimError` without a compiler.
     """
     shape = Shape(system=system, models=models, lanes=preferred_lanes())
     assert shape.kernels

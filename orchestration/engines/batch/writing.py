@@ -1,4 +1,4 @@
-"""Expressions as C over lanes: at a row, just before the next one, and half-way, as in `expressions/over_span.py`."""
+"""Expressions as C over SIMD lanes: at a row, just before the next, and half-way, as in `expressions/over_span.py`."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -10,40 +10,40 @@ from orchestration.expressions.syntax import Call, Name, Node, Number, Operation
 
 Moment: TypeAlias = Literal["row", "end", "middle"]
 Kind: TypeAlias = Literal["number", "continuous", "held", "line"]
-"""What a value does from row to row: it is the same in the whole run, moves, stays, or follows a line"""
+"""How a value changes between rows: never in the run, continuously, not at all, or linearly"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Leaf:
-    """What a name is in C, and what it does."""
+    """The C of a name, and how its value changes."""
 
     code: str
     kind: Kind
 
 
 class Section:
-    """Lines of C, and the names in them of what they have found; those of a section `before` are known too."""
+    """Lines of C, and the names of the values that they compute; those of a section `before` are known too."""
 
     def __init__(self, prefix: str, before: "Section | None" = None) -> None:
         self.lines: list[str] = []
-        self._prefix, self._before, self._found = prefix, before, dict[object, str]()
+        self._prefix, self._before, self._names = prefix, before, dict[object, str]()
 
     def named(self, key: object, code: Callable[[], str], kind: str = "q_real") -> str:
-        """The name of a value, which is computed once."""
+        """The name of a value, which is computed on first use."""
         known = self._known(key)
         if known is None:
             computed = code()
-            known = self._found[key] = f"{self._prefix}{len(self.lines)}"
+            known = self._names[key] = f"{self._prefix}{len(self.lines)}"
             self.lines.append(f"const {kind} {known} = {computed};")
         return known
 
     def _known(self, key: object) -> str | None:
         before = None if self._before is None else self._before._known(key)
-        return self._found.get(key, before)
+        return self._names.get(key, before)
 
 
 class ExpressionWriter:
-    """Writes expressions of one number at an instant, as `scalars` makes them; what they need is kept from row to row.
+    """Writes scalar expressions at an instant, as `scalars` makes them; values that they need are kept between rows.
 
     Its C calls `row` states STATE(i), and constants of a run CONSTANT(i).
     """
@@ -51,27 +51,27 @@ class ExpressionWriter:
     def __init__(self, leaves: Mapping[str, Leaf], reductions: Mapping[Node, str]) -> None:
         self._leaves, self._reductions = leaves, reductions
         self.once = Section("c")
-        """what is the same in the whole run"""
+        """what is constant in a run"""
         self.now = Section("x")
         """what is computed at every row"""
         self.held = Section("h", self.now)
         """what is computed at rows at which something that is held may have changed"""
         self.step = Section("e", self.now)
-        """what is computed of the step that ends at a row"""
+        """what is computed for the step that ends at a row"""
         self.states: list[float] = []
-        """of each, what it is at the beginning"""
+        """initial values"""
         self.constants: dict[Node, int] = {}
         self._before: dict[Node, int] = {}
         self.slopes: dict[str, str] = {}
-        """of signals on a line, where it is asked for"""
+        """states with the slopes of signals that are extrapolated linearly, where needed"""
 
     def state(self, begin: float = 0.0) -> str:
-        """A number of each lane that lasts from row to row."""
+        """The C of a new state: a number of each lane that is kept between rows."""
         self.states.append(begin)
         return f"STATE({len(self.states) - 1})"
 
     def before(self, node: Node) -> str:
-        """What an expression was at the row before."""
+        """The value of an expression at the row before."""
         if node not in self._before:
             self.state()
             self._before[node] = len(self.states) - 1
@@ -79,7 +79,7 @@ class ExpressionWriter:
         return f"STATE({self._before[node]})"
 
     def remembered(self, section: Section) -> list[str]:
-        """Lines by which what has been asked for by `before`, and is computed in a section, is kept."""
+        """Lines that keep the values requested by `before` that are computed in a section."""
         states = {f"STATE({i})": node for node, i in self._before.items() if self._section_of(node) is section}
         values = {state: self.value(node, "row", section) for state, node in states.items()}
         return [f"{state} = q_select(m, {value}, {state});" for state, value in values.items()]
@@ -92,7 +92,7 @@ class ExpressionWriter:
         return all(self.kinds(node) <= {"number", "held"} for node in nodes)
 
     def kinds(self, node: Node) -> set[Kind]:
-        """What the values in an expression do from row to row."""
+        """How the values in an expression change between rows."""
         if isinstance(node, Name):
             return {self.leaf(node.text).kind}
         if node in self._reductions:
@@ -101,7 +101,7 @@ class ExpressionWriter:
         return {kind for part in parts for kind in self.kinds(part)}
 
     def value(self, node: Node, place: Moment, into: Section) -> str:
-        """The name, in C, of the value of an expression."""
+        """The C of the value of an expression."""
         kinds = self.kinds(node)
         if isinstance(node, Number):
             return f"q_all({node.value!r})"
@@ -115,7 +115,7 @@ class ExpressionWriter:
         return into.named((node, place), lambda: self._code(node, place, into))
 
     def truth(self, node: Node, place: Moment, into: Section) -> str:
-        """The mask of the lanes in which it is not zero."""
+        """The mask of the lanes in which an expression is not zero."""
         is_here = place == "row" or self.kinds(node) - {"number", "held"}
         if (
             isinstance(node, Operation)
@@ -127,7 +127,7 @@ class ExpressionWriter:
         return f"q_ne({self.value(node, place, into)}, 0.0)"
 
     def leaf(self, name: str) -> Leaf:
-        """What a name is; raises `UsageError` for one that is not there."""
+        """The leaf of a name; raises `UsageError` for an unknown one."""
         if name not in self._leaves:
             raise UsageError(
                 f"there is no {name}; expected a recorded signal, time, stop_time or an objective above it"

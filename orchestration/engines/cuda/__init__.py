@@ -1,1 +1,1 @@
-"""Runs in threads of a GPU, one in each: the text of lanes as CUDA, what compiles it and what flies it."""
+"""The engine `cuda`: many runs at once, one in each thread of a GPU, by the C for SIMD lanes compiled as CUDA."""

@@ -1,4 +1,4 @@
-"""Many batches of one shape on a GPU: each of their lanes in a thread."""
+"""Runs many batches of one shape on a GPU, each of their lanes in a thread."""
 
 import ctypes
 import itertools
@@ -11,7 +11,7 @@ import numpy as np
 
 from orchestration.basics.errors import QuadcosimError
 from orchestration.basics.simulator import Floats
-from orchestration.engines.batch.batch import Batch, BatchResult, Going, Group, Run, Track
+from orchestration.engines.batch.batch import Batch, BatchResult, Group, Run, Stepwise, Track
 from orchestration.engines.batch.batches import Batches
 from orchestration.engines.batch.shape import Shape
 from orchestration.engines.cuda.compiler import compiled, expect_compiler
@@ -24,15 +24,15 @@ from orchestration.schedule.schedule_cache import RunSchedule, ScheduleCache, Ti
 from orchestration.system.model import System
 
 _MESSAGES, _VALUES = 16, 1024
-"""On their way over a connection, and kept of an expression: what there is room for at first"""
-_MORE = 8
-"""times as much, where there is too little: its runs begin again"""
-_MOST = 2**12
-"""Groups at once"""
+"""Initial capacities: messages on their way over a connection, and values kept of an expression"""
+_GROWTH = 8
+"""Factor by which a capacity grows if it is exceeded; the runs of the batch are repeated"""
+_MOST_GROUPS = 2**12
+"""Largest number of groups that are run at once"""
 
 
 def expect_gpu() -> None:
-    """Raise `QuadcosimError` if nothing can be flown on a GPU here, saying what is missing."""
+    """Raise `QuadcosimError` if runs on a GPU are not possible here, naming what is missing."""
     try:
         expect_compiler()
         Gpu()
@@ -41,12 +41,12 @@ def expect_gpu() -> None:
 
 
 def batches() -> Batches:
-    """Batches that fly on a GPU; raises `QuadcosimError` without one."""
+    """Batches that run on a GPU; raises `QuadcosimError` without one."""
     return Batches(partial(Fleet, gpu=Gpu()))
 
 
 class Fleet:
-    """Flies groups of runs of a shape, all at once."""
+    """Runs groups of runs of a shape, all at once."""
 
     def __init__(self, shape: Shape, schedules: ScheduleCache, gpu: Gpu) -> None:
         self._shape, self._schedules, self._gpu = shape, schedules, gpu
@@ -56,109 +56,111 @@ class Fleet:
         self._batches: list[_Threads] = []
 
     def run(self, groups: Sequence[Group], record: Sequence[str] | None = None) -> list[tuple[Batch, BatchResult]]:
-        """The groups in their order, each with the batch that has flown it."""
+        """The results of groups in their order, each with the batch that has run it."""
         while len(self._batches) < len(groups):
             self._batches.append(_Threads(self._shape, self._schedules, self._memory))
         try:
-            found = self._results(groups, record)
+            results = self._results(groups, record)
         finally:
-            self._memory.forget()
-        return [(self._batches[i], found[i]) for i in range(len(groups))]
+            self._memory.release_temporary()
+        return [(self._batches[i], results[i]) for i in range(len(groups))]
 
     def each(self, groups: Sequence[Group], record: Sequence[str] | None) -> Iterator[tuple[Batch, BatchResult]]:
-        """The same of any number of groups, some thousands at once."""
-        for first in range(0, len(groups), _MOST):
-            yield from self.run(groups[first : first + _MOST], record)
+        """The same for any number of groups, some thousands at once."""
+        for first in range(0, len(groups), _MOST_GROUPS):
+            yield from self.run(groups[first : first + _MOST_GROUPS], record)
 
     def _results(self, groups: Sequence[Group], record: Sequence[str] | None) -> Mapping[int, BatchResult]:
-        found: dict[int, BatchResult] = {}
-        going: dict[int, Going] = {}
-        begin = [*range(len(groups))]
-        while begin or going:
-            for i in begin:
-                going[i] = self._batches[i].going(groups[i], record)
-                next(going[i])
-            flying = [self._batches[i] for i in going if self._batches[i].flying]
-            if flying:
-                self._expect_known(flying)
-                self._go_on(flying)
-            begin = [i for i in going if self._batches[i].makes_room()]
-            for i in sorted({*going} - {*begin}):
+        results: dict[int, BatchResult] = {}
+        running: dict[int, Stepwise] = {}
+        to_begin = [*range(len(groups))]
+        while to_begin or running:
+            for i in to_begin:
+                running[i] = self._batches[i].stepwise(groups[i], record)
+                next(running[i])
+            alive = [self._batches[i] for i in running if self._batches[i].lanes_alive]
+            if alive:
+                self._update_kernel(alive)
+                self._launch(alive)
+            to_begin = [i for i in running if self._batches[i].grow_if_full()]
+            for i in sorted({*running} - {*to_begin}):
                 try:
-                    going[i].send(self._batches[i].waiting())
+                    running[i].send(self._batches[i].waiting_tracks())
                 except StopIteration as end:
-                    found[i] = end.value
-                    del going[i]
-        return found
+                    results[i] = end.value
+                    del running[i]
+        return results
 
-    def _expect_known(self, batches: Sequence["_Threads"]) -> None:
-        """Have what flies them know no other numbers than those that are the same in all runs, now and before."""
-        found = {
-            name: _the_same(code, np.hstack([batch.begins_with(i) for batch in batches]))
+    def _update_kernel(self, batches: Sequence["_Threads"]) -> None:
+        """Compile a kernel whose constants are the numbers that are the same in all runs, now and before."""
+        common = {
+            name: _common_numbers(code, np.hstack([batch.memory_alive(i) for batch in batches]))
             for i, (name, code) in enumerate(self._codes.items())
         }
         if self._known is not None:
-            found = {
-                name: {place: x for place, x in known.items() if found[name].get(place, np.nan).hex() == x.hex()}
+            common = {
+                name: {place: x for place, x in known.items() if common[name].get(place, np.nan).hex() == x.hex()}
                 for name, known in self._known.items()
             }
-        if found != self._known:
-            self._known = found
-            text = program(self._shape, self._codes, found)
-            self._fly = self._gpu.kernel(compiled(text, self._gpu.architecture), "fly")
+        if common != self._known:
+            self._known = common
+            text = program(self._shape, self._codes, common)
+            self._kernel = self._gpu.kernel(compiled(text, self._gpu.architecture), "fly")
 
-    def _go_on(self, batches: Sequence["_Threads"]) -> None:
+    def _launch(self, batches: Sequence["_Threads"]) -> None:
         addresses = np.array([batch.address for batch in batches], dtype=np.int64)
-        self._gpu.launch(self._fly, len(batches) * self._shape.lanes, self._memory.passing(addresses), len(batches))
+        self._gpu.launch(
+            self._kernel, len(batches) * self._shape.lanes, self._memory.temporary_address(addresses), len(batches)
+        )
 
 
-def _the_same(code: Code, memory: Floats) -> Known:
-    """What is the same in all runs, of numbers that may be known."""
+def _common_numbers(code: Code, memory: Floats) -> Known:
+    """The numbers that are the same in all runs, of those that may be constants."""
     numbers = memory[[*code.constant.values()]]
     bits = numbers.view(np.int64)
-    alike = (bits == bits[:, :1]).all(axis=1) & np.isfinite(numbers).all(axis=1)
-    return {name: float(row[0]) for name, row, same in zip(code.constant, numbers, alike) if same}
+    same_in_all = (bits == bits[:, :1]).all(axis=1) & np.isfinite(numbers).all(axis=1)
+    return {name: float(row[0]) for name, row, same in zip(code.constant, numbers, same_in_all) if same}
 
 
 class _Threads(Batch):
-    """A batch whose lanes go on by themselves: each has a track, and values that it keeps, of its own."""
+    """A batch whose lanes are independent: each has its own track and its own kept values."""
 
     def __init__(self, shape: Shape, schedules: ScheduleCache, memory: SharedMemory) -> None:
         super().__init__(shape, schedules, memory)
-        self._kept_count = len(self._written.folds.kept)
+        self._kept_count = len(self._expressions.folds.kept)
         self._kept = memory.structures(self._c.Kept, self._kept_count * self._lanes)
         self._batch.kept = ctypes.addressof(self._kept)
         self._values: dict[int, Floats] = {}
-        """that are kept of an expression, shape (rows, lanes)"""
+        """the kept values of expressions, shape (rows, lanes)"""
         for i in range(self._kept_count):
             self._make_room_to_keep(i, _VALUES)
         for channel in self._channels:
             self._make_room(channel, _MESSAGES)
 
     def __del__(self) -> None:
-        """What there is room for belongs to the memory."""
+        """The buffers belong to the memory."""
 
-    def waiting(self) -> list[int]:
-        """The tracks that ask for their next window."""
-        return [lane for lane in self.flying if self._batch.returned[lane] == self._c.NEXT_WINDOW]
+    def waiting_tracks(self) -> list[int]:
+        """The tracks that need their next window."""
+        return [lane for lane in self.lanes_alive if self._batch.returned[lane] == self._c.NEXT_WINDOW]
 
     @property
-    def flying(self) -> list[int]:
-        """The lanes that go on."""
+    def lanes_alive(self) -> list[int]:
+        """The lanes whose runs have not ended."""
         return [lane for lane in range(self._lanes) if self._batch.alive >> lane & 1]
 
-    def begins_with(self, component: int) -> Floats:
-        """The memory of a component in the runs that go on."""
-        return self.memories[component][:, self.flying]
+    def memory_alive(self, component: int) -> Floats:
+        """The memory of a component in the runs that have not ended."""
+        return self.memories[component][:, self.lanes_alive]
 
-    def makes_room(self) -> bool:
-        """Whether there was too little room for some lane: there is more now, to begin again."""
+    def grow_if_full(self) -> bool:
+        """Enlarge the buffers if one was too small for some lane; whether the runs must be repeated."""
         if self._c.NO_MEMORY not in self._batch.returned[:]:
             return False
         for i, values in self._values.items():
-            self._make_room_to_keep(i, _MORE * len(values))
+            self._make_room_to_keep(i, _GROWTH * len(values))
         for channel in self._channels:
-            self._make_room(channel, _MORE * channel.capacity)
+            self._make_room(channel, _GROWTH * channel.capacity)
         return True
 
     def _make_room_to_keep(self, i: int, count: int) -> None:
@@ -171,11 +173,11 @@ class _Threads(Batch):
         channel.flight, channel.capacity = address(self._array(count * channel.size)), count
 
     def _result(self, systems: Sequence[System], recorded: Sequence[Floats]) -> BatchResult:
-        """Its rows are no longer in memory that is given back."""
+        """As in a batch, with copies of the rows, since their memory is reused."""
         result = super()._result(systems, recorded)
         return replace(result, signals=[rows.copy() for rows in result.signals])
 
-    # -- what is each lane's own -------------------------------------------------------------------------------------
+    # -- separately for each lane ------------------------------------------------------------------------------------
 
     def _clear(self) -> None:
         super()._clear()
@@ -190,12 +192,12 @@ class _Threads(Batch):
         for timing, course in courses.items():
             lanes = [lane for lane, own in enumerate(timings) if own == timing]
             for lane, spans in zip(lanes, itertools.tee(course.spans, len(lanes))):
-                found[lane] = self._track([lane], spans, alike=True)
+                found[lane] = self._track([lane], spans, same_sources=True)
         return [found[lane] for lane in sorted(found)]
 
     def _growth(self, call: Call, own: Call, values: Mapping[Call, Floats]) -> Floats:
-        """A lane may have kept fewer values than others; what is not a number does not grow."""
-        i = self._written.folds.kept[own]
+        """As in a batch; a lane that has kept fewer values than others is filled with NaN, which does not grow."""
+        i = self._expressions.folds.kept[own]
         kept = self._kept[i :: self._kept_count]
         for lane, each in enumerate(kept):
             self._values[i][each.count :, lane] = np.nan

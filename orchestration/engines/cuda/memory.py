@@ -1,4 +1,4 @@
-"""Memory that a GPU and this process share: each finds it by the same addresses (CUDA calls it managed)."""
+"""Memory that a GPU and this process share at the same addresses (CUDA calls it managed)."""
 
 import ctypes
 import math
@@ -15,41 +15,41 @@ from orchestration.engines.cuda.driver import Gpu
 from orchestration.engines.structures import address
 
 _LINE = 64
-"""[byte] that what is asked for begins at a multiple of"""
+"""[byte], the alignment of what is handed out"""
 _SLAB = 1 << 24
-"""[byte] that are allocated at once, or more"""
+"""[byte], the smallest allocation"""
 
 
 class SharedMemory(Memory):
-    """Gives room that a GPU reaches; freed with this."""
+    """Provides memory that a GPU can access; freed with this object."""
 
     def __init__(self, gpu: Gpu) -> None:
         super().__init__()
         self._gpu = gpu
-        self._own, self._passing = _Slabs(gpu), _Slabs(gpu)
-        self._known: dict[int, tuple[npt.NDArray[Any], int]] = {}
+        self._permanent, self._temporary = _Slabs(gpu), _Slabs(gpu)
+        self._copies: dict[int, tuple[npt.NDArray[Any], int]] = {}
 
-    def lasting(self, array: npt.NDArray[Any]) -> int:
-        """Where both find a copy of an array."""
-        return self._own.copied(array)
+    def permanent_address(self, array: npt.NDArray[Any]) -> int:
+        """The address of a copy of an array."""
+        return self._permanent.copied(array)
 
-    def passing(self, array: npt.NDArray[Any]) -> int:
-        """The same until `forget`; of an array that many ask for, as the instants of one timing, there is one copy."""
-        if id(array) not in self._known:
-            self._known[id(array)] = array, self._passing.copied(array)
-        return self._known[id(array)][1]
+    def temporary_address(self, array: npt.NDArray[Any]) -> int:
+        """The same, valid until `release_temporary`; repeated calls with one array share a copy."""
+        if id(array) not in self._copies:
+            self._copies[id(array)] = array, self._temporary.copied(array)
+        return self._copies[id(array)][1]
 
-    def forget(self) -> None:
-        """The runs are over that arrays were passed for."""
-        self._known.clear()
-        self._passing.reuse()
+    def release_temporary(self) -> None:
+        """Reuse the memory of the copies with temporary addresses."""
+        self._copies.clear()
+        self._temporary.reuse()
 
     def _room(self, *shape: int) -> Integers:
-        return self._own.room(8 * math.prod(shape)).view(np.int64).reshape(shape)
+        return self._permanent.room(8 * math.prod(shape)).view(np.int64).reshape(shape)
 
 
 class _Slabs:
-    """Allocated in large pieces, handed out in small ones."""
+    """Memory that is allocated in large pieces and handed out in small ones."""
 
     def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
@@ -69,8 +69,8 @@ class _Slabs:
             self._at, self._used = self._at + 1, 0
         if self._at == len(self._slabs):
             whole = max(size_of_lines, _SLAB)
-            there = (ctypes.c_uint8 * whole).from_address(self._gpu.allocate(whole))
-            self._slabs.append(np.ctypeslib.as_array(there))
+            allocated = (ctypes.c_uint8 * whole).from_address(self._gpu.allocate(whole))
+            self._slabs.append(np.ctypeslib.as_array(allocated))
             self._used = 0
         room = self._slabs[self._at][self._used : self._used + size]
         self._used += size_of_lines
@@ -78,7 +78,7 @@ class _Slabs:
         return room
 
     def reuse(self) -> None:
-        """Hand out the same again."""
+        """Hand out the same memory again."""
         self._at = self._used = 0
 
 

@@ -41,7 +41,7 @@ def test_a_line_with_the_numbers_of_a_study_spills_nothing(component: str) -> No
     flight = located(Scenario(stop_time=0.1).as_system())
     shape = shape_of(flight)
     batch = Batch(shape, ScheduleCache())
-    next(batch.going(group_of([flight])))
+    next(batch.stepwise(group_of([flight])))
     code = Code.of(component, shape.models[component])
     memory = batch.memories[shape.names.index(component)]
     known = {name: float(memory[place, 0]) for name, place in code.constant.items()}
