@@ -18,7 +18,7 @@ from orchestration.certificates.breaking import least_breaking
 from orchestration.certificates.certificate import Certificate, read_certificate
 from orchestration.certificates.certify import find_certificate
 from orchestration.certificates.checker import verified
-from orchestration.certificates.family import Family
+from orchestration.certificates.family import LoopFamily
 from tests.orchestration.certificates.loops import HOVER_A, HOVER_B, HOVER_F, late_command, switched
 
 EACH = 50
@@ -42,13 +42,13 @@ def main() -> None:
     print(f"one number of {ALTERED} altered: {_rejected(found.certificate)} rejected, the others prove another loop")
 
 
-def _switched() -> Iterator[tuple[Family, Family]]:
+def _switched() -> Iterator[tuple[LoopFamily, LoopFamily]]:
     for seed in range(EACH):
         random = np.random.default_rng(seed)
         pair = [random.normal(size=(3, 3)) for _ in range(2)]
         pair = [m / np.abs(np.linalg.eigvals(m)).max() for m in pair]
 
-        def of_size(size: float, pair=pair) -> Family:  # type: ignore[no-untyped-def]
+        def of_size(size: float, pair=pair) -> LoopFamily:  # type: ignore[no-untyped-def]
             return switched(*[size * m for m in pair])
 
         broken = least_breaking(of_size, 1.05)
@@ -56,7 +56,7 @@ def _switched() -> Iterator[tuple[Family, Family]]:
         yield of_size(BEYOND * broken.value), of_size(BELOW * broken.value)
 
 
-def _late() -> Iterator[tuple[Family, Family]]:
+def _late() -> Iterator[tuple[LoopFamily, LoopFamily]]:
     count, seed = 0, 0
     while count < EACH:
         random, seed = np.random.default_rng([1, seed]), seed + 1
@@ -67,7 +67,7 @@ def _late() -> Iterator[tuple[Family, Family]]:
         P = solve_discrete_are(held, moved, np.eye(n), np.eye(1))
         F = -np.linalg.solve(np.eye(1) + moved.T @ P @ moved, moved.T @ P @ held)
 
-        def up_to(jitter: float, A=A, B=B, F=F) -> Family:  # type: ignore[no-untyped-def]
+        def up_to(jitter: float, A=A, B=B, F=F) -> LoopFamily:  # type: ignore[no-untyped-def]
             return late_command(A, B, F, 1.0, jitter)
 
         broken = least_breaking(up_to, 0.99)

@@ -25,7 +25,7 @@ from orchestration.comparison.design import Comparison
 from orchestration.comparison.figures import BINS, Reach
 from orchestration.comparison.file import load_comparison
 from orchestration.comparison.fronts import Point
-from orchestration.comparison.limits import Limit
+from orchestration.comparison.limits import GridLimit
 from orchestration.comparison.outcome import as_json
 from orchestration.comparison.run import compare
 from orchestration.comparison.survival import FATES, RESIDUAL, SETTLING, survived
@@ -296,7 +296,7 @@ def _reaches(name: str, factor: float = 1.0) -> Iterator[Reach]:
     """The limits of each controller; `factor` scales the axis, but not the period of the attitude loop."""
     last = factor * float(load(name).values[-1])
     for controller, group in groupby(read_data(name)["limits"], lambda one: one["controller"]):
-        limits = [Limit(**{**one, **{key: one[key] and factor * one[key] for key in ("value", "low", "high")},
+        limits = [GridLimit(**{**one, **{key: one[key] and factor * one[key] for key in ("value", "low", "high")},
                            "bandwidth": one["bandwidth"] if factor == 1.0 else None}) for one in group]  # fmt: skip
         yield Reach(name=controller, limits=limits, last=last)
 

@@ -43,7 +43,7 @@ from orchestration.studies.store import open_for_reading, store_path
 from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
 from orchestration.studies.sweep import AGREEMENT, sweep
-from orchestration.workers.batching import Agreement
+from orchestration.workers.batching import LaneAgreement
 
 ROOT = Path(__file__).parent.parent
 FIGURES = Path(__file__).parent / "figures"
@@ -299,7 +299,7 @@ def agreement() -> list[str]:
     lines = []
     for path in sorted(RESULTS.glob("*/study.sqlite")):
         with open_for_reading(path) as opened:
-            lines.append(f"{path.parent.name}: {Agreement.from_text(opened.about()[AGREEMENT])}")
+            lines.append(f"{path.parent.name}: {LaneAgreement.from_text(opened.about()[AGREEMENT])}")
     return lines
 
 

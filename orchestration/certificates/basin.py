@@ -23,10 +23,10 @@ from orchestration.certificates.certificate import Cells, Certificate
 from orchestration.certificates.certify import RADIUS
 from orchestration.certificates.checker import BITS, NotProven, verified
 from orchestration.certificates.events import LOSS, Varying
-from orchestration.certificates.family import Factor, Family, Letter
+from orchestration.certificates.family import Factor, Letter, LoopFamily
 from orchestration.certificates.margin import linear_loop_of
 from orchestration.certificates.search import least_cost
-from orchestration.certificates.timeline import Timeline
+from orchestration.certificates.timeline import LoopTimeline
 from orchestration.requests.request import RequestLike, request_of
 
 FALL = 1e-4
@@ -73,10 +73,10 @@ def basin(request: RequestLike, connection: str, limit: float) -> Basin:
     sent = [x.name for x in loop.system.connections if x.sender in sampled]
     if len(sampled) != 1 or len(loop.components[sampled[0]].A) or sent != [connection]:
         raise UsageError(f"{connection}: expected the connection from the only sampled component, which has no memory")
-    return largest_basin(Timeline(loop, [Varying(kind=LOSS, name=connection, path=connection)]).family(), limit)
+    return largest_basin(LoopTimeline(loop, [Varying(kind=LOSS, name=connection, path=connection)]).family(), limit)
 
 
-def largest_basin(family: Family, limit: float) -> Basin:
+def largest_basin(family: LoopFamily, limit: float) -> Basin:
     """The basin of a family of one letter, whose first factor computes the command in the rows that copy no value."""
     (letter,) = family.letters
     sample = family.matrices[letter.product[0].matrix]
@@ -92,7 +92,7 @@ def largest_basin(family: Family, limit: float) -> Basin:
     return Basin(P=P, H=H, limit=limit, certificate=certificate.to_json())
 
 
-def _with_commands(family: Family, of_signal: Sequence[Sequence[int]], commands: Sequence[Floats | None]) -> Floats:
+def _with_commands(family: LoopFamily, of_signal: Sequence[Sequence[int]], commands: Sequence[Floats | None]) -> Floats:
     """The first factor with other commands, by the kept coordinates; None: unchanged."""
     sample: Floats = family.matrices[family.letters[0].product[0].matrix].copy()
     for rows, command in zip(of_signal, commands):
@@ -102,7 +102,7 @@ def _with_commands(family: Family, of_signal: Sequence[Sequence[int]], commands:
     return sample
 
 
-def _solve(family: Family, of_signal: Sequence[Sequence[int]], limit: float) -> tuple[Floats, Floats]:
+def _solve(family: LoopFamily, of_signal: Sequence[Sequence[int]], limit: float) -> tuple[Floats, Floats]:
     """P and H, by Q = P⁻¹ and Y = H Q."""
     n, m, letter = len(family.kept), len(of_signal), family.letters[0]
     name = letter.product[0].matrix
@@ -149,7 +149,7 @@ def _solve(family: Family, of_signal: Sequence[Sequence[int]], limit: float) -> 
     return 0.5 * (P + P.T), Y @ P
 
 
-def _certificate(family: Family, of_signal: Sequence[Sequence[int]], P: Floats, H: Floats) -> Certificate:
+def _certificate(family: LoopFamily, of_signal: Sequence[Sequence[int]], P: Floats, H: Floats) -> Certificate:
     """The certificate that the form falls for every combination of commands."""
     letter = family.letters[0]
     first, *rest = letter.product
@@ -163,7 +163,7 @@ def _certificate(family: Family, of_signal: Sequence[Sequence[int]], P: Floats, 
         matrices[name] = _with_commands(family, of_signal, [h if c else None for h, c in zip(H, cut)])
         letters.append(Letter(name=name, product=(Factor(matrix=name), *rest)))
     return Certificate(
-        of=(), radius=RADIUS, family=Family(matrices=matrices, kept=family.kept, letters=tuple(letters)),
+        of=(), radius=RADIUS, family=LoopFamily(matrices=matrices, kept=family.kept, letters=tuple(letters)),
         cells=tuple(Cells(edges=(), labels=(i,)) for i in range(len(letters))),
         coordinates=np.linalg.cholesky(P).T, memory=0, forms={(0, ()): np.eye(len(P))},
     )  # fmt: skip

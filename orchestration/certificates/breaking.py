@@ -11,7 +11,7 @@ import numpy as np
 
 from orchestration.basics.bisection import bisected
 from orchestration.basics.simulator import Floats
-from orchestration.certificates.family import Family
+from orchestration.certificates.family import LoopFamily
 
 LONGEST = 6
 """letters after which a sequence repeats"""
@@ -36,7 +36,7 @@ class BreakingSequence:
     """spectral radius of the sequence"""
 
 
-def unstable_sequence(family: Family, longest: int = LONGEST) -> tuple[tuple[Draw, ...], float] | None:
+def unstable_sequence(family: LoopFamily, longest: int = LONGEST) -> tuple[tuple[Draw, ...], float] | None:
     """The sequence that grows most by letter, each parameter at an end of its range; None if none is unstable."""
     draws = [(i, point) for i, x in enumerate(family.letters) for point in itertools.product(*x.ranges)]
     maps = {draw: family.at(family.letters[draw[0]], draw[1]) for draw in dict.fromkeys(draws)}
@@ -48,7 +48,7 @@ def unstable_sequence(family: Family, longest: int = LONGEST) -> tuple[tuple[Dra
     return None if best is None else (best[1], best[0] ** len(best[1]))
 
 
-def _cycles(family: Family, maps: dict[Draw, Floats], longest: int) -> Iterator[tuple[tuple[Draw, ...], Floats]]:
+def _cycles(family: LoopFamily, maps: dict[Draw, Floats], longest: int) -> Iterator[tuple[tuple[Draw, ...], Floats]]:
     """Words that lead from a mode back to it, one of each rotation, with their products."""
     draws = list(maps)
     seen = set[tuple[int, ...]]()
@@ -74,7 +74,7 @@ def _cycles(family: Family, maps: dict[Draw, Floats], longest: int) -> Iterator[
 
 
 def least_breaking(
-    family_up_to: Callable[[float], Family], limit: float, longest: int = LONGEST
+    family_up_to: Callable[[float], LoopFamily], limit: float, longest: int = LONGEST
 ) -> BreakingSequence | None:
     """The least value up to `limit` at which the scan finds an unstable sequence."""
     found = functools.cache(lambda value: unstable_sequence(family_up_to(value), longest))
@@ -86,7 +86,7 @@ def least_breaking(
     return breaking_at(family_up_to(value), value, longest)
 
 
-def breaking_at(family: Family, value: float, longest: int = LONGEST) -> BreakingSequence | None:
+def breaking_at(family: LoopFamily, value: float, longest: int = LONGEST) -> BreakingSequence | None:
     """An unstable sequence of a family; None if none was found."""
     found = unstable_sequence(family, longest)
     if found is None:

@@ -13,9 +13,9 @@ from orchestration.basics.bisection import bisected
 from orchestration.basics.errors import UsageError
 from orchestration.certificates.breaking import FINE
 from orchestration.certificates.events import JITTER, LATENCY, SHIFT, Varying
-from orchestration.certificates.family import Family
-from orchestration.certificates.parts import Loop
-from orchestration.certificates.timeline import Timeline
+from orchestration.certificates.family import LoopFamily
+from orchestration.certificates.parts import CertifiedLoop
+from orchestration.certificates.timeline import LoopTimeline
 from orchestration.computers.windows import Window, windows_of
 from orchestration.system.distribution import Distribution, lowest
 from orchestration.system.distribution import Varying as Delay
@@ -56,7 +56,7 @@ def cause_at(system: System, path: str) -> Cause | None:
 class ScheduledLoop:
     """A loop that a computer or a network delays."""
 
-    def __init__(self, loop: Loop, system: System, cause: Cause) -> None:
+    def __init__(self, loop: CertifiedLoop, system: System, cause: Cause) -> None:
         """`loop` is that of the components of `system` without delays.
 
         Raises `UsageError` where there is no bound of their lateness, where a message may arrive after the next sample,
@@ -65,10 +65,10 @@ class ScheduledLoop:
         self._loop, self._system, self._cause = loop, system, cause
         self.family(0.0)
 
-    def family(self, value: float) -> Family:
+    def family(self, value: float) -> LoopFamily:
         """The family for draws up to a value [s]; raises `UsageError` as above."""
         windows = self._windows(value)
-        timeline = Timeline(replace(self._loop, system=self._earliest_system(windows)), self._varying(windows))
+        timeline = LoopTimeline(replace(self._loop, system=self._earliest_system(windows)), self._varying(windows))
         largest_sum = [window.together / NANOSECONDS for window in windows.values() if not window.is_certain]
         return timeline.family(_widths(windows), largest_sum=largest_sum[0] if largest_sum else None)
 
@@ -84,7 +84,7 @@ class ScheduledLoop:
 
         return floor_to_nanoseconds(bisected(fails, 0.0, self._cause.period, FINE * self._cause.period).good or 0.0)
 
-    def value_of(self, family: Family) -> float:
+    def value_of(self, family: LoopFamily) -> float:
         """The largest value [s] whose windows are no wider than those of a family."""
         most = family.largest()
 

@@ -15,7 +15,7 @@ import numpy as np
 from orchestration.basics.documents import read_text
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
-from orchestration.certificates.family import Factor, Family, Letter
+from orchestration.certificates.family import Factor, Letter, LoopFamily
 
 FORMAT = "quadcosim certificate 1"
 
@@ -49,7 +49,7 @@ class Certificate:
     """paths of the quantities that vary in its system"""
     radius: float
     """relative, by row, of measured matrices: the proof covers all matrices within it"""
-    family: Family
+    family: LoopFamily
     cells: tuple[Cells, ...]
     """of each letter; a label belongs to one letter"""
     coordinates: Floats
@@ -140,7 +140,7 @@ def _certificate(document: Mapping[str, Any]) -> Certificate:
     return Certificate(
         of=tuple(map(str, document["of"])),
         radius=_number(document["radius"]),
-        family=Family(matrices=matrices, kept=kept, letters=tuple(letters)),
+        family=LoopFamily(matrices=matrices, kept=kept, letters=tuple(letters)),
         cells=tuple(cells),
         coordinates=_square(document["coordinates"], len(kept)),
         memory=_index(document["memory"]),

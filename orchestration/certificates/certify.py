@@ -11,7 +11,7 @@ import numpy as np
 from orchestration.basics.simulator import Floats
 from orchestration.certificates.certificate import Cells, Certificate
 from orchestration.certificates.checker import NotProven, verified
-from orchestration.certificates.family import Family
+from orchestration.certificates.family import LoopFamily
 from orchestration.certificates.search import forms_for, inequalities_of
 
 RADIUS = 1e-6
@@ -40,7 +40,7 @@ class CertificateOnStep:
 
 
 def find_certificate(
-    family: Family, of: Sequence[str], first: int = 0, radius: float = RADIUS
+    family: LoopFamily, of: Sequence[str], first: int = 0, radius: float = RADIUS
 ) -> CertificateOnStep | None:
     """A certificate that the checker accepts, from a step of the ladder on; None if none was found."""
     parts = parts_of(family)
@@ -82,7 +82,7 @@ def _prove(certificate: Certificate, parts: Sequence[Sequence[int]], labels: int
     return None
 
 
-def _cells_of(family: Family, labels: int, refinement: int) -> Iterator[Cells]:
+def _cells_of(family: LoopFamily, labels: int, refinement: int) -> Iterator[Cells]:
     """The cells of each letter: labels of equal width along each parameter, each of as many cells."""
     total = [sum(x.ranges[i][1] - x.ranges[i][0] for x in family.letters if len(x.ranges) > i) for i in (0, 1)]
     first = 0
@@ -102,7 +102,7 @@ def _cells_of(family: Family, labels: int, refinement: int) -> Iterator[Cells]:
         first += int(numbers.max()) + 1
 
 
-def parts_of(family: Family) -> list[list[int]]:
+def parts_of(family: LoopFamily) -> list[list[int]]:
     """The kept coordinates in sets that do not act on one another, the largest first."""
     size = len(next(iter(family.matrices.values())))
     joined = np.eye(size, dtype=bool)
@@ -117,7 +117,7 @@ def parts_of(family: Family) -> list[list[int]]:
     return [list(part) for part in sorted(parts, key=lambda part: (-len(part), part))]
 
 
-def _coordinates(family: Family, parts: Sequence[Sequence[int]]) -> Floats:
+def _coordinates(family: LoopFamily, parts: Sequence[Sequence[int]]) -> Floats:
     """Coordinates in which the mean square, over values of the parameters, is nearly a decreasing norm."""
     maps = [
         family.at(letter, [low + share * (high - low) for low, high in letter.ranges])

@@ -13,9 +13,9 @@ from orchestration.basics.simulator import Floats
 from orchestration.certificates.causes import ScheduledLoop
 from orchestration.certificates.certificate import Certificate, read_certificate
 from orchestration.certificates.events import LOSS, Varying
-from orchestration.certificates.family import Family
+from orchestration.certificates.family import LoopFamily
 from orchestration.certificates.margin import cause_in, expect_without_scheduler, linear_loop_of, varying_of
-from orchestration.certificates.timeline import Timeline
+from orchestration.certificates.timeline import LoopTimeline
 from orchestration.requests.request import RequestLike, request_of
 from orchestration.stability.known_loops import rested
 
@@ -62,7 +62,7 @@ def check(path: str | Path, request: RequestLike | None = None) -> Checked:
         if cause is None:
             expect_without_scheduler(request)
             varying = [varying_of(request, of) for of in certificate.of]
-            family = _family_for(certificate, Timeline(linear_loop_of(request), varying), varying)
+            family = _family_for(certificate, LoopTimeline(linear_loop_of(request), varying), varying)
         else:
             scheduled = ScheduledLoop(linear_loop_of(request), rested(request), cause)
             up_to = scheduled.value_of(certificate.family)
@@ -74,7 +74,7 @@ def check(path: str | Path, request: RequestLike | None = None) -> Checked:
     )  # fmt: skip
 
 
-def _family_for(certificate: Certificate, timeline: Timeline, varying: list[Varying]) -> Family | None:
+def _family_for(certificate: Certificate, timeline: LoopTimeline, varying: list[Varying]) -> LoopFamily | None:
     """The family of a system for the ranges and runs of a certificate; None: the system has none."""
     own = certificate.family
     timed = sum(each.kind != LOSS for each in varying)
@@ -85,7 +85,7 @@ def _family_for(certificate: Certificate, timeline: Timeline, varying: list[Vary
     return timeline.family(most, run=run) if not most or sum(most) <= timeline.largest() else None
 
 
-def expect_same_family(certificate: Certificate, family: Family | None) -> None:
+def expect_same_family(certificate: Certificate, family: LoopFamily | None) -> None:
     """Raise `AnotherLoop` where a certificate is not of that family, within the radius that its proof covers."""
     own = certificate.family
     if family is None or (family.kept, family.letters) != (own.kept, own.letters):

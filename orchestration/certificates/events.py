@@ -26,7 +26,7 @@ class Varying:
 
 
 @dataclass(frozen=True)
-class Event:
+class LoopEvent:
     """An event at `time` + `slopes` · parameters [ns]; events at one instant are in the order of `rank`."""
 
     time: Fraction
@@ -37,9 +37,9 @@ class Event:
     subject: str
     """a component or connection"""
 
-    def later(self, by: Fraction) -> Event:
+    def later(self, by: Fraction) -> LoopEvent:
         """The event, later by a time [ns]."""
-        return Event(self.time + by, self.slopes, self.rank, self.kind, self.subject)
+        return LoopEvent(self.time + by, self.slopes, self.rank, self.kind, self.subject)
 
     def at(self, point: Sequence[Fraction]) -> Fraction:
         """Its time at values of the parameters."""
@@ -72,11 +72,11 @@ class Draws:
         return min(self.largest[1], self.largest_sum - first)
 
 
-def first_time(group: Sequence[Event], corners: Sequence[Sequence[Fraction]]) -> Fraction:
+def first_time(group: Sequence[LoopEvent], corners: Sequence[Sequence[Fraction]]) -> Fraction:
     """The earliest time of an event of a group, over all draws."""
     return min(event.at(corner) for event in group for corner in corners)
 
 
-def last_time(group: Sequence[Event], corners: Sequence[Sequence[Fraction]]) -> Fraction:
+def last_time(group: Sequence[LoopEvent], corners: Sequence[Sequence[Fraction]]) -> Fraction:
     """The latest time of an event of a group, over all draws."""
     return max(event.at(corner) for event in group for corner in corners)

@@ -43,7 +43,7 @@ class Letter:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Family:
+class LoopFamily:
     """All letters, with their matrices."""
 
     matrices: Mapping[str, Floats]
@@ -68,7 +68,7 @@ class Family:
         found: Floats = total[list(self.kept)]
         return found
 
-    def without_idle(self) -> Family:
+    def without_idle(self) -> LoopFamily:
         """The family without coordinates on whose values at the beginning of a period nothing depends."""
         samples = [abs(self.at(x, [low + share * (high - low) for low, high in x.ranges]))
                    for x in self.letters for share in (0.0, 0.37, 1.0)]  # fmt: skip

@@ -10,9 +10,9 @@ from fractions import Fraction
 import numpy as np
 
 from orchestration.basics.simulator import Floats
-from orchestration.certificates.events import Event
-from orchestration.certificates.family import Factor, Family, Letter
-from orchestration.certificates.parts import InstantMap, Layout
+from orchestration.certificates.events import LoopEvent
+from orchestration.certificates.family import Factor, Letter, LoopFamily
+from orchestration.certificates.parts import InstantMap, StateLayout
 from orchestration.system.connection import Connection
 from orchestration.system.distribution import lowest
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
@@ -22,11 +22,11 @@ from orchestration.system.variable_names import variable_of
 class FamilyBuilder:
     """Collects the matrices of a family."""
 
-    def __init__(self, layout: Layout, size: int, lossy: str | None, late: frozenset[str]) -> None:
+    def __init__(self, layout: StateLayout, size: int, lossy: str | None, late: frozenset[str]) -> None:
         self._layout, self._size, self._lossy, self._late = layout, size, lossy, late
         self._matrices: dict[str, Floats] = {}
 
-    def family(self, letters: Sequence[Letter], begins: Sequence[Fraction]) -> Family:
+    def family(self, letters: Sequence[Letter], begins: Sequence[Fraction]) -> LoopFamily:
         """The family; messages that are not in transit at the beginning of a piece are not kept."""
         in_transit = [self._in_transit(begin) for begin in begins]
         kept = [
@@ -34,12 +34,14 @@ class FamilyBuilder:
             for place, i in self._layout.places.items()
             if place[0] != "message" or int(place[2]) < max(counts[place[1]] for counts in in_transit)
         ]
-        found = Family(
+        found = LoopFamily(
             matrices={"flow": self._layout.flow(), **self._matrices}, kept=tuple(kept), letters=tuple(letters)
         )
         return found.without_idle()
 
-    def product(self, events: Sequence[Event], span: tuple[Fraction, Fraction], *, lost: bool) -> tuple[Factor, ...]:
+    def product(
+        self, events: Sequence[LoopEvent], span: tuple[Fraction, Fraction], *, lost: bool
+    ) -> tuple[Factor, ...]:
         """The map from the beginning of a piece to its end."""
         found, at = list[Factor](), (span[0], (0,) * len(events[0].slopes))
         in_transit = self._in_transit(span[0])
@@ -63,7 +65,7 @@ class FamilyBuilder:
             found[x.name] = math.ceil((time - first - sent) / step) - math.ceil((time - first - arrives) / step)
         return found
 
-    def _matrix_name(self, event: Event, in_transit: dict[str, int], lost: bool) -> str:
+    def _matrix_name(self, event: LoopEvent, in_transit: dict[str, int], lost: bool) -> str:
         """The name of the matrix of an event, which is built."""
         loop, instant = self._layout.loop, InstantMap(self._layout, self._size)
         if event.kind == "sample":

@@ -16,10 +16,10 @@ from orchestration.building.inputs import files_of
 from orchestration.certificates.breaking import LONGEST, BreakingSequence, breaking_at, least_breaking
 from orchestration.certificates.causes import Cause, ScheduledLoop, cause_at
 from orchestration.certificates.events import DELAY, JITTER, LOSS, Varying
-from orchestration.certificates.family import Family
-from orchestration.certificates.parts import Loop, loop_of
+from orchestration.certificates.family import LoopFamily
+from orchestration.certificates.parts import CertifiedLoop, loop_of
 from orchestration.certificates.repeated import least_repeated
-from orchestration.certificates.timeline import Timeline
+from orchestration.certificates.timeline import LoopTimeline
 from orchestration.exact.scheduled import without_scheduler
 from orchestration.fmi.foreign import isolated_call
 from orchestration.fmi.reuse import Instances
@@ -93,17 +93,17 @@ def margin(request: RequestLike, of: str, *, progress: ShareProgress = None) -> 
     varying = varying_of(request, of)
     expect_without_scheduler(request)
     loop = linear_loop_of(request)
-    timeline = Timeline(loop, [varying])
+    timeline = LoopTimeline(loop, [varying])
     with share_reporter(progress, "certifying") as report:
         return (_of_losses if varying.kind == LOSS else _of_times)(timeline, varying, report)
 
 
-def linear_loop_of(request: Request) -> Loop:
+def linear_loop_of(request: Request) -> CertifiedLoop:
     """The loop of a request about its operating point, from its FMUs, without computers and networks."""
     return isolated_call(files_of(system_of(request)).fmus.values(), _linear_loop_of, request)
 
 
-def _linear_loop_of(request: Request) -> Loop:
+def _linear_loop_of(request: Request) -> CertifiedLoop:
     instances = Instances()
     try:
         with errors_in_own_terms(request), at_rest(without_scheduler(rested(request)), instances) as rest:
@@ -145,8 +145,8 @@ def varying_of(request: Request, of: str) -> Varying:
     )
 
 
-def _of_times(timeline: Timeline, varying: Varying, progress: Share) -> Certified:
-    def up_to(value: float) -> Family:
+def _of_times(timeline: LoopTimeline, varying: Varying, progress: Share) -> Certified:
+    def up_to(value: float) -> LoopFamily:
         return timeline.family([value])
 
     largest = floor_to_nanoseconds(timeline.largest())
@@ -166,7 +166,7 @@ def _of_times(timeline: Timeline, varying: Varying, progress: Share) -> Certifie
     )  # fmt: skip
 
 
-def _of_losses(timeline: Timeline, varying: Varying, progress: Share) -> Certified:
+def _of_losses(timeline: LoopTimeline, varying: Varying, progress: Share) -> Certified:
     from orchestration.certificates.certify import find_certificate
 
     searched = f"sequences that repeat after at most the run and {LONGEST // 2} messages, runs up to {MOST_LOST}"
@@ -209,7 +209,7 @@ def _of_cause(request: Request, cause: Cause, progress: Share) -> Certified:
     )  # fmt: skip
 
 
-def _unstable(varying: Varying, largest: float, searched: str, family: Family) -> Certified:
+def _unstable(varying: Varying, largest: float, searched: str, family: LoopFamily) -> Certified:
     return Certified(
         of=varying.path, certified=None, breaking=0, breaking_sequence=(), small_gain=None, largest=largest,
         searched=searched, states=len(family.kept), certificate=None,
@@ -217,7 +217,7 @@ def _unstable(varying: Varying, largest: float, searched: str, family: Family) -
 
 
 def largest_certified(
-    family_up_to: Callable[[float], Family],
+    family_up_to: Callable[[float], LoopFamily],
     of: Sequence[str],
     top: float,
     progress: Share,
@@ -253,7 +253,7 @@ def largest_certified(
     return best
 
 
-def small_gain(loop: Loop, varying: Varying) -> float | None:
+def small_gain(loop: CertifiedLoop, varying: Varying) -> float | None:
     """The bound of Kao and Lincoln [s]; None where it does not apply to the loop.
 
     It applies to one component in continuous time and a sampled one without memory, with delays of the command alone.

@@ -30,7 +30,7 @@ Place = tuple[str, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Loop:
+class CertifiedLoop:
     """A system about its operating point, as matrices; times are exact, in nanoseconds."""
 
     system: System
@@ -59,7 +59,7 @@ class Loop:
         return self.system.components[name].sampling is not None
 
 
-def loop_of(rest: AtRest) -> Loop:
+def loop_of(rest: AtRest) -> CertifiedLoop:
     """The loop of a system at rest; raises `UsageError` for an unsupported one."""
     from scipy.linalg import expm  # comes with an extra
 
@@ -90,7 +90,7 @@ def loop_of(rest: AtRest) -> Loop:
             known = (components[x.sender].outputs, components[x.receiver].inputs)
             if variable_of(start) not in known[0] or variable_of(end) not in known[1]:
                 raise UsageError(f"connections.{x.name}: carries {start}, which is no Real")
-    return Loop(
+    return CertifiedLoop(
         system=system,
         components=components,
         period=rest.period,
@@ -100,10 +100,10 @@ def loop_of(rest: AtRest) -> Loop:
 
 
 @dataclass(kw_only=True)
-class Layout:
+class StateLayout:
     """The places of the state: states of components, held inputs, messages in transit."""
 
-    loop: Loop
+    loop: CertifiedLoop
     kept: frozenset[str] = frozenset()
     """connections whose last message is remembered, as later ones may be lost"""
     places: dict[Place, int] = field(default_factory=dict)
@@ -140,7 +140,7 @@ class Layout:
 class InstantMap:
     """The linear map of an instant, built by assignments one after the other: a row for every place."""
 
-    def __init__(self, layout: Layout, size: int) -> None:
+    def __init__(self, layout: StateLayout, size: int) -> None:
         self.layout = layout
         self.rows: Floats = np.eye(size)
         self._read: dict[tuple[str, str], Floats] = {}

@@ -13,9 +13,9 @@ from orchestration.basics.extras import needs
 from orchestration.basics.progress import ShareProgress, share_reporter
 from orchestration.certificates.breaking import BreakingSequence, least_breaking, unstable_sequence
 from orchestration.certificates.events import LOSS
-from orchestration.certificates.family import Family
+from orchestration.certificates.family import LoopFamily
 from orchestration.certificates.margin import expect_without_scheduler, largest_certified, linear_loop_of, varying_of
-from orchestration.certificates.timeline import Timeline
+from orchestration.certificates.timeline import LoopTimeline
 from orchestration.figures.palette import BLUE, RED
 from orchestration.figures.style import SCREEN, Style, save
 from orchestration.requests.request import RequestLike, request_of
@@ -93,7 +93,7 @@ def region(
     if any(each.kind == LOSS for each in pair) or pair[0] == pair[1]:
         raise UsageError(f"--of {of} --and {and_of}: expected two different jitters or delay jitters")
     expect_without_scheduler(request)
-    timeline = Timeline(linear_loop_of(request), pair)
+    timeline = LoopTimeline(linear_loop_of(request), pair)
     if unstable_sequence(timeline.family([0.0, 0.0])) is not None:
         raise UsageError("the loop is unstable where nothing varies, so nothing can be certified")
     paths = (pair[0].path, pair[1].path)
@@ -119,14 +119,14 @@ def region(
     )  # fmt: skip
 
 
-def _second_varies(timeline: Timeline, a: float) -> Callable[[float], Family]:
+def _second_varies(timeline: LoopTimeline, a: float) -> Callable[[float], LoopFamily]:
     return lambda b: timeline.family([a, b])
 
 
-def _least_breaking(timeline: Timeline, other: float, *, first: bool = False) -> BreakingSequence | None:
+def _least_breaking(timeline: LoopTimeline, other: float, *, first: bool = False) -> BreakingSequence | None:
     """What breaks the loop in one quantity, the other one varying up to its value."""
 
-    def up_to(value: float) -> Family:
+    def up_to(value: float) -> LoopFamily:
         return timeline.family([value, other] if first else [other, value])
 
     return least_breaking(up_to, floor_to_nanoseconds(timeline.largest() - other), LONGEST)

@@ -19,14 +19,14 @@ from orchestration.certificates.events import (
     LOSS,
     SHIFT,
     Draws,
-    Event,
+    LoopEvent,
     Varying,
     first_time,
     last_time,
 )
-from orchestration.certificates.family import Family, Letter
+from orchestration.certificates.family import Letter, LoopFamily
 from orchestration.certificates.family_builder import FamilyBuilder
-from orchestration.certificates.parts import Layout, Loop
+from orchestration.certificates.parts import CertifiedLoop, StateLayout
 from orchestration.system.connection import Connection
 from orchestration.system.distribution import lowest
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
@@ -35,10 +35,10 @@ LARGEST = 400
 """numbers in the state of a loop"""
 
 
-class Timeline:
+class LoopTimeline:
     """The events of a loop in which one quantity varies, or two, or none."""
 
-    def __init__(self, loop: Loop, varying: Sequence[Varying]) -> None:
+    def __init__(self, loop: CertifiedLoop, varying: Sequence[Varying]) -> None:
         self.loop, self.varying = loop, varying
         self._timed = [each for each in varying if each.kind != LOSS]
         for each in varying:
@@ -54,7 +54,7 @@ class Timeline:
         spans = [last_time(group, nothing) - first_time(group, nothing) for group in self._groups]
         return float(gap - max(spans)) / NANOSECONDS
 
-    def family(self, largest: Sequence[float] = (), run: int = 0, largest_sum: float | None = None) -> Family:
+    def family(self, largest: Sequence[float] = (), run: int = 0, largest_sum: float | None = None) -> LoopFamily:
         """The family for values of times in [0, `largest`] [s], the sum of two at most `largest_sum`.
 
         At most `run` messages are lost in a row. Raises `UsageError` where two draws would be open at once.
@@ -69,7 +69,7 @@ class Timeline:
                 raise UsageError(
                     f"{self._paths_text()}: expected less, so that no message is open when the next one is drawn"
                 )
-        layout = Layout(loop=self.loop, kept=frozenset([self._lossy] if self._lossy else []))
+        layout = StateLayout(loop=self.loop, kept=frozenset([self._lossy] if self._lossy else []))
         for size in (LARGEST, None):
             builder = FamilyBuilder(layout, size or len(layout.places), self._lossy, self._queued())
             letters: list[Letter] = []
@@ -80,19 +80,19 @@ class Timeline:
 
     # -- events ----------------------------------------------------------------------------------------------------
 
-    def _all_events(self) -> list[Event]:
+    def _all_events(self) -> list[LoopEvent]:
         """The events that begin in one period of the loop."""
         loop, found = self.loop, []
         for rank, name in enumerate(loop.order):
             for k, time in enumerate(loop.samples_of(name)):
                 by, sent = self._slopes((JITTER, SHIFT), name), self._slopes((JITTER, LATENCY), name)
-                found.append(Event(time, by, (1, rank, k), "sample", name))
+                found.append(LoopEvent(time, by, (1, rank, k), "sample", name))
                 for place, x in enumerate(loop.system.connections):
                     delay = exact_nanoseconds(lowest(x.delay))
                     own = self._slopes((DELAY,), x.name)
                     if x.receiver == name and not loop.is_sampled(x.sender) and self._is_late(x):
                         slopes = tuple(a - b for a, b in zip(by, own))
-                        found.append(Event(time - delay, slopes, (0, rank, place), "measure", x.name))
+                        found.append(LoopEvent(time - delay, slopes, (0, rank, place), "measure", x.name))
                     elif x.sender == name and (self._is_late(x) or x.order == "jacobi"):
                         slopes = tuple(a + b for a, b in zip(sent, own))
                         wait = delay
@@ -101,7 +101,7 @@ class Timeline:
                             if any(by):
                                 raise UsageError(f"connections.{x.name}.order: expected gauss-seidel beside jitter")
                         last = 2 if not loop.is_sampled(x.receiver) else 0
-                        found.append(Event(time + wait, slopes, (last, rank, place), "arrive", x.name))
+                        found.append(LoopEvent(time + wait, slopes, (last, rank, place), "arrive", x.name))
         return found
 
     def _queued(self) -> frozenset[str]:
@@ -128,7 +128,7 @@ class Timeline:
             raise UsageError(f"{self._paths_text()}: expected quantities of one sampled component")
         return owners.pop()
 
-    def _groups_by_draw(self) -> list[list[Event]]:
+    def _groups_by_draw(self) -> list[list[LoopEvent]]:
         """For each draw the events that depend on it; of losses the sample at which they occur."""
         owner = self._owner()
         count = len(self.loop.samples_of(owner))
@@ -137,17 +137,17 @@ class Timeline:
             kinds = [event for event in self._events if (event.kind, event.subject) == ("sample", owner)]
             late = [event for event in self._events if (event.kind, event.subject) == ("measure", self._lossy)]
             depend = late or kinds
-        groups: list[list[Event]] = [[] for _ in range(count)]
+        groups: list[list[LoopEvent]] = [[] for _ in range(count)]
         for event in depend:
             groups[self._draw_of(event, count)].append(event)
         return groups
 
-    def _draw_of(self, event: Event, count: int) -> int:
+    def _draw_of(self, event: LoopEvent, count: int) -> int:
         """The index of the sample within a period to which an event belongs: each kind of event is in order."""
         alike = [e for e in self._events if (e.kind, e.subject) == (event.kind, event.subject)]
         return alike.index(event) % count
 
-    def _deterministic_events(self, begin: Fraction, end: Fraction) -> list[Event]:
+    def _deterministic_events(self, begin: Fraction, end: Fraction) -> list[LoopEvent]:
         """The events between two instants that do not depend on draws."""
         drawn = {id(event) for group in self._groups for event in group}
         found, period = [], self.loop.period
@@ -161,7 +161,7 @@ class Timeline:
     # -- letters ---------------------------------------------------------------------------------------------------
 
     def _letters(
-        self, builder: FamilyBuilder, events: list[Event], draws: Draws, span: tuple[Fraction, Fraction],
+        self, builder: FamilyBuilder, events: list[LoopEvent], draws: Draws, span: tuple[Fraction, Fraction],
         piece: tuple[int, int], run: int,
     ) -> list[Letter]:  # fmt: skip
         """The letters of a piece: one for each order of its events, and another one where a message may be lost."""
@@ -186,7 +186,7 @@ class Timeline:
             for i, letter in enumerate(found)
         ]  # fmt: skip
 
-    def _boxes(self, events: Sequence[Event], draws: Draws) -> list[list[tuple[Fraction, Fraction]]]:
+    def _boxes(self, events: Sequence[LoopEvent], draws: Draws) -> list[list[tuple[Fraction, Fraction]]]:
         """Boxes of values, divided where two events change their order, and covering two of a limited sum."""
         if not draws.largest:
             return [[]]

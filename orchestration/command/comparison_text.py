@@ -5,7 +5,7 @@ from itertools import groupby
 
 from orchestration.comparison.cells import PEAK, VARIATION, CellSummary, Median, Share
 from orchestration.comparison.design import Comparison
-from orchestration.comparison.limits import Limit
+from orchestration.comparison.limits import GridLimit
 from orchestration.comparison.outcome import Outcome
 
 
@@ -54,7 +54,7 @@ def _limits(outcome: Outcome) -> Iterator[list[str]]:
         yield [controller, vehicle, condition, fate, _limit(half), _limit(most), bandwidth]
 
 
-def _limit(limit: Limit) -> str:
+def _limit(limit: GridLimit) -> str:
     return f"{limit.value:.4g} [{limit.low:.4g}, {'...' if limit.high is None else f'{limit.high:.4g}'}]"
 
 

@@ -74,7 +74,7 @@ def status(study: StudyFile, out: Out = None) -> CommandResult:
     from orchestration.studies.store import open_for_reading, store_path
     from orchestration.studies.study_file import load_study
     from orchestration.studies.sweep import AGREEMENT, ENGINE, TOTAL, expect_current
-    from orchestration.workers.batching import Agreement
+    from orchestration.workers.batching import LaneAgreement
 
     loaded = load_study(study)
     path = store_path(loaded.name, out)
@@ -84,7 +84,7 @@ def status(study: StudyFile, out: Out = None) -> CommandResult:
         total = int(about.get(TOTAL, "0"))
     done, failed = counts.get("done", 0), counts.get("failed", 0)
     missing = total - done - failed
-    agreement = Agreement.from_text(about[AGREEMENT]) if AGREEMENT in about else None
+    agreement = LaneAgreement.from_text(about[AGREEMENT]) if AGREEMENT in about else None
     lines = [f"{path}: {done + failed} of {total} runs, {failed} failed, {missing} missing"]
     if agreement is not None:
         lines.append(f"engine {about[ENGINE]}: {agreement}")

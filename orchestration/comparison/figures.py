@@ -16,7 +16,7 @@ from matplotlib.patheffects import withStroke
 from orchestration.basics.simulator import Floats
 from orchestration.comparison.cells import CellSummary, Median
 from orchestration.comparison.fronts import Point
-from orchestration.comparison.limits import Limit
+from orchestration.comparison.limits import GridLimit
 from orchestration.figures import cells
 from orchestration.figures.palette import BLUE, CYCLE, DASHES, GREY, MARKS, ORANGE
 from orchestration.figures.style import SCREEN, Style
@@ -92,7 +92,7 @@ class Reach:
     """The limits of one controller, and the last value of its axis."""
 
     name: str
-    limits: Sequence[Limit]
+    limits: Sequence[GridLimit]
     last: float
 
 
@@ -207,7 +207,7 @@ def _name_curves(
         )  # fmt: skip
 
 
-def _bar(panel: Axes, limit: Limit, last: float, factor: float, at: float, color: str, label: str | None) -> None:
+def _bar(panel: Axes, limit: GridLimit, last: float, factor: float, at: float, color: str, label: str | None) -> None:
     high = last if limit.high is None else limit.high
     ends = [[factor * (limit.value - limit.low)], [factor * (high - limit.value)]]
     panel.errorbar(factor * limit.value, at, xerr=ends, fmt="o", color=color, markersize=5, capsize=2, label=label)

@@ -20,7 +20,7 @@ SHARES = {"half": 0.5, "nine in ten": 0.9}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Limit:
+class GridLimit:
     """The value of the axis up to which a share of the initial conditions survives, or settles, at all values below."""
 
     vehicle: str
@@ -38,7 +38,7 @@ class Limit:
     """of the attitude loop at that value [rad/s]"""
 
 
-def limits(comparison: Comparison, table: "pd.DataFrame", bandwidths: Bandwidths) -> list[Limit]:
+def limits(comparison: Comparison, table: "pd.DataFrame", bandwidths: Bandwidths) -> list[GridLimit]:
     """The limits of each controller on each vehicle under each condition whose runs are all in the table."""
     listed = []
     done = table[table["status"] == "done"]
@@ -50,7 +50,7 @@ def limits(comparison: Comparison, table: "pd.DataFrame", bandwidths: Bandwidths
             for name, share in SHARES.items():
                 value = _reached(ends, share)
                 listed.append(
-                    Limit(
+                    GridLimit(
                         vehicle=vehicle,
                         condition=condition,
                         controller=controller,

@@ -11,7 +11,7 @@ from orchestration.comparison import equal_terms, fronts
 from orchestration.comparison.bandwidth import Bandwidths
 from orchestration.comparison.cells import CellSummary, cell_summaries
 from orchestration.comparison.design import Comparison
-from orchestration.comparison.limits import Limit, limits
+from orchestration.comparison.limits import GridLimit, limits
 from orchestration.comparison.pairs import Pair, pairs
 from orchestration.results.quantities import is_in_seconds
 
@@ -26,7 +26,7 @@ class Outcome:
     """All that is concluded from the runs of a comparison."""
 
     cells: list[CellSummary]
-    limits: list[Limit]
+    limits: list[GridLimit]
     fronts: list[fronts.Point]
     pairs: list[Pair]
     at_equal_bandwidth: list[equal_terms.AtPhase]

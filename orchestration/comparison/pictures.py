@@ -14,7 +14,7 @@ from orchestration.comparison.cells import sizes
 from orchestration.comparison.design import CONDITION, CONTROLLER, VEHICLE, Comparison
 from orchestration.comparison.figures import BINS, Reach, basins, colors_of, fronts_of, limits_of, shares
 from orchestration.comparison.fronts import Point
-from orchestration.comparison.limits import Limit
+from orchestration.comparison.limits import GridLimit
 from orchestration.comparison.outcome import Outcome
 from orchestration.comparison.survival import FATES
 from orchestration.figures.style import SCREEN, Style
@@ -82,7 +82,7 @@ def _of_one(
         yield from save(partial(fronts_of, points, shown, axis, names, colors, title), folder / f"front_{end}", style)
 
 
-def reaches_of(comparison: Comparison, limits: Sequence[Limit]) -> list[Reach]:
+def reaches_of(comparison: Comparison, limits: Sequence[GridLimit]) -> list[Reach]:
     """The limits of each controller, on each vehicle and under each condition if there are several."""
     several = len(comparison.vehicles) * len(comparison.conditions) > 1
     groups = itertools.groupby(limits, lambda one: (one.vehicle, one.condition, one.controller))

@@ -23,12 +23,12 @@ from orchestration.computers.parts import (
     Carrier,
     Constant,
     Leg,
-    Link,
-    Message,
+    NetworkLink,
     Parts,
     Processor,
+    ScheduledFrame,
+    ScheduledTask,
     Stream,
-    Task,
 )
 from orchestration.computers.scheduler import Scheduler
 
@@ -40,11 +40,11 @@ _ROOM = 4096
 """Notes that C collects until Python takes them"""
 _TABLES: dict[str, tuple[str, ...]] = {
     "PROCESSOR": Processor._fields,
-    "TASK": Task._fields,
+    "TASK": ScheduledTask._fields,
     "CARRIER": (*Carrier._fields, "releases_end"),
-    "MESSAGE": Message._fields,
+    "MESSAGE": ScheduledFrame._fields,
     "LEG": ("message", "place", "is_last", *Leg._fields),
-    "LINK": Link._fields,
+    "LINK": NetworkLink._fields,
 }
 """The columns of each table; nested parts are replaced by the index of the first"""
 _KINDS = ("PROCESSORS", "TASKS", "CARRIERS", "MESSAGES", "LEGS", "LINKS")
@@ -193,8 +193,8 @@ class _Notes:
 
 @functools.lru_cache(8)
 def _tables(
-    processors: tuple[Processor, ...], tasks: tuple[Task, ...], carriers: tuple[Carrier, ...],
-    messages: tuple[Message, ...], links: tuple[Link, ...],
+    processors: tuple[Processor, ...], tasks: tuple[ScheduledTask, ...], carriers: tuple[Carrier, ...],
+    messages: tuple[ScheduledFrame, ...], links: tuple[NetworkLink, ...],
 ) -> dict[str, Integers]:  # fmt: skip
     """The tables of parts by name; cached, as many runs share them."""
     ends = np.cumsum([0, *(len(each.releases) for each in carriers)])

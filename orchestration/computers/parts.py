@@ -40,7 +40,7 @@ class Processor(NamedTuple):
     """[ns], the overhead before a job starts or resumes"""
 
 
-class Task(NamedTuple):
+class ScheduledTask(NamedTuple):
     """A task; tasks are in the order of the file."""
 
     processor: int
@@ -76,7 +76,7 @@ class Carrier(NamedTuple):
     """tasks that its arrivals release"""
 
 
-class Message(NamedTuple):
+class ScheduledFrame(NamedTuple):
     """A message that goes over a network as frames; messages are in the order of the file."""
 
     rank: int
@@ -106,7 +106,7 @@ class Leg(NamedTuple):
     """[ns], of a corrupted frame"""
 
 
-class Link(NamedTuple):
+class NetworkLink(NamedTuple):
     """A link, which carries one frame at a time."""
 
     slots: int
@@ -122,10 +122,10 @@ class Parts:
     stop: int
     """[ns]: nothing is released from here on"""
     processors: Sequence[Processor]
-    tasks: Sequence[Task]
+    tasks: Sequence[ScheduledTask]
     carriers: Sequence[Carrier]
-    messages: Sequence[Message]
-    links: Sequence[Link]
+    messages: Sequence[ScheduledFrame]
+    links: Sequence[NetworkLink]
     streams: Sequence[Stream]
     places: Sequence[str] = ()
     """the paths of tasks, then of messages, for errors"""

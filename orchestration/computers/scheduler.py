@@ -40,10 +40,10 @@ from orchestration.computers.parts import (
     SWITCHING,
     WRITTEN,
     Leg,
-    Message,
     Parts,
+    ScheduledFrame,
+    ScheduledTask,
     Stream,
-    Task,
 )
 
 
@@ -79,7 +79,7 @@ class _TaskState:
     __slots__ = ("carriers", "jobs", "next_late", "next_nominal", "number", "part", "sampled_at", "samples",
                  "started_at", "unwritten")  # fmt: skip
 
-    def __init__(self, part: Task, carriers: list[int]) -> None:
+    def __init__(self, part: ScheduledTask, carriers: list[int]) -> None:
         self.part, self.carriers = part, carriers
         self.jobs: deque[_Job] = deque()
         self.unwritten: deque[_Job] = deque()
@@ -118,7 +118,7 @@ class _LegState:
 
     __slots__ = ("coming", "frames", "is_last", "message", "part", "place", "rank")
 
-    def __init__(self, message: int, place: int, of: Message) -> None:
+    def __init__(self, message: int, place: int, of: ScheduledFrame) -> None:
         self.message, self.place, self.rank = message, place, of.rank
         self.part: Leg = of.legs[place]
         self.is_last = place == len(of.legs) - 1
@@ -455,7 +455,7 @@ class Scheduler:
         time = self._numbers[self._parts.links[k].begins].next()
         self._due[self._slot + k] = time if time < self._stop else LATER
 
-    def _post(self, m: int, message: Message, now: int) -> None:
+    def _post(self, m: int, message: ScheduledFrame, now: int) -> None:
         """Send a message at its instant."""
         nominal, _ = self._message_next[m]
         if message.carrier == NONE:

@@ -12,7 +12,7 @@ from orchestration.basics.simulator import Floats
 from orchestration.exact.effects import LoopEffects, Places
 from orchestration.exact.flows import Flows
 from orchestration.exact.linear import Components, Continuous
-from orchestration.exact.links import ATTOSECONDS, Link, Task
+from orchestration.exact.links import ATTOSECONDS, RandomLink, SampledTask
 from orchestration.exact.objectives import Mean
 from orchestration.exact.pieces import Piece
 from orchestration.schedule.plan import Plan
@@ -181,7 +181,7 @@ def _seconds(seconds: float) -> Fraction:
     return exact_nanoseconds(seconds) / NANOSECONDS
 
 
-def expect_rows(system: System, tasks: Sequence[Task], links: Sequence[Link]) -> None:
+def expect_rows(system: System, tasks: Sequence[SampledTask], links: Sequence[RandomLink]) -> None:
     """Raise `UsageError` for events between the steps of a component in continuous time."""
     continuous = [name for name, one in system.components.items() if one.sampling is None]
     steps = {_seconds(system.components[name].step or 0.0) for name in continuous}

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from orchestration.exact.pieces import Piece
 
 
-class Event(NamedTuple):
+class BranchEvent(NamedTuple):
     """A future event; events are ordered by these fields."""
 
     time: int
@@ -34,7 +34,7 @@ class Branch:
     """One course of events up to a time."""
 
     time: int
-    events: tuple[Event, ...]
+    events: tuple[BranchEvent, ...]
     """future ones, in order"""
     in_transit: tuple[tuple[int, int], ...]
     """messages in the order of their numbers in the state: token and size"""

@@ -15,8 +15,8 @@ from typing import Protocol
 import numpy as np
 
 from orchestration.basics.errors import UsageError
-from orchestration.exact.branch import ARRIVES, MEASURES, NEVER, POSTS, SAMPLES, Branch, Event, Mode
-from orchestration.exact.links import Link, Task, attoseconds
+from orchestration.exact.branch import ARRIVES, MEASURES, NEVER, POSTS, SAMPLES, Branch, BranchEvent, Mode
+from orchestration.exact.links import RandomLink, SampledTask, attoseconds
 from orchestration.exact.pieces import Piece
 from orchestration.exact.random_times import Kinks
 
@@ -56,8 +56,8 @@ class Branching:
 
     def __init__(
         self,
-        tasks: Sequence[Task],
-        links: Sequence[Link],
+        tasks: Sequence[SampledTask],
+        links: Sequence[RandomLink],
         effects: Effects,
         *,
         order: int,
@@ -92,7 +92,7 @@ class Branching:
         return Branch(
             time=time,
             events=tuple(
-                Event(time + after if after != NEVER else NEVER, phase, rank, birth, kind, of, token, place)
+                BranchEvent(time + after if after != NEVER else NEVER, phase, rank, birth, kind, of, token, place)
                 for birth, (after, phase, rank, kind, of, token, place) in enumerate(events)
             ),
             in_transit=tuple(enumerate(sizes)),
@@ -118,9 +118,9 @@ class Branching:
             age -= math.ceil((age - most) / self._hyperperiod) * self._hyperperiod
         return age, gap
 
-    def _clock_of(self, link: Link) -> Task:
+    def _clock_of(self, link: RandomLink) -> SampledTask:
         which = link.sender if link.sender is not None else link.receiver
-        return self.tasks[which] if which is not None else Task(name="", period=link.step or Fraction(1))
+        return self.tasks[which] if which is not None else SampledTask(name="", period=link.step or Fraction(1))
 
     # -- events are planned --------------------------------------------------------------------------------------
 
@@ -157,7 +157,7 @@ class Branching:
             likely = _likely(branch, p)
             yield self._plan(likely, measured, MEASURES, i, "measure", i, time - measured)
 
-    def _dispatch(self, branch: Branch, event: Event, sent: int) -> Iterator[Branch]:
+    def _dispatch(self, branch: Branch, event: BranchEvent, sent: int) -> Iterator[Branch]:
         """A message that waited for the next sample of its sender is sent then."""
         rest = replace(branch, events=tuple(x for x in branch.events if x is not event))
         for arrival, likely in self._arrivals(rest, event.of, sent):
@@ -167,7 +167,7 @@ class Branching:
         self, branch: Branch, time: int, phase: int, rank: int, kind: str, of: int, token: int = -1, place: int = 0
     ) -> Branch:
         events = list(branch.events)
-        bisect.insort(events, Event(time, phase, rank, branch.born, kind, of, token, place))
+        bisect.insort(events, BranchEvent(time, phase, rank, branch.born, kind, of, token, place))
         return replace(branch, events=tuple(events), born=branch.born + 1)
 
     # -- events happen -------------------------------------------------------------------------------------------
@@ -190,7 +190,7 @@ class Branching:
             return branch
         return replace(branch, time=time, piece=self._effects.advance(branch.piece, time - branch.time))
 
-    def _outcomes(self, branch: Branch, event: Event) -> Iterator[Branch]:
+    def _outcomes(self, branch: Branch, event: BranchEvent) -> Iterator[Branch]:
         if event.kind == "arrive":
             yield self._receive(branch, event.of, event.token)
         elif event.kind == "sample":

@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from orchestration.basics.errors import SimulatorError, UsageError
-from orchestration.exact.linear import Continuous, Sampled
+from orchestration.exact.linear import Continuous, SampledSystem
 from orchestration.stability.linearised_component import Tangent
 from orchestration.stability.loop_at_rest import AtRest
 from orchestration.stability.matrices import INEXACT, depends_on_step, in_continuous_time, of_samples, whole_nanoseconds
@@ -35,7 +35,7 @@ DIFFERS = 1e-9
 class IdentifiedComponent:
     """A component as matrices."""
 
-    part: Continuous | Sampled
+    part: Continuous | SampledSystem
     method: str
     """it is identified"""
     accuracy: float
@@ -80,9 +80,9 @@ def _cache_key(loop: AtRest, name: str) -> tuple[object, ...]:
 def _identified(loop: AtRest, name: str) -> IdentifiedComponent:
     component, step = loop.simulation.system.components[name], _informative_step(loop, name)
     tangent, is_linear, discrepancy = _tangent_by_pulses(loop, name, step)
-    part: Continuous | Sampled
+    part: Continuous | SampledSystem
     if component.sampling is not None:
-        part = Sampled(**vars(of_samples(tangent, step)), depends_on_step=depends_on_step(tangent, step))
+        part = SampledSystem(**vars(of_samples(tangent, step)), depends_on_step=depends_on_step(tangent, step))
     else:
         matrices, unfit = in_continuous_time(tangent, step, DIFFERS if is_linear else INEXACT)
         part = Continuous(**vars(matrices), step=tangent.derivatives, unfit=unfit)

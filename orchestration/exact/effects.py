@@ -18,7 +18,7 @@ from orchestration.basics.simulator import Floats
 from orchestration.engines.channel import of_each
 from orchestration.exact.flows import Flows
 from orchestration.exact.initial_state import InitialState
-from orchestration.exact.linear import Components, Continuous, Sampled
+from orchestration.exact.linear import Components, Continuous, SampledSystem
 from orchestration.exact.links import ATTOSECONDS
 from orchestration.exact.objectives import Mean
 from orchestration.exact.pieces import Piece
@@ -61,7 +61,7 @@ class LoopEffects(ABC):
         self.wires = {system.connections[i].name for i in Plan(system).wires}
         self.fed_by = {end: (x, j) for x in system.connections for j, end in enumerate(x.end)}
         self.continuous = {n: c for n, c in components.items() if isinstance(c, Continuous)}
-        self.sampled_parts = {n: c for n, c in components.items() if isinstance(c, Sampled)}
+        self.sampled_parts = {n: c for n, c in components.items() if isinstance(c, SampledSystem)}
         for name, part in self.continuous.items():
             places.add("state", name, len(part.A))
         for x in system.connections:

@@ -24,11 +24,11 @@ class Continuous(Matrices):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sampled(Matrices):
+class SampledSystem(Matrices):
     """At each sample y = C x + D u, and then x becomes A x + B u."""
 
     depends_on_step: bool = False
     """whether a sample depends on the time to the next one"""
 
 
-Components = dict[str, Continuous | Sampled]
+Components = dict[str, Continuous | SampledSystem]

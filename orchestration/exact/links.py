@@ -13,7 +13,7 @@ ATTOSECONDS = 10**18
 
 
 @dataclass(frozen=True, kw_only=True)
-class Task:
+class SampledTask:
     """A component that samples at each offset + k period + jitter."""
 
     name: str
@@ -24,7 +24,7 @@ class Task:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Link:
+class RandomLink:
     """The messages of one connection: one at each sample of its sender, or of its receiver."""
 
     name: str

@@ -19,8 +19,8 @@ from orchestration.exact.components import ComponentIdentifier
 from orchestration.exact.effects import ContinuousEffects, LoopEffects
 from orchestration.exact.horizon import costs_until
 from orchestration.exact.initial_state import InitialState, initial_state_of
-from orchestration.exact.linear import Components, Continuous, Sampled
-from orchestration.exact.links import ATTOSECONDS, Link, Task
+from orchestration.exact.linear import Components, Continuous, SampledSystem
+from orchestration.exact.links import ATTOSECONDS, RandomLink, SampledTask
 from orchestration.exact.moments import JumpLinear
 from orchestration.exact.objective_means import ObjectiveMeans
 from orchestration.exact.repeating import periodic_schedule
@@ -212,7 +212,7 @@ class Loops:
 
     def _refined(
         self,
-        timing: tuple[Sequence[Task], Sequence[Link]],
+        timing: tuple[Sequence[SampledTask], Sequence[RandomLink]],
         effects: LoopEffects,
         answer: Callable[[TimingChain], tuple[T, Floats]],
         agree: float,
@@ -256,7 +256,7 @@ class Loops:
 
     def _tasks_and_links(
         self, system: System, linear: Linear, effects: LoopEffects, horizon: float | None = None
-    ) -> tuple[Sequence[Task], Sequence[Link]]:
+    ) -> tuple[Sequence[SampledTask], Sequence[RandomLink]]:
         """The tasks and links, those of a scheduler included: over its period, or up to a `horizon` [s]."""
         unscheduled = [
             task.period for task in tasks_of(system) if not has_scheduled_instants(_sampling(system, task.name))
@@ -270,14 +270,16 @@ class Loops:
         return tasks, links
 
 
-def expect_same_steps(system: System, tasks: Sequence[Task], parts: Components, *, repeating: bool = True) -> None:
+def expect_same_steps(
+    system: System, tasks: Sequence[SampledTask], parts: Components, *, repeating: bool = True
+) -> None:
     """Raise `UsageError` for a task with irregular samples that depend on the time to the next one.
 
     `repeating`: the last sample of a period is followed by the first of the next.
     """
     for task in tasks:
         part = parts[task.name]
-        if not (isinstance(part, Sampled) and part.depends_on_step):
+        if not (isinstance(part, SampledSystem) and part.depends_on_step):
             continue
         if not task.jitter.is_certain:
             raise UsageError(

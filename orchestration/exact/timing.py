@@ -6,7 +6,7 @@ from dataclasses import replace
 from fractions import Fraction
 
 from orchestration.basics.errors import UsageError
-from orchestration.exact.links import ATTOSECONDS, Link, Task
+from orchestration.exact.links import ATTOSECONDS, RandomLink, SampledTask
 from orchestration.exact.periodic_schedule import NO_SCHEDULE, PeriodicSchedule
 from orchestration.exact.random_times import CERTAIN, RandomTime, normal, table, uniform
 from orchestration.schedule.plan import Plan
@@ -16,7 +16,7 @@ from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
 
 
-def tasks_of(system: System, schedule: PeriodicSchedule = NO_SCHEDULE) -> list[Task]:
+def tasks_of(system: System, schedule: PeriodicSchedule = NO_SCHEDULE) -> list[SampledTask]:
     """The sampled components, in the order of those that are due at once; some sample by a schedule.
 
     Raises `UsageError` for one that keeps its own clock.
@@ -26,14 +26,14 @@ def tasks_of(system: System, schedule: PeriodicSchedule = NO_SCHEDULE) -> list[T
         sampling = system.components[name].sampling
         assert sampling is not None
         if name in schedule.samples:
-            found.append(Task(name=name, period=schedule.period, offsets=schedule.samples[name]))
+            found.append(SampledTask(name=name, period=schedule.period, offsets=schedule.samples[name]))
             continue
         if sampling.clock == "fmu":
             raise UsageError(f"components.{name}.sampling.clock: fmu: expected the master's")
         ratio = Fraction(repr(float(sampling.clock_ratio)))
         place = f"components.{name}.sampling.jitter"
         found.append(
-            Task(
+            SampledTask(
                 name=name, period=_seconds(sampling.period) / ratio, offsets=(_seconds(sampling.offset) / ratio,),
                 jitter=_jitter(sampling.jitter, sampling.jitter_distribution, place),
             )
@@ -41,7 +41,7 @@ def tasks_of(system: System, schedule: PeriodicSchedule = NO_SCHEDULE) -> list[T
     return found
 
 
-def links_of(system: System, schedule: PeriodicSchedule = NO_SCHEDULE) -> list[Link]:
+def links_of(system: System, schedule: PeriodicSchedule = NO_SCHEDULE) -> list[RandomLink]:
     """The connections; wires carry no messages, some messages are sent by a schedule."""
     plan = Plan(system)
     tasks = list(plan.sampled)
@@ -49,7 +49,7 @@ def links_of(system: System, schedule: PeriodicSchedule = NO_SCHEDULE) -> list[L
     return [_scheduled_link(link, x, schedule) for link, x in zip(links, system.connections)]
 
 
-def _scheduled_link(link: Link, x: Connection, schedule: PeriodicSchedule) -> Link:
+def _scheduled_link(link: RandomLink, x: Connection, schedule: PeriodicSchedule) -> RandomLink:
     if x.sender in schedule.samples:
         nothing = (0,) * len(schedule.samples[x.sender])
         link = replace(link, transit_times=schedule.transit_times.get(x.name, nothing))
@@ -63,7 +63,7 @@ def _scheduled_link(link: Link, x: Connection, schedule: PeriodicSchedule) -> Li
     return link
 
 
-def _link(x: Connection, tasks: list[str], system: System, *, wire: bool) -> Link:
+def _link(x: Connection, tasks: list[str], system: System, *, wire: bool) -> RandomLink:
     sender, receiver = (tasks.index(name) if name in tasks else None for name in (x.sender, x.receiver))
     step = system.components[x.sender].step if sender is None and receiver is None and not wire else None
     place = f"connections.{x.name}"
@@ -73,7 +73,7 @@ def _link(x: Connection, tasks: list[str], system: System, *, wire: bool) -> Lin
         delay, jitter = 0, replace(random_delay, added=None if jitter == CERTAIN else jitter)
     else:
         delay = round(_seconds(x.delay) * ATTOSECONDS)
-    return Link(
+    return RandomLink(
         name=place, size=len(x.start), sender=sender, receiver=receiver,
         step=None if step is None else _seconds(step), delay=delay, delay_jitter=jitter, loss=_loss(x, place),
         burst_length=x.burst_length, jacobi=x.order == "jacobi" and sender is not None, first_order=x.hold == "first",

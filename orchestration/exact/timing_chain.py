@@ -15,7 +15,7 @@ from fractions import Fraction
 from orchestration.basics.errors import UsageError
 from orchestration.exact.branch import Branch, Mode
 from orchestration.exact.branching import Branching, Effects
-from orchestration.exact.links import Link, Task, attoseconds, hyperperiod
+from orchestration.exact.links import RandomLink, SampledTask, attoseconds, hyperperiod
 from orchestration.exact.moments import Passage, Stage
 from orchestration.exact.pieces import Piece
 
@@ -28,8 +28,8 @@ class TimingChain:
 
     def __init__(
         self,
-        tasks: Sequence[Task],
-        links: Sequence[Link],
+        tasks: Sequence[SampledTask],
+        links: Sequence[RandomLink],
         effects: Effects,
         *,
         order: int,

@@ -26,7 +26,7 @@ from orchestration.fmi.messages import WARNING, Messages, failure_text
 from orchestration.fmi.model import Variable, read_model
 from orchestration.fmi.slaves import binary_folders, folder_here, instantiate, load_slave
 from orchestration.fmi.surroundings import FOLDER, ROUNDING, Surroundings, sentence
-from orchestration.fmi.transfers import Call, Numbers, Part, TransferLayout
+from orchestration.fmi.transfers import Numbers, TransferCall, TransferLayout, TransferPart
 from orchestration.fmi.values import Value, convert_value, same
 
 DIVERGENCE_CATEGORY = b"divergence"
@@ -53,7 +53,7 @@ class NativeInstance(Instance):
         self._messages = Messages()
         self._initial_values: dict[str, Value] = {}  # until the end of initialisation
         self._arrays: dict[int, Numbers] = {}  # last values of arrays, by reference: a call sets a whole array
-        self._calls: WeakKeyDictionary[Transfer, tuple[Call, ...]] = WeakKeyDictionary()
+        self._calls: WeakKeyDictionary[Transfer, tuple[TransferCall, ...]] = WeakKeyDictionary()
         self._folder: Scratch | None = None
         self.model = read_model(path)
         self._layout = TransferLayout(instance_name, self.model, self.stored)
@@ -260,7 +260,7 @@ class NativeInstance(Instance):
 
     # -- for the compiled loop, which makes the calls without Python -----------------------------------------------
 
-    def calls_of(self, transfer: Transfer) -> Sequence[Call]:
+    def calls_of(self, transfer: Transfer) -> Sequence[TransferCall]:
         """The calls of a transfer of `reader` or `writer`."""
         return self._calls[transfer]
 
@@ -278,9 +278,10 @@ class NativeInstance(Instance):
         """The number of messages that have not been processed."""
         return self._messages.waiting
 
-    def _registered(self, transfer: Transfer, action: str, parts: Sequence[Part], array: Floats) -> Transfer:
+    def _registered(self, transfer: Transfer, action: str, parts: Sequence[TransferPart], array: Floats) -> Transfer:
         self._calls[transfer] = tuple(
-            Call(function=self._access(action, part.type), part=part, in_place=part.buffer is array) for part in parts
+            TransferCall(function=self._access(action, part.type), part=part, in_place=part.buffer is array)
+            for part in parts
         )
         return transfer
 

@@ -17,7 +17,7 @@ Numbers = npt.NDArray[Any]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Part:
+class TransferPart:
     """Variables that one call transfers: all scalars of a type, or one array."""
 
     type: str
@@ -31,11 +31,11 @@ class Part:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Call:
+class TransferCall:
     """One call of a transfer, for a loop that makes it without Python."""
 
     function: str
-    part: Part
+    part: TransferPart
     in_place: bool
     """whether the buffer is the array of the transfer"""
 
@@ -47,7 +47,9 @@ class TransferLayout:
         """`stored` has the type of the values in memory, by the type of the variable."""
         self._name, self._model, self._stored = name, model, stored
 
-    def parts(self, names: Sequence[str], array: Floats, shared: dict[int, Numbers] | None = None) -> list[Part]:
+    def parts(
+        self, names: Sequence[str], array: Floats, shared: dict[int, Numbers] | None = None
+    ) -> list[TransferPart]:
         """The calls that transfer `names`; without a buffer where the array itself has the right layout.
 
         FMI arrays are kept in `shared`, initially with their start values, because a call sets all elements.
@@ -81,7 +83,7 @@ class TransferLayout:
 
     def _part(
         self, array: Floats, group: list[tuple[int, Variable]], reference: int | None, shared: dict[int, Numbers] | None
-    ) -> Part:
+    ) -> TransferPart:
         first = group[0][1]
         array_places = np.array([i for i, _ in group])
         if reference is None:
@@ -99,7 +101,9 @@ class TransferLayout:
             buffer = np.zeros(length, dtype=self._stored[first.type])
         else:
             buffer = shared.setdefault(reference, self._start_values(first))
-        return Part(type=first.type, references=references, buffer=buffer, array_places=array_places, places=places)
+        return TransferPart(
+            type=first.type, references=references, buffer=buffer, array_places=array_places, places=places
+        )
 
     def _start_values(self, element: Variable) -> Numbers:
         """Those of all elements of the array that an element is of."""

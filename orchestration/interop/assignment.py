@@ -19,7 +19,7 @@ class Ports:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Loop:
+class AssignedLoop:
     """The connections of a system, and its compared signals."""
 
     ports: Mapping[str, Ports]
@@ -51,14 +51,14 @@ class Loop:
         return {name: behind[component, name] for name in self.ports[component].inputs}
 
 
-def loop_of(export: Export) -> Loop:
+def loop_of(export: Export) -> AssignedLoop:
     """The loop of a system; raises `UsageError` for a connection with scale or offset."""
     for x in export.system.connections:
         if x.converts:
             raise UsageError(f"connections.{x.name}: has scale or offset; expected none to compare with other masters")
     sampled = {name for name, component in export.system.components.items() if component.sampling is not None}
     outputs = [(part.name, f"{part.name}.{name}") for part in export.parts for name in part.outputs]
-    return Loop(
+    return AssignedLoop(
         ports={part.name: Ports(inputs=part.inputs, outputs=part.outputs) for part in export.parts},
         connections=tuple(
             ((x.sender, variable_of(start)), (x.receiver, variable_of(end)))

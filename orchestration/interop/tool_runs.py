@@ -13,7 +13,7 @@ from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.foreign import isolated_call
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.instances import open_instance
-from orchestration.interop.assignment import Loop, loop_of
+from orchestration.interop.assignment import AssignedLoop, loop_of
 from orchestration.interop.catalogue import Tool
 from orchestration.interop.copies import expect_traceable, traced_copy
 from orchestration.interop.job import Job
@@ -133,7 +133,7 @@ class ToolRuns:
         return self._master_rows[key]
 
 
-def _rows(system: System, loop: Loop, start: FirstInputs) -> Floats | str:
+def _rows(system: System, loop: AssignedLoop, start: FirstInputs) -> Floats | str:
     """The time and the signals of a run here; or the reason why it ended early."""
 
     def load(path: Path, instance_name: str) -> Instance:

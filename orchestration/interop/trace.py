@@ -10,7 +10,7 @@ from typing import Any
 from orchestration.basics.errors import QuadcosimError
 from orchestration.fmi.model import read_model
 from orchestration.fmi.values import number_of
-from orchestration.interop.assignment import Loop
+from orchestration.interop.assignment import AssignedLoop
 from orchestration.interop.copies import log_of
 
 
@@ -35,7 +35,7 @@ class Trace:
     """The time at which the last step ended [s]."""
 
 
-def read_trace(folder: Path, components: Mapping[str, Path], loop: Loop, step: float) -> Trace:
+def read_trace(folder: Path, components: Mapping[str, Path], loop: AssignedLoop, step: float) -> Trace:
     """The trace in the logs of `components`, FMUs by name; raises `QuadcosimError` if a component took no step."""
     starts, steps = {}, {}
     for component in components:
@@ -61,7 +61,7 @@ def read_trace(folder: Path, components: Mapping[str, Path], loop: Loop, step: f
     )
 
 
-def _order(steps: Mapping[str, list[dict[str, Any]]], loop: Loop) -> str:
+def _order(steps: Mapping[str, list[dict[str, Any]]], loop: AssignedLoop) -> str:
     """The order of exchange: the step whose outputs were the inputs of each step after the first."""
     if set(steps) != set(loop.ports) or len(steps) < 2:
         return "alone"
@@ -75,7 +75,7 @@ def _order(steps: Mapping[str, list[dict[str, Any]]], loop: Loop) -> str:
 
 
 def _exchanged(
-    component: str, steps: Mapping[str, list[dict[str, Any]]], loop: Loop
+    component: str, steps: Mapping[str, list[dict[str, Any]]], loop: AssignedLoop
 ) -> Iterator[tuple[str, list[float], list[float], list[float]]]:
     """For each connected input: its sender, its values from the second step on, the outputs of the step before and of
     the same step.
@@ -89,7 +89,7 @@ def _exchanged(
 def _first_exchange(
     component: str,
     fmu: Path,
-    loop: Loop,
+    loop: AssignedLoop,
     starts: Mapping[str, dict[str, Any]],
     steps: Mapping[str, list[dict[str, Any]]],
 ) -> str:

@@ -36,7 +36,7 @@ _Pipes = tuple[IO[bytes] | None, IO[bytes] | None, IO[bytes] | None]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Request:
+class ForkRequest:
     """What a forked process is to be."""
 
     arguments: tuple[str, ...]
@@ -104,7 +104,7 @@ class ForkServer:
         """Whether it can fork."""
         return self.close.alive and self._process.poll() is None
 
-    def fork(self, request: Request, piped: tuple[bool, bool, bool]) -> ForkedProcess:
+    def fork(self, request: ForkRequest, piped: tuple[bool, bool, bool]) -> ForkedProcess:
         """A process; `piped` as in `forked`.
 
         Raises `ConnectionError` or `EOFError` if the server has ended, `OSError` if it cannot fork.
@@ -148,7 +148,7 @@ def forked(
     discarded, and errors go where those of this process go. Raises `OSError` if it cannot be started, as
     `ConnectionError` if the server ends, perhaps because importing the module ends it.
     """
-    request = Request(
+    request = ForkRequest(
         arguments=module.arguments, environment=dict(environment), folder=str(folder or os.getcwd()), umask=_umask()
     )
     for _ in range(2):  # the server may just have been killed

@@ -19,10 +19,10 @@ import tempfile
 
 from orchestration.processes import channel as parent_channel
 from orchestration.processes.family import NamesInPlace
-from orchestration.processes.fork_server import ANSWER, LENGTH, Request, exactly
+from orchestration.processes.fork_server import ANSWER, LENGTH, ForkRequest, exactly
 
 
-def main(module: str, connection: socket.socket) -> Request | None:
+def main(module: str, connection: socket.socket) -> ForkRequest | None:
     """Serve; returns its request in each forked process, and None in the server at its end."""
     names, own = NamesInPlace(), os.getpid()
     gc.disable()  # takes a tenth of the time of importing
@@ -88,9 +88,9 @@ def _report_failure(channel: socket.socket, error: Exception) -> None:
         channel.sendall(ANSWER.pack(False, -(getattr(error, "errno", None) or errno.EIO)))
 
 
-def _become(channel: socket.socket, streams: list[int], names: NamesInPlace) -> Request:
+def _become(channel: socket.socket, streams: list[int], names: NamesInPlace) -> ForkRequest:
     """Make this fork what a process is that was started with the environment, folder and streams of its request."""
-    request: Request = pickle.loads(exactly(channel, *LENGTH.unpack(exactly(channel, LENGTH.size))))
+    request: ForkRequest = pickle.loads(exactly(channel, *LENGTH.unpack(exactly(channel, LENGTH.size))))
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     signal.signal(signal.SIGINT, signal.default_int_handler)
     os.setsid()

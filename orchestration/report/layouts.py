@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
 from orchestration.report.known_layouts import layout_for
-from orchestration.report.model import Layout, Line, Panel
+from orchestration.report.model import Line, Panel, ReportLayout
 from orchestration.results import display_names as labels
 from orchestration.results.column_info import ColumnInfo
 from orchestration.system.model import System
@@ -16,11 +16,11 @@ About = Mapping[str, ColumnInfo]
 """By column"""
 
 
-def layout_of(system: System | None, columns: Collection[str], about: About) -> Layout:
+def layout_of(system: System | None, columns: Collection[str], about: About) -> ReportLayout:
     """The layout for some columns; `system` is that of the run, if it is known."""
     known = layout_for(columns)
     if known is None:
-        return Layout(columns=tuple(columns), panels=(*_of_connections(system, columns, about),), scene=None)
+        return ReportLayout(columns=tuple(columns), panels=(*_of_connections(system, columns, about),), scene=None)
     panels, scene = known.panels(columns), known.scene(columns, system)
     if scene is None:  # then the page computes no columns from it
         panels = tuple(panel for panel in panels if all(line.column in columns for line in panel.lines))
@@ -28,7 +28,7 @@ def layout_of(system: System | None, columns: Collection[str], about: About) -> 
     if scene is not None:
         drawn |= {*scene.position, *scene.quaternion, *(scene.desired or ())}
     rest = [*_of_components(system, [name for name in columns if name not in drawn], about, shown=False)]
-    return Layout(columns=tuple(columns), panels=(*panels, *rest), scene=scene)
+    return ReportLayout(columns=tuple(columns), panels=(*panels, *rest), scene=scene)
 
 
 def _of_connections(system: System | None, columns: Collection[str], about: About) -> Iterator[Panel]:

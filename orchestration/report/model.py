@@ -54,7 +54,7 @@ class Scene:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Layout:
+class ReportLayout:
     """The panels and the scene of tracks with the same columns."""
 
     columns: tuple[str, ...]
@@ -64,7 +64,7 @@ class Layout:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Track:
+class ReportTrack:
     """Signals of a run, as indices of blobs."""
 
     layout: int
@@ -88,7 +88,7 @@ class Bars:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run:
+class ReportRun:
     """A run that the page can open."""
 
     name: str
@@ -101,7 +101,7 @@ class Run:
     """what diverged"""
     note: str | None = None
     """on its track"""
-    track: Track | None = None
+    track: ReportTrack | None = None
     bars: Bars | None = None
     """of a system with computers or networks"""
 
@@ -120,7 +120,7 @@ class Column:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Table:
+class ReportTable:
     """The runs of a study."""
 
     count: int
@@ -137,7 +137,7 @@ class Table:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Share:
+class ReportShare:
     """The share of good runs among some runs."""
 
     label: str
@@ -157,11 +157,11 @@ class Shares:
     axis: str
     unit: str | None
     logarithmic: bool
-    shares: tuple[Share, ...]
+    shares: tuple[ReportShare, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cell:
+class ReportCell:
     """A cell of a comparison: one controller on one vehicle under one condition at one value of the axis."""
 
     number: int
@@ -169,8 +169,8 @@ class Cell:
     condition: str
     controller: str
     value: float
-    survives: Share
-    settles: Share
+    survives: ReportShare
+    settles: ReportShare
     diverged: int
     medians: Mapping[str, tuple[Number, Number, Number]]
     """by metric: value, and the ends of its interval at 95 %"""
@@ -185,7 +185,7 @@ class ComparisonCells:
     label: str
     unit: str | None
     controllers: tuple[str, ...]
-    cells: tuple[Cell, ...]
+    cells: tuple[ReportCell, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,17 +197,17 @@ class Report:
     summary: str
     words: tuple[str, str]
     """the names of the outcomes of a good run and of one that is not good"""
-    layouts: tuple[Layout, ...]
-    runs: tuple[Run, ...]
+    layouts: tuple[ReportLayout, ...]
+    runs: tuple[ReportRun, ...]
     blobs: Sequence[Blob]
     units: Mapping[str, str] = field(default_factory=dict)
     """of metrics"""
     labels: Mapping[str, str] = field(default_factory=dict)
     """of metrics"""
-    table: Table | None = None
+    table: ReportTable | None = None
     metric: str | None = None
     """the one of the table that is drawn first"""
-    overall: Share | None = None
+    overall: ReportShare | None = None
     shares: tuple[Shares, ...] = ()
     compared: ComparisonCells | None = None
     contents: tuple[str, ...] = ()

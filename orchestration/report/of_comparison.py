@@ -7,7 +7,7 @@ from pathlib import Path
 from orchestration.comparison.cells import CellSummary, Median, cell_summaries
 from orchestration.comparison.cells import Share as CellShare
 from orchestration.comparison.design import START, Comparison
-from orchestration.report.model import Cell, ComparisonCells, Report, Share
+from orchestration.report.model import ComparisonCells, Report, ReportCell, ReportShare
 from orchestration.report.number_format import number
 from orchestration.report.of_study import Stored, axes_of, read, report_of
 from orchestration.report.reruns import Progress
@@ -74,9 +74,9 @@ def _from_each_cell(comparison: Comparison, stored: Stored) -> Callable[[int], l
     return choose
 
 
-def _cell(summary: CellSummary, axis: Quantity) -> Cell:
+def _cell(summary: CellSummary, axis: Quantity) -> ReportCell:
     value = float(axis.of(summary.value))
-    return Cell(
+    return ReportCell(
         number=summary.cell,
         vehicle=summary.vehicle,
         condition=summary.condition,
@@ -89,8 +89,8 @@ def _cell(summary: CellSummary, axis: Quantity) -> Cell:
     )
 
 
-def _share(share: CellShare, value: float, runs: int) -> Share:
-    return Share(label=number(value), value=value, good=share.count, runs=runs, low=share.low, high=share.high)
+def _share(share: CellShare, value: float, runs: int) -> ReportShare:
+    return ReportShare(label=number(value), value=value, good=share.count, runs=runs, low=share.low, high=share.high)
 
 
 def _ends(median: Median) -> tuple[float | None, float | None, float | None]:

@@ -8,7 +8,7 @@ import numpy as np
 from orchestration.basics.documents import tables_in
 from orchestration.basics.errors import UsageError
 from orchestration.report.blobs import Blobs
-from orchestration.report.model import Bars, Report, Run, Setting
+from orchestration.report.model import Bars, Report, ReportRun, Setting
 from orchestration.report.number_format import number
 from orchestration.report.tracks import Tracks
 from orchestration.results import display_names as labels
@@ -63,9 +63,9 @@ def report_of(results: Mapping[str, Result], command: str) -> Report:
     )
 
 
-def _run(name: str, result: Result, tracks: Tracks, blobs: Blobs, rows: int) -> Run:
+def _run(name: str, result: Result, tracks: Tracks, blobs: Blobs, rows: int) -> ReportRun:
     signals = dict(result.signals)
-    return Run(
+    return ReportRun(
         name=name,
         settings=_settings(result),
         metrics=result.metrics,

@@ -12,7 +12,7 @@ import numpy as np
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
 from orchestration.report.blobs import Blobs
-from orchestration.report.model import Report, Run, Setting, Share
+from orchestration.report.model import Report, ReportRun, ReportShare, Setting
 from orchestration.report.number_format import percent
 from orchestration.report.reruns import Progress, Rerun, fastest, rerun
 from orchestration.report.subset import MOST_IN_BATCHES, MOST_SINGLY, points_for, select
@@ -29,7 +29,7 @@ from orchestration.studies.store_columns import FIXED, TEXTS, UNITS
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import AGREEMENT, expect_current
 from orchestration.system.criterion import DIVERGED, TERMINATED
-from orchestration.workers.batching import Agreement
+from orchestration.workers.batching import LaneAgreement
 
 AGREES = 1e-6
 """Relative difference of the metric that is drawn first up to which a rerun equals the run in the store"""
@@ -67,7 +67,7 @@ def read(path: Path, study: Study | None = None) -> Stored:
 class Embedded:
     """The runs whose signals are in a report."""
 
-    runs: Sequence[Run]
+    runs: Sequence[ReportRun]
     places: Mapping[int, int]
     """in `runs`, by index in the design"""
     contents: Sequence[str]
@@ -172,7 +172,7 @@ def is_sample(stored: Stored, study: Study | None) -> bool:
     return drawn or study.vary_seed
 
 
-def summary_of(overall: Share, words: tuple[str, str], stored: Stored) -> str:
+def summary_of(overall: ReportShare, words: tuple[str, str], stored: Stored) -> str:
     """A sentence with the outcomes of all runs."""
     total = int(stored.about.get("total", overall.runs))
     runs = f"{overall.runs} runs" if total == overall.runs else f"{overall.runs} of {total} runs are done so far"
@@ -220,7 +220,7 @@ def embed(
     variant, files, lanes = fastest(study)
     limit = (MOST_IN_BATCHES if lanes else MOST_SINGLY) if most is None else most
     selected = select(indices, required, limit) if choose is None else sorted({*required, *choose(limit)})
-    runs: list[Run] = []
+    runs: list[ReportRun] = []
     places: dict[int, int] = {}
     differing = 0
     points = points_for(len(selected), COLUMNS)
@@ -232,7 +232,7 @@ def embed(
         settings: dict[str, Setting] = dict(known[again.index]["settings"])
         track = tracks.compact(again.system, again.signals, about, points)
         runs.append(
-            Run(
+            ReportRun(
                 name=f"run {again.index}", index=again.index, settings=settings, message=again.message, note=note,
                 track=track,
             )
@@ -280,5 +280,5 @@ def provenance_of(about: Mapping[str, str]) -> list[tuple[str, str]]:
     versions = {f"version of {name}": text for name, text in json.loads(about.get("versions", "{}")).items()}
     guids = {f"GUID of the {name}": text for name, text in json.loads(about.get("guids", "{}")).items()}
     machine = {"machine": str(place["machine"])} if "machine" in place else {}
-    agreement = {"lanes": str(Agreement.from_text(about[AGREEMENT]))} if AGREEMENT in about else {}
+    agreement = {"lanes": str(LaneAgreement.from_text(about[AGREEMENT]))} if AGREEMENT in about else {}
     return [*versions.items(), *guids.items(), *machine.items(), *agreement.items()]

@@ -10,7 +10,7 @@ import numpy as np
 from orchestration.basics.simulator import Floats
 from orchestration.basics.statistics import wilson
 from orchestration.report.blobs import Blobs
-from orchestration.report.model import Column, Share, Shares, Table
+from orchestration.report.model import Column, ReportShare, ReportTable, Shares
 from orchestration.report.number_format import number
 from orchestration.report.subset import evenly
 from orchestration.results import display_names as labels
@@ -47,7 +47,7 @@ def table_of(
     tracks: Mapping[int, int],
     messages: Mapping[int, str],
     is_grid: bool,
-) -> Table:
+) -> ReportTable:
     """The table of the rows of a store; `tracks` and `messages` are by index in the design."""
     kept = rows if len(rows) <= MOST_ROWS else [rows[i] for i in sorted(evenly(len(rows), MOST_ROWS))]
     places = {row["design_index"]: place for place, row in enumerate(kept)}
@@ -60,7 +60,7 @@ def table_of(
         _words(OUTCOME, [row[OUTCOME] for row in kept], blobs, "metric"),
         *_metrics(kept, metrics, units, blobs),
     ]  # fmt: skip
-    return Table(
+    return ReportTable(
         count=len(kept),
         total=len(rows),
         columns=tuple(columns),
@@ -106,11 +106,11 @@ def is_good(row: Row) -> bool:
     return bool(row["good"] == 1)
 
 
-def share_of(label: str, value: float | None, rows: Sequence[Row], *, by_chance: bool) -> Share:
+def share_of(label: str, value: float | None, rows: Sequence[Row], *, by_chance: bool) -> ReportShare:
     """The share of good runs in some rows; with its interval if the runs are a random sample."""
     good = sum(map(is_good, rows))
     low, high = wilson(good, len(rows)) if by_chance else (None, None)
-    return Share(label=label, value=value, good=good, runs=len(rows), low=low, high=high)
+    return ReportShare(label=label, value=value, good=good, runs=len(rows), low=low, high=high)
 
 
 def shares_along(rows: Sequence[Row], axis: ColumnAxis, *, by_chance: bool) -> Shares | None:
@@ -131,7 +131,7 @@ def shares_along(rows: Sequence[Row], axis: ColumnAxis, *, by_chance: bool) -> S
     return Shares(axis=axis.quantity.name, unit=unit, logarithmic=axis.logarithmic, shares=tuple(shares))
 
 
-def _by_part(rows: Sequence[Row], values: Floats, axis: ColumnAxis, *, by_chance: bool) -> Iterator[Share]:
+def _by_part(rows: Sequence[Row], values: Floats, axis: ColumnAxis, *, by_chance: bool) -> Iterator[ReportShare]:
     scaled = np.log(values) if axis.logarithmic else values
     edges = np.linspace(scaled.min(), scaled.max(), PARTS + 1)
     part = np.clip(np.digitize(scaled, edges) - 1, 0, PARTS - 1)

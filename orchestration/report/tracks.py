@@ -8,7 +8,7 @@ from orchestration.basics.simulator import Floats
 from orchestration.report.blobs import Blobs
 from orchestration.report.known_layouts import layout_for
 from orchestration.report.layouts import About, layout_of
-from orchestration.report.model import Layout, Track
+from orchestration.report.model import ReportLayout, ReportTrack
 from orchestration.system.model import System
 
 Signals = Mapping[str, Floats]
@@ -20,16 +20,16 @@ class Tracks:
 
     def __init__(self, blobs: Blobs) -> None:
         self._blobs = blobs
-        self.layouts: list[Layout] = []
+        self.layouts: list[ReportLayout] = []
 
-    def whole(self, system: System | None, signals: Signals, about: About, rows: int) -> Track:
+    def whole(self, system: System | None, signals: Signals, about: About, rows: int) -> ReportTrack:
         """Every n-th row, about `rows` in all, and the rows with the largest or smallest value of a signal."""
         signals = _with_computed(signals)
         kept = _rows(signals, rows)
         columns = {name: self._blobs.exact(values[kept]) for name, values in signals.items() if name != "time"}
         return self._track(system, columns, about, self._blobs.exact(signals["time"][kept]))
 
-    def compact(self, system: System, signals: Signals, about: About, points: int) -> Track:
+    def compact(self, system: System, signals: Signals, about: About, points: int) -> ReportTrack:
         """Values at `points` times, denser where signals change more: interpolated, of held signals the row before."""
         signals = _with_computed(signals)
         time = signals["time"]
@@ -46,11 +46,11 @@ class Tracks:
                 columns[name] = self._blobs.compact(thinned, logarithmic=name in logarithmic)
         return self._track(system, columns, about, self._blobs.exact(at))
 
-    def _track(self, system: System | None, columns: Mapping[str, int], about: About, time: int) -> Track:
+    def _track(self, system: System | None, columns: Mapping[str, int], about: About, time: int) -> ReportTrack:
         layout = layout_of(system, [*columns], about)
         if layout not in self.layouts:
             self.layouts.append(layout)
-        return Track(layout=self.layouts.index(layout), time=time, columns=tuple(columns.values()))
+        return ReportTrack(layout=self.layouts.index(layout), time=time, columns=tuple(columns.values()))
 
 
 def _with_computed(signals: Signals) -> Signals:

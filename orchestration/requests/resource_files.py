@@ -6,10 +6,10 @@ from typing import Any
 
 from orchestration.basics.errors import UsageError
 from orchestration.requests import can_database, task_table
-from orchestration.system.proposal import Resources
+from orchestration.system.proposal import ProposedResources
 
 
-def resources_of(arguments: Sequence[str]) -> tuple[Resources, list[str]]:
+def resources_of(arguments: Sequence[str]) -> tuple[ProposedResources, list[str]]:
     """The computers and networks of the files that have them, and the other arguments.
 
     Raises `UsageError` for a file that cannot be read, and where two have the same computer or network.
@@ -29,7 +29,7 @@ def resources_of(arguments: Sequence[str]) -> tuple[Resources, list[str]]:
             undecided += bus.undecided
         else:
             others.append(text)
-    return Resources(tables=tables, guessed=tuple(guessed), undecided=tuple(undecided)), others
+    return ProposedResources(tables=tables, guessed=tuple(guessed), undecided=tuple(undecided)), others
 
 
 def _add(tables: dict[str, dict[str, Any]], table: str, path: Path, more: dict[str, Any]) -> None:

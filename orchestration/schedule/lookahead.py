@@ -20,7 +20,7 @@ _FURTHER = 1_000_000
 """[ns], the least time by which the scheduler advances"""
 
 
-class Messages:
+class ForeseenMessages:
     """The messages of one connection in the order of sending, until they are taken."""
 
     def __init__(self) -> None:
@@ -64,7 +64,7 @@ class Messages:
 class Samples:
     """The samples of a component until they are taken, and the messages that it sends."""
 
-    def __init__(self, messages: Collection[Messages]) -> None:
+    def __init__(self, messages: Collection[ForeseenMessages]) -> None:
         """`messages` are those of its connections that the scheduler computes."""
         self.times: Integers = np.zeros(0, dtype=np.int64)
         self._messages = messages
@@ -96,7 +96,7 @@ class Lookahead:
         self._scheduler = scheduler(resources.of_run(streams), (SAMPLED, SENT, ARRIVES))
         self._tasks, self._stop = resources.tasks, resources.parts.stop
         self._reached = 0
-        self.messages = {name: Messages() for name in resources.carriers}
+        self.messages = {name: ForeseenMessages() for name in resources.carriers}
         """by connection"""
         self.samples = {
             name: Samples(

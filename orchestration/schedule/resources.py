@@ -26,12 +26,12 @@ from orchestration.computers.parts import (
     Carrier,
     Constant,
     Leg,
-    Link,
-    Message,
+    NetworkLink,
     Parts,
     Processor,
+    ScheduledFrame,
+    ScheduledTask,
     Stream,
-    Task,
 )
 from orchestration.computers.results import Timeline
 from orchestration.computers.scheduler_events import EventBuilder
@@ -75,7 +75,7 @@ class Resources:
         """Up to `stop` [ns]."""
         self._system, self._stop = system, stop
         self._streams: list[Constant | OfRun] = []
-        self._links: list[Link] = []
+        self._links: list[NetworkLink] = []
         self._link_names: list[str] = []
         self._zero = self._stream(Constant(0))
         placed, self._placed_messages = [*placed_tasks(system.computers)], [*placed_messages(system.networks)]
@@ -149,12 +149,12 @@ class Resources:
 
     # -- tasks -----------------------------------------------------------------------------------------------------
 
-    def _task(self, of: PlacedTask) -> Task:
+    def _task(self, of: PlacedTask) -> ScheduledTask:
         task, ratio = of.task, Fraction(repr(float(of.computer.clock_ratio)))
         nominal = NONE
         if task.on is None:
             nominal = self._instants(of.place, task.offset, task.period, task.arrivals, ratio)
-        return Task(
+        return ScheduledTask(
             processor=list(self._system.computers).index(of.computer_name),
             priority=task.priority,
             deadline=nanoseconds(task.due),
@@ -167,7 +167,7 @@ class Resources:
             reports_samples=task.component is not None,
         )
 
-    def _task_without_computer(self, name: str, processor: int) -> Task:
+    def _task_without_computer(self, name: str, processor: int) -> ScheduledTask:
         """The task of a sampled component that is on no computer; its jobs take no time."""
         sampling = self._system.components[name].sampling
         assert sampling is not None
@@ -176,7 +176,7 @@ class Resources:
             place = f"components.{name}"
             nominal = self._instants(place, sampling.offset, sampling.period, None, ratio)
             late = self._late(sampling.jitter, sampling.jitter_distribution, place)
-        return Task(
+        return ScheduledTask(
             processor=processor,
             priority=1,
             deadline=_NO_DEADLINE,
@@ -215,14 +215,14 @@ class Resources:
             releases=releases,
         )
 
-    def _message(self, of: PlacedMessage) -> Message:
+    def _message(self, of: PlacedMessage) -> ScheduledFrame:
         message, network = of.message, of.network
         nominal = NONE
         if message.period is not None or message.arrivals is not None:
             nominal = self._instants(of.place, message.offset, message.period, message.arrivals, Fraction(1))
         is_can = network.kind in ("can", "can-fd")
         ranked = {"ethernet": message.priority}
-        return Message(
+        return ScheduledFrame(
             rank=(message.identifier or 0) if is_can else ranked.get(network.kind, 0),
             legs=self._legs(of),
             pause=nanoseconds(network.latency),
@@ -252,7 +252,7 @@ class Resources:
                 grids = [Grid(sum(lengths[:i], Fraction(0)), sum(lengths, Fraction(0))) for i in range(len(lengths))]
                 begins = self._stream(_Interleaved(grids, self._stop).of_run)
             self._link_names.append(name)
-            self._links.append(Link(slots=len(slots), begins=begins))
+            self._links.append(NetworkLink(slots=len(slots), begins=begins))
         return self._link_names.index(name)
 
     # -- numbers ---------------------------------------------------------------------------------------------------

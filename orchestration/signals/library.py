@@ -7,7 +7,7 @@ from typing import Any
 
 from orchestration.basics.errors import UsageError, expected_name, shown
 from orchestration.signals.dryden import Dryden
-from orchestration.signals.limits import Limits
+from orchestration.signals.limits import SignalLimits
 from orchestration.signals.motions import MOTIONS
 
 KINDS: dict[str, dict[str, type]] = {"motion": {**MOTIONS}, "wind": {"dryden": Dryden}}
@@ -25,9 +25,9 @@ def make_signal(name: str, parameters: Mapping[str, Any], among: Mapping[str, ty
     return _with_parameters(name, among[name], parameters)
 
 
-def limits(parameters: Mapping[str, Any]) -> Limits:
+def limits(parameters: Mapping[str, Any]) -> SignalLimits:
     """The limits of a curve through way-points; raises `UsageError` as `make_signal` does."""
-    found: Limits = _with_parameters(WAY_POINTS, Limits, parameters)
+    found: SignalLimits = _with_parameters(WAY_POINTS, SignalLimits, parameters)
     return found
 
 

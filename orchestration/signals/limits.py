@@ -9,7 +9,7 @@ AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Limits:
+class SignalLimits:
     """The limits of a curve through way-points without times."""
 
     speed: float = 1.0

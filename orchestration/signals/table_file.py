@@ -20,7 +20,7 @@ LONGEST_LINE = 2**17
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rows:
+class TableRows:
     """The numbers of a CSV file by column, with the line of each row."""
 
     path: Path
@@ -58,7 +58,7 @@ def read_table(path: Path, columns: Sequence[str], stop_time: float) -> tuple[Fl
     return time, np.column_stack([rows.columns[name] for name in columns])
 
 
-def read_rows(path: Path, columns: Sequence[str]) -> Rows:
+def read_rows(path: Path, columns: Sequence[str]) -> TableRows:
     """A CSV file that has at least these columns.
 
     Raises `UsageError` for a missing column and, naming line and column, for a value that is no finite number.
@@ -93,7 +93,7 @@ def _names(lines: Any) -> list[str]:
     return [name.strip() for name in next(lines, [])]
 
 
-def _read_rows(path: Path, lines: Any, columns: Sequence[str]) -> Rows:
+def _read_rows(path: Path, lines: Any, columns: Sequence[str]) -> TableRows:
     header = _names(lines)
     _expect_columns(path, header, columns)
     numbers, places = array("d"), []
@@ -113,7 +113,7 @@ def _read_rows(path: Path, lines: Any, columns: Sequence[str]) -> Rows:
     if len(places) < 2:
         raise UsageError(f"{path}: expected at least two rows of numbers")
     table = np.array(numbers).reshape(-1, len(header))
-    return Rows(path=path, columns={name: table[:, i].copy() for i, name in enumerate(header)}, lines=places)
+    return TableRows(path=path, columns={name: table[:, i].copy() for i, name in enumerate(header)}, lines=places)
 
 
 def _expect_columns(path: Path, header: Sequence[str], columns: Sequence[str]) -> None:

@@ -8,9 +8,9 @@ import numpy as np
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
-from orchestration.signals.limits import AXES, Limits
+from orchestration.signals.limits import AXES, SignalLimits
 from orchestration.signals.spline import DEGREE, Spline, through
-from orchestration.signals.table_file import TIME, Rows, read_rows
+from orchestration.signals.table_file import TIME, TableRows, read_rows
 
 HOLD, SPEED = "hold", "speed"
 _SAMPLES, _FINER = 32, 3
@@ -33,10 +33,10 @@ def read_waypoints(path: Path, limits: Mapping[str, float]) -> Spline:
             raise UsageError(f"parameters.{next(iter(limits))}: expected none; {path} has times")
         rows.expect_increasing_times()
         return through(rows.columns[TIME], points)
-    return _timed(rows, points, Limits(**limits))
+    return _timed(rows, points, SignalLimits(**limits))
 
 
-def _timed(rows: Rows, points: Floats, limits: Limits) -> Spline:
+def _timed(rows: TableRows, points: Floats, limits: SignalLimits) -> Spline:
     """Curves from hold to hold, each as fast as the limits allow."""
     count = len(points)
     holds = rows.columns.get(HOLD, np.zeros(count))

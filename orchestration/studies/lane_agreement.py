@@ -16,10 +16,10 @@ from orchestration.building.inputs import Files
 from orchestration.fmi.model import Model, Variable
 from orchestration.system.component import Component
 from orchestration.system.model import System
-from orchestration.workers.batching import TOLERATED, Agreement, Pair, sample
+from orchestration.workers.batching import TOLERATED, LaneAgreement, Pair, sample
 from orchestration.workers.executors import TaskRunner
 from orchestration.workers.row import Row
-from orchestration.workers.task import Chunk, RunTask
+from orchestration.workers.task import RunTask, TaskBatch
 
 BEGINNING, SHARE = 1.0, 0.05
 """[s] simulated by FMUs in Python, and least share of a run: a whole run costs as much as hundreds in lanes"""
@@ -36,7 +36,7 @@ def with_python_twins(files: Files) -> Files:
 
 def lane_agreement(
     lanes: Mapping[str, Row], files: Files, task_of: Callable[[int, str], RunTask], run: TaskRunner
-) -> Agreement | None:
+) -> LaneAgreement | None:
     """The agreement of a sample of runs in lanes with the same runs by FMUs; None if there were no runs in lanes.
 
     `lanes` are their rows by key; `task_of` makes the task of a run from its index and key. `run` works with `files`,
@@ -46,10 +46,10 @@ def lane_agreement(
     if not chosen:
         return None
     beginnings = [_beginning(task) for task in chosen if _has_twins(task.system, files)]
-    tasks: list[RunTask | Chunk] = [*chosen, *map(_in_python, beginnings)]
+    tasks: list[RunTask | TaskBatch] = [*chosen, *map(_in_python, beginnings)]
     if beginnings:
         nudged = (_nudged(one, files.models_of(one.system)) for one in beginnings)
-        tasks.append(Chunk(tasks=(*beginnings, *nudged)))
+        tasks.append(TaskBatch(tasks=(*beginnings, *nudged)))
     # A run that exceeds the time limit outside of lanes is not compared: lanes are faster.
     rows = {one.row.key: one.row for outcomes in run(tasks) for one in outcomes if not one.ended}
 
@@ -57,9 +57,9 @@ def lane_agreement(
         both = ((task, one.get(task.key), rows.get(prefix + task.key)) for task in tasks)
         return [(task.index, _metrics(here), _metrics(there)) for task, here, there in both if here and there]
 
-    steady = [one for one in beginnings if Agreement.of(pairs([one], rows, _NUDGED)).difference <= TOLERATED]
-    python = Agreement.of(pairs(steady, rows, _PYTHON)) if steady else None
-    return replace(Agreement.of(pairs(chosen, lanes, "")), python=python)
+    steady = [one for one in beginnings if LaneAgreement.of(pairs([one], rows, _NUDGED)).difference <= TOLERATED]
+    python = LaneAgreement.of(pairs(steady, rows, _PYTHON)) if steady else None
+    return replace(LaneAgreement.of(pairs(chosen, lanes, "")), python=python)
 
 
 def _metrics(row: Row) -> Mapping[str, Any]:

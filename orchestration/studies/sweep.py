@@ -34,7 +34,7 @@ from orchestration.workers.executors import TaskRunner, cluster, expect_schedule
 from orchestration.workers.pool import Inputs
 from orchestration.workers.provenance import versions
 from orchestration.workers.row import Row
-from orchestration.workers.task import Outcome, RunTask
+from orchestration.workers.task import RunTask, TaskOutcome
 
 Announce = Callable[[str], None]
 """Called with lines about the engine and failed runs."""
@@ -178,7 +178,7 @@ class _Progress:
         self.done = total - sum(self._missing.values())
         self._report()
 
-    def add(self, outcomes: Iterable[Outcome]) -> None:
+    def add(self, outcomes: Iterable[TaskOutcome]) -> None:
         """Count runs that have been written."""
         for row in (outcome.row for outcome in outcomes):
             if row.status == "failed":
@@ -227,7 +227,7 @@ def _signals_path(opened: store.Store, key: str) -> Path:
     return opened.path.parent / "signals" / f"{key[:16]}.parquet"
 
 
-def _keep(outcomes: Sequence[Outcome], opened: store.Store) -> None:
+def _keep(outcomes: Sequence[TaskOutcome], opened: store.Store) -> None:
     """Write signals first, then the rows, so that every row has its signals."""
     for outcome in outcomes:
         if outcome.signals is not None:

@@ -9,7 +9,7 @@ from orchestration.basics.extras import explains_missing
 from orchestration.results import html
 from orchestration.studies.store import open_for_reading
 from orchestration.studies.study import Study
-from orchestration.workers.batching import Agreement
+from orchestration.workers.batching import LaneAgreement
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,7 +34,7 @@ class Swept:
     """The store of the study."""
     engine: str
     """The engine, by its name in `--engine`."""
-    agreement: Agreement | None = None
+    agreement: LaneAgreement | None = None
     """Agreement of runs in SIMD lanes with the same runs by FMUs; None if there were none."""
     follows: tuple[str, ...] = ()
     """The references of its runs and the components that follow them."""

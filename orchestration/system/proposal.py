@@ -43,7 +43,7 @@ class Proposal:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Resources:
+class ProposedResources:
     """Computers and networks of other files, for the proposal."""
 
     tables: Mapping[str, Any] = field(default_factory=dict)
@@ -52,7 +52,7 @@ class Resources:
     undecided: tuple[str, ...] = ()
 
 
-def propose(fmus: Sequence[tuple[str, Model]], folder: Path, resources: Resources | None = None) -> Proposal:
+def propose(fmus: Sequence[tuple[str, Model]], folder: Path, resources: ProposedResources | None = None) -> Proposal:
     """Components named after their models, connected by name, type and unit; for a file that lies in `folder`.
 
     Each FMU is given by the path or name that the user wrote, with its model description.
@@ -60,7 +60,7 @@ def propose(fmus: Sequence[tuple[str, Model]], folder: Path, resources: Resource
     An FMU whose outputs are all discrete is proposed as sampled, and so is the controller of a loop; any other in
     continuous time. Raises `UsageError` without any FMU.
     """
-    resources = resources or Resources()
+    resources = resources or ProposedResources()
     if not (fmus or resources.tables):
         raise UsageError("expected at least one FMU")
     models = [model for _, model in fmus]

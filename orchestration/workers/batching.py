@@ -12,7 +12,7 @@ from orchestration.basics.errors import QuadcosimError
 from orchestration.engines.batch.kernels import preferred_lanes
 from orchestration.engines.batch.shape import outline
 from orchestration.schedule.schedule_cache import timing
-from orchestration.workers.task import Chunk, RunTask
+from orchestration.workers.task import RunTask, TaskBatch
 
 SAMPLE = 8
 """Runs that are repeated with FMUs"""
@@ -24,7 +24,7 @@ ON_GPU = 2**15
 """Largest number of runs in a chunk on a GPU, enough to fill its threads"""
 
 
-def chunks(tasks: Iterable[RunTask], total: int, workers: int, on_gpu: bool = False) -> Iterator[RunTask | Chunk]:
+def chunks(tasks: Iterable[RunTask], total: int, workers: int, on_gpu: bool = False) -> Iterator[RunTask | TaskBatch]:
     """Tasks in chunks, several for each worker; tasks whose signals are kept remain single."""
     size = max(preferred_lanes(), min(CHUNK, total // (4 * workers) // preferred_lanes() * preferred_lanes()))
     size, order = (ON_GPU, ON_GPU) if on_gpu else (size, SORTED)
@@ -37,7 +37,7 @@ def chunks(tasks: Iterable[RunTask], total: int, workers: int, on_gpu: bool = Fa
             places.setdefault(key, len(places))
         ordered = [task for task, _ in sorted(rest, key=lambda pair: places[pair[1]])]
         for first in range(0, len(ordered), size):
-            yield Chunk(tasks=tuple(ordered[first : first + size]), on_gpu=on_gpu)
+            yield TaskBatch(tasks=tuple(ordered[first : first + size]), on_gpu=on_gpu)
 
 
 def sample(keys: Iterable[str]) -> set[str]:
@@ -50,7 +50,7 @@ Pair = tuple[int, Mapping[str, Any], Mapping[str, Any]]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Agreement:
+class LaneAgreement:
     """Agreement of a sample of runs in lanes with the same runs by FMUs."""
 
     runs: int
@@ -59,7 +59,7 @@ class Agreement:
     metric: str | None
     index: int | None
     """the run in which it occurs; None if there is none"""
-    python: "Agreement | None" = None
+    python: "LaneAgreement | None" = None
     """the same for the beginning of non-chaotic runs with FMUs in Python; None: there are no such FMUs"""
 
     def __str__(self) -> str:
@@ -78,14 +78,14 @@ class Agreement:
         return json.dumps(asdict(self))
 
     @classmethod
-    def from_text(cls, text: str) -> "Agreement":
+    def from_text(cls, text: str) -> "LaneAgreement":
         """From the form in which a store keeps it."""
         fields = json.loads(text)
         python = fields.pop("python", None)
         return cls(**fields, python=None if python is None else cls(**python))
 
     @classmethod
-    def of(cls, pairs: Iterable[Pair]) -> "Agreement":
+    def of(cls, pairs: Iterable[Pair]) -> "LaneAgreement":
         """Compare runs in lanes with the same runs by FMUs."""
         differences = [
             (_difference(lanes.get(name), value), name, index)

@@ -18,11 +18,11 @@ from orchestration.engines.engine import Engine
 from orchestration.system.model import System
 from orchestration.workers.batching import chunks
 from orchestration.workers.pool import Inputs, InterruptedWorker, Pool
-from orchestration.workers.task import Chunk, Outcome, RunTask
+from orchestration.workers.task import RunTask, TaskBatch, TaskOutcome
 
-TaskRunner = Callable[[Iterable[RunTask | Chunk]], Generator[list[Outcome], None, None]]
+TaskRunner = Callable[[Iterable[RunTask | TaskBatch]], Generator[list[TaskOutcome], None, None]]
 """Yields the outcomes of tasks as they come, in any order."""
-Submit = Callable[[RunTask | Chunk], "Future[list[Outcome]]"]
+Submit = Callable[[RunTask | TaskBatch], "Future[list[TaskOutcome]]"]
 _PATIENCE = 10.0
 """[s] to wait for the scheduler"""
 _WORKERS_PATIENCE = 60.0
@@ -86,7 +86,7 @@ class RunEvaluator:
         return RunTask(index=index, key="", settings={}, system=system, keep_signals=False, engine=self._engine)
 
 
-def _metrics(outcome: Outcome) -> Any:
+def _metrics(outcome: TaskOutcome) -> Any:
     """The metrics of a run; raises `QuadcosimError` if it has failed."""
     if outcome.row.metrics is None:
         raise QuadcosimError(str(outcome.row.message))
@@ -133,7 +133,7 @@ def cluster(inputs: Inputs, address: str) -> Iterator[TaskRunner]:
         executor = stack.enter_context(client.get_executor(pure=False))
         slots = sum(client.nthreads().values())
 
-        def submit(task: RunTask | Chunk) -> "Future[list[Outcome]]":
+        def submit(task: RunTask | TaskBatch) -> "Future[list[TaskOutcome]]":
             return executor.submit(run_on_cluster, task, scattered)  # type: ignore[no-any-return]
 
         try:
@@ -156,7 +156,7 @@ def expect_scheduler(address: str) -> None:
         raise QuadcosimError(f"--dask {address}: expected a dask scheduler with workers there: {error}") from error
 
 
-def run_on_cluster(task: RunTask | Chunk, inputs: Inputs) -> list[Outcome]:
+def run_on_cluster(task: RunTask | TaskBatch, inputs: Inputs) -> list[TaskOutcome]:
     """The outcomes of runs; called in a dask worker, simulates in a separate process there too."""
     with _POOLS_LOCK:
         if inputs.digest not in _POOLS:
@@ -181,7 +181,7 @@ def _local_submit(stack: ExitStack, inputs: Inputs, workers: int) -> Submit:
     return lambda task: executor.submit(pool.run, task)
 
 
-def _drain(tasks: Iterable[RunTask | Chunk], submit: Submit, most: int) -> Generator[list[Outcome], None, None]:
+def _drain(tasks: Iterable[RunTask | TaskBatch], submit: Submit, most: int) -> Generator[list[TaskOutcome], None, None]:
     """Keep `most` tasks in progress until none is left; yield the outcomes of those that finish."""
     waiting = iter(tasks)
     in_progress = {submit(task) for task in islice(waiting, most)}

@@ -20,11 +20,11 @@ from orchestration.processes import subprocesses
 from orchestration.processes.child import Child, Died
 from orchestration.workers.provenance import sources, versions
 from orchestration.workers.task import (
-    Chunk,
     EnvironmentFailure,
-    Outcome,
     Ready,
     RunTask,
+    TaskBatch,
+    TaskOutcome,
     WorkerEnvironmentError,
     row_of,
 )
@@ -69,7 +69,7 @@ class WorkerProcess:
             environment=subprocesses.environment(**dict.fromkeys(("TMPDIR", "TEMP", "TMP"), path)),
         )
 
-    def request(self, task: RunTask | Chunk) -> Any:
+    def request(self, task: RunTask | TaskBatch) -> Any:
         """Send a task and return the answer; raises `Died`, also at its time limit."""
         self._child.allow(task.time_limit)
         self._child.send(task)
@@ -100,7 +100,7 @@ class Supervisor:
         self._worker: WorkerProcess | None = None
         self._machine: str | None = None
 
-    def run(self, task: RunTask) -> Outcome:
+    def run(self, task: RunTask) -> TaskOutcome:
         """The outcome of a run; a run that ends its process `ATTEMPTS` times has failed.
 
         Raises `QuadcosimError` for failures not caused by the run.
@@ -114,7 +114,7 @@ class Supervisor:
                 self._drop()
                 if death.ending.reached is not None:
                     message = f"it was ended: {death.ending.reached}"
-                    return Outcome(row=row_of(task, None, message, 0.0, self._machine), ended=True)
+                    return TaskOutcome(row=row_of(task, None, message, 0.0, self._machine), ended=True)
                 _expect_no_interrupt(death)
                 if death.ending.code in _FROM_OUTSIDE:
                     killed += 1
@@ -122,7 +122,7 @@ class Supervisor:
                     crashes += 1
                 if crashes == ATTEMPTS:
                     message = f"its worker process {death}, {ATTEMPTS} times, the last times in a new process"
-                    return Outcome(row=row_of(task, None, message, 0.0, self._machine))
+                    return TaskOutcome(row=row_of(task, None, message, 0.0, self._machine))
                 if killed == ATTEMPTS:
                     raise QuadcosimError(
                         f"the worker process of run {task.index} {death} {ATTEMPTS} times: not caused by the run, or "
@@ -131,10 +131,10 @@ class Supervisor:
                 continue
             if isinstance(answer, EnvironmentFailure):
                 raise WorkerEnvironmentError(f"not a failure of a run: {answer.message}")
-            assert isinstance(answer, Outcome)
+            assert isinstance(answer, TaskOutcome)
             return answer
 
-    def run_chunk(self, chunk: Chunk) -> list[Outcome]:
+    def run_chunk(self, chunk: TaskBatch) -> list[TaskOutcome]:
         """The outcomes of many runs; they are run one by one if together they end their process or exceed their
         common time limit.
 
@@ -218,14 +218,14 @@ class Pool:
             self._scratch.remove()
             raise
 
-    def run(self, task: RunTask | Chunk) -> list[Outcome]:
+    def run(self, task: RunTask | TaskBatch) -> list[TaskOutcome]:
         """The outcomes of runs; may be called from several threads, each of which gets its own process.
 
         Raises `QuadcosimError` once it is closed.
         """
         supervisor = self._supervisor()
         try:
-            if isinstance(task, Chunk):
+            if isinstance(task, TaskBatch):
                 systems = all_with_files([each.system for each in task.tasks], self._paths)
                 each = tuple(replace(one, system=system) for one, system in zip(task.tasks, systems))
                 return supervisor.run_chunk(replace(task, tasks=each))

@@ -42,7 +42,7 @@ class RunTask:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Chunk:
+class TaskBatch:
     """Runs of a study that are simulated in SIMD lanes, all with native FMUs and without keeping signals."""
 
     tasks: tuple[RunTask, ...]
@@ -57,7 +57,7 @@ class Chunk:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Outcome:
+class TaskOutcome:
     """The row of a run, and its signals as the bytes of a Parquet file if they are kept."""
 
     row: Row
@@ -96,7 +96,7 @@ class Runner:
         self._batches: dict[bool, Batches] = {}
         """by `on_gpu`; loaded when runs are first simulated in lanes"""
 
-    def run(self, task: RunTask) -> Outcome:
+    def run(self, task: RunTask) -> TaskOutcome:
         """Simulate one run; its own failure becomes its row.
 
         Raises `WorkerEnvironmentError` for other failures.
@@ -118,11 +118,11 @@ class Runner:
             raise WorkerEnvironmentError(str(error) or type(error).__name__) from error
         except Exception as error:
             message = f"{type(error).__name__}: {error}"
-        return Outcome(
+        return TaskOutcome(
             row=row_of(task, metrics, message, time.perf_counter() - started, self._machine), signals=signals
         )
 
-    def run_chunk(self, chunk: Chunk) -> list[Outcome]:
+    def run_chunk(self, chunk: TaskBatch) -> list[TaskOutcome]:
         """Simulate many runs at once, and one by one those that a batch cannot complete.
 
         Raises `WorkerEnvironmentError` for failures not caused by a run.
@@ -139,7 +139,7 @@ class Runner:
         return [
             self.run(task)
             if each is None
-            else Outcome(row=row_of(task, each.metrics, each.message, duration, self._machine), in_lanes=True)
+            else TaskOutcome(row=row_of(task, each.metrics, each.message, duration, self._machine), in_lanes=True)
             for task, each in zip(chunk.tasks, outcomes, strict=True)
         ]
 

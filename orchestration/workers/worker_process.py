@@ -10,12 +10,12 @@ from orchestration.basics import scratch
 from orchestration.processes.channel import Parent
 from orchestration.workers.provenance import Sources, machine, software
 from orchestration.workers.task import (
-    Chunk,
     EnvironmentFailure,
-    Outcome,
     Ready,
     Runner,
     RunTask,
+    TaskBatch,
+    TaskOutcome,
     WorkerEnvironmentError,
 )
 
@@ -38,9 +38,9 @@ def main(own_folder: str) -> None:
     parent.leave()
 
 
-def _run(runner: Runner, task: RunTask | Chunk) -> Outcome | list[Outcome] | EnvironmentFailure:
+def _run(runner: Runner, task: RunTask | TaskBatch) -> TaskOutcome | list[TaskOutcome] | EnvironmentFailure:
     try:
-        return runner.run_chunk(task) if isinstance(task, Chunk) else runner.run(task)
+        return runner.run_chunk(task) if isinstance(task, TaskBatch) else runner.run(task)
     except WorkerEnvironmentError as error:
         return EnvironmentFailure(message=str(error))
 

@@ -4,9 +4,9 @@ from collections.abc import Iterable, Iterator
 
 from orchestration.checks.doctor.binaries import Dependency, newest
 from orchestration.checks.doctor.dependencies import PYTHON_DLL, missing_versions, needed, offered, part_for
-from orchestration.checks.doctor.fmu import PLATFORMS, Fmu, PlatformBinary
+from orchestration.checks.doctor.fmu import PLATFORMS, InspectedFmu, PlatformBinary
 from orchestration.checks.doctor.machine import Library, Machine
-from orchestration.checks.doctor.report import Report
+from orchestration.checks.doctor.report import DoctorReport
 from orchestration.checks.doctor.verdict import Host, UnexaminedFmu, Verdict
 
 _WIDTH = 12
@@ -15,7 +15,7 @@ Row = tuple[str, str, bool]
 """Label, text, and whether it is a problem."""
 
 
-def as_text(report: Report) -> str:
+def as_text(report: DoctorReport) -> str:
     """A block of lines for the machine and one for each FMU; problems are marked with an exclamation mark."""
     blocks = [_block("this machine", _machine_rows(report.machine))]
     blocks += [_verdict_block(verdict, report.machine) for verdict in report.verdicts]
@@ -99,7 +99,7 @@ def _found_text(dependency: Dependency, library: Library | None) -> str:
     return "none" if library is None else offered(dependency, library) or str(library.path)
 
 
-def _python_rows(fmu: Fmu, machine: Machine) -> Iterator[Row]:
+def _python_rows(fmu: InspectedFmu, machine: Machine) -> Iterator[Row]:
     if fmu.python is None:
         return
     version = f"Python {fmu.requires_python}" if fmu.requires_python else "a version of Python that is not declared"

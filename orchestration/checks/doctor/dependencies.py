@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator
 
 from orchestration.checks.doctor.binaries import Dependency, newest
-from orchestration.checks.doctor.fmu import Fmu, PlatformBinary
+from orchestration.checks.doctor.fmu import InspectedFmu, PlatformBinary
 from orchestration.checks.doctor.machine import Libraries, Library, Machine
 
 PYTHON_DLL = re.compile(r"python3\d*\.dll", re.IGNORECASE)
@@ -15,7 +15,7 @@ _API_SETS = ("api-ms-", "ext-ms-")
 _REDISTRIBUTABLE = "the Microsoft Visual C++ Redistributable"
 
 
-def part_for(fmu: Fmu, machine: Machine) -> PlatformBinary | None:
+def part_for(fmu: InspectedFmu, machine: Machine) -> PlatformBinary | None:
     """The FMU's binary for this machine, if any."""
     parts = {part.platform: part for part in fmu.platforms}
     for part in map(parts.get, machine.platforms(fmu.version)):

@@ -80,7 +80,7 @@ class PlatformBinary:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fmu:
+class InspectedFmu:
     """The requirements of an FMU."""
 
     path: Path
@@ -101,7 +101,7 @@ class Fmu:
     """None if it is not made by pythonfmu."""
 
 
-def read_fmu(path: Path, size_limit: float = math.inf) -> Fmu:
+def read_fmu(path: Path, size_limit: float = math.inf) -> InspectedFmu:
     """The requirements of a file; raises `UnreadableFmuError` if it is no FMU, or unpacks to over `size_limit` MB."""
     archive = read_archive(path, size_limit)
     description = read_root(archive)
@@ -112,7 +112,7 @@ def read_fmu(path: Path, size_limit: float = math.inf) -> Fmu:
         raise UnreadableFmuError(f"expected {' or '.join(list(KINDS)[:version])} in {DESCRIPTION}")
     declared = description.find("VendorAnnotations/Tool[@name='quadcosim']/Python")
     tool = description.get("generationTool", "the tool that made it")
-    return Fmu(
+    return InspectedFmu(
         path=path,
         version=version,
         kinds=kinds,

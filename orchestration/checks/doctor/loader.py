@@ -20,7 +20,7 @@ _CACHED = re.compile(r"\s+(\S+) \(.*\) => (.+)")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Loader:
+class DynamicLoader:
     """A dynamic loader: it searches folders, the run path of the binary, the cache, and more folders, in this order."""
 
     system: str
@@ -52,25 +52,25 @@ def read_file(path: Path) -> Binary | None:
         return None
 
 
-def loader_of_programs(system: str, architecture: str) -> Loader:
+def loader_of_programs(system: str, architecture: str) -> DynamicLoader:
     """The loader of a program started here that is not Python."""
     if system == WINDOWS:
         root = os.environ.get("SYSTEMROOT", r"C:\Windows")
-        return Loader(
+        return DynamicLoader(
             system=system, architecture=architecture, first=(Path(root, "System32"), Path(root)), last=_folders("PATH")
         )
     if system == LINUX:
-        return Loader(
+        return DynamicLoader(
             system=system,
             architecture=architecture,
             first=_folders("LD_LIBRARY_PATH"),
             cache=_ldconfig(),
             last=_default_folders(),
         )
-    return Loader(system=system, architecture=architecture)
+    return DynamicLoader(system=system, architecture=architecture)
 
 
-def loader_of_this_python(programs: Loader) -> Loader:
+def loader_of_this_python(programs: DynamicLoader) -> DynamicLoader:
     """The loader of this process, which first searches the run path of its executable."""
     if programs.system == WINDOWS:
         return replace(programs, first=(Path(sys.base_prefix), *programs.first))

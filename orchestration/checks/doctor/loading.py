@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.basics.errors import QuadcosimError, UsageError
-from orchestration.checks.doctor.fmu import CO_SIMULATION, KINDS, Fmu, read_fmu
+from orchestration.checks.doctor.fmu import CO_SIMULATION, KINDS, InspectedFmu, read_fmu
 from orchestration.fmi.archive import OtherVersionError, UnreadableFmuError
 from orchestration.processes import subprocesses
 from orchestration.processes.channel import Parent
@@ -25,7 +25,7 @@ from orchestration.processes.limits import Limits, restrict
 class Trial:
     """The result of trying an FMU in a separate process."""
 
-    fmu: Fmu
+    fmu: InspectedFmu
     failure: str | None
     """why it did not load; None if it did"""
 
@@ -64,7 +64,7 @@ def _try_loading(path: Path, limits: Limits, environment: Mapping[str, str]) -> 
     if "fmu" not in received:
         words = f": {ending.last_line}" if ending.last_line else ""
         raise UsageError(f"{path}: could not be read, the process {ending.description}{words}")
-    fmu: Fmu = received["fmu"]
+    fmu: InspectedFmu = received["fmu"]
     if CO_SIMULATION not in fmu.kinds:
         return Trial(fmu=fmu, failure=f"not tried: it is for {' and '.join(KINDS[kind] for kind in fmu.kinds)} only")
     return Trial(fmu=fmu, failure=_failure(received, ending))
@@ -102,7 +102,7 @@ def _try(path: Path, folder: Path, size_limit: float, send: Callable[[object], N
             send({"loads": True})
 
 
-def _load(fmu: Fmu, folder: Path) -> None:
+def _load(fmu: InspectedFmu, folder: Path) -> None:
     """Load with the required parts of the description only: others may be invalid."""
     import fmpy
 
@@ -126,7 +126,7 @@ def _load(fmu: Fmu, folder: Path) -> None:
     slave.freeInstance()
 
 
-def _initialisation(slave: Any, fmu: Fmu) -> Iterator[tuple[str, Callable[[], object]]]:
+def _initialisation(slave: Any, fmu: InspectedFmu) -> Iterator[tuple[str, Callable[[], object]]]:
     """The calls that initialise an instance, by the names of their functions."""
     enter, start = slave.enterInitializationMode, fmu.start_time
     if fmu.version == 2:

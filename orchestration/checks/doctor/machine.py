@@ -13,8 +13,8 @@ from pathlib import Path
 
 from orchestration.checks.doctor import loader
 from orchestration.checks.doctor.binaries import LINUX, MACOS, WINDOWS
-from orchestration.checks.doctor.fmu import ARCHITECTURES, SYSTEMS, Fmu
-from orchestration.checks.doctor.loader import Loader
+from orchestration.checks.doctor.fmu import ARCHITECTURES, SYSTEMS, InspectedFmu
+from orchestration.checks.doctor.loader import DynamicLoader
 from orchestration.checks.doctor.pythons import PythonLibrary, python_libraries
 
 _SYSTEMS = {"Linux": LINUX, "Windows": WINDOWS, "Darwin": MACOS}
@@ -71,7 +71,7 @@ class Machine:
         return (usual,) if self.architecture.startswith("x86") else (name, usual)
 
 
-def this_machine(fmus: Iterable[Fmu]) -> Machine:
+def this_machine(fmus: Iterable[InspectedFmu]) -> Machine:
     """This machine, examined for the requirements of `fmus`."""
     fmus = tuple(fmus)
     system, architecture = _SYSTEMS.get(platform.system(), platform.system()), _architecture()
@@ -127,7 +127,7 @@ def _shared(system: str) -> bool | None:
     return any(name.startswith("libpython") for name in binary.dependency_names)
 
 
-def _library(where: Loader, name: str, run_path: Iterable[str]) -> Library | None:
+def _library(where: DynamicLoader, name: str, run_path: Iterable[str]) -> Library | None:
     path = where.find(name, run_path)
     binary = None if path is None else loader.read_file(path)
     return None if path is None or binary is None else Library(path=path, versions=binary.defined_versions)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from orchestration.checks.doctor.binaries import LINUX, WINDOWS
-from orchestration.checks.doctor.loader import Loader
+from orchestration.checks.doctor.loader import DynamicLoader
 
 THIS_PYTHON, PRELOADED, ON_PATH, BY_LOADER = "this Python", "LD_PRELOAD", "PATH", "the loader"
 
@@ -32,7 +32,7 @@ class PythonLibrary:
     """The PYTHONHOME with which it finds its standard library; None if it needs none."""
 
 
-def python_libraries(loader: Loader) -> tuple[PythonLibrary, ...]:
+def python_libraries(loader: DynamicLoader) -> tuple[PythonLibrary, ...]:
     """Pythons that a host that is not Python could load, best first.
 
     A library that is already loaded or on PATH comes first, as it takes precedence; then the version of this Python,
@@ -55,7 +55,7 @@ def python_libraries(loader: Loader) -> tuple[PythonLibrary, ...]:
     return tuple(sorted(found.values(), key=order))
 
 
-def _preloaded(loader: Loader) -> Iterator[PythonLibrary]:
+def _preloaded(loader: DynamicLoader) -> Iterator[PythonLibrary]:
     for name in re.split(r"[\s:]+", os.environ.get("LD_PRELOAD", "")):
         path = loader.find(name) if name else None
         match = _LIBPYTHON.match(Path(name).name)
@@ -63,7 +63,7 @@ def _preloaded(loader: Loader) -> Iterator[PythonLibrary]:
             yield PythonLibrary(path=path, version=match[1], found_by=PRELOADED)
 
 
-def _loadable(loader: Loader) -> Iterator[PythonLibrary]:
+def _loadable(loader: DynamicLoader) -> Iterator[PythonLibrary]:
     cached = (path for paths in loader.cache.values() for path in paths)
     for path in (*_in_folders(loader.first), *cached, *_in_folders(loader.last)):
         match = _LIBPYTHON.match(path.name)
@@ -88,7 +88,7 @@ def _own() -> Iterator[PythonLibrary]:
                 yield PythonLibrary(path=path, version=match[1], found_by=THIS_PYTHON, home=home)
 
 
-def _python_dlls(loader: Loader) -> Iterator[PythonLibrary]:
+def _python_dlls(loader: DynamicLoader) -> Iterator[PythonLibrary]:
     """The python3.dll that is first on PATH, and that of this Python."""
     on_path = loader.find("python3.dll")
     own = Path(sys.base_prefix, "python3.dll")

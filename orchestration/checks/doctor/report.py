@@ -16,7 +16,7 @@ from orchestration.processes.limits import Limits
 
 
 @dataclass(frozen=True, kw_only=True)
-class Report:
+class DoctorReport:
     """A machine, and the verdict on each FMU."""
 
     machine: Machine
@@ -28,11 +28,11 @@ class Report:
         return all(verdict.good for verdict in self.verdicts)
 
 
-def examine(paths: Iterable[Path], limits: Limits) -> Report:
+def examine(paths: Iterable[Path], limits: Limits) -> DoctorReport:
     """Examine this machine, read the FMUs and try them within `limits`; `UsageError` for a file that is no FMU."""
     trials = [_trial_of(path, limits) for path in paths]
     machine = this_machine([trial.fmu for trial in trials if isinstance(trial, Trial)])
-    return Report(machine=machine, verdicts=tuple(_verdict_on(trial, machine) for trial in trials))
+    return DoctorReport(machine=machine, verdicts=tuple(_verdict_on(trial, machine) for trial in trials))
 
 
 def _trial_of(path: Path, limits: Limits) -> Trial | UnexaminedFmu:
@@ -46,7 +46,7 @@ def _verdict_on(trial: Trial | UnexaminedFmu, machine: Machine) -> Verdict | Une
     return trial if isinstance(trial, UnexaminedFmu) else judge(trial.fmu, machine, trial.failure)
 
 
-def as_tables(report: Report) -> dict[str, Any]:
+def as_tables(report: DoctorReport) -> dict[str, Any]:
     """All facts, for `json.dumps`."""
     return {
         "machine": _plain(report.machine),

@@ -7,7 +7,7 @@ from packaging.specifiers import InvalidSpecifier, SpecifierSet
 
 from orchestration.checks.doctor.binaries import LINUX, WINDOWS
 from orchestration.checks.doctor.dependencies import PYTHON_DLL, missing_dependencies, part_for
-from orchestration.checks.doctor.fmu import Fmu, PlatformBinary
+from orchestration.checks.doctor.fmu import InspectedFmu, PlatformBinary
 from orchestration.checks.doctor.machine import Machine
 from orchestration.checks.doctor.pythons import BY_LOADER, ON_PATH, PRELOADED, PythonLibrary
 from orchestration.fmi.pythonfmu import uri_is_read
@@ -39,7 +39,7 @@ class Host:
 class Verdict:
     """An FMU on a machine."""
 
-    fmu: Fmu
+    fmu: InspectedFmu
     platforms: tuple[str, ...]
     """The folders in `binaries/` that are for the machine."""
     python_host: Host
@@ -87,7 +87,7 @@ class UnexaminedFmu:
         return False
 
 
-def judge(fmu: Fmu, machine: Machine, failure: str | None) -> Verdict:
+def judge(fmu: InspectedFmu, machine: Machine, failure: str | None) -> Verdict:
     """The verdict; `failure` is the reason why the FMU did not load here, if it did not."""
     hosts = python_host(fmu, machine), other_host(fmu, machine)
     return Verdict(
@@ -95,7 +95,7 @@ def judge(fmu: Fmu, machine: Machine, failure: str | None) -> Verdict:
     )
 
 
-def python_host(fmu: Fmu, machine: Machine) -> Host:
+def python_host(fmu: InspectedFmu, machine: Machine) -> Host:
     """A host in this Python, such as fmpy."""
     part = part_for(fmu, machine)
     needs = _general_needs(fmu, machine, part)
@@ -109,7 +109,7 @@ def python_host(fmu: Fmu, machine: Machine) -> Host:
     return Host(needs=tuple(needs))
 
 
-def other_host(fmu: Fmu, machine: Machine) -> Host:
+def other_host(fmu: InspectedFmu, machine: Machine) -> Host:
     """A host that is not Python: Simulink, Modelica tools, programs in C."""
     part = part_for(fmu, machine)
     needs = _general_needs(fmu, machine, part)
@@ -128,7 +128,7 @@ def other_host(fmu: Fmu, machine: Machine) -> Host:
     return Host(needs=tuple(needs), start=_start(library, part), note=note)
 
 
-def python_library(fmu: Fmu, machine: Machine) -> PythonLibrary | None:
+def python_library(fmu: InspectedFmu, machine: Machine) -> PythonLibrary | None:
     """The best Python for a host that is not Python, among those that satisfy the FMU."""
     fitting = (one for one in machine.python_libraries if satisfies(one.version, fmu.requires_python) is not False)
     return next(fitting, None)
@@ -160,7 +160,7 @@ def is_specifier(text: str) -> bool:
     return True
 
 
-def _general_needs(fmu: Fmu, machine: Machine, part: PlatformBinary | None) -> list[str]:
+def _general_needs(fmu: InspectedFmu, machine: Machine, part: PlatformBinary | None) -> list[str]:
     needs = []
     if part is None:
         needs.append(f"an FMU with a binary for {machine.system}, {machine.architecture}")
@@ -173,11 +173,11 @@ def _general_needs(fmu: Fmu, machine: Machine, part: PlatformBinary | None) -> l
     return needs
 
 
-def _imports(fmu: Fmu) -> tuple[str, ...]:
+def _imports(fmu: InspectedFmu) -> tuple[str, ...]:
     return () if fmu.python is None else fmu.python.imports
 
 
-def _python_to_install(fmu: Fmu, machine: Machine) -> str:
+def _python_to_install(fmu: InspectedFmu, machine: Machine) -> str:
     required = f"Python {fmu.requires_python or '3'}"
     if machine.system == LINUX:
         return f"a shared libpython of {required}: {INSTALL_LIBPYTHON}"

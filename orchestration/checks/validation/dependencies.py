@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 from orchestration.checks.validation.declared import Unknown, Variable
-from orchestration.checks.validation.excitation import Plan
+from orchestration.checks.validation.excitation import ExcitationPlan
 from orchestration.checks.validation.fmu import Fmu
-from orchestration.checks.validation.instance import Instance, RefusedError, Row, Value, Values, same
+from orchestration.checks.validation.instance import CheckedInstance, RefusedError, Row, Value, Values, same
 from orchestration.checks.validation.probe import Probe
 
 MOST_SWITCHES = 16
@@ -119,7 +119,7 @@ def _move(
                     moved[v.whole] |= _moving(probe, instance, v, before)
 
 
-def _moving(probe: Probe, instance: Instance, v: Variable, before: Row) -> set[str]:
+def _moving(probe: Probe, instance: CheckedInstance, v: Variable, before: Row) -> set[str]:
     """The outputs that move with a variable, which is then reset."""
     value, *near = probe.around(v)
     outputs = set()
@@ -148,12 +148,12 @@ def _changed(probe: Probe, before: Row, after: Row) -> set[str]:
     return {v.whole for v in probe.outputs if not same(before[v.name], after[v.name])}
 
 
-def _prepare(probe: Probe, instance: Instance, values: Values, steps: int | None) -> None:
+def _prepare(probe: Probe, instance: CheckedInstance, values: Values, steps: int | None) -> None:
     if steps is None:
         instance.begin(values, probe.start)
         return
     instance.initialise(values, probe.start)
-    for t, h in probe.points(Plan(steps=steps))[:steps]:
+    for t, h in probe.points(ExcitationPlan(steps=steps))[:steps]:
         instance.step(t, h)
 
 

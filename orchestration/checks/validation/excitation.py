@@ -18,7 +18,7 @@ UNEVEN = (0.4, 0.6, 1.0, 0.3, 0.7)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Plan:
+class ExcitationPlan:
     """The inputs, parameters and steps of a run."""
 
     parameters: Values = field(default_factory=dict)
@@ -31,7 +31,7 @@ class Plan:
     steps: int = STEPS
 
 
-PLAIN = Plan()
+PLAIN = ExcitationPlan()
 """At start values, by the default experiment"""
 
 

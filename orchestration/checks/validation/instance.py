@@ -31,7 +31,7 @@ class RefusedError(QuadcosimError):
     """The FMU did not carry out a call; the text names the call and has the FMU's message."""
 
 
-class Instance:
+class CheckedInstance:
     """One instance; after a failed call it is never called again, not even to free it."""
 
     def __init__(self, fmu: Fmu, folder: Path, name: str, beat: Callable[[], None]) -> None:
@@ -49,7 +49,7 @@ class Instance:
         beat()
         self._failed = False
 
-    def __enter__(self) -> "Instance":
+    def __enter__(self) -> "CheckedInstance":
         return self
 
     def __exit__(self, *exception: object) -> None:
@@ -174,7 +174,7 @@ class Instance:
         return RefusedError(f"{function}: {failure_text(self.messages, otherwise)[0]}")
 
 
-class Instance2(Instance):
+class Instance2(CheckedInstance):
     """An instance of FMI 2.0."""
 
     _states = ("getFMUstate", "serializeFMUstate", "freeFMUstate", "deSerializeFMUstate", "setFMUstate")
@@ -184,7 +184,7 @@ class Instance2(Instance):
         self._call("enterInitializationMode")
 
     def step(self, t: float, h: float) -> bool:
-        """As `Instance`."""
+        """As `CheckedInstance`."""
         if self._failed:
             raise RefusedError("fmi2DoStep: the instance has failed and is not called again")
         self._beat()
@@ -198,7 +198,7 @@ class Instance2(Instance):
         return True
 
 
-class Instance3(Instance):
+class Instance3(CheckedInstance):
     """An instance of FMI 3.0, without event mode and early return, which an importer need not support."""
 
     _states = ("getFMUState", "serializeFMUState", "freeFMUState", "deserializeFMUState", "setFMUState")
@@ -207,7 +207,7 @@ class Instance3(Instance):
         self._call("enterInitializationMode", startTime=start, stopTime=stop)
 
     def step(self, t: float, h: float) -> bool:
-        """As `Instance`; the FMU must not request what was not offered."""
+        """As `CheckedInstance`; the FMU must not request what was not offered."""
         event, ends, early, reached = self._call("doStep", t, h)
         if ends:
             return False
@@ -221,7 +221,7 @@ class Instance3(Instance):
         return True
 
 
-def instance_of(fmu: Fmu, folder: Path, name: str, beat: Callable[[], None]) -> Instance:
+def instance_of(fmu: Fmu, folder: Path, name: str, beat: Callable[[], None]) -> CheckedInstance:
     """A fresh instance of the FMU unpacked in `folder`; raises `RefusedError`."""
     return (Instance2 if fmu.version == 2 else Instance3)(fmu, folder, name, beat)
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from orchestration.checks.validation.declared import Variable
-from orchestration.checks.validation.excitation import PLAIN, STEPS, UNEVEN, Plan, around, inputs_at, moved
+from orchestration.checks.validation.excitation import PLAIN, STEPS, UNEVEN, ExcitationPlan, around, inputs_at, moved
 from orchestration.checks.validation.fmu import Fmu
-from orchestration.checks.validation.instance import Instance, RefusedError, Row, Value, instance_of
+from orchestration.checks.validation.instance import CheckedInstance, RefusedError, Row, Value, instance_of
 from orchestration.checks.validation.run_comparison import deviations, difference
 from orchestration.fmi.messages import Message
 from orchestration.processes.waiting import own_clock
@@ -46,7 +46,7 @@ class Probe:
     """called when a call of the FMU begins or returns"""
     _numbers: Iterator[int] = field(default_factory=itertools.count)
 
-    def instance(self) -> Instance:
+    def instance(self) -> CheckedInstance:
         """A fresh instance with a unique name."""
         return instance_of(self.fmu, self.folder, f"{self.fmu.model_identifier} {next(self._numbers)}", self.beat)
 
@@ -68,14 +68,14 @@ class Probe:
         step = experiment.get("stepSize", self.fmu.fixed_step or share)
         return step if math.isfinite(step) and step > 0.0 else 0.01
 
-    def points(self, plan: Plan) -> list[tuple[float, float]]:
+    def points(self, plan: ExcitationPlan) -> list[tuple[float, float]]:
         """Communication point and step size of each step, up to the end of the default experiment.
 
         Times are not accumulated. No more steps than there is time for.
         """
         return self._points(plan)[: self.first.steps]
 
-    def _points(self, plan: Plan) -> list[tuple[float, float]]:
+    def _points(self, plan: ExcitationPlan) -> list[tuple[float, float]]:
         shares = UNEVEN if plan.uneven else (1.0,)
         stop = self.fmu.experiment.get("stopTime", math.inf) + 1e-6 * self.step
         points: list[tuple[float, float]] = []
@@ -152,11 +152,13 @@ class Probe:
                 messages=tuple(instance.messages),
             )
 
-    def begin(self, instance: Instance, plan: Plan) -> None:
+    def begin(self, instance: CheckedInstance, plan: ExcitationPlan) -> None:
         """Initialise an instance."""
         instance.initialise({**plan.parameters, **(self.inputs_at(0) if plan.moving else {})}, self.start)
 
-    def run_steps(self, instance: Instance, plan: Plan, first: int = 0, last: int | None = None) -> list[Row]:
+    def run_steps(
+        self, instance: CheckedInstance, plan: ExcitationPlan, first: int = 0, last: int | None = None
+    ) -> list[Row]:
         """Do the steps `first` to before `last`; the watched variables after each of them."""
         rows = []
         for k, (t, h) in list(enumerate(self.points(plan)))[first:last]:
@@ -167,20 +169,20 @@ class Probe:
             rows.append(instance.get(self.watched))
         return rows
 
-    def run(self, plan: Plan) -> list[Row]:
+    def run(self, plan: ExcitationPlan) -> list[Row]:
         """A complete run of a fresh instance."""
         with self.instance() as instance:
             self.begin(instance, plan)
             return self.run_steps(instance, plan)
 
     @functools.cached_property
-    def full_plan(self) -> Plan:
+    def full_plan(self) -> ExcitationPlan:
         """Parameters near their starts, moving inputs, and uneven steps if the FMU declares that it takes them."""
         uneven = self.fmu.can("canHandleVariableCommunicationStepSize")
-        return Plan(parameters=self.general_parameters, moving=True, uneven=uneven, steps=40)
+        return ExcitationPlan(parameters=self.general_parameters, moving=True, uneven=uneven, steps=40)
 
     @functools.cached_property
-    def _general_run(self) -> tuple[Plan, list[Row]]:
+    def _general_run(self) -> tuple[ExcitationPlan, list[Row]]:
         plan = self.full_plan
         at_starts = replace(plan, parameters={})
         for candidate in (plan, at_starts, replace(at_starts, uneven=False), replace(at_starts, moving=False)):
@@ -188,11 +190,11 @@ class Probe:
                 return candidate, self.run(candidate)
             except RefusedError:
                 continue
-        plain = Plan(steps=plan.steps)
+        plain = ExcitationPlan(steps=plan.steps)
         return plain, self.run(plain)
 
     @property
-    def general_plan(self) -> Plan:
+    def general_plan(self) -> ExcitationPlan:
         """As much of `full_plan` as the FMU accepts; it need not accept all."""
         return self._general_run[0]
 

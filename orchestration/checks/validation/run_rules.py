@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from orchestration.checks.validation.declared import Variable
-from orchestration.checks.validation.excitation import PLAIN, Plan
+from orchestration.checks.validation.excitation import PLAIN, ExcitationPlan
 from orchestration.checks.validation.finding import Note
 from orchestration.checks.validation.instance import RefusedError, Row, Value, same
 from orchestration.checks.validation.probe import FEWEST, Probe
@@ -94,7 +94,7 @@ def variable_steps(probe: Probe) -> Iterator[str]:
     """An FMU that declares variable step sizes takes them, and a step is as long as its halves."""
     if not probe.fmu.can("canHandleVariableCommunicationStepSize"):
         return
-    whole = probe.points(Plan(uneven=True, steps=20))
+    whole = probe.points(ExcitationPlan(uneven=True, steps=20))
     halves = [(t + i * 0.5 * h, 0.5 * h) for t, h in whole for i in (0, 1)]
     ends = []
     for points in (whole, halves):
@@ -128,7 +128,7 @@ def inputs_set_twice(probe: Probe) -> Iterator[str]:
 
 def reset(probe: Probe) -> Iterator[str]:
     """A run after a reset equals the run of a fresh instance, whatever was run before."""
-    short = Plan(steps=20)
+    short = ExcitationPlan(steps=20)
     fresh = probe.run(short)
     with probe.instance() as instance:
         for plan, expected in (
@@ -152,7 +152,7 @@ def instances(probe: Probe) -> Iterator[str]:
     """A run is the same beside another instance."""
     if probe.fmu.can("canBeInstantiatedOnlyOncePerProcess"):
         return
-    plan, other = probe.general_plan, Plan(steps=probe.general_plan.steps)
+    plan, other = probe.general_plan, ExcitationPlan(steps=probe.general_plan.steps)
     rows = []
     with probe.instance() as first, probe.instance() as second:
         probe.begin(first, plan)
@@ -199,7 +199,7 @@ def serialised_state(probe: Probe) -> Iterator[str]:
 
 def stop_time(probe: Probe) -> Iterator[str]:
     """A step past the stop time is an error, or ends the run (FMI 2.0.4, section 2.1.6)."""
-    *allowed, (t, h) = probe.points(Plan(steps=FEWEST))
+    *allowed, (t, h) = probe.points(ExcitationPlan(steps=FEWEST))
     if not allowed:
         return
     with probe.instance() as instance:

@@ -4,7 +4,7 @@ import numpy as np
 
 from orchestration.basics.simulator import Floats
 from orchestration.certificates.certificate import Cells, Certificate
-from orchestration.certificates.family import Factor, Family, Letter
+from orchestration.certificates.family import Factor, Letter, LoopFamily
 
 HOVER_A = np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 19.62, 0.0], [0.0, 0.0, 0.0, 0.5], [0.0, 0.0, 0.0, 0.0]])
 HOVER_B = np.array([[0.0], [0.0], [0.0], [1.0]])
@@ -12,7 +12,7 @@ HOVER_F = np.array([[-280.9746177, -97.0239144, -430.1129600, -25.49]])
 """A lateral axis of the quadrotor about hover, and its law"""
 
 
-def late_command(A: Floats, B: Floats, F: Floats, period: float, jitter: float) -> Family:
+def late_command(A: Floats, B: Floats, F: Floats, period: float, jitter: float) -> LoopFamily:
     """ẋ = A x + B u under u = F x of each sample, which arrives up to `jitter` later."""
     n, m = B.shape
     size = n + 2 * m
@@ -24,23 +24,23 @@ def late_command(A: Floats, B: Floats, F: Floats, period: float, jitter: float) 
         Factor(matrix="sample"), Factor(matrix="flow", times=(0.0, 1.0)), Factor(matrix="arrive"),
         Factor(matrix="flow", times=(period, -1.0)),
     )  # fmt: skip
-    return Family(
+    return LoopFamily(
         matrices={"flow": flow, "sample": sample, "arrive": arrive},
         kept=tuple(range(size)),
         letters=(Letter(name="late", product=product, ranges=((0.0, jitter),)),),
     ).without_idle()
 
 
-def switched(*matrices: Floats) -> Family:
+def switched(*matrices: Floats) -> LoopFamily:
     """Any of some matrices at each step."""
-    return Family(
+    return LoopFamily(
         matrices={f"m{i}": matrix for i, matrix in enumerate(matrices)},
         kept=tuple(range(len(matrices[0]))),
         letters=tuple(Letter(name=f"m{i}", product=(Factor(matrix=f"m{i}"),)) for i in range(len(matrices))),
     )
 
 
-def certificate_of(family: Family, form: Floats) -> Certificate:
+def certificate_of(family: LoopFamily, form: Floats) -> Certificate:
     """One form for letters without parameters, in the coordinates of the family."""
     cells = tuple(Cells(edges=(), labels=(i,)) for i in range(len(family.letters)))
     return Certificate(

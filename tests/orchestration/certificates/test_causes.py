@@ -18,7 +18,7 @@ from orchestration.certificates.causes import ScheduledLoop, cause_at
 from orchestration.certificates.certify import find_certificate
 from orchestration.certificates.check import AnotherLoop, check
 from orchestration.certificates.margin import Certified, linear_loop_of, margin
-from orchestration.certificates.parts import Loop
+from orchestration.certificates.parts import CertifiedLoop
 from orchestration.certificates.region import region
 from orchestration.certificates.repeated import least_repeated
 from orchestration.exact.loops import Loops
@@ -61,11 +61,11 @@ def on_a_bus(**sampling: Any) -> System:
 
 
 @pytest.fixture(scope="module")
-def loop() -> Loop:
+def loop() -> CertifiedLoop:
     return linear_loop_of(request_of(on_a_computer()))
 
 
-def scheduled_loop(loop: Loop, system: System, path: str) -> ScheduledLoop:
+def scheduled_loop(loop: CertifiedLoop, system: System, path: str) -> ScheduledLoop:
     cause = cause_at(system, path)
     assert cause is not None
     return ScheduledLoop(loop, system, cause)
@@ -95,7 +95,7 @@ def test_what_breaks_a_loop_does_so_where_it_is_run(found: Certified) -> None:
     assert good == [True, False]
 
 
-def test_in_windows_that_are_a_little_wider_a_sequence_grows(loop: Loop) -> None:
+def test_in_windows_that_are_a_little_wider_a_sequence_grows(loop: CertifiedLoop) -> None:
     """No scheduler deals it; but of the windows alone no more can be proved."""
     windows = scheduled_loop(loop, on_a_computer(), LOGGER)
     assert unstable_sequence(windows.family(0.12), 2) is None
@@ -141,7 +141,7 @@ def test_more_urgent_tasks_that_do_not_vary_leave_less(found: Certified, tmp_pat
         ({"priority": 0}, {}, 0),
     ],
 )
-def test_only_what_a_task_lets_vary_is_drawn(loop: Loop, control: Any, computer: Any, kinds: int) -> None:
+def test_only_what_a_task_lets_vary_is_drawn(loop: CertifiedLoop, control: Any, computer: Any, kinds: int) -> None:
     family = scheduled_loop(loop, on_a_computer(control=control, **computer), LOGGER).family(0.08)
     assert {len(letter.ranges) for letter in family.letters} == {kinds}
     assert find_certificate(family, [LOGGER]) is not None
@@ -157,7 +157,9 @@ def test_only_what_a_task_lets_vary_is_drawn(loop: Loop, control: Any, computer:
         ({"write": "deadline", "deadline": 0.25, "read": "release"}, {}),
     ],
 )
-def test_where_nothing_varies_the_map_is_that_of_the_timetable(loop: Loop, control: Any, computer: Any) -> None:
+def test_where_nothing_varies_the_map_is_that_of_the_timetable(
+    loop: CertifiedLoop, control: Any, computer: Any
+) -> None:
     system = on_a_computer(control=control, **computer)
     family = scheduled_loop(loop, system, LOGGER).family(0.05)
     (letter,) = family.letters
@@ -193,7 +195,7 @@ def test_a_sequence_that_breaks_a_loop_does_so_where_it_is_a_trace(tmp_path: Pat
 
 
 @pytest.mark.parametrize("scheduling", ["fixed-priority", "earliest-deadline-first"])
-def test_of_the_laws_own_task_a_larger_value_is_never_earlier(loop: Loop, scheduling: Any) -> None:
+def test_of_the_laws_own_task_a_larger_value_is_never_earlier(loop: CertifiedLoop, scheduling: Any) -> None:
     system = on_a_computer(control={"deadline": 0.3}, scheduling=scheduling)
     own = scheduled_loop(loop, system, OWN)
     for value in (0.01, 0.1):

@@ -20,7 +20,7 @@ from orchestration.certificates.breaking import least_breaking
 from orchestration.certificates.certificate import Certificate, read_certificate
 from orchestration.certificates.certify import find_certificate
 from orchestration.certificates.checker import NotProven, verified
-from orchestration.certificates.family import Family
+from orchestration.certificates.family import LoopFamily
 from tests.orchestration.certificates.loops import (
     HOVER_A,
     HOVER_B,
@@ -165,7 +165,7 @@ def test_what_is_no_certificate_is_refused(hover: Certificate, change: Callable[
 # -- never for a loop that is unstable -------------------------------------------------------------------------------
 
 
-def unstable(seed: int) -> Family:
+def unstable(seed: int) -> LoopFamily:
     """Two random matrices, each stable by itself, of which a product of a few is not, by construction just so."""
     random = np.random.default_rng(seed)
     pair = [random.normal(size=(3, 3)) for _ in range(2)]
@@ -193,7 +193,7 @@ def test_what_lies_close_below_has_one() -> None:
 def test_of_an_integrator_all_but_the_last_of_what_breaks_it_is_certified() -> None:
     """x' = u, u = -1.5 x of each second: late and at once in turn is too much first."""
 
-    def up_to(jitter: float) -> Family:
+    def up_to(jitter: float) -> LoopFamily:
         return late_command(np.zeros((1, 1)), np.ones((1, 1)), np.array([[-1.5]]), 1.0, jitter)
 
     broken = least_breaking(up_to, 1.0)

@@ -16,9 +16,9 @@ from orchestration.certificates.certify import find_certificate, parts_of
 from orchestration.certificates.check import check
 from orchestration.certificates.checker import verified
 from orchestration.certificates.margin import Certified, linear_loop_of, margin, small_gain, varying_of
-from orchestration.certificates.parts import Loop
+from orchestration.certificates.parts import CertifiedLoop
 from orchestration.certificates.region import region
-from orchestration.certificates.timeline import Timeline
+from orchestration.certificates.timeline import LoopTimeline
 from orchestration.command.cli import main
 from orchestration.stability import delay_bounds
 from orchestration.stability.delay_bounds import breaking_jitter
@@ -146,13 +146,13 @@ def test_what_it_is_not_for_is_refused(system: System) -> None:
 
 
 @functools.cache
-def hover(period: float) -> Loop:
+def hover(period: float) -> CertifiedLoop:
     return linear_loop_of(native(timing=Timing(period=period)))
 
 
-def command_of(period: float) -> tuple[Timeline, Any]:
+def command_of(period: float) -> tuple[LoopTimeline, Any]:
     varying = varying_of(native(), COMMAND)
-    return Timeline(hover(period), [varying]), varying
+    return LoopTimeline(hover(period), [varying]), varying
 
 
 @pytest.mark.parametrize(("period", "breaking", "step"), [(0.04, 0.02823, 1), (0.06, 0.0200, 0)])
@@ -172,11 +172,11 @@ def test_95_percent_of_what_breaks_hover_is_certified_for_all_axes(period: float
 def test_two_at_once_about_hover() -> None:
     """Samples up to 4 ms late and commands up to 23.87 ms, at 40 ms."""
     both = [varying_of(native(), path) for path in (SAMPLE, COMMAND)]
-    assert find_certificate(Timeline(hover(0.04), both).family([0.004, 0.02387]), [SAMPLE, COMMAND]) is not None
+    assert find_certificate(LoopTimeline(hover(0.04), both).family([0.004, 0.02387]), [SAMPLE, COMMAND]) is not None
 
 
 def test_losses_about_hover() -> None:
-    timeline = Timeline(hover(0.04), [varying_of(native(), LOST)])
+    timeline = LoopTimeline(hover(0.04), [varying_of(native(), LOST)])
     assert find_certificate(timeline.family(run=1), [LOST]) is not None
     broken = breaking_at(timeline.family(run=2), 2)
     assert broken is not None

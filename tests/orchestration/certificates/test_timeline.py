@@ -11,9 +11,9 @@ import pytest
 
 from orchestration.basics.errors import UsageError
 from orchestration.certificates.events import BOXES, DELAY, JITTER, LATENCY, LOSS, SHIFT, Varying
-from orchestration.certificates.family import Family
-from orchestration.certificates.parts import Loop, loop_of
-from orchestration.certificates.timeline import Timeline
+from orchestration.certificates.family import LoopFamily
+from orchestration.certificates.parts import CertifiedLoop, loop_of
+from orchestration.certificates.timeline import LoopTimeline
 from orchestration.fmi.reuse import Instances
 from orchestration.stability.loop_at_rest import at_rest
 from orchestration.stability.monodromy import growth_of_loop
@@ -42,12 +42,12 @@ def system() -> System:
     return changed(dataclasses.replace(example("double_integrator"), stop_time=20.0), slow)
 
 
-def loop(system: System, instances: Instances) -> Loop:
+def loop(system: System, instances: Instances) -> CertifiedLoop:
     with at_rest(system, instances) as rest:
         return loop_of(rest)
 
 
-def radius_of(family: Family, value: float) -> float:
+def radius_of(family: LoopFamily, value: float) -> float:
     """Of the same draw again and again."""
     maps = [
         family.at(letter, [value])
@@ -83,7 +83,7 @@ def test_a_delay_that_stays_is_the_masters(
 ) -> None:
     as_it_is = changed(system, changes)
     nominal, jitter = loop(as_it_is, instances), 0.35
-    family = Timeline(nominal, [varying]).family([jitter])
+    family = LoopTimeline(nominal, [varying]).family([jitter])
     seconds = float(nominal.period) / 1e9
     delay = changes.get(path, 0.0)
     for value in (0.11, jitter):
@@ -93,7 +93,7 @@ def test_a_delay_that_stays_is_the_masters(
 
 def test_a_start_moves_the_sample_and_not_the_message(system: System, instances: Instances) -> None:
     early = loop(changed(system, {"connections.command.delay": 0.3}), instances)
-    family = Timeline(early, [Varying(kind=SHIFT, name="controller", path="start")]).family([0.25])
+    family = LoopTimeline(early, [Varying(kind=SHIFT, name="controller", path="start")]).family([0.25])
     for late in (0.11, 0.25):
         shorter = changed(system, {"connections.command.delay": round(0.3 - late, 6)})
         expected = math.exp(PERIOD * growth_of_loop(shorter, instances))
@@ -103,12 +103,12 @@ def test_a_start_moves_the_sample_and_not_the_message(system: System, instances:
 def test_a_latency_is_of_all_that_a_component_sends(system: System, instances: Instances) -> None:
     of = loop(changed(system, {"connections.command.delay": 0.1}), instances)
     latency = Varying(kind=LATENCY, name="controller", path="latency")
-    found, expected = (Timeline(of, [each]).family([0.3]) for each in (latency, COMMAND))
+    found, expected = (LoopTimeline(of, [each]).family([0.3]) for each in (latency, COMMAND))
     assert found.letters == expected.letters
 
 
 def test_two_that_are_limited_in_sum_may_each_be_as_large_as_the_sum(system: System, instances: Instances) -> None:
-    both = Timeline(loop(system, instances), [SAMPLE, COMMAND])
+    both = LoopTimeline(loop(system, instances), [SAMPLE, COMMAND])
     with pytest.raises(UsageError, match="expected less, so that no message is open"):
         both.family([0.4, 0.4])
     letters = both.family([0.4, 0.4], largest_sum=0.4).letters
@@ -120,7 +120,7 @@ def test_two_that_are_limited_in_sum_may_each_be_as_large_as_the_sum(system: Sys
 
 def test_where_the_order_depends_on_the_draw_there_is_a_letter_for_each(system: System, instances: Instances) -> None:
     nominal = loop(changed(system, {"connections.command.delay": 0.3}), instances)
-    family = Timeline(nominal, [COMMAND]).family([0.35])
+    family = LoopTimeline(nominal, [COMMAND]).family([0.35])
     assert [letter.ranges for letter in family.letters] == [((0.0, 0.2),), ((0.2, 0.35),)]
     at_once, just_after = (family.at(letter, [0.2]) for letter in family.letters)
     assert at_once == pytest.approx(
@@ -129,14 +129,14 @@ def test_where_the_order_depends_on_the_draw_there_is_a_letter_for_each(system: 
 
 
 def test_samples_that_are_all_late_by_the_same_are_not_late(system: System, instances: Instances) -> None:
-    family = Timeline(loop(changed(system, {"connections.command.delay": 0.1}), instances), [SAMPLE]).family([0.3])
+    family = LoopTimeline(loop(changed(system, {"connections.command.delay": 0.1}), instances), [SAMPLE]).family([0.3])
     expected = radius_of(family, 0.0)
     assert radius_of(family, 0.3) == pytest.approx(expected, abs=1e-10)
 
 
 def test_a_late_sample_with_a_late_command_is_the_sum_of_both(system: System, instances: Instances) -> None:
     """Of the sample, and of its command: x after it is as by hand, for a double integrator under u = -x - v."""
-    family = Timeline(loop(system, instances), [SAMPLE, COMMAND]).family([0.1, 0.3])
+    family = LoopTimeline(loop(system, instances), [SAMPLE, COMMAND]).family([0.1, 0.3])
     late, wait = 0.07, 0.21
     flow = [
         np.array([[1.0, t, 0.5 * t * t], [0.0, 1.0, t], [0.0, 0.0, 1.0]]) for t in (late, wait, PERIOD - late - wait)
@@ -154,7 +154,7 @@ def test_a_late_sample_with_a_late_command_is_the_sum_of_both(system: System, in
 def test_what_is_lost_leaves_the_command_as_it_was(system: System, instances: Instances, delay: float) -> None:
     """Every second message lost is a sample every second period, the delay as it is."""
     nominal = changed(system, {"connections.command.delay": delay})
-    family = Timeline(loop(nominal, instances), [LOST]).family(run=1)
+    family = LoopTimeline(loop(nominal, instances), [LOST]).family(run=1)
     arrives, lost = (family.at(letter) for letter in family.letters)
     radius = np.abs(np.linalg.eigvals(lost @ arrives)).max()
     slower = changed(nominal, {"components.controller.sampling.period": 2.0 * PERIOD})
@@ -167,7 +167,7 @@ def test_a_law_without_memory_says_the_same_where_its_measurement_is_lost(system
     of = loop(system, instances)
     radii = []
     for what in (LOST, LOST_MEASUREMENT):
-        family = Timeline(of, [what]).family(run=1)
+        family = LoopTimeline(of, [what]).family(run=1)
         arrives, lost = (family.at(letter) for letter in family.letters)
         radii.append(np.abs(np.linalg.eigvals(lost @ arrives)).max())
     assert radii[0] == pytest.approx(radii[1], abs=1e-12)
@@ -175,10 +175,10 @@ def test_a_law_without_memory_says_the_same_where_its_measurement_is_lost(system
 
 def test_draws_that_would_be_open_at_once_are_refused(system: System, instances: Instances) -> None:
     of = loop(changed(system, {"connections.command.delay": 0.1}), instances)
-    assert Timeline(of, [SAMPLE]).largest() == pytest.approx(0.4)
-    assert Timeline(of, [COMMAND]).largest() == pytest.approx(0.5)
+    assert LoopTimeline(of, [SAMPLE]).largest() == pytest.approx(0.4)
+    assert LoopTimeline(of, [COMMAND]).largest() == pytest.approx(0.5)
     with pytest.raises(UsageError, match=r"connections\.command\.delay_jitter: expected less"):
-        Timeline(of, [COMMAND]).family([0.51])
+        LoopTimeline(of, [COMMAND]).family([0.51])
 
 
 def test_what_is_not_for_this_is_refused(system: System, instances: Instances) -> None:
@@ -190,4 +190,4 @@ def test_a_law_that_integrates_over_its_step_is_refused_with_late_samples(system
     of = loop(system, instances)
     assert not of.step_dependent
     with pytest.raises(UsageError, match="samples of controller depend on the time to the next one"):
-        Timeline(dataclasses.replace(of, step_dependent=frozenset(["controller"])), [SAMPLE])
+        LoopTimeline(dataclasses.replace(of, step_dependent=frozenset(["controller"])), [SAMPLE])

@@ -14,12 +14,12 @@ from orchestration.computers.parts import (
     Carrier,
     Constant,
     Leg,
-    Link,
-    Message,
+    NetworkLink,
     Parts,
     Processor,
+    ScheduledFrame,
+    ScheduledTask,
     Stream,
-    Task,
 )
 from orchestration.computers.results import Timeline
 from orchestration.computers.scheduler import Scheduler
@@ -46,10 +46,10 @@ class Described:
     def __init__(self, stop: int) -> None:
         self.stop = stop
         self.processors: list[Processor] = []
-        self.tasks: list[Task] = []
+        self.tasks: list[ScheduledTask] = []
         self.carriers: list[Carrier] = []
-        self.messages: list[Message] = []
-        self.links: list[Link] = []
+        self.messages: list[ScheduledFrame] = []
+        self.links: list[NetworkLink] = []
         self.streams: list[Stream] = []
 
     def stream(self, stream: Stream | int) -> int:
@@ -64,7 +64,7 @@ class Described:
              offset: int = 0, overrun: int = QUEUE, processor: int = 0, at_release: bool = False,
              at_deadline: bool = False, late: Stream | int = 0) -> int:  # fmt: skip
         self.tasks.append(
-            Task(
+            ScheduledTask(
                 processor=processor,
                 priority=priority,
                 deadline=deadline or period or 1,
@@ -81,7 +81,7 @@ class Described:
     def message(self, length: int, period: int | None, *, rank: int = 0, offset: int = 0, link: int = 0,
                 corrupted: Stream | int = 0, more: int = 0) -> int:  # fmt: skip
         self.messages.append(
-            Message(
+            ScheduledFrame(
                 rank=rank,
                 legs=(Leg(link=link, slot=NONE, length=length, corrupted_length=length + more),),
                 pause=0,
@@ -94,7 +94,7 @@ class Described:
         return len(self.messages) - 1
 
     def link(self) -> int:
-        self.links.append(Link(slots=0, begins=NONE))
+        self.links.append(NetworkLink(slots=0, begins=NONE))
         return len(self.links) - 1
 
     def parts(self) -> Parts:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from orchestration.exact.effects import ContinuousEffects
-from orchestration.exact.linear import Components, Continuous, Sampled
+from orchestration.exact.linear import Components, Continuous, SampledSystem
 from orchestration.exact.moments import JumpLinear
 from orchestration.exact.objectives import Mean
 from orchestration.exact.timing import links_of, tasks_of
@@ -37,7 +37,7 @@ def integrator(*, nodes: int = 3, sampling: dict[str, Any] | None = None, **comm
         "plant": Continuous(
             inputs=("u", "w"), outputs=("x",), A=np.zeros((1, 1)), B=np.ones((1, 2)), C=np.eye(1), D=np.zeros((1, 2))
         ),
-        "law": Sampled(
+        "law": SampledSystem(
             inputs=("x",), outputs=("u",), A=empty, B=np.zeros((0, 1)), C=np.zeros((1, 0)), D=np.array([[-GAIN]])
         ),
     }
@@ -66,7 +66,7 @@ def servo(*, nodes: int = 3, K: float = 1.5, Td: float = 0.035, **command: Any) 
             inputs=("u", "w"), outputs=("y",), A=np.array([[0.0, 1.0], [0.0, -1.0]]),
             B=np.array([[0.0, 0.0], [1000.0, 1000.0]]), C=np.array([[1.0, 0.0]]), D=np.zeros((1, 2)),
         ),
-        "law": Sampled(
+        "law": SampledSystem(
             inputs=("y",), outputs=("u",), A=np.zeros((1, 1)), B=np.eye(1), C=np.array([[K * derivative]]),
             D=np.array([[-K * (1.0 + derivative)]]),
         ),

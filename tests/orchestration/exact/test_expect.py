@@ -11,7 +11,7 @@ import pytest
 
 from orchestration.building.inputs import files_of
 from orchestration.exact.expect import Expected, expect, expected_of
-from orchestration.exact.linear import Sampled
+from orchestration.exact.linear import SampledSystem
 from orchestration.exact.loops import Loops, expect_same_steps
 from orchestration.exact.timing import tasks_of
 from orchestration.flight.hover_loop import HoverLoop
@@ -213,7 +213,7 @@ def test_what_is_nearly_linear_is_known_by_small_pulses_and_how_far() -> None:
 def test_a_task_that_minds_how_long_its_step_is_has_no_jitter() -> None:
     system = example("minimum_variance", {"components.controller.sampling.jitter": 0.1})
     none = np.zeros((0, 0))
-    minding = Sampled(inputs=(), outputs=(), A=none, B=none, C=none, D=none, depends_on_step=True)
+    minding = SampledSystem(inputs=(), outputs=(), A=none, B=none, C=none, D=none, depends_on_step=True)
     with pytest.raises(
         UsageError, match=r"components\.controller\.sampling\.jitter: the samples of controller depend on"
     ):

@@ -9,7 +9,7 @@ import pytest
 
 from orchestration.basics.errors import UsageError
 from orchestration.exact.expect import expect
-from orchestration.exact.linear import Components, Sampled
+from orchestration.exact.linear import Components, SampledSystem
 from orchestration.exact.loops import expect_same_steps
 from orchestration.exact.repeating import periodic_schedule
 from orchestration.exact.timing import tasks_of
@@ -236,7 +236,7 @@ def test_periods_that_have_nothing_in_common_are_refused() -> None:
 def test_a_task_that_minds_how_long_its_step_is_has_to_sample_regularly() -> None:
     none = np.zeros((0, 0))
     parts: Components = {
-        "controller": Sampled(inputs=(), outputs=(), A=none, B=none, C=none, D=none, depends_on_step=True)
+        "controller": SampledSystem(inputs=(), outputs=(), A=none, B=none, C=none, D=none, depends_on_step=True)
     }
     for load, fits in ((0.0, True), (0.001, False)):
         computer = Computer(tasks={"load": Task(period=0.004, execution=load)})

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from orchestration.basics.simulator import Floats
-from orchestration.interop.assignment import Loop, Ports
+from orchestration.interop.assignment import AssignedLoop, Ports
 from orchestration.interop.catalogue import TOOLS, Tool
 from orchestration.interop.compare import Agreement
 from orchestration.interop.trace import Trace
@@ -16,7 +16,7 @@ PORTS = {
     "controller": Ports(inputs=MEASUREMENT, outputs=COMMAND),
     "plant": Ports(inputs=COMMAND, outputs=MEASUREMENT),
 }
-LOOP = Loop(
+LOOP = AssignedLoop(
     ports=PORTS,
     connections=(
         *((("plant", name), ("controller", name)) for name in MEASUREMENT),

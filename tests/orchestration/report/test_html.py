@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from orchestration.report import html, of_runs
-from orchestration.report.model import Report, Run
+from orchestration.report.model import Report, ReportRun
 from orchestration.runs.simulation import run
 from quadcosim import Timing
 from tests.commands import Main
@@ -20,7 +20,7 @@ NASTY = "</script><script>alert('!')</script> & \u2028 \"quoted\" <b>"
 
 def report(**fields: object) -> Report:
     empty = Report(
-        kind="runs", title="run", summary="", words=("good", "bad"), layouts=(), runs=(Run(name="run"),), blobs=()
+        kind="runs", title="run", summary="", words=("good", "bad"), layouts=(), runs=(ReportRun(name="run"),), blobs=()
     )
     return dataclasses.replace(empty, **fields)  # type: ignore[arg-type]
 
@@ -33,14 +33,14 @@ def document(text: str) -> dict[str, Any]:
 
 
 def test_names_are_in_the_file_as_they_are_and_end_no_element() -> None:
-    text = html.as_html(report(title=NASTY, runs=(Run(name=NASTY),), command=NASTY))
+    text = html.as_html(report(title=NASTY, runs=(ReportRun(name=NASTY),), command=NASTY))
     assert document(text)["title"] == NASTY
     assert "<script>alert" not in text
     assert text.count("</script>") == 3
 
 
 def test_what_is_not_finite_is_null() -> None:
-    text = html.as_html(report(runs=(Run(name="run", metrics={"a": float("nan"), "b": float("inf"), "c": 1.5}),)))
+    text = html.as_html(report(runs=(ReportRun(name="run", metrics={"a": float("nan"), "b": float("inf"), "c": 1.5}),)))
     assert document(text)["runs"][0]["metrics"] == {"a": None, "b": None, "c": 1.5}
 
 

@@ -12,7 +12,7 @@ from orchestration.quadrotor.translation import quadrotor
 from orchestration.quadrotor.wiring import POSITION_REFERENCE
 from orchestration.report.blobs import Blobs
 from orchestration.report.layouts import layout_of
-from orchestration.report.model import Track
+from orchestration.report.model import ReportTrack
 from orchestration.report.tracks import Signals, Tracks
 from orchestration.results.column_info import ColumnInfo
 from orchestration.system.paths import changed
@@ -31,7 +31,7 @@ def flight(count: int = 5001) -> dict[str, Floats]:
     return found
 
 
-def columns_of(tracks: Tracks, blobs: Blobs, track: Track) -> dict[str, Floats]:
+def columns_of(tracks: Tracks, blobs: Blobs, track: ReportTrack) -> dict[str, Floats]:
     names = tracks.layouts[track.layout].columns
     found = {name: read(blobs.blobs[place]) for name, place in zip(names, track.columns, strict=True)}
     return {"time": read(blobs.blobs[track.time]), **found}

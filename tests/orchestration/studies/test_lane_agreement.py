@@ -10,9 +10,9 @@ from orchestration.basics.errors import QuadcosimError
 from orchestration.studies.lane_agreement import lane_agreement, with_python_twins
 from orchestration.studies.study import Study
 from orchestration.system.model import System
-from orchestration.workers.batching import Agreement
+from orchestration.workers.batching import LaneAgreement
 from orchestration.workers.row import Row
-from orchestration.workers.task import Chunk, Outcome, RunTask
+from orchestration.workers.task import RunTask, TaskBatch, TaskOutcome
 from tests.orchestration.fmi.small import needs_compiler
 from tests.orchestration.studies.common import axis, short, study
 
@@ -28,7 +28,7 @@ def chosen() -> Study:
     return replace(study(axis("timing.period", 0.01, 0.02), base=base), native=True)
 
 
-def agreement(chosen: Study, error: Error) -> Agreement | None:
+def agreement(chosen: Study, error: Error) -> LaneAgreement | None:
     """The agreement of two runs if each kind of run has this error."""
     files = with_python_twins(chosen.files())
 
@@ -39,11 +39,11 @@ def agreement(chosen: Study, error: Error) -> Agreement | None:
     def task(index: int, key: str) -> RunTask:
         return RunTask(index=index, key=key, settings={}, system=chosen.system(index, {}), keep_signals=False)
 
-    def run(tasks: Iterable[RunTask | Chunk]) -> Generator[list[Outcome], None, None]:
+    def run(tasks: Iterable[RunTask | TaskBatch]) -> Generator[list[TaskOutcome], None, None]:
         for each in tasks:
-            for one in each.tasks if isinstance(each, Chunk) else (each,):
+            for one in each.tasks if isinstance(each, TaskBatch) else (each,):
                 assert files.fmus.keys() >= {*one.system.fmus.values()}
-                yield [Outcome(row=row(one, isinstance(each, Chunk)))]
+                yield [TaskOutcome(row=row(one, isinstance(each, TaskBatch)))]
 
     return lane_agreement({str(i): row(task(i, str(i)), True) for i in range(2)}, files, task, run)
 
@@ -66,7 +66,7 @@ def test_whole_runs_are_compared_with_native_fmus_and_their_beginning_with_pytho
     assert {*seen} == {(False, True, LENGTH), (False, False, LENGTH), (False, True, 1.0), (True, False, 1.0)}
     assert "2 runs repeated with FMUs" in str(found)
     assert "the beginning of 2 with FMUs in Python" in str(found)
-    assert Agreement.from_text(found.as_text()) == found
+    assert LaneAgreement.from_text(found.as_text()) == found
 
 
 def test_an_error_of_compilation_disagrees_with_python(chosen: Study) -> None:

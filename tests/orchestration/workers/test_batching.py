@@ -12,9 +12,9 @@ from orchestration.studies.store import open_for_reading
 from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
 from orchestration.studies.sweep import AGREEMENT
-from orchestration.workers.batching import SAMPLE, Agreement, chunks, sample
+from orchestration.workers.batching import SAMPLE, LaneAgreement, chunks, sample
 from orchestration.workers.pool import Inputs, Supervisor
-from orchestration.workers.task import Chunk, RunTask
+from orchestration.workers.task import RunTask, TaskBatch
 from tests.commands import Main
 from tests.orchestration.fmi.small import needs_compiler, small
 from tests.orchestration.studies.common import NOISY, RUNS, STORE, axis, bits, short, study, sweep, swept
@@ -58,7 +58,7 @@ def test_rows_are_those_of_the_fmus_and_the_command_reports_their_agreement(
     assert len(lanes) == RUNS
     assert_alike(lanes, alone)
     with open_for_reading(tmp_path / STORE) as opened:
-        agreement = Agreement.from_text(opened.about()[AGREEMENT])
+        agreement = LaneAgreement.from_text(opened.about()[AGREEMENT])
     assert agreement.runs == SAMPLE
     assert agreement.difference < 1e-12
     assert agreement.python is not None
@@ -99,13 +99,15 @@ def test_a_system_without_lanes_is_refused_before_any_run(tmp_path: Path) -> Non
 
 
 def test_a_difference_names_run_and_metric() -> None:
-    agreement = Agreement.of([(3, {"a": 1.0, "b": None}, {"a": 1.0, "b": None}), (7, {"a": 2.0}, {"a": 2.0 + 1e-6})])
+    agreement = LaneAgreement.of(
+        [(3, {"a": 1.0, "b": None}, {"a": 1.0, "b": None}), (7, {"a": 2.0}, {"a": 2.0 + 1e-6})]
+    )
     assert (agreement.runs, agreement.metric, agreement.index) == (2, "a", 7)
     with pytest.raises(QuadcosimError, match=r"run 7: a in lanes differs by 5e-07"):
         agreement.expect()
     with pytest.raises(QuadcosimError, match="run 1: outcome"):
-        Agreement.of([(1, {"outcome": "good"}, {"outcome": "bad"})]).expect()
-    Agreement.of([(3, {"a": 1.0}, {"a": 1.0 + 1e-12})]).expect()
+        LaneAgreement.of([(1, {"outcome": "good"}, {"outcome": "bad"})]).expect()
+    LaneAgreement.of([(3, {"a": 1.0}, {"a": 1.0 + 1e-12})]).expect()
 
 
 def test_a_sample_is_chosen_by_content_alone() -> None:
@@ -126,7 +128,7 @@ def tasks(count: int, keep: tuple[int, ...] = ()) -> list[RunTask]:
 def test_chunks_group_similar_runs_without_those_whose_signals_are_kept() -> None:
     items = list(chunks(tasks(64, keep=(5,)), 64, 1))
     assert [each.index for each in items if isinstance(each, RunTask)] == [5]
-    lanes = [each.tasks for each in items if isinstance(each, Chunk)]
+    lanes = [each.tasks for each in items if isinstance(each, TaskBatch)]
     assert sorted(task.index for each in lanes for task in each) == [i for i in range(64) if i != 5]
     assert [len({task.index % 2 for task in each}) for each in lanes].count(2) <= 1
 
@@ -141,5 +143,5 @@ def test_runs_that_end_their_process_together_are_repeated_one_by_one(
     repeated: list[int] = []
     monkeypatch.setattr(Supervisor, "_ready_worker", lambda self: Dying())
     monkeypatch.setattr(Supervisor, "run", lambda self, task: repeated.append(task.index))
-    Supervisor(tmp_path, Inputs(contents={}, versions={})).run_chunk(Chunk(tasks=tuple(tasks(3))))
+    Supervisor(tmp_path, Inputs(contents={}, versions={})).run_chunk(TaskBatch(tasks=tuple(tasks(3))))
     assert repeated == [0, 1, 2]

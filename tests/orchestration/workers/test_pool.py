@@ -15,7 +15,7 @@ from orchestration.workers import pool
 from orchestration.workers.executors import _local_submit
 from orchestration.workers.pool import Inputs, Pool
 from orchestration.workers.provenance import Sources, sources, versions
-from orchestration.workers.task import Outcome, RunTask
+from orchestration.workers.task import RunTask, TaskOutcome
 from quadcosim import QuadcosimError, UsageError
 from tests.orchestration.fmi.small import needs_compiler, small
 from tests.orchestration.studies.common import sweep
@@ -115,7 +115,7 @@ def test_temporary_files_are_removed_after_the_last_thread_that_could_leave_more
     started, closed = threading.Event(), threading.Event()
 
     class Slow(pool.Supervisor):
-        def run(self, task: RunTask) -> Outcome:
+        def run(self, task: RunTask) -> TaskOutcome:
             started.set()
             closed.wait()
             (self._root / "late").mkdir(parents=True)

@@ -8,7 +8,7 @@ import pytest
 from orchestration.building.inputs import with_files
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.workers.task import Outcome, Runner, RunTask, WorkerEnvironmentError
+from orchestration.workers.task import Runner, RunTask, TaskOutcome, WorkerEnvironmentError
 from quadcosim import QuadcosimError
 from tests.orchestration.studies.common import FAILS, files_in, short
 
@@ -32,7 +32,7 @@ def instantiated(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return names
 
 
-def rmse(outcome: Outcome) -> str:
+def rmse(outcome: TaskOutcome) -> str:
     assert outcome.row.metrics is not None, outcome.row.message
     return str(outcome.row.metrics["position_rmse"].hex())
 

@@ -12,7 +12,7 @@ from elftools.elf.elffile import ELFFile
 
 from orchestration.checks.doctor.binaries import LINUX
 from orchestration.checks.doctor.dependencies import needed
-from orchestration.checks.doctor.fmu import Fmu
+from orchestration.checks.doctor.fmu import InspectedFmu
 from orchestration.checks.doctor.machine import Library, Machine
 from orchestration.checks.doctor.pythons import PythonLibrary
 
@@ -72,7 +72,7 @@ def with_run_path(elf: bytes, tag: int, folder: str) -> bytes:
     return bytes(changed.replace(name, folder.encode().ljust(len(name), b"\0")))
 
 
-def machine_for(fmu: Fmu, **changes: Any) -> Machine:
+def machine_for(fmu: InspectedFmu, **changes: Any) -> Machine:
     """A Linux machine that has just what the FMU needs, but for `changes`."""
     libraries = {
         dependency.name: Library(path=Path("/lib", dependency.name), versions=dependency.versions)

@@ -13,7 +13,7 @@ import pytest
 from orchestration.building.models import MODELS
 from orchestration.checks.doctor import loading
 from orchestration.checks.doctor.as_lines import as_text
-from orchestration.checks.doctor.report import Report, as_tables, examine
+from orchestration.checks.doctor.report import DoctorReport, as_tables, examine
 from orchestration.processes.limits import Limits
 from tests.commands import Main
 from tests.fmus.foreign import lag, needs_compiler
@@ -35,7 +35,7 @@ def plant(built: dict[str, Path]) -> Path:
 
 
 @pytest.fixture(scope="module")
-def report(built: dict[str, Path]) -> Report:
+def report(built: dict[str, Path]) -> DoctorReport:
     """What is found of two FMUs that load."""
     return examine([built["QuadrotorPlant"], built["UnifiedController"]], Limits())
 
@@ -63,12 +63,12 @@ def only(report: dict[str, Any]) -> dict[str, Any]:
     return {"machine": report["machine"], **table}
 
 
-def code_of(report: Report) -> int:
+def code_of(report: DoctorReport) -> int:
     """With which the command ends for an FMU that loads."""
     return 0 if report.machine.python_libraries else 1
 
 
-def test_all_fmus_of_the_project_load_here(report: Report, main: Main) -> None:
+def test_all_fmus_of_the_project_load_here(report: DoctorReport, main: Main) -> None:
     document = json.loads(main("doctor", "--json", code=code_of(report)).stdout)
     assert [Path(table["path"]).name for table in document["fmus"]] == [f"{model}.fmu" for model in MODELS]
     for table in document["fmus"]:
@@ -78,7 +78,9 @@ def test_all_fmus_of_the_project_load_here(report: Report, main: Main) -> None:
         assert table["hosts"]["other"]["ready"] == bool(document["machine"]["python_libraries"])
 
 
-def test_the_text_has_a_block_for_the_machine_and_one_for_each_fmu(built: dict[str, Path], report: Report) -> None:
+def test_the_text_has_a_block_for_the_machine_and_one_for_each_fmu(
+    built: dict[str, Path], report: DoctorReport
+) -> None:
     fmus = [built["QuadrotorPlant"], built["UnifiedController"]]
     blocks = "\n".join(as_text(report).splitlines()).split("\n\n")
     assert [block.splitlines()[0] for block in blocks] == ["this machine", *map(str, fmus)]
@@ -88,7 +90,7 @@ def test_the_text_has_a_block_for_the_machine_and_one_for_each_fmu(built: dict[s
         assert block.splitlines()[-1].split() == ["tried", "here", "loads"]
 
 
-def test_the_machine_is_this_one(report: Report) -> None:
+def test_the_machine_is_this_one(report: DoctorReport) -> None:
     machine = as_tables(report)["machine"]
     assert machine["executable"] == sys.executable
     assert machine["python"] == ".".join(map(str, sys.version_info[:3]))
@@ -148,7 +150,7 @@ def test_a_temp_folder_that_is_not_ascii_is_found_out(
 
 
 def test_a_temp_folder_with_a_space_is_none_of_pythonfmus_troubles(
-    plant: Path, tmp_path: Path, report: Report, main: Main, monkeypatch: pytest.MonkeyPatch
+    plant: Path, tmp_path: Path, report: DoctorReport, main: Main, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     table = examined_in(tmp_path / "with space", plant, code_of(report), main, monkeypatch)
     assert table["loads"]

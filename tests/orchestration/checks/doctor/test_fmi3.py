@@ -6,9 +6,9 @@ import fmpy
 import pytest
 
 from orchestration.checks.doctor.as_lines import as_text
-from orchestration.checks.doctor.fmu import Fmu, read_fmu
+from orchestration.checks.doctor.fmu import InspectedFmu, read_fmu
 from orchestration.checks.doctor.loading import try_loading
-from orchestration.checks.doctor.report import Report, examine
+from orchestration.checks.doctor.report import DoctorReport, examine
 from orchestration.checks.doctor.verdict import judge
 from orchestration.processes.limits import Limits
 from tests.orchestration.checks.doctor.common import AARCH64, changed, described, files_of, for_machine, machine_for
@@ -29,9 +29,9 @@ def problems(path: Path) -> dict[str, str | None]:
     return {part.platform: part.problem for part in read_fmu(path).platforms}
 
 
-def lines(read: Fmu) -> list[str]:
+def lines(read: InspectedFmu) -> list[str]:
     machine = machine_for(read)
-    return as_text(Report(machine=machine, verdicts=(judge(read, machine, None),))).splitlines()
+    return as_text(DoctorReport(machine=machine, verdicts=(judge(read, machine, None),))).splitlines()
 
 
 def test_one_that_is_sound_loads_and_needs_nothing_more(fmu: Path) -> None:

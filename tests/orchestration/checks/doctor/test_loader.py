@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from orchestration.checks.doctor.binaries import LINUX, MACOS, WINDOWS, read
-from orchestration.checks.doctor.loader import Loader, loader_of_programs, loader_of_this_python
+from orchestration.checks.doctor.loader import DynamicLoader, loader_of_programs, loader_of_this_python
 from orchestration.checks.doctor.machine import this_machine
 from orchestration.checks.doctor.pythons import ON_PATH, PRELOADED, THIS_PYTHON, PythonLibrary, python_libraries
 from tests.orchestration.checks.doctor.common import AARCH64, LINUX64, WIN64, files_of, for_machine, with_run_path
@@ -35,8 +35,8 @@ def put(content: bytes, *parts: str | Path) -> Path:
     return path
 
 
-def linux(*first: Path, **others: tuple[Path, ...]) -> Loader:
-    return Loader(system=LINUX, architecture="x86-64", first=first, **others)  # type: ignore[arg-type]
+def linux(*first: Path, **others: tuple[Path, ...]) -> DynamicLoader:
+    return DynamicLoader(system=LINUX, architecture="x86-64", first=first, **others)  # type: ignore[arg-type]
 
 
 # -- libraries ------------------------------------------------------------------------------------------------
@@ -44,7 +44,7 @@ def linux(*first: Path, **others: tuple[Path, ...]) -> Loader:
 
 def test_folders_are_searched_in_order(elf: bytes, tmp_path: Path) -> None:
     paths = [put(elf, tmp_path, folder, "lib.so") for folder in ("first", "requested", "cached", "last")]
-    loader = Loader(
+    loader = DynamicLoader(
         system=LINUX,
         architecture="x86-64",
         first=(tmp_path / "first",),

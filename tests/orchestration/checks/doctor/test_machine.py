@@ -11,7 +11,7 @@ from orchestration.checks.doctor.as_lines import as_text
 from orchestration.checks.doctor.binaries import LINUX, MACOS, WINDOWS
 from orchestration.checks.doctor.fmu import read_fmu
 from orchestration.checks.doctor.machine import this_machine
-from orchestration.checks.doctor.report import Report, as_tables
+from orchestration.checks.doctor.report import DoctorReport, as_tables
 from orchestration.checks.doctor.verdict import judge
 
 
@@ -50,7 +50,7 @@ def test_where_nothing_can_be_had_there_is_still_a_report(
     machine = this_machine([fmu])
     assert machine.glibc is None
     assert machine.shared is (True if name == "Windows" else None)
-    report = Report(machine=machine, verdicts=(judge(fmu, machine, "not tried"),))
+    report = DoctorReport(machine=machine, verdicts=(judge(fmu, machine, "not tried"),))
     assert not report.good
     assert as_tables(report)["machine"]["python_libraries"] == []
     assert "libpython    none for a host that is not Python" in as_text(report)

@@ -9,10 +9,10 @@ import pytest
 from orchestration.checks.doctor.as_lines import as_text
 from orchestration.checks.doctor.binaries import MACOS, WINDOWS, Dependency
 from orchestration.checks.doctor.dependencies import missing_versions
-from orchestration.checks.doctor.fmu import Fmu, read_fmu
+from orchestration.checks.doctor.fmu import InspectedFmu, read_fmu
 from orchestration.checks.doctor.machine import Library, Machine
 from orchestration.checks.doctor.pythons import ON_PATH, PRELOADED, THIS_PYTHON, PythonLibrary
-from orchestration.checks.doctor.report import Report, as_tables
+from orchestration.checks.doctor.report import DoctorReport, as_tables
 from orchestration.checks.doctor.verdict import Verdict, judge
 from tests.orchestration.checks.doctor.common import (
     AARCH64,
@@ -34,11 +34,11 @@ def plant(built: dict[str, Path]) -> Path:
 
 
 @pytest.fixture
-def fmu(plant: Path) -> Fmu:
+def fmu(plant: Path) -> InspectedFmu:
     return read_fmu(plant)
 
 
-def judged(fmu: Fmu, **changes: Any) -> Verdict:
+def judged(fmu: InspectedFmu, **changes: Any) -> Verdict:
     """The FMU on a machine that has all it needs but for `changes`, and where loading it went well."""
     return judge(fmu, machine_for(fmu, **changes), None)
 
@@ -60,11 +60,11 @@ def pythons(*libraries: tuple[str, str, str]) -> tuple[PythonLibrary, ...]:
 
 def marked(verdict: Verdict, machine: Machine) -> list[str]:
     """What the text marks as wrong: the first word of each such line."""
-    lines = as_text(Report(machine=machine, verdicts=(verdict,))).splitlines()
+    lines = as_text(DoctorReport(machine=machine, verdicts=(verdict,))).splitlines()
     return [line[2:15].strip() or line.split()[2] for line in lines if line.startswith("!")]
 
 
-def test_a_machine_with_all_that_is_needed_is_ready(fmu: Fmu) -> None:
+def test_a_machine_with_all_that_is_needed_is_ready(fmu: InspectedFmu) -> None:
     verdict = judged(fmu)
     assert verdict.good
     assert needs(verdict) == ((), ())
@@ -72,7 +72,7 @@ def test_a_machine_with_all_that_is_needed_is_ready(fmu: Fmu) -> None:
     assert marked(verdict, machine_for(fmu)) == []
 
 
-def test_a_failed_attempt_is_a_problem_whatever_else_is_said(fmu: Fmu) -> None:
+def test_a_failed_attempt_is_a_problem_whatever_else_is_said(fmu: InspectedFmu) -> None:
     verdict = judge(fmu, machine_for(fmu), "took its process down")
     assert not verdict.good
     assert needs(verdict) == ((), ())
@@ -82,7 +82,7 @@ def test_a_failed_attempt_is_a_problem_whatever_else_is_said(fmu: Fmu) -> None:
 # -- binaries and libraries ---------------------------------------------------------------------------------
 
 
-def test_a_machine_without_a_binary_is_told_so(fmu: Fmu) -> None:
+def test_a_machine_without_a_binary_is_told_so(fmu: InspectedFmu) -> None:
     for system, architecture in ((MACOS, "aarch64"), ("Linux", "aarch64"), ("Linux", "x86")):
         verdict = judged(fmu, system=system, architecture=architecture)
         assert not verdict.good
@@ -110,7 +110,7 @@ def test_on_arm_the_folder_of_fmi_3_goes_before_that_of_x86(plant: Path, tmp_pat
     assert judged(fmu).good
 
 
-def test_an_old_glibc_is_told_what_is_wanted(fmu: Fmu) -> None:
+def test_an_old_glibc_is_told_what_is_wanted(fmu: InspectedFmu) -> None:
     machine = machine_for(fmu)
     old = without(machine, "libc.so.6", "GLIBC_2.2.5", "GLIBC_2.4", "GLIBC_2.14", "GLIBC_2.31")
     machine = dataclasses.replace(machine, found=old, found_by_python=old)
@@ -118,15 +118,15 @@ def test_an_old_glibc_is_told_what_is_wanted(fmu: Fmu) -> None:
     text = "libc.so.6 with GLIBC_2.32, here GLIBC_2.31"
     assert needs(verdict) == ((text,), (text,))
     assert marked(verdict, machine) == ["libc.so.6", "Python host", "other host"]
-    assert "needs libc.so.6 GLIBC_2.32; here GLIBC_2.31" in as_text(Report(machine=machine, verdicts=(verdict,)))
+    assert "needs libc.so.6 GLIBC_2.32; here GLIBC_2.31" in as_text(DoctorReport(machine=machine, verdicts=(verdict,)))
 
 
-def test_a_library_that_is_not_there_is_named(fmu: Fmu) -> None:
+def test_a_library_that_is_not_there_is_named(fmu: InspectedFmu) -> None:
     gone = without(machine_for(fmu), "libstdc++.so.6")
     assert needs(judged(fmu, found=gone, found_by_python=gone)) == (("libstdc++.so.6",), ("libstdc++.so.6",))
 
 
-def test_each_host_is_judged_by_what_its_own_loader_finds(fmu: Fmu) -> None:
+def test_each_host_is_judged_by_what_its_own_loader_finds(fmu: InspectedFmu) -> None:
     old = without(machine_for(fmu), "libstdc++.so.6", "GLIBCXX_3.4.29")
     python, other = needs(judged(fmu, found=old))
     assert python == ()
@@ -140,7 +140,7 @@ def test_versions_without_a_number_count_as_well() -> None:
     )
 
 
-def test_a_library_without_versions_is_taken_as_it_is(fmu: Fmu) -> None:
+def test_a_library_without_versions_is_taken_as_it_is(fmu: InspectedFmu) -> None:
     bare = {name: Library(path=library.path) for name, library in machine_for(fmu).found.items() if library}
     assert judged(fmu, found=bare, found_by_python=bare).good
 
@@ -174,14 +174,14 @@ def test_a_requirement_that_cannot_be_understood_is_a_problem(plant: Path, tmp_p
     assert not verdict.good
 
 
-def test_without_a_shared_libpython_only_a_python_host_is_ready(fmu: Fmu) -> None:
+def test_without_a_shared_libpython_only_a_python_host_is_ready(fmu: InspectedFmu) -> None:
     verdict = judged(fmu, python_libraries=())
     assert verdict.python_host.ready
     assert not verdict.other_host.ready
     assert not verdict.good
 
 
-def test_the_start_of_another_host_hangs_on_where_its_python_is(fmu: Fmu) -> None:
+def test_the_start_of_another_host_hangs_on_where_its_python_is(fmu: InspectedFmu) -> None:
     preloaded = pythons(("/a/libpython3.11.so", "3.11", PRELOADED))
     assert judged(fmu, python_libraries=preloaded).other_host.start is None
     own = PythonLibrary(
@@ -199,7 +199,7 @@ def test_packages_that_the_sources_import_must_be_there(plant: Path, tmp_path: P
     assert verdict.other_host.start == PRELOAD
     assert verdict.other_host.note == "Python 3.11 must be able to import numpy, scipy"
     machine = machine_for(fmu, modules={"numpy": True, "scipy": False})
-    assert "numpy, scipy (not here)" in as_text(Report(machine=machine, verdicts=(verdict,)))
+    assert "numpy, scipy (not here)" in as_text(DoctorReport(machine=machine, verdicts=(verdict,)))
     assert judged(fmu, modules={"numpy": True, "scipy": True}).good
 
 
@@ -221,7 +221,7 @@ def _library_without_python() -> bytes:
     ("folder", "good"),
     [("/tmp", True), ("/tmp/with space", True), ("/tmp/a-b_c.d~", True), ("/tmp/café", False), ("/tmp/a+b", False)],
 )
-def test_pythonfmu_needs_a_temp_folder_that_its_uri_does_not_escape(folder: str, good: bool, fmu: Fmu) -> None:
+def test_pythonfmu_needs_a_temp_folder_that_its_uri_does_not_escape(folder: str, good: bool, fmu: InspectedFmu) -> None:
     verdict = judged(fmu, temp_folder=Path(folder))
     assert verdict.good == good
     for host in needs(verdict):
@@ -246,14 +246,14 @@ def test_windows_takes_the_python_on_path_if_it_satisfies(plant: Path, tmp_path:
     assert nowhere.other_host.needs == ("python3.dll of Python >=3.10 on PATH",)
 
 
-def test_windows_is_not_asked_for_its_api_sets_but_for_the_runtime(fmu: Fmu) -> None:
+def test_windows_is_not_asked_for_its_api_sets_but_for_the_runtime(fmu: InspectedFmu) -> None:
     gone = without(machine_for(fmu), "MSVCP140.dll")
     assert not any(name.startswith("api-ms-") for name in gone)
     python, other = needs(judged(fmu, system=WINDOWS, found=gone, found_by_python=gone))
     assert python == other == ("MSVCP140.dll (the Microsoft Visual C++ Redistributable)",)
 
 
-def test_python_that_is_not_on_path_is_no_missing_library_of_windows(fmu: Fmu) -> None:
+def test_python_that_is_not_on_path_is_no_missing_library_of_windows(fmu: InspectedFmu) -> None:
     own = pythons(("/Python312/python3.dll", "3.12", THIS_PYTHON))
     found = without(machine_for(fmu), "python3.dll")
     machine = machine_for(fmu, system=WINDOWS, found=found, python_libraries=own)
@@ -269,15 +269,17 @@ def test_of_a_mach_o_binary_nothing_is_claimed(plant: Path, tmp_path: Path) -> N
     verdict = judge(fmu, machine, None)
     assert needs(verdict) == ((), ())
     assert verdict.other_host.note == "the dependencies of its binary are unknown"
-    assert "ready; the dependencies of its binary are unknown" in as_text(Report(machine=machine, verdicts=(verdict,)))
+    assert "ready; the dependencies of its binary are unknown" in as_text(
+        DoctorReport(machine=machine, verdicts=(verdict,))
+    )
 
 
 # -- the two forms of a report --------------------------------------------------------------------------------
 
 
-def test_json_has_what_the_text_says(fmu: Fmu) -> None:
+def test_json_has_what_the_text_says(fmu: InspectedFmu) -> None:
     machine = machine_for(fmu, glibc="glibc 2.36", shared=False)
-    tables = as_tables(Report(machine=machine, verdicts=(judge(fmu, machine, "no"),)))
+    tables = as_tables(DoctorReport(machine=machine, verdicts=(judge(fmu, machine, "no"),)))
     (table,) = tables["fmus"]
     assert tables["good"] is table["good"] is table["loads"] is False
     assert table["failure"] == "no"
@@ -291,9 +293,9 @@ def test_json_has_what_the_text_says(fmu: Fmu) -> None:
     assert {"name": "python3.dll", "versions": []} in windows["binary"]["dependencies"]
 
 
-def test_text_names_the_tool_that_an_fmu_asks_for(fmu: Fmu) -> None:
+def test_text_names_the_tool_that_an_fmu_asks_for(fmu: InspectedFmu) -> None:
     asking = dataclasses.replace(fmu, needs_tool="Modelotron 3")
     verdict = judged(asking)
     assert verdict.good
-    text = as_text(Report(machine=machine_for(fmu), verdicts=(verdict,)))
+    text = as_text(DoctorReport(machine=machine_for(fmu), verdicts=(verdict,)))
     assert "Modelotron 3, declared by the FMU (needsExecutionTool)" in text

@@ -9,7 +9,7 @@ from orchestration.engines.cuda import compiler, driver, fleet
 from orchestration.engines.cuda.driver import Gpu
 from orchestration.workers.choice import choose_execution
 from orchestration.workers.pool import Supervisor
-from orchestration.workers.task import Chunk, Outcome, Runner, RunTask
+from orchestration.workers.task import Runner, RunTask, TaskBatch, TaskOutcome
 from tests.orchestration.fmi.small import needs_compiler
 from tests.orchestration.studies.common import axis, short, study, sweep
 from tests.orchestration.workers.test_choice import first
@@ -20,11 +20,11 @@ pytestmark = needs_compiler
 def test_a_sweep_on_a_gpu_agrees_with_the_fmus(gpu: Gpu, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     runner, on_gpu = Runner(), list[int]()
 
-    def run_chunk(self: Supervisor, chunk: Chunk) -> list[Outcome]:
+    def run_chunk(self: Supervisor, chunk: TaskBatch) -> list[TaskOutcome]:
         on_gpu.extend([len(chunk.tasks)] * chunk.on_gpu)
         return runner.run_chunk(chunk)
 
-    def run(self: Supervisor, task: RunTask) -> Outcome:
+    def run(self: Supervisor, task: RunTask) -> TaskOutcome:
         return runner.run(task)
 
     monkeypatch.setattr(Supervisor, "run_chunk", run_chunk)  # in this process, which plays the GPU
