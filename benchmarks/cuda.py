@@ -58,7 +58,7 @@ def print_resources(architecture: str) -> None:
     }
     for name, code in codes.items():
         for what, known in (("with none", {}), (f"with {len(numbers[name])}", numbers[name])):
-            found = image(line(code, known, shape.lanes), architecture).taken
+            found = image(line(code, known, shape.lanes), architecture).resources
             spilled = sum(each.spilled for each in found.values())
             print(
                 f"{architecture}, {name} {what} of its numbers known: {found['line'].registers} registers, {spilled} "

@@ -1,12 +1,12 @@
-/* The condition by which a run has diverged, with a bound on how far each number may be from the one that Python finds:
-   0 where both do the same operations of IEEE 754, some rounding where a root or a source is in it. What the bounds do
-   not decide, Python does. */
+/* The condition of divergence, with a bound on the difference of each number from the one that Python computes: 0 where
+   both do the same operations of IEEE 754, some rounding errors where a root or a source is involved. Where the bounds
+   do not decide, Python does. */
 
 enum { NUMBER, TIME, SIGNAL, SOURCE, OPERATOR }; /* leaves, and the first operator */
-enum { DEEPEST = 256 };                          /* numbers that there is room for */
+enum { DEEPEST = 256 };                          /* the size of the stack */
 
 typedef struct {
-    int64_t code, operands; /* an operator of operators.h, or a leaf: of SIGNAL and SOURCE the place */
+    int64_t code, operands; /* an operator of operators.h, or a leaf; of SIGNAL and SOURCE `operands` is the place */
     double number;
 } Operation;
 
@@ -14,7 +14,7 @@ typedef struct {
     double value, error;
 } Known;
 
-#define SOURCES_AGREE 1e-9 /* a source over many times with the same at one time */
+#define SOURCES_AGREE 1e-9 /* relative difference between a source over many times and at one time */
 
 static Known known(double value, double error) {
     if (!isfinite(value) || !isfinite(error)) return (Known){0.0, INFINITY};
@@ -47,7 +47,7 @@ static int is_close(Known a, Known b) {
 
 static int is_undecided(Known a) { return a.error > 0.0 && !(fabs(a.value) > a.error); }
 
-/* `ends`: the side that decides by itself. */
+/* `ends`: the truth value of one part that decides the result. */
 static Known joined(int ends, const Known *parts, int64_t count) {
     int open = 0;
     for (int64_t i = 0; i < count; i++) {
@@ -61,7 +61,7 @@ static Known joined(int ends, const Known *parts, int64_t count) {
 
 #include "operators.h"
 
-/* Whether the condition may hold: it does, or the bounds do not say. */
+/* Whether the condition may hold: it does, or the bounds do not decide. */
 static int may_hold(const Operation *program, int64_t length, double t, const double *row, const double *sources) {
     Known stack[DEEPEST];
     int64_t top = 0;

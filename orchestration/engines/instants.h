@@ -1,12 +1,12 @@
-/* What happens at an instant, as instants.py has it, to the bit, in L lanes: lane l of every vector is run l. Runs of one
-   timing are a track: they share a schedule and pass through it together.
+/* Processes an instant exactly as instants.py does, in L SIMD lanes: lane l of every vector is run l. Runs of one
+   timing are a track: they share a schedule and process it together.
 
-   It is compiled for FMUs that are called (loop.c, one lane) and for kernels (batch.c). These say how values are set,
-   stepped and read, what is noted, and what is looked at: the functions that are only declared here. A lane that is not
-   alive any more takes part in nothing.
+   It is compiled for FMUs that are called (loop.c, one lane) and for kernels (batch.c). These define how values are
+   set, stepped and read, what is noted, and the divergence monitor: the functions that are only declared here. A lane
+   whose run has ended is not alive, and takes part in nothing.
 
-   Kernels are in lanes of vector registers, or in threads: with QUADCOSIM_THREADS each thread is one lane, LANE, of
-   memory that has L of them, and computes with single numbers. */
+   Kernels run in lanes of vector registers, or in threads: with QUADCOSIM_THREADS each thread is one lane, LANE, of
+   memory for L of them, and computes with single numbers. */
 
 #define NANOSECONDS 1e9
 #ifdef QUADCOSIM_THREADS
@@ -15,25 +15,25 @@
 #define EVERY (L == 64 ? ~(uint64_t)0 : (((uint64_t)1 << (L & 63)) - 1))
 #endif
 
-typedef struct { /* of tracks that have any, rows of a table that begin with an index */
+typedef struct { /* of the tracks that have any, rows of a table, which begin with an index */
     Lanes tracks;
     const int64_t *next[L], *end[L];
 } Rows;
 
-typedef struct { /* messages over one connection, one of each track that has one next */
+typedef struct { /* messages over one connection, one of each track whose next message it is */
     const Message *message; /* one of them */
     Lanes lost, at_once, later, beyond;
 } Messages;
 
 typedef struct {
-    Lanes lanes, tracks; /* that have reached it */
+    Lanes lanes, tracks; /* that are at this instant */
     q_real t;
     int64_t time[L];
     Rows stepped, samples; /* of components, in the order of ranks */
     Rows arrivals, posted, measured;
     /* of kernels */
-    Lanes *marks; /* lanes in which a message of a connection has values of now */
-    int still;    /* whether all that is held is what it was */
+    Lanes *marks; /* by connection, lanes in which a message has values of this instant */
+    int still;    /* whether all held values are unchanged */
 } Instant;
 
 static void set(Loop *l, Channel *c, Lanes lanes, const double *value, const Instant *now);
@@ -44,7 +44,7 @@ static void feed(Loop *l, const Component *c, Lanes lanes, const Instant *now);
 static void look(Loop *l, Lanes lanes, const Instant *now);
 static void note(Loop *l, int kind, const Messages *m, const Instant *now);
 
-/* What an instant calls in many places costs a tenth of a step of FMUs where the compiler leaves it a function. */
+/* Without inlining, the functions that an instant calls in many places cost a tenth of a step of FMUs. */
 #define INLINED static inline __attribute__((always_inline))
 
 /* -- lanes --------------------------------------------------------------------------------------------------------- */
@@ -61,7 +61,7 @@ Q_ONE Lanes lanes_of(q_mask mask) { return (Lanes)(mask != 0); }
 #else
 static const q_bits lane_bits = LANE_BITS;
 
-/* As functions of components are told of lanes: all bits of each, or none. */
+/* Lanes as the functions of components receive them: all bits of each, or none. */
 Q_ONE q_bits bits_of(Lanes lanes) { return (q_bits)((lane_bits & lanes) != 0); }
 
 #if defined(__AVX512DQ__) && L == 8
@@ -89,7 +89,7 @@ Q_ONE Lanes lanes_of(q_mask mask) {
         for (Track *track = &l->tracks[__builtin_ctzll(tracks_)], *end_ = track + 1; track < end_; track++)
 #endif
 
-/* What lanes have at a place of a memory. */
+/* The numbers of the lanes at a place of a memory. */
 #ifdef QUADCOSIM_THREADS
 #define AT(memory, place) ((memory)[(place) * L + LANE])
 #define READ(memory, place) AT(memory, place)
@@ -115,7 +115,7 @@ INLINED void add(Rows *rows, int64_t track, const void *table, int64_t width, in
     rows->next[track] = (const int64_t *)table + width * begin, rows->end[track] = (const int64_t *)table + width * end;
 }
 
-/* The next row of a track, which is gone then. */
+/* Remove and return the next row of a track. */
 INLINED const int64_t *row_of(Rows *rows, int64_t track, int64_t width) {
     const int64_t *row = rows->next[track];
     if ((rows->next[track] += width) == rows->end[track]) rows->tracks &= ~((Lanes)1 << track);
@@ -183,7 +183,7 @@ static void pass_on(Loop *l, Channel *c, Lanes lanes, const Instant *now) {
 
 INLINED void apply(Loop *l, Channel *c, Lanes lanes, const double *value, const Instant *now) {
     if (c->extrapolates)
-        EACH(lane, lanes) { /* of those before this time the last one stays */
+        EACH(lane, lanes) { /* keep only the last of the values before this time */
             int64_t count = c->applied_count[lane], n = c->size;
             while (count > 0 && c->applied_time[(count - 1) * L + lane] >= now->time[lane]) count--;
             if (count > 1) {
@@ -219,7 +219,7 @@ static void extrapolate(Loop *l, Channel *c, Lanes lanes, const Instant *now) {
     if (on_a_line) set(l, c, on_a_line, c->value, now);
 }
 
-/* Where message number k of a lane is, in a ring. */
+/* The place of message number k of a lane in the ring. */
 Q_ONE double *slot_of(const Channel *c, int64_t k) { return c->flight + (k & (c->capacity - 1)) * c->size * L; }
 
 static void dispatch(Loop *l, Channel *c, Lanes lanes) {
@@ -267,7 +267,7 @@ static void pass_on_each(Loop *l, const List *wires, Lanes lanes, const Instant 
 
 /* -- messages of several tracks ------------------------------------------------------------------------------------ */
 
-/* The next messages, in the order of each track; those over one connection go together. */
+/* The next messages, in the order of each track; those over one connection are processed together. */
 INLINED int next(Loop *l, Rows *rows, Messages *m) {
     while (rows->tracks) {
         int64_t connection = *rows->next[__builtin_ctzll(rows->tracks)];
@@ -301,7 +301,7 @@ static void note_sending(Loop *l, const Messages *m, const Instant *now) {
     if (m->lost) note(l, LOST, m, now);
 }
 
-/* Of components in continuous time to one another, where a message can be late or lost. */
+/* Messages between components in continuous time that can be late or lost. */
 static void post(Loop *l, Rows *rows, const Instant *now) {
     for (Messages m; next(l, rows, &m);) {
         Channel *c = channel_of(l, &m);
@@ -314,7 +314,7 @@ static void post(Loop *l, Rows *rows, const Instant *now) {
     }
 }
 
-/* Values for samples to come. */
+/* Measure values for later samples. */
 static void measure(Loop *l, Rows *rows, const Instant *now) {
     for (Messages m; next(l, rows, &m);) {
         note(l, MEASURED, &m, now);
@@ -323,21 +323,21 @@ static void measure(Loop *l, Rows *rows, const Instant *now) {
     }
 }
 
-/* The sample reads what it measures itself. */
+/* A sample reads the values that it measures. */
 static void sense(Loop *l, Rows *rows, const Instant *now) {
     for (Messages m; next(l, rows, &m);) {
         Channel *c = channel_of(l, &m);
-        Lanes come = m.at_once | m.later;
+        Lanes not_lost = m.at_once | m.later;
         note(l, SAMPLED, &m, now);
         if (m.lost) note(l, LOST, &m, now);
         if (!c->read_ahead) skip(c, m.lost);
-        if (!come) continue;
-        if (c->read_ahead) deliver(l, c, come, now);
-        else hand_over(l, c, come, now);
+        if (!not_lost) continue;
+        if (c->read_ahead) deliver(l, c, not_lost, now);
+        else hand_over(l, c, not_lost, now);
     }
 }
 
-/* What it sends are its outputs, which no arrival changes. */
+/* A sample sends its outputs, which no arrival changes. */
 static void send(Loop *l, Rows *rows, const Instant *now) {
     for (Messages m; next(l, rows, &m);) {
         Channel *c = channel_of(l, &m);
@@ -353,7 +353,7 @@ static void send(Loop *l, Rows *rows, const Instant *now) {
 
 /* -- components ---------------------------------------------------------------------------------------------------- */
 
-/* Who is next, by rank, of those that have a turn in some track. */
+/* The rank of the next component among those that are due in some track. */
 INLINED int64_t next_rank(Loop *l, const Rows *rows) {
     int64_t rank = INT64_MAX;
     TRACKS(track, rows->tracks) {
@@ -363,7 +363,7 @@ INLINED int64_t next_rank(Loop *l, const Rows *rows) {
     return rank;
 }
 
-/* What a track has for a component, if it is its turn. */
+/* The row of a track for a component, if it is next. */
 INLINED const int64_t *turn_of(Rows *rows, int64_t track, int64_t index, int64_t width) {
     if (!(rows->tracks >> track & 1) || *rows->next[track] != index) return NULL;
     return row_of(rows, track, width);
@@ -380,7 +380,7 @@ INLINED void count_steps(Loop *l, Lanes lanes) {
 #endif
 }
 
-/* A component in continuous time reaches the instant; the lanes in which it has. */
+/* Step a component in continuous time to the instant; the lanes in which it has reached it. */
 INLINED Lanes
 move(Loop *l, int64_t index, Lanes lanes, q_real begin, q_real length, int64_t until, const Instant *now) {
     pass_on_each(l, &l->components[index].ahead, lanes, now);
@@ -392,7 +392,7 @@ move(Loop *l, int64_t index, Lanes lanes, q_real begin, q_real length, int64_t u
     return lanes;
 }
 
-/* Components in continuous time reach the instant; divergence is noticed before any value is passed on. */
+/* Step components in continuous time to the instant; divergence is detected before any value is passed on. */
 static void step_continuous(Loop *l, Rows *stepped, const Instant *now) {
     Lanes moved = 0;
     while (stepped->tracks) {
@@ -413,7 +413,7 @@ static void step_continuous(Loop *l, Rows *stepped, const Instant *now) {
     if (moved & l->alive) look(l, moved & l->alive, now);
 }
 
-/* A component reads, steps and sends in the tracks in which it is due; with a clock of its own it steps in all. */
+/* A component reads, steps and sends in the tracks in which it is due; with its own clock it steps in all. */
 static void sample(Loop *l, int64_t index, Rows *samples, const Instant *now) {
     const Component *c = &l->components[index];
     Rows received, sent;
@@ -454,7 +454,7 @@ static void sample_each(Loop *l, Rows *samples, const Instant *now) {
         while (samples->tracks) sample(l, l->sampled.items[next_rank(l, samples)], samples, now);
 }
 
-/* What a component in continuous time holds over the step that begins now. */
+/* Set the inputs that a component in continuous time holds over the step that begins now. */
 static void hold(Loop *l, int64_t index, Lanes lanes, const Instant *now) {
     const Component *c = &l->components[index];
     extrapolate_each(l, &c->held, lanes, now);
@@ -477,7 +477,7 @@ static void settle(Loop *l, Rows *stepped, const Instant *now) {
 static void pass(Loop *l, Instant *now) {
     Rows stepped = now->stepped;
     step_continuous(l, &stepped, now);
-    arrive(l, &now->arrivals, now); /* before what is sent now, which is delivered last if it arrives at once */
+    arrive(l, &now->arrivals, now); /* before messages sent now, which are delivered last if they arrive at once */
     post(l, &now->posted, now);
     measure(l, &now->measured, now);
     sample_each(l, &now->samples, now);

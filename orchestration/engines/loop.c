@@ -1,6 +1,5 @@
-/* The loop of one run of FMUs, which are called by their function pointers, and its rows and events. All memory is
-   Python's, which also begins and ends a run, and says what has failed in its own words. What happens at an instant is
-   in instants.h. */
+/* The loop of one run of FMUs, which are called by their function pointers, with its rows and events. Python owns all
+   memory, begins and ends a run, and reports failures. The processing of an instant is in instants.h. */
 
 #define QUADCOSIM_LANES 1
 #include "lanes.h"
@@ -16,7 +15,7 @@
 
 #include "instants.h"
 
-#define WARNING 1 /* the worst status of a call that was done */
+#define WARNING 1 /* the worst status of a successful call */
 
 EXPORT const Size sizes[] = {SIZES, SIZE_OF(Operation), {0}};
 
@@ -25,17 +24,17 @@ typedef int CountedAccess(void *, const uint32_t *, size_t, void *, size_t);
 typedef int Step2(void *, double, double, int);
 typedef int Step3(void *, double, double, bool, bool *, bool *, bool *, double *);
 
-/* -- what FMUs have in common -------------------------------------------------------------------------------------- */
+/* -- the rounding mode --------------------------------------------------------------------------------------------- */
 
-/* How this thread computes, as far as it can be seen in its results: to which side numbers are rounded, and whether
-   the smallest ones are taken for zero. */
+/* The observable mode of this thread's arithmetic: how numbers are rounded, and whether subnormal numbers are treated
+   as zero. */
 static int mode(void) {
     static const volatile double one = 1.0, little = 0x1p-60, smallest = 0x1p-1022, half = 0.5, tiny = 0x1p-1074;
     return (one + little != one) | (one - little != one) << 1 | (-one - little != -one) << 2 |
            (smallest * half == 0.0) << 3 | (tiny * one == 0.0) << 4;
 }
 
-/* After each call of a foreign FMU: the others compute as they did. */
+/* After each call of an FMU: restore the mode if a foreign one has changed it. */
 static void called(Loop *l, int64_t index) {
     Component *c = &l->components[index];
     l->calling = -1;
@@ -128,7 +127,7 @@ static int write_all(Loop *l, const Transfer *transfer) {
     return 0;
 }
 
-/* -- what an instant asks for -------------------------------------------------------------------------------------- */
+/* -- the functions that an instant calls --------------------------------------------------------------------------- */
 
 static void end_if(Loop *l, int64_t outcome, const Instant *now) {
     if (outcome) end_some(l, 1, outcome, l->component, now);
@@ -139,7 +138,7 @@ static void set(Loop *l, Channel *c, Lanes lanes, const double *value, const Ins
     end_if(l, write_all(l, &c->write), now);
 }
 
-static int make_room(Channel *c, int lane) { return 0; } /* there always is: for all messages of a schedule */
+static int make_room(Channel *c, int lane) { return 0; } /* the buffer holds all messages of a schedule */
 
 static void step(Loop *l, int64_t index, Lanes lanes, q_real begin, q_real length, int64_t until, const Instant *now) {
     Component *c = &l->components[index];
@@ -160,7 +159,7 @@ static void step(Loop *l, int64_t index, Lanes lanes, q_real begin, q_real lengt
         }
         l->is_over = 1;
     }
-    if (*c->heard) l->collect(index);
+    if (*c->messages_waiting) l->collect(index);
 }
 
 static void read_outputs(Loop *l, int64_t index, Lanes lanes, const Instant *now) {
@@ -186,7 +185,7 @@ static void look(Loop *l, Lanes lanes, const Instant *now) {
 
 static void note(Loop *l, int kind, const Messages *m, const Instant *now) {
     const Message *x = m->message;
-    if (kind == MEASURED || x->sent > l->tracks->stop) return; /* what is measured is noted when the sample reads it */
+    if (kind == MEASURED || x->sent > l->tracks->stop) return; /* noted when the sample reads it */
     int64_t *event = kind == ARRIVED ? l->arrived + 4 * l->arrived_count++ : l->events + 4 * l->event_count++;
     event[0] = kind == ARRIVED ? now->time[0] : x->sent, event[1] = kind, event[2] = x->connection, event[3] = x->k;
 }
@@ -203,7 +202,7 @@ static void record(Loop *l, const Instant *now) {
         memcpy(row + l->width, l->watched + l->tracks->at * l->watched_size, (size_t)l->in_rows * sizeof(double));
 }
 
-/* Pass through instants of the schedule up to the count of the track; the code says why it ended. */
+/* Process the instants of the schedule up to the count of the track; the result states why it ended. */
 EXPORT int run(Loop *l) {
     Track *track = l->tracks;
     Instant now = {.lanes = 0};

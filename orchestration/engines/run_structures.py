@@ -56,7 +56,7 @@ class RunStructures:
             step=instance.address(f"fmi{version}DoStep"),
             version=version,
             foreign=instance.guard is not None,
-            heard=ctypes.addressof(instance.messages_waiting),
+            messages_waiting=ctypes.addressof(instance.messages_waiting),
             read=self.transfer(index, read, values),
             outputs=self.address(values),
             connected=connected,

@@ -1,5 +1,5 @@
-/* What a run has that C and Python share. Structures are declared here alone: structures.py reads them. Of fields whose
-   number is that of the lanes, L is 1 where FMUs are called; those of the other kind of components are 0 then. */
+/* The structures of a run that C and Python share. They are declared only here: structures.py reads this file. L, the
+   number of lanes, is 1 where FMUs are called; fields for the other kind of components are 0. */
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -9,52 +9,52 @@
 #define L QUADCOSIM_LANES
 #endif
 
-typedef uint64_t Lanes; /* a bit for each */
+typedef uint64_t Lanes; /* SIMD lanes of a vector register, or tracks: a bit for each */
 
-/* What has become of a run, or why C comes back from one that goes on. */
+/* How a run has ended, or why C returns from one that has not. */
 enum { RUNNING, FAILED, REFUSED, STOPPED, OVER, NOT_FINITE, DIVERGED, AT_END, FULL, PAUSED, NEXT_WINDOW, NO_MEMORY };
 
-/* What a buffer of an FMU holds, and what an input of a kernel takes. */
+/* The types of an FMU's buffer, and the kinds of a kernel's inputs. */
 enum { FLOAT64, FLOAT32, INT8, UINT8, INT16, UINT16, INT32, UINT32, INT64, UINT64, BOOL, BOOLEAN32 };
 enum { REAL, TRUTH, WHOLE };
 
-/* What happens to a message, as recording.py has it; MEASURED is not recorded. */
+/* The events of a message, as in recording.py; MEASURED is not recorded. */
 enum { SAMPLED, SENT, ARRIVED, LOST, MEASURED };
 
-/* -- what happens when, as orchestration/schedule/schedule.py has it ----------------------------------------------- */
+/* -- schedules, as in orchestration/schedule/schedule.py ----------------------------------------------------------- */
 
 typedef struct {
     int64_t connection, k, sent, arrival; /* arrival -1: lost */
 } Message;
 
 typedef struct {
-    int64_t component, next_time, received, sent, end; /* where its messages begin */
+    int64_t component, next_time, received, sent, end; /* indices of its messages */
 } SampleInstant;
 
 typedef struct {
-    const int64_t *times; /* one more than there are instants */
+    const int64_t *times; /* of the instants, and one more */
     const int64_t *stepped_at, *stepped, *posted_at, *measured_at, *arrivals_at, *samples_at;
     const Message *posted, *measured, *arrivals, *exchanged;
     const SampleInstant *samples;
 } Schedule;
 
-typedef struct { /* in order, each once */
+typedef struct { /* in increasing order, without duplicates */
     const int64_t *times;
-    const bool *stepped; /* of each, whether the components in continuous time are stepped to it */
-    int64_t count, at;   /* how many, and which is next */
+    const bool *stepped; /* of each, whether each component in continuous time is stepped to it */
+    int64_t count, at;   /* their number, and the next one */
 } Instants;
 
-typedef struct { /* what happens from one time to another, as orchestration/schedule/spans.py has it */
+typedef struct { /* the schedule of an interval, as in orchestration/schedule/spans.py */
     Instants regular, own;
     const Message *posted, *measured, *arrivals, *exchanged;
     const SampleInstant *samples;
     const int64_t *sampled; /* [ns], the times of the samples */
     int64_t posted_count, measured_count, arrivals_count, samples_count;
-    int64_t posted_at, measured_at, arrivals_at, samples_at; /* which are next */
-    int64_t end;                                             /* [ns] of the instant after these */
+    int64_t posted_at, measured_at, arrivals_at, samples_at; /* the next ones */
+    int64_t end;                                             /* [ns] the instant after these */
 } Span;
 
-/* What happens at an instant, as a sum: nothing but a step of the only component in continuous time is 0. */
+/* The kind of an instant, as a sum; 0: only the one component in continuous time is stepped. */
 enum { MORE = 1, SAMPLES = 2, START = 4 };
 
 /* -- values of FMUs ------------------------------------------------------------------------------------------------ */
@@ -78,7 +78,7 @@ typedef struct { /* the calls that move the values of one array */
     double *array;
 } Transfer;
 
-typedef struct { /* a source at work on inputs of one component */
+typedef struct { /* a source that sets inputs of one component */
     Transfer write;
     const double *values; /* at each instant of the schedule */
     int64_t size;
@@ -86,11 +86,11 @@ typedef struct { /* a source at work on inputs of one component */
 
 /* -- values of kernels --------------------------------------------------------------------------------------------- */
 
-typedef struct { /* inputs of a component in its memory, and what they take */
+typedef struct { /* inputs of a component in its memory, with their kinds and bounds */
     double *memory;
     const int64_t *places, *kinds;
     const double *low, *high;
-    int32_t plain, as_they_are; /* whether nothing has to be checked, and whether they are Reals beside */
+    int32_t plain, as_they_are; /* whether they need no check, and whether they are also all Reals */
 } Inputs;
 
 typedef struct { /* a value of a source, and the place of the input that gets it */
@@ -102,7 +102,7 @@ typedef struct { /* values that are kept row by row */
     int64_t count, capacity;
 } Kept;
 
-/* -- a system at work ---------------------------------------------------------------------------------------------- */
+/* -- a running system ---------------------------------------------------------------------------------------------- */
 
 typedef struct {
     const int64_t *items;
@@ -110,60 +110,60 @@ typedef struct {
 } List;
 
 typedef struct {
-    int64_t rank; /* its place among those of its kind in the order of an instant */
+    int64_t rank; /* its place in the order of an instant, among components of its kind */
     List held, ahead, behind; /* connections into it */
-    const double *ratio;      /* of the lanes; of a sampled one */
+    const double *ratio;      /* by lane, of a sampled component */
     int64_t by_itself;
     /* of FMUs */
     void *fmu, *step;
     int32_t version, unused;
-    int32_t foreign, moved;     /* whether it may change how numbers are rounded, and whether it has */
-    bool *event, *ends, *early; /* what an FMU of FMI 3 says of a step */
+    int32_t foreign, moved;     /* whether it may change the rounding mode, and whether it has */
+    bool *event, *ends, *early; /* what an FMU of FMI 3 returns from a step */
     double *reached;
-    const int64_t *heard; /* how many messages of it wait */
+    const int64_t *messages_waiting; /* their number */
     Transfer read;
-    const double *outputs; /* connected ones, in the row */
+    const double *outputs; /* the connected ones, in the row */
     int64_t connected;
     List feeds;
     /* of kernels */
     double *memory;
     const int64_t *places; /* of the connected outputs in it */
-    const bool *wanted;    /* of each variable, whether it is read, if it is an output */
+    const bool *wanted;    /* of each variable, whether it is read */
     const Fed *fed;
     int64_t fed_count;
 } Component;
 
 typedef struct {
     const double *sender;
-    const int64_t *places; /* of what is sent */
+    const int64_t *places; /* of the sent variables */
     int64_t size;
     int32_t noisy, rounds, converts, extrapolates, read_ahead, unused;
-    const double *sigma, *quantum, *scale, *offset; /* of each lane, the first two of each variable too */
-    const double *noise[L];                         /* what is drawn, message by message */
-    double *value;                                  /* of the message at hand */
-    double *flight; /* messages on their way, in the order of sending, which is that of arrival: a ring */
+    const double *sigma, *quantum, *scale, *offset; /* by lane, the first two also by variable */
+    const double *noise[L];                         /* random numbers, message by message */
+    double *value;                                  /* of the current message */
+    double *flight; /* a ring of messages on their way, in the order of sending, which is that of arrival */
     int64_t capacity, first[L], last[L];
-    double *applied; /* the last two, of a first-order hold */
+    double *applied; /* the last two values, for a first-order hold */
     int64_t applied_count[L], applied_time[2 * L];
-    Transfer write; /* of FMUs: its array is what the receiver has been told */
+    Transfer write; /* of FMUs: its array has the values that the receiver was set to */
     Inputs into;    /* of kernels */
 } Channel;
 
 typedef struct { /* runs that share a schedule */
     Schedule schedule;
-    int64_t count, at, last_window; /* instants of it to go through, the next one, whether it is the last window */
+    int64_t count, at, last_window; /* its number of instants, the next one, whether it is the last window */
     Lanes lanes;
     int64_t stop; /* [ns] */
     int64_t *now; /* [ns] of each component in continuous time */
     /* of kernels */
-    Span span; /* of which the schedule has the next instant */
+    Span span; /* whose next instant is in the schedule */
     int64_t times[2], stepped_at[2], posted_at[2], measured_at[2], arrivals_at[2], samples_at[2]; /* its tables */
     int64_t *moving;
-    int64_t said; /* which regular instant it is; of another, ~ which own one */
-    int64_t kind, more; /* [ns] when more than a step happens after it */
-    const double *seen[L], *given[L]; /* sources as objectives see them, and as inputs get them, at regular instants */
-    const double *seen_own[L], *given_own[L]; /* and at own ones */
-    int64_t one_for_all, unused; /* whether these are the same for all lanes */
+    int64_t source_row; /* the index of the regular instant, or ~ that of the own one */
+    int64_t kind, more; /* [ns] of the next instant with more than a step */
+    const double *seen[L], *given[L]; /* values of sources for expressions and for inputs, at regular instants */
+    const double *seen_own[L], *given_own[L]; /* at own ones */
+    int64_t one_for_all, unused; /* whether these are the same in all lanes */
 } Track;
 
 typedef struct {
@@ -173,46 +173,46 @@ typedef struct {
     int64_t some_by_themselves, settles;
     Track *tracks;
     int64_t track_count, channel_count;
-    Lanes alive; /* that go on */
+    Lanes alive; /* whose runs have not ended */
     int64_t outcome[L], outcome_component[L], outcome_time[L], steps[L];
-    int64_t no_memory; /* for messages on their way, or for values that are kept */
+    int64_t no_memory; /* for messages on their way, or for kept values */
     /* of FMUs */
     const Feed *feeds;
     int64_t pause_at, now; /* [ns] */
     double *row, *rows;
-    int64_t width, stride, row_count, row_limit; /* in numbers; after the width come sources, which Python adds */
-    int64_t *events, *arrived; /* of `arrived` those of this instant, noted after what was sent at it */
+    int64_t width, stride, row_count, row_limit; /* in numbers; behind the width are sources, which Python adds */
+    int64_t *events, *arrived; /* `arrived`: those of this instant, noted after the messages sent at it */
     int64_t event_count, event_limit, arrived_count;
     const Part *failed;
     int64_t component; /* whose FMU was called last */
     double end;        /* of its step [s] */
-    int64_t is_over;   /* with this instant: an FMU ends the run */
+    int64_t is_over;   /* whether an FMU ends the run at this instant */
     int (*look)(double);
-    int (*stopped)(int, int64_t); /* whether a step that was not simply done leaves the instant undone */
+    int (*stopped)(int, int64_t); /* called if a step was not simply successful: whether it ends the run here */
     void (*collect)(int64_t);
-    const void *condition; /* steps of condition.h; NULL: ask `look` each time */
+    const void *condition; /* operations of condition.h; NULL: call `look` each time */
     int64_t condition_length;
     const double *watched; /* sources of the condition at each instant */
-    int64_t watched_size, in_rows; /* how many, and how many of them rows end with: all or none */
+    int64_t watched_size, in_rows; /* their number, and the number of them at the end of rows: all or none */
     int64_t calling; /* the component whose FMU is called; -1: none */
-    int64_t mode;    /* how numbers are rounded in this run */
+    int64_t mode;    /* the rounding mode of this run */
     const void *environment;
     /* of kernels */
-    int64_t track; /* whose next window is asked for */
-    int64_t stays; /* whether all that is held stays what it is where nothing but a step happens */
+    int64_t track; /* that needs its next window */
+    int64_t stays; /* whether all held values stay unchanged at an instant with nothing but a step */
     int64_t seen_count, given_count;
     double *seen, *given, *state, *constants, *numbers;
     Lanes doubtful; /* in which a value was not a number */
     Kept *kept;
     int32_t *status;
-    int64_t recorded_count, record_limit; /* columns that are kept row by row, and of how many rows: 0 for none */
+    int64_t recorded_count, record_limit; /* number of recorded columns, and largest number of rows: 0 for none */
     const double **recorded;
     double *records[L];
     int64_t record_counts[L];
-    int64_t returned[L]; /* of threads: why each has come back */
+    int64_t returned[L]; /* of threads: why each has returned */
 } Loop;
 
-/* -- that Python has the same -------------------------------------------------------------------------------------- */
+/* -- sizes, which Python compares ---------------------------------------------------------------------------------- */
 
 typedef struct {
     const char *name;

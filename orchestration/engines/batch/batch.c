@@ -1,8 +1,8 @@
-/* The loop of runs of kernels in lanes: what a run comes to is summed up row by row by expressions.h, which is written
-   for the system. What happens at an instant is in instants.h.
+/* The loop of runs of kernels in SIMD lanes: the reductions of a run are updated row by row by expressions.h, which is
+   generated for the system. The processing of an instant is in instants.h.
 
-   The lanes are those of vector registers, or threads with QUADCOSIM_THREADS: then this is C++ too, what is declared here
-   alone is in flights.cu, and nothing can be allocated. */
+   The lanes are those of vector registers, or threads with QUADCOSIM_THREADS: then this is C++ too, functions that are
+   only declared here are in flights.cu, and nothing can be allocated. */
 
 #include "lanes.h"
 #include "mathematics.h"
@@ -16,7 +16,7 @@
 
 #include "instants.h"
 
-typedef Loop Batch; /* as expressions.h calls it */
+typedef Loop Batch; /* its name in expressions.h */
 
 static int make_room_to_keep(Kept *kept);
 
@@ -37,9 +37,9 @@ Q_ONE q_real highest(q_real a, q_real b) { return q_select(q_gt(a, b) | q_isnan(
 
 #include "expressions.h"
 
-/* -- what an instant asks for -------------------------------------------------------------------------------------- */
+/* -- the functions that an instant calls --------------------------------------------------------------------------- */
 
-/* Set the receiver's inputs; a value that it cannot be set to is for the FMU itself to refuse. */
+/* Set the receiver's inputs; a run with an invalid value ends here, and is repeated with the FMU itself. */
 static void set(Loop *l, Channel *c, Lanes lanes, const double *value, const Instant *now) {
     if (lanes == EVERY && c->into.as_they_are) {
         for (int64_t i = 0; i < c->size; i++) AT(c->into.memory, c->into.places[i]) = READ(value, i);
@@ -67,14 +67,14 @@ static void step(Loop *l, int64_t index, Lanes lanes, q_real begin, q_real lengt
     if (failed) end_some(l, failed, FAILED, index, now);
 }
 
-/* Nothing that is not finite is passed on. */
+/* End the lanes in which a connected output is not finite. */
 static void read_outputs(Loop *l, int64_t index, Lanes lanes, const Instant *now) {
     const Component *c = &l->components[index];
     const double *memory = c->memory;
     const int64_t *outputs = c->places, count = c->connected;
     q_real none = q_all(0.0), other = q_all(0.0), third = q_all(0.0);
     int64_t i = 0;
-    for (; i + 2 < count; i += 3) { /* three sums at once take a third of the time */
+    for (; i + 2 < count; i += 3) { /* three independent sums take a third of the time */
         q_real x = READ(memory, outputs[i]), y = READ(memory, outputs[i + 1]), z = READ(memory, outputs[i + 2]);
         none = none + (x - x), other = other + (y - y), third = third + (z - z);
     }
@@ -98,16 +98,16 @@ static void look(Loop *l, Lanes lanes, const Instant *now) {
     if (q_any(over)) end_some(l, lanes_of(over), DIVERGED, 0, now);
 }
 
-/* A message marks the row of the time at which its values were taken, or at which they arrive. */
+/* Mark the lanes whose row has values of a message: the row at which they were sampled, or at which they arrive. */
 static void note(Loop *l, int kind, const Messages *m, const Instant *now) {
     int64_t connection = m->message->connection;
-    Lanes come = m->at_once | m->later;
+    Lanes not_lost = m->at_once | m->later;
     if (kind == ARRIVED) now->marks[connection] |= m->at_once;
-    if (kind == SAMPLED && !l->channels[connection].read_ahead) now->marks[connection] |= come;
-    if (kind == MEASURED) now->marks[connection] |= come & ~m->beyond;
+    if (kind == SAMPLED && !l->channels[connection].read_ahead) now->marks[connection] |= not_lost;
+    if (kind == MEASURED) now->marks[connection] |= not_lost & ~m->beyond;
 }
 
-/* -- what happens when --------------------------------------------------------------------------------------------- */
+/* -- schedules ----------------------------------------------------------------------------------------------------- */
 
 static int64_t time_in(const Instants *some) { return some->at < some->count ? some->times[some->at] : INT64_MAX; }
 
@@ -116,7 +116,7 @@ static int64_t next_time(const Span *span) {
     return regular < own ? regular : own;
 }
 
-/* When the next of something happens that is not regular. */
+/* The time of the next event that is not a regular instant. */
 static int64_t next_more(const Span *span) {
     int64_t time = time_in(&span->own);
 #define EARLIEST(table, time_of_row) \
@@ -133,8 +133,8 @@ static void advance(Loop *l, Track *track) {
     Span *s = &track->span;
     Instants *regular = &s->regular, *own = &s->own;
     int64_t count = l->continuous.count, one_moves = count == 1 && !l->some_by_themselves, moving = 0;
-    if (time_in(regular) < track->more && one_moves && regular->stepped[regular->at]) { /* as most of them */
-        track->times[0] = time_in(regular), track->said = regular->at++, track->kind = 0, track->count = 1;
+    if (time_in(regular) < track->more && one_moves && regular->stepped[regular->at]) { /* the usual case */
+        track->times[0] = time_in(regular), track->source_row = regular->at++, track->kind = 0, track->count = 1;
         return;
     }
     int64_t time = next_time(s);
@@ -143,7 +143,7 @@ static void advance(Loop *l, Track *track) {
     for (int64_t i = 0; i < count; i++)
         if ((is_regular && regular->stepped[regular->at * count + i]) || (is_own && own->stepped[own->at * count + i]))
             track->moving[moving++] = l->continuous.items[i];
-    track->said = is_regular ? regular->at : ~own->at;
+    track->source_row = is_regular ? regular->at : ~own->at;
     regular->at += is_regular, own->at += is_own;
 #define THOSE_OF(table, time_of_row) \
     track->table##_at[0] = s->table##_at; \
@@ -167,28 +167,29 @@ static void advance(Loop *l, Track *track) {
 
 /* -- a run --------------------------------------------------------------------------------------------------------- */
 
-static const double *said(const double *const *regular, const double *const *own, int lane, int64_t row, int64_t n) {
+static const double *
+source_values(const double *const *regular, const double *const *own, int lane, int64_t row, int64_t n) {
     return row < 0 ? own[lane] + ~row * n : regular[lane] + row * n;
 }
 
-/* What sources say at the instants that tracks have reached. */
-static void hear(Loop *l, const Instant *now) {
+/* Take over the values of sources at the instants that tracks have reached. */
+static void take_sources(Loop *l, const Instant *now) {
     TRACKS(track, now->tracks) {
         Lanes lanes = track->lanes & l->alive;
-        int64_t row = track->said;
+        int64_t row = track->source_row;
         if (track->one_for_all) {
             int lane = __builtin_ctzll(track->lanes);
             q_mask mask = mask_of(lanes);
-            const double *seen = said(track->seen, track->seen_own, lane, row, l->seen_count);
-            const double *given = said(track->given, track->given_own, lane, row, l->given_count);
+            const double *seen = source_values(track->seen, track->seen_own, lane, row, l->seen_count);
+            const double *given = source_values(track->given, track->given_own, lane, row, l->given_count);
             for (int64_t i = 0; i < l->seen_count; i++)
                 AT(l->seen, i) = q_select(mask, q_all(seen[i]), READ(l->seen, i));
             for (int64_t i = 0; i < l->given_count; i++)
                 AT(l->given, i) = q_select(mask, q_all(given[i]), READ(l->given, i));
         } else
             EACH(lane, lanes) {
-                const double *seen = said(track->seen, track->seen_own, lane, row, l->seen_count);
-                const double *given = said(track->given, track->given_own, lane, row, l->given_count);
+                const double *seen = source_values(track->seen, track->seen_own, lane, row, l->seen_count);
+                const double *given = source_values(track->given, track->given_own, lane, row, l->given_count);
                 for (int64_t i = 0; i < l->seen_count; i++) l->seen[i * L + lane] = seen[i];
                 for (int64_t i = 0; i < l->given_count; i++) l->given[i * L + lane] = given[i];
             }
@@ -204,8 +205,8 @@ static void record(Loop *l, const Instant *now, Lanes lanes) {
     }
 }
 
-/* Through an instant at which nothing happens in some tracks but that the only component in continuous time is stepped:
-   as `reach` and `pass` have it, without looking for anything else. */
+/* Process an instant at which, in some tracks, only the one component in continuous time is stepped: as `reach` and
+   `pass` do, without looking for anything else. */
 static void only_step(Loop *l, Instant *now, Lanes tracks) {
     int64_t index = l->continuous.items[0], until = 0;
     q_real begin = q_all(0.0), length = q_all(0.0);
@@ -218,13 +219,13 @@ static void only_step(Loop *l, Instant *now, Lanes tracks) {
         begin = q_select(mask_of(lanes), q_all((double)before / NANOSECONDS), begin);
         length = q_select(mask_of(lanes), q_all((double)(until - before) / NANOSECONDS), length);
     }
-    hear(l, now);
+    take_sources(l, now);
     Lanes moved = move(l, index, now->lanes, begin, length, until, now);
     if (moved & l->alive) look(l, moved & l->alive, now);
     if (l->settles) hold(l, index, now->lanes & l->alive, now);
 }
 
-/* The same as a schedule has it, for those that pass beside others in which more happens. */
+/* Write such a step as a schedule, for tracks that are processed together with others in which more happens. */
 static void lay_out_step(Loop *l, Lanes tracks) {
     TRACKS(track, tracks) {
         int64_t *const tables[] = {track->posted_at, track->measured_at, track->arrivals_at, track->samples_at};
@@ -236,23 +237,23 @@ static void lay_out_step(Loop *l, Lanes tracks) {
 static void reach_and_pass(Loop *l, Instant *now, Lanes tracks, int first) {
     reach(l, now, tracks);
     now->still = 0;
-    hear(l, now);
+    take_sources(l, now);
     if (first) look(l, now->lanes, now);
     pass(l, now);
 }
 
-static Lanes in_turn(Lanes going, Lanes sampling);
+static Lanes in_turn(Lanes ready, Lanes sampling);
 
-/* Pass through the windows that the tracks have. Tracks that set out do so together; those that sample next wait for one
-   another, since what a sample costs does not grow with the lanes that take part. */
+/* Process the windows of the tracks. Tracks at their first instant process it together; those that sample next wait for
+   one another, since the cost of a sample does not grow with the number of its lanes. */
 EXPORT int run(Loop *l) {
-    Lanes marks[CHANNELS], come = ((Lanes)1 << (l->track_count - 1) << 1) - 1; /* to another instant */
-    Lanes going = 0, with_more = 0, sampling = 0, setting_out = 0;
+    Lanes marks[CHANNELS], due = ((Lanes)1 << (l->track_count - 1) << 1) - 1; /* tracks that need their next instant */
+    Lanes ready = 0, with_more = 0, sampling = 0, setting_out = 0;
     Instant now = {.marks = marks};
     constants(l);
     for (;;) {
-        going &= ~come, with_more &= ~come, sampling &= ~come, setting_out &= ~come;
-        TRACKS(track, come) {
+        ready &= ~due, with_more &= ~due, sampling &= ~due, setting_out &= ~due;
+        TRACKS(track, due) {
             int64_t number = track - l->tracks;
             if (!(track->lanes & l->alive)) continue;
             if (!track->count) advance(l, track);
@@ -261,21 +262,21 @@ EXPORT int run(Loop *l) {
                 l->track = number;
                 return NEXT_WINDOW;
             }
-            going |= (Lanes)1 << number;
+            ready |= (Lanes)1 << number;
             if (!track->kind) continue;
             with_more |= (Lanes)1 << number;
             sampling |= (Lanes)((track->kind & SAMPLES) != 0) << number;
             setting_out |= (Lanes)((track->kind & START) != 0) << number;
         }
-        if (!going) return AT_END;
-        come = setting_out ? setting_out : in_turn(going, sampling);
-        if (!come) continue;
+        if (!ready) return AT_END;
+        due = setting_out ? setting_out : in_turn(ready, sampling);
+        if (!due) continue;
         memset(marks, 0, sizeof marks);
-        if (come & with_more) {
-            lay_out_step(l, come & ~with_more);
-            reach_and_pass(l, &now, come, setting_out != 0);
+        if (due & with_more) {
+            lay_out_step(l, due & ~with_more);
+            reach_and_pass(l, &now, due, setting_out != 0);
         } else
-            only_step(l, &now, come);
+            only_step(l, &now, due);
         Lanes lanes = now.lanes & l->alive;
         if (lanes) {
             if (!(setting_out ? begin_row(l, &now, mask_of(lanes)) : next_row(l, &now, mask_of(lanes))))
@@ -283,7 +284,7 @@ EXPORT int run(Loop *l) {
             if (l->record_limit) record(l, &now, lanes);
         }
         if (l->no_memory) return NO_MEMORY;
-        TRACKS(track, come) track->count = 0;
+        TRACKS(track, due) track->count = 0;
     }
 }
 
@@ -309,7 +310,7 @@ static Lanes failed_steps(Loop *l, int64_t index, Lanes lanes, q_real begin, q_r
     return failed;
 }
 
-static Lanes in_turn(Lanes going, Lanes sampling) { return going & ~sampling ? going & ~sampling : going; }
+static Lanes in_turn(Lanes ready, Lanes sampling) { return ready & ~sampling ? ready & ~sampling : ready; }
 
 static int make_room_to_keep(Kept *kept) {
     int64_t capacity = kept->capacity ? 2 * kept->capacity : 1024;
@@ -336,25 +337,25 @@ static int make_room(Channel *c, int lane) {
     return 1;
 }
 
-/* How often a value that was kept grows, and ends above a floor. */
-EXPORT void grown(const Loop *l, int64_t number, const double *floor, double *found) {
+/* The number of steps in which a kept value grows, and ends above a floor. */
+EXPORT void grown(const Loop *l, int64_t number, const double *floor, double *grown_steps) {
     const Kept *kept = &l->kept[number];
     q_real count = q_all(0.0);
     for (int64_t i = 1; i < kept->count; i++) {
         q_real before = READ(kept->values, i - 1), x = READ(kept->values, i);
         count = count + TRUE(q_gt(x - before, 0.0) & q_gt(x, READ(floor, 0)));
     }
-    AT(found, 0) = count;
+    AT(grown_steps, 0) = count;
 }
 
-/* Begin again: nothing is on its way, and nothing is kept. Memory that was made for it stays. */
+/* Discard messages on their way and kept values; their memory stays allocated. */
 EXPORT void clear(Loop *l) {
     for (int64_t i = 0; i < KEPT; i++) l->kept[i].count = 0;
     for (int64_t i = 0; i < l->channel_count; i++)
         for (int lane = 0; lane < L; lane++) l->channels[i].first[lane] = l->channels[i].last[lane] = 0;
 }
 
-/* Free what was made. */
+/* Free the memory of messages and kept values. */
 EXPORT void free_all(Loop *l) {
     for (int64_t i = 0; i < KEPT; i++) free(l->kept[i].values);
     for (int64_t i = 0; i < l->channel_count; i++) free(l->channels[i].flight);

@@ -1,4 +1,4 @@
-"""From CUDA to what a GPU runs, by NVRTC of the wheel nvidia-cuda-nvrtc-cu12: no GPU is needed for that."""
+"""Compiles CUDA by NVRTC, of the wheel nvidia-cuda-nvrtc-cu12; this needs no GPU."""
 
 import ctypes
 import importlib.util
@@ -27,80 +27,82 @@ typedef unsigned long uint64_t;
 """,
     "stddef.h": "", "stdbool.h": "", "string.h": "",
 }  # fmt: skip
-"""Of the standard library what is made use of, for a compiler that has no files of it: the rest is in the language"""
-_TAKEN = re.compile(
+"""The parts of the standard library that are used: NVRTC has no header files"""
+_RESOURCES = re.compile(
     r"Function properties for (\w+)\n.*?(\d+) bytes spill stores, (\d+) bytes spill loads(?:\n.*?Used (\d+) registers)?"
 )
 
 
 @dataclass(frozen=True, kw_only=True)
-class Taken:
-    """What a function takes of a processor."""
+class Resources:
+    """The resources of a processor that a function uses."""
 
     registers: int | None
-    """None: as many as the kernel that calls it"""
+    """None: as many as the kernel that calls the function"""
     spilled: int
-    """[byte] that are put into memory for want of registers"""
+    """[byte] that are moved to memory for lack of registers"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Image:
-    """What a GPU loads, and what was said of it."""
+    """A compiled program, and the log of its compilation."""
 
     content: bytes
     log: str
 
     @property
-    def taken(self) -> dict[str, Taken]:
-        """What functions take, by the names that the compiler gives them."""
+    def resources(self) -> dict[str, Resources]:
+        """The resources of functions, by their names in the log."""
         return {
-            name: Taken(registers=None if registers is None else int(registers), spilled=int(stores) + int(loads))
-            for name, stores, loads, registers in (found.groups() for found in _TAKEN.finditer(self.log))
+            name: Resources(registers=None if registers is None else int(registers), spilled=int(stores) + int(loads))
+            for name, stores, loads, registers in (match.groups() for match in _RESOURCES.finditer(self.log))
         }
 
 
 def expect_compiler() -> None:
-    """Raise `QuadcosimError` without NVRTC, saying what to install."""
+    """Raise `QuadcosimError` without NVRTC, naming what to install."""
     _library()
 
 
 def compiled(text: str, architecture: str) -> bytes:
-    """What GPUs of an architecture, as sm_90, run; kept in the user's cache.
+    """The program compiled for GPUs of an architecture, as sm_90, from the user's cache if it is there.
 
-    Raises `QuadcosimError` without NVRTC, saying what to install.
+    Raises `QuadcosimError` without NVRTC, naming what to install.
     """
-    make = lambda: image(text, architecture).content  # noqa: E731
-    return cached_library("cuda", {"flights.cu": text.encode()}, (OPTIONS, architecture, _version()), make).read_bytes()
+    compile_ = lambda: image(text, architecture).content  # noqa: E731
+    return cached_library(
+        "cuda", {"flights.cu": text.encode()}, (OPTIONS, architecture, _version()), compile_
+    ).read_bytes()
 
 
 def image(text: str, architecture: str) -> Image:
-    """The same, compiled now, with what the compiler says of it."""
+    """The same, always compiled anew, with the log of the compiler."""
     library, program = _library(), ctypes.c_void_p()
     names, contents = (
         (ctypes.c_char_p * len(_HEADERS))(*(each.encode() for each in some)) for some in (_HEADERS, _HEADERS.values())
     )
-    given = [each.encode() for each in (f"--gpu-architecture={architecture}", *OPTIONS)]
+    options = [each.encode() for each in (f"--gpu-architecture={architecture}", *OPTIONS)]
     _expect(library.nvrtcCreateProgram(
         ctypes.byref(program), text.encode(), b"flights.cu", len(_HEADERS), contents, names
     ))  # fmt: skip
     try:
-        failed = library.nvrtcCompileProgram(program, len(given), (ctypes.c_char_p * len(given))(*given))
-        log = _told(library.nvrtcGetProgramLogSize, library.nvrtcGetProgramLog, program).rstrip(b"\0").decode()
+        failed = library.nvrtcCompileProgram(program, len(options), (ctypes.c_char_p * len(options))(*options))
+        log = _read(library.nvrtcGetProgramLogSize, library.nvrtcGetProgramLog, program).rstrip(b"\0").decode()
         if failed:
             first = next((line for line in log.splitlines() if "error" in line), log)
             raise QuadcosimError(f"CUDA for {architecture}: {first}")
-        content = _told(library.nvrtcGetCUBINSize, library.nvrtcGetCUBIN, program)
+        content = _read(library.nvrtcGetCUBINSize, library.nvrtcGetCUBIN, program)
     finally:
         library.nvrtcDestroyProgram(ctypes.byref(program))
     return Image(content=content, log=log)
 
 
-def _told(size_of: Any, get: Any, program: ctypes.c_void_p) -> bytes:
+def _read(size_of: Any, get: Any, program: ctypes.c_void_p) -> bytes:
     size = ctypes.c_size_t()
     _expect(size_of(program, ctypes.byref(size)))
-    found = ctypes.create_string_buffer(size.value)
-    _expect(get(program, found))
-    return found.raw
+    buffer = ctypes.create_string_buffer(size.value)
+    _expect(get(program, buffer))
+    return buffer.raw
 
 
 def _expect(result: int) -> None:
@@ -117,10 +119,10 @@ def _version() -> Sequence[int]:
 @cache
 def _library() -> Any:
     try:
-        found = importlib.util.find_spec("nvidia.cuda_nvrtc")
+        spec = importlib.util.find_spec("nvidia.cuda_nvrtc")
     except ModuleNotFoundError:
-        found = None
-    folders = [] if found is None else [Path(each) for each in found.submodule_search_locations or ()]
+        spec = None
+    folders = [] if spec is None else [Path(each) for each in spec.submodule_search_locations or ()]
     path = next((path for folder in folders for path in sorted(folder.glob("lib/libnvrtc.so.*"))), None)
     if path is None:
         raise QuadcosimError("NVRTC is not installed; this needs: pip install 'quadcosim[cuda]'")

@@ -1,6 +1,6 @@
-/* The end of a component's namespace: its step, 0 or else the number of the error by which it fails. The general step
-   is a function apart, so that what it needs of registers is no matter of the straight line. If it changes what the
-   line takes as known, the run is left to others. */
+/* The end of a component's namespace: its step, which returns 0 or the number of its error. The general step is a
+   separate function, so that its registers do not add to those of the straight line. If it changes a number that is a
+   constant in the line, the run fails here, and another engine repeats it. */
 
 static __noinline__ int general_step(q_place *v, q_real t, q_real h) {
     q_real failed = 0.0;

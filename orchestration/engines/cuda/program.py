@@ -1,4 +1,4 @@
-"""The runs of a shape as one text of CUDA: that of lanes, for threads (`threads.h`, `flights.cu`)."""
+"""The runs of a shape as one CUDA text: the C for SIMD lanes, used for threads (`threads.h`, `flights.cu`)."""
 
 import ctypes
 import re
@@ -15,22 +15,22 @@ from orchestration.engines.structures import constants, shared
 from orchestration.fmi.model import Model
 
 Known = Mapping[str, float]
-"""Places of a component's memory that hold one number in all runs, by their names in C"""
+"""Numbers that are the same in all runs, by the names in C of their places in a component's memory"""
 
 _OF_KIT = ("lanes.h", "mathematics.h", "integers.h")
 _OWN = ("flights.cu", "threads.h", "component.h")
 _INCLUDE = re.compile(r'(?m)^#include "(.+)"\n')
 _LITERAL = re.compile(r"\((q_\w+|[A-Z]\w+)\)\{")
-"""A structure of known values, as C has it: C++ has no parentheses there"""
+"""A compound literal of C, which C++ writes without the parentheses"""
 _STRAIGHT = re.compile(
     r"static Q_FLAT q_mask (\w+)\([^)]*\)\n\{\n.*?\n\}\n(?=\s*#define STRAIGHT_STEP \1\n)", re.DOTALL
 )
 _METHOD = re.compile(r"static (?=q_mask (?!model_do_step)\w+\()")
-"""That is called; one that NVRTC puts wherever it is called takes it twice as long, and more registers"""
+"""A function; if NVRTC inlines it, compilation takes twice as long, and the kernel more registers"""
 _FUNCTION = re.compile(r"static q_mask (\w+)\([^)]*\)\n\{\n(.*?)\n\}\n", re.DOTALL)
 _CALLED = re.compile(r"\b(model_\w+)\(")
 _TAKES_PARAMETERS = "model_take_parameters"
-"""The method of all slaves that reads parameters again where one has been set"""
+"""The method of all slaves that reads parameters again after one was set"""
 _READ, _STORED = re.compile(r"v\[(\w+)\]"), re.compile(r"v\[(\w+)\] = ")
 _LINE = """
 extern "C" __global__ void line(q_place *v, q_real t, q_real h, int *through) {
@@ -46,11 +46,11 @@ class Code:
     places: str
     functions: str
     constant: Mapping[str, int] = field(default_factory=dict)
-    """Places that its straight line reads and that follow from parameters alone, by name"""
+    """the places that its straight line reads and that depend on parameters alone, by name"""
 
     @classmethod
     def of(cls, name: str, model: Model) -> "Code":
-        """That of an FMU; raises `UsageError` naming one of another kit than this."""
+        """The code of an FMU; raises `UsageError` naming it if it was built by another version of the kit."""
         sources = sources_of(name, model)
         if any(sources.get(header) != (FOLDER / header).read_bytes() for header in _OF_KIT):
             raise UsageError(
@@ -62,15 +62,17 @@ class Code:
         if straight is None:
             return cls(places, functions)
         inputs = {variable.reference for variable in model.variables.values() if variable.causality == "input"}
-        some = {*_READ.findall(straight[0])} - {*_STORED.findall(straight[0])} - _changed(functions)
-        there = {each: place for each, place in constants(places).items() if each in some and place not in inputs}
-        return cls(places, functions, there)
+        candidates = {*_READ.findall(straight[0])} - {*_STORED.findall(straight[0])} - _changed(functions)
+        constant = {
+            each: place for each, place in constants(places).items() if each in candidates and place not in inputs
+        }
+        return cls(places, functions, constant)
 
     def text(self, known: Known) -> str:
-        """With numbers that are known in its straight line; after a general step they are looked at."""
+        """The text, with known numbers as constants in its straight line, which are checked after a general step."""
 
-        def number(found: re.Match[str]) -> str:
-            return f"({known[found[1]].hex()})" if found[1] in known else found[0]
+        def number(match: re.Match[str]) -> str:
+            return f"({known[match[1]].hex()})" if match[1] in known else match[0]
 
         functions = _STRAIGHT.sub(lambda straight: _READ.sub(number, straight[0]), self.functions)
         functions = _METHOD.sub("static __noinline__ ", functions)
@@ -79,7 +81,7 @@ class Code:
 
 
 def _changed(functions: str) -> set[str]:
-    """The places that a general step changes, but where it takes over parameters."""
+    """The places that a general step changes, except where it takes over parameters."""
     bodies: dict[str, str] = dict(_FUNCTION.findall(functions))
     reached, waiting = {_TAKES_PARAMETERS}, ["model_do_step"]
     while waiting:
@@ -91,8 +93,8 @@ def _changed(functions: str) -> set[str]:
 
 
 def program(shape: Shape, codes: Mapping[str, Code], known: Mapping[str, Known]) -> str:
-    """What flies runs of a shape, of whose components these places hold known numbers, by component."""
-    written = {
+    """The program that runs a shape, given the known numbers of each component."""
+    generated = {
         "components.h": "\n".join([
             *(_in_space(f"component_{i}", code.text(known[name]) + '#include "component.h"\n')
               for i, (name, code) in enumerate(codes.items())),
@@ -110,11 +112,11 @@ def program(shape: Shape, codes: Mapping[str, Code], known: Mapping[str, Known])
         f'static_assert(sizeof({name}) == {ctypes.sizeof(each)}, "{name} as in Python");'
         for name, each in shared(shape.lanes).items()
     )
-    return _of_threads(f'#include "flights.cu"\n{sizes}\n', shape.lanes, written)
+    return _of_threads(f'#include "flights.cu"\n{sizes}\n', shape.lanes, generated)
 
 
 def line(code: Code, known: Known, lanes: int) -> str:
-    """The straight line of a component's step alone, as a kernel: to see what it takes of a processor."""
+    """The straight line of a component's step alone as a kernel, to measure its resources."""
     text = f'#include "threads.h"\n#include "integers.h"\n{_in_space("component", code.text(known))}{_LINE}'
     return _of_threads(text, lanes, {})
 
@@ -123,12 +125,12 @@ def _in_space(name: str, text: str) -> str:
     return f"namespace {name} {{\n{text}}}\n"
 
 
-def _of_threads(text: str, lanes: int, written: Mapping[str, str]) -> str:
-    """A text with all that it includes, each once, as C++."""
-    files, seen = {**_files(), **written}, set[str]()
+def _of_threads(text: str, lanes: int, generated: Mapping[str, str]) -> str:
+    """A text as C++, with each file that it includes once."""
+    files, seen = {**_files(), **generated}, set[str]()
 
-    def content(found: re.Match[str]) -> str:
-        name = found[1]
+    def content(match: re.Match[str]) -> str:
+        name = match[1]
         if name in seen and name != "component.h":
             return ""
         seen.add(name)

@@ -1,13 +1,13 @@
-/* What the loop of runs asks for where each thread of a GPU flies one run: CUDA in C++, in one text with all that it
-   includes. Thread t flies lane t % L of batch t / L, in the memory that lanes of vector registers have: the lanes of a
-   batch lie beside one another there, so that threads that are neighbours read neighbours.
+/* Definitions for the loop of runs where each thread of a GPU computes one run: CUDA in C++, in one text with all that
+   it includes. Thread t computes lane t % L of batch t / L, in memory of the same layout as for SIMD lanes: the lanes
+   of a batch are adjacent, so that neighbouring threads read neighbouring numbers.
 
    Multiplications and additions are not contracted (--fmad=false), division and root are rounded correctly, and the
    elementary functions are those of mathematics.h: the bits are those of lanes. */
 
 #define QUADCOSIM_THREADS
 #define QUADCOSIM_LANES 1
-#define LANE ((int)(threadIdx.x % L)) /* blocks are of whole batches */
+#define LANE ((int)(threadIdx.x % L)) /* blocks contain whole batches */
 #define EXPORT static
 #define Q_HARDWARE_SQRT(x) __dsqrt_rn(x)
 #define Q_IF_EVER(condition) if (__builtin_expect(condition, 0))
@@ -16,7 +16,7 @@
 
 #include <stdint.h>
 
-/* A place of a component's memory, as its functions have it, v[PLACE]: the next one is L numbers on. */
+/* A place of a component's memory, v[PLACE] in its functions: the next place is L numbers further. */
 struct q_place {
     double own, others[L - 1];
     operator double() const { return own; }

@@ -1,4 +1,4 @@
-"""What the text of CUDA takes of a GPU's processor, by the compiler for it: no GPU is needed."""
+"""The resources that the CUDA text uses of a GPU's processor, by its compiler: no GPU is needed."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -7,7 +7,7 @@ import pytest
 
 from orchestration.basics.errors import QuadcosimError
 from orchestration.engines.batch.batch import Batch
-from orchestration.engines.cuda.compiler import Taken, image
+from orchestration.engines.cuda.compiler import Resources, image
 from orchestration.engines.cuda.program import Code, line, program
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.schedule.schedule_cache import ScheduleCache
@@ -16,9 +16,9 @@ from tests.orchestration.engines.batch.lanes import group_of, located, shape_of
 from tests.orchestration.fmi.small import needs_compiler
 
 MOST = {"plant": 168, "controller": 255}
-"""Registers of a thread: of 65,536 in a processor, for 384 threads, and for 256, which have as many as there can be"""
+"""Registers of a thread: of 65,536 in a processor, for 384 threads, and for 256, with the largest possible number"""
 LOOP = 128
-"""And of the loop, without the steps of components: for 512"""
+"""The same of the loop without the steps of components, for 512 threads"""
 ARCHITECTURE = "sm_90"
 EXAMPLE = Path(__file__).parents[4] / "examples" / "double_integrator" / "system.toml"
 
@@ -28,9 +28,9 @@ def _nvrtc() -> None:
     pytest.importorskip("nvidia.cuda_nvrtc", reason="no NVRTC: pip install 'quadcosim[cuda]'")
 
 
-def assert_it_spills_nothing(taken: Mapping[str, Taken], kernel: str, most: int) -> None:
-    assert sum(each.spilled for each in taken.values()) == 0
-    registers = taken[kernel].registers
+def assert_it_spills_nothing(resources: Mapping[str, Resources], kernel: str, most: int) -> None:
+    assert sum(each.spilled for each in resources.values()) == 0
+    registers = resources[kernel].registers
     assert registers is not None
     assert registers <= most
 
@@ -45,18 +45,18 @@ def test_a_line_with_the_numbers_of_a_study_spills_nothing(component: str) -> No
     code = Code.of(component, shape.models[component])
     memory = batch.memories[shape.names.index(component)]
     known = {name: float(memory[place, 0]) for name, place in code.constant.items()}
-    made = image(line(code, known, shape.lanes), ARCHITECTURE)
-    assert_it_spills_nothing(made.taken, "line", MOST[component])
+    compiled = image(line(code, known, shape.lanes), ARCHITECTURE)
+    assert_it_spills_nothing(compiled.resources, "line", MOST[component])
 
 
 @needs_compiler
 def test_the_loop_around_small_components_spills_nothing() -> None:
     shape = shape_of(located(load_system(EXAMPLE)))
     codes = {name: Code.of(name, model) for name, model in shape.models.items()}
-    made = image(program(shape, codes, {name: {} for name in codes}), ARCHITECTURE)
-    assert_it_spills_nothing(made.taken, "fly", LOOP)
+    compiled = image(program(shape, codes, {name: {} for name in codes}), ARCHITECTURE)
+    assert_it_spills_nothing(compiled.resources, "fly", LOOP)
 
 
-def test_what_is_wrong_with_a_text_is_said_in_a_line() -> None:
+def test_an_error_in_a_text_is_reported_in_a_line() -> None:
     with pytest.raises(QuadcosimError, match=r"^CUDA for sm_90: .*identifier \"x\" is undefined$"):
         image("static double y = x;", ARCHITECTURE)

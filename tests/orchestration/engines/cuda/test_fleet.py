@@ -1,4 +1,4 @@
-"""The text for a GPU, played by a processor thread after thread, has the bits of lanes of vector registers."""
+"""The CUDA text, executed by a CPU thread after thread, has the bits of SIMD lanes."""
 
 import re
 from collections.abc import Sequence
@@ -42,19 +42,19 @@ LATE = Timing(jitter=0.004, delay=0.003, measurement_loss=0.2, command_loss=0.1,
 
 
 def assert_the_same(
-    flown: Fleet, shape: Shape, crowd: Sequence[System], *, count: int | None = None
+    fleet_: Fleet, shape: Shape, crowd: Sequence[System], *, count: int | None = None
 ) -> list[BatchResult]:
-    """By threads and in lanes, in groups of `count`."""
+    """The results in threads and in lanes, in groups of `count`."""
     groups = [crowd[i : i + (count or len(crowd))] for i in range(0, len(crowd), count or len(crowd))]
-    given = [*map(group_of, groups)]
+    groups_of_runs = [*map(group_of, groups)]
     columns = shape.board.columns[1:]
-    threads = [found for _, found in flown.run(given, columns)]
+    threads = [found for _, found in fleet_.run(groups_of_runs, columns)]
     lanes = Batch(shape, ScheduleCache())
-    for own, by_threads in zip(given, threads):
+    for own, by_threads in zip(groups_of_runs, threads):
         by_lanes = lanes.run(own, columns)
         for name in ("outcome", "time", "component", "steps", "doubtful"):
             assert getattr(by_threads, name).tolist() == getattr(by_lanes, name).tolist(), name
-        whole = by_lanes.outcome == c.RUNNING  # what has ended before has no objectives
+        whole = by_lanes.outcome == c.RUNNING  # runs that ended early have no objectives
         for call, values in by_lanes.reductions.items():
             assert by_threads.reductions[call][whole].tobytes() == values[whole].tobytes(), call
         assert [rows.tobytes() for rows in by_threads.signals] == [rows.tobytes() for rows in by_lanes.signals]
@@ -87,7 +87,7 @@ def test_a_gpu_has_the_bits_of_lanes(monkeypatch: pytest.MonkeyPatch) -> None:
     assert_the_same(Fleet(shape, ScheduleCache(), Gpu()), shape, crowd, count=shape.lanes)
 
 
-def test_connections_of_every_kind_and_every_function_with_numbers_that_are_known_no_longer(gpu: Gpu) -> None:
+def test_connections_of_every_kind_and_every_function_with_numbers_that_are_no_longer_constants(gpu: Gpu) -> None:
     cruise = located(replace(load_system(EXAMPLE), stop_time=3.0))
     connections = tuple(replace(x, hold="first") if x.name == "force" else x for x in cruise.connections)
     signals = ("car.speed", "engine.force", "car.force", "sampled(demand, controller.force)")
@@ -95,13 +95,13 @@ def test_connections_of_every_kind_and_every_function_with_numbers_that_are_know
     cruise = replace(cruise, connections=connections, objectives={f"x{i}": text for i, text in enumerate(texts)})
     cruise = replace(cruise, criterion=Criterion())
     shape = shape_of(cruise)
-    flown = Fleet(shape, ScheduleCache(), gpu)
+    one = Fleet(shape, ScheduleCache(), gpu)
     crowd = [replace(cruise, seed=seed) for seed in (1, 2)]
-    assert_the_same(flown, shape, crowd)
-    assert_the_same(flown, shape, [changed(each, {"components.car.parameters.mass": 1500.0}) for each in crowd])
+    assert_the_same(one, shape, crowd)
+    assert_the_same(one, shape, [changed(each, {"components.car.parameters.mass": 1500.0}) for each in crowd])
 
 
-def test_a_run_is_left_to_others_where_a_known_number_has_changed(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_fails_in_its_thread_where_a_constant_has_changed(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
     read = Code.of
     begin, line = re.compile(r"(static q_mask model_do_step\(.*\)\n\{\n)"), re.compile(r"#define STRAIGHT_STEP .*\n")
 

@@ -1,4 +1,4 @@
-"""A study is flown on a GPU, played by a processor, as it is in lanes; without one it is said what is missing."""
+"""A study runs on a GPU, emulated by the CPU, as in lanes; without a GPU what is missing is reported."""
 
 from pathlib import Path
 
@@ -27,7 +27,7 @@ def test_a_sweep_on_a_gpu_agrees_with_the_fmus(gpu: Gpu, tmp_path: Path, monkeyp
     def run(self: Supervisor, task: RunTask) -> TaskOutcome:
         return runner.run(task)
 
-    monkeypatch.setattr(Supervisor, "run_chunk", run_chunk)  # in this process, which plays the GPU
+    monkeypatch.setattr(Supervisor, "run_chunk", run_chunk)  # in this process, which emulates the GPU
     monkeypatch.setattr(Supervisor, "run", run)
     monkeypatch.setattr(fleet, "expect_compiler", lambda: None)
     some = study(axis("timing.period", 0.01, 0.02), axis("plant.mass", 0.9, 1.0, 1.1), base=short())
@@ -38,19 +38,19 @@ def test_a_sweep_on_a_gpu_agrees_with_the_fmus(gpu: Gpu, tmp_path: Path, monkeyp
     assert summary.agreement.difference < 1e-12
 
 
-def test_without_a_driver_it_is_said_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_driver_what_is_missing_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fleet, "expect_compiler", lambda: None)
     monkeypatch.setattr(driver, "LIBRARY", "libno_gpu.so.1")
-    with pytest.raises(QuadcosimError, match=r"cuda: no driver of a GPU of NVIDIA: expected libno_gpu\.so\.1$"):
+    with pytest.raises(QuadcosimError, match=r"cuda: no driver of an NVIDIA GPU: expected libno_gpu\.so\.1$"):
         choose_execution("cuda", False, first)
 
 
-def test_what_the_driver_says_is_said(gpu: Gpu) -> None:
+def test_an_error_of_the_driver_is_reported(gpu: Gpu) -> None:
     with pytest.raises(QuadcosimError, match=r"^cuModuleLoadData: not found \(500\)$"):
         gpu.kernel(b"no image", "fly")
 
 
-def test_without_a_compiler_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_compiler_what_to_install_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     compiler._library.cache_clear()
     try:
