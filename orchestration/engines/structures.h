@@ -188,7 +188,7 @@ typedef struct {
     double end;        /* of its step [s] */
     int64_t is_over;   /* whether an FMU ends the run at this instant */
     int (*look)(double);
-    int (*stopped)(int, int64_t); /* called if a step was not simply successful: whether it ends the run here */
+    int (*stopped)(int, int64_t); /* called after an unsuccessful step: whether the instant is not completed */
     void (*collect)(int64_t);
     const void *condition; /* operations of condition.h; NULL: call `look` each time */
     int64_t condition_length;

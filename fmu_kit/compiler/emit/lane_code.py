@@ -1,7 +1,7 @@
-"""A program as C for several lanes of runs at once: what is a branch in one run is a mask over lanes in many.
+"""Writes a program as C for several SIMD lanes, one run in each: branches become masks over lanes.
 
-A function gets the lanes that it is done in, and returns those that have come through; a lane that fails leaves the
-number of its error behind. Nothing is said: texts are for instances.
+A function gets the lanes in which it is executed, and returns those in which it succeeded; of a lane that fails it
+stores the number of the error. Nothing is logged: messages are for instances.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from fmu_kit.compiler.trace.tracing import Program
 
 
 def lane_code(program: Program, line: Function | None = None) -> str:
-    """The functions of a program in lanes, each after those that it calls, and its step as a straight line."""
+    """The C of the functions of a program in lanes, each after those that it calls, and of its straight line."""
     names = place_names(program.places)
     writers: list[LaneWriter] = [LaneWriter(function, program, names) for function in program.functions]
     if line is None:
@@ -30,9 +30,9 @@ def lane_code(program: Program, line: Function | None = None) -> str:
 
 
 class LaneWriter(FunctionWriter):
-    """Writes one function, in lanes.
+    """Writes one function in lanes.
 
-    `masks` has, for each block that is being written, the variable that holds the lanes that it is done in.
+    `masks` are the variables with the lanes in which the current blocks are executed, the innermost last.
     """
 
     always: ClassVar[tuple[str, ...]] = ("v", "failed")
@@ -61,7 +61,7 @@ class LaneWriter(FunctionWriter):
     # -- lanes -----------------------------------------------------------------------------------------------
 
     def _takes_out(self, block: Block) -> bool:
-        """Whether lanes may leave a block before its end."""
+        """Whether lanes may leave a block early."""
         return any(
             each.op in ("raise", "return")
             or (each.op == "call" and bool(each.data.function.raises) and not self._is_caught(each))
@@ -70,7 +70,7 @@ class LaneWriter(FunctionWriter):
         )
 
     def _set(self, symbol: Symbol, value: str) -> None:
-        """Where it is set first, it may be set in all lanes: only in those of this block will it be asked for."""
+        """Set a symbol; for the first time in all lanes, since it is read only in those of the current block."""
         first = id(symbol) not in self.pinned
         name = self._pin(symbol)
         self._line(f"{name} = {value if first else self._choice(symbol, value, name)};")
@@ -94,13 +94,13 @@ class LaneWriter(FunctionWriter):
             done += max(len(checks), 1)
 
     def _check(self, checks: list[Statement]) -> None:
-        """What may fail one after another: first whether any of it does."""
+        """Write successive checks, under a test whether any of them fails."""
         mask = self.masks[-1]
-        found: dict[str, Statement] = {}
+        conditions: dict[str, Statement] = {}
         for each in checks:
-            found.setdefault(self.value(each.symbols[0]), each)
-        self._line(f"Q_IF_EVER(q_any({mask} & ({' | '.join(found)}))) {{")
-        for condition, each in found.items():
+            conditions.setdefault(self.value(each.symbols[0]), each)
+        self._line(f"Q_IF_EVER(q_any({mask} & ({' | '.join(conditions)}))) {{")
+        for condition, each in conditions.items():
             self.masks.append(self._name("m"))
             self._line(f"    const q_mask {self.masks[-1]} = {mask} & {condition};")
             self._inner(each.blocks[0])
@@ -115,12 +115,12 @@ class LaneWriter(FunctionWriter):
         holds, mask = self.value(condition), self.masks[-1]
         if not ends(then):
             self._hoist(then, otherwise, rest)
-        ways = [(then, holds, f"q_not({holds})"), (otherwise, f"q_not({holds})", holds)]
-        ways = [way for way in ways if not _is_silent(way[0])]
-        masks = [self._name("m") for _ in ways]
-        for own, (_, condition_of_block, _) in zip(masks, ways):
+        branches = [(then, holds, f"q_not({holds})"), (otherwise, f"q_not({holds})", holds)]
+        branches = [branch for branch in branches if not _is_silent(branch[0])]
+        masks = [self._name("m") for _ in branches]
+        for own, (_, condition_of_block, _) in zip(masks, branches):
             self._line(f"q_mask {own} = {mask} & {condition_of_block};")
-        for own, (block, _, others) in zip(masks, ways):
+        for own, (block, _, others) in zip(masks, branches):
             self._line(f"{'Q_IF_EVER' if block[-1].op == 'raise' else 'if '}(q_any({own})) {{")
             self.masks.append(own)
             self._inner(block)
@@ -157,23 +157,23 @@ class LaneWriter(FunctionWriter):
         return f"{status} & q_eq(*failed, {number}.0)"
 
     def _goes_on(self, index: str, last: str) -> str:
-        goes = self._name("m")
-        self.declared.append(f"q_mask {goes};")
-        condition = f"q_any({goes} = {self.masks[-1]} & q_lt({index}, {last}))"
-        self.masks.append(goes)
+        goes_on = self._name("m")
+        self.declared.append(f"q_mask {goes_on};")
+        condition = f"q_any({goes_on} = {self.masks[-1]} & q_lt({index}, {last}))"
+        self.masks.append(goes_on)
         return condition
 
     def _round(self, body: Block, states: list[str], nexts: tuple[Symbol, ...]) -> None:
-        goes, before = self.masks[-1], self._name("m")
+        goes_on, before = self.masks[-1], self._name("m")
         takes_out = self._takes_out(body)
         if takes_out:
-            self._line(f"const q_mask {before} = {goes};")
+            self._line(f"const q_mask {before} = {goes_on};")
         self._block(body)
         for state, symbol, value in zip(states, nexts, [self._as(symbol.kind, symbol) for symbol in nexts]):
             self._line(f"{state} = {self._choice(symbol, value, state)};")
         self.masks.pop()
         if takes_out:
-            self._line(f"{self.masks[-1]} = {self.masks[-1]} & (q_not({before}) | {goes});")
+            self._line(f"{self.masks[-1]} = {self.masks[-1]} & (q_not({before}) | {goes_on});")
 
     def _warn(self, each: Statement, rest: Block) -> None:
         pass
@@ -187,11 +187,10 @@ class LaneWriter(FunctionWriter):
 
 
 class LineWriter(LaneWriter):
-    """Writes a step that is a straight line: nothing is stored where a guard holds in a lane, and 0 returned.
+    """Writes a step that is a straight line: if a guard holds in any lane, it stores nothing and returns 0.
 
-    All that a next step needs is computed before the guards are looked at, without any branch: a compiler then orders
-    operations so that they wait least for one another. Variables that are `unread` by the slave come last, if they are
-    wanted.
+    Everything that a next step needs is computed before the guards are tested, without any branch, so that a compiler
+    can order operations for low latency. Variables that are `unread` by the slave come last, if they are `wanted`.
     """
 
     type: ClassVar = "Q_FLAT q_mask"
@@ -203,7 +202,7 @@ class LineWriter(LaneWriter):
         self.unread = unread
         self.declared.append("q_mask rare = q_known(0);")
         self.is_guarded = True
-        """whether lanes in which functions have no usual value still leave the line"""
+        """whether the guards are still to be tested, so that functions may mark rare lanes"""
 
     def _block(self, block: Block) -> None:
         stores = [each for each in block if each.op == "store"]
@@ -220,7 +219,7 @@ class LineWriter(LaneWriter):
         self._line(self.through)
 
     def _wanted(self, stores: list[Statement]) -> None:
-        """Those of one vector, if any of them is wanted."""
+        """Write the stores of one vector, done if any of them is wanted."""
         self._line(f"if ({' || '.join(f'Q_WANTED({self.places[each.data]})' for each in stores)}) {{")
         self.scopes.append({})
         for each in stores:
@@ -249,10 +248,10 @@ def _returns(block: Block) -> bool:
 
 
 def _is_check(each: Statement) -> bool:
-    """Whether a statement does nothing but fail, if a condition holds."""
+    """Whether a statement only fails if a condition holds."""
     return each.op == "if" and not each.blocks[1] and len(each.blocks[0]) == 1 and each.blocks[0][0].op == "raise"
 
 
 def _is_silent(block: Block) -> bool:
-    """Whether a block does nothing, or nothing but speak."""
+    """Whether a block does nothing but log messages."""
     return all(each.op == "warn" or (each.op == "if" and all(map(_is_silent, each.blocks))) for each in block)

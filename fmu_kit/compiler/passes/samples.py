@@ -1,6 +1,6 @@
-"""States that a slave comes to, and what is computed of them: by these is seen which way a step usually takes.
+"""Sampled states of a slave, and the values of symbols in them, which show the usual path of a step.
 
-They decide how fast a kernel is, never what it computes.
+They influence the speed of a kernel, never its results.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from fmu_kit.slave import Phase, Slave
 from fmu_kit.variables import Variable
 
 _SIZES = (0.02, 0.3, 3.0)
-"""By how much inputs differ from their starts, of what they usually are"""
+"""Deviations of inputs from their start values, relative to their nominal values"""
 _STEPS = 8
-"""After so many of them a state is taken"""
+"""A state is taken after fewer steps"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,56 +39,58 @@ class State:
 
 
 def states_of(program: Program, count: int = 24) -> list[State]:
-    """States of a slave with its own parameters, after steps with inputs that are drawn; fewer where steps fail."""
-    drawn = random.Random(0)
+    """States of a slave with its usual parameters after steps with random inputs; fewer than `count` if steps fail."""
+    rng = random.Random(0)
     found = []
     for k in range(count):
         with contextlib.suppress(FmuError, ArithmeticError, ValueError):
-            found.append(_state(program.slave, drawn, _SIZES[k % len(_SIZES)]))
+            found.append(_state(program.slave, rng, _SIZES[k % len(_SIZES)]))
     return found
 
 
-def _state(slave: type[Slave], drawn: random.Random, size: float) -> State:
-    step = float(slave.default_experiment.step_size) / drawn.choice((1.0, 10.0, 11.0, 13.0))
-    made, t = slave(instance_name="sample"), 0.0
-    for variable in made.variables:
+def _state(slave: type[Slave], rng: random.Random, size: float) -> State:
+    step = float(slave.default_experiment.step_size) / rng.choice((1.0, 10.0, 11.0, 13.0))
+    instance, t = slave(instance_name="sample"), 0.0
+    for variable in instance.variables:
         if variable.causality == "parameter" and variable.name in slave.usual_parameters:
-            setattr(made, variable.name, slave.usual_parameters[variable.name])
-    made._phase = Phase.INITIALIZATION
-    _set_inputs(made, drawn, size)
-    made._initialise()
-    made._phase = Phase.STEPPING
-    for _ in range(drawn.randrange(1, _STEPS)):
-        _set_inputs(made, drawn, size)
-        made._advance(t, step)  # an instance would also log that it failed
+            setattr(instance, variable.name, slave.usual_parameters[variable.name])
+    instance._phase = Phase.INITIALIZATION
+    _set_inputs(instance, rng, size)
+    instance._initialise()
+    instance._phase = Phase.STEPPING
+    for _ in range(rng.randrange(1, _STEPS)):
+        _set_inputs(instance, rng, size)
+        instance._advance(t, step)  # not by do_step, which would log a failure
         t += step
-    _set_inputs(made, drawn, size)
+    _set_inputs(instance, rng, size)
     memory = {
-        _name(made, path): float(value) for path, value in leaves(Memory(made, {}).attributes()) if is_number(value)
+        _name(instance, path): float(value)
+        for path, value in leaves(Memory(instance, {}).attributes())
+        if is_number(value)
     }
     return State(memory=memory, t=t, h=step)
 
 
-def _set_inputs(made: Slave, drawn: random.Random, size: float) -> None:
-    for reference, variable in enumerate(made.variables):
+def _set_inputs(instance: Slave, rng: random.Random, size: float) -> None:
+    for reference, variable in enumerate(instance.variables):
         if variable.causality == "input" and variable.type == "Real":
-            made.set_real([reference], [_near_its_start(variable, drawn, size)])
+            instance.set_real([reference], [_random_near_start(variable, rng, size)])
 
 
-def _near_its_start(variable: Variable, drawn: random.Random, size: float) -> float:
+def _random_near_start(variable: Variable, rng: random.Random, size: float) -> float:
     usual = variable.nominal if variable.nominal is not None else max(abs(float(variable.start)), 1.0)
     low = -math.inf if variable.minimum is None else variable.minimum
     high = math.inf if variable.maximum is None else variable.maximum
-    return min(max(float(variable.start) + size * usual * (2.0 * drawn.random() - 1.0), low), high)
+    return min(max(float(variable.start) + size * usual * (2.0 * rng.random() - 1.0), low), high)
 
 
-def _name(made: Slave, path: tuple[Any, ...]) -> str:
+def _name(instance: Slave, path: tuple[Any, ...]) -> str:
     is_variable = path[0] in ("_reals", "_others") and len(path) > 1
-    return made.variables[path[1]].name if is_variable else attribute_name(path)
+    return instance.variables[path[1]].name if is_variable else attribute_name(path)
 
 
 class Values:
-    """What symbols of a step are in each state: as near as the functions of this Python come."""
+    """The values of symbols of a step in each state, up to the accuracy of Python's functions."""
 
     def __init__(self, program: Program, states: Sequence[State]) -> None:
         self.states = states
@@ -96,11 +98,11 @@ class Values:
         self._computed = {
             each.data: each.symbols[0] for f in taking for each in all_statements(f.body) if each.op == "store"
         }
-        """what is computed when parameters are taken over, by its place"""
+        """the values computed when parameters are taken over, by place"""
         self._known: dict[int, list[float]] = {}
 
     def of(self, symbol: Symbol) -> list[float]:
-        """A value for each state, NaN where there is none; raises `KeyError` for what is not known by values alone."""
+        """A value for each state, NaN for none; raises `KeyError` if the state does not determine the value."""
         waiting = [symbol]
         while waiting:  # not by recursion: the graph is deep
             one = waiting[-1]
@@ -134,9 +136,9 @@ class Values:
                 yield _result(_FUNCTIONS[symbol.op], [values[k] for values in operands])
 
 
-def _result(function: Callable[..., float], given: list[float]) -> float:
+def _result(function: Callable[..., float], operands: list[float]) -> float:
     try:
-        return float(function(*given))
+        return float(function(*operands))
     except (ArithmeticError, ValueError):
         return math.nan
 

@@ -1,8 +1,8 @@
-"""A step as one straight line: along the way that it usually takes, with what would lead off it as guards.
+"""Makes a step one straight line: its usual path, with guards against all others.
 
-Calls are put in their place, loops unrolled, and of each `if` the way is taken that all sampled states take; where they
-differ, both are, and the values selected. What is left are values, then what is stored, if no guard holds. Each value
-is computed as on the way through the branches: the same operations on the same numbers, so the same bits.
+Calls are inlined, loops unrolled, and of each `if` the branch is taken that all sampled states take; where they differ,
+both are computed, and the values selected. The result is values, then stores, which are done if no guard holds. Each
+value is computed as in the step with branches: the same operations on the same numbers, so the same bits.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from fmu_kit.compiler.trace.symbols import (
 from fmu_kit.compiler.trace.tracing import Program
 
 LEAVES = "leaves the straight line"
-"""What the function that is made raises where a guard holds"""
+"""The error that the function raises where a guard holds"""
 MOST_ROUNDS = 4
-"""of a loop that is unrolled"""
+"""Largest number of rounds of an unrolled loop"""
 
 
 class _NoLineError(Exception):
@@ -42,7 +42,7 @@ class _NoLineError(Exception):
 def straightened(program: Program) -> Function | None:
     """The step of a program as a straight line; None if there is none.
 
-    The function stores nothing, but fails, where a guard holds.
+    Where a guard holds, the function fails and stores nothing.
     """
     states = states_of(program)
     if not states:
@@ -51,7 +51,7 @@ def straightened(program: Program) -> Function | None:
     step = program.do_step
     try:
         line.call(step, list(step.parameters), None)
-    except (_NoLineError, KeyError):  # of what values are not known, the way cannot be seen
+    except (_NoLineError, KeyError):  # the path depends on an unknown value
         return None
     fails = statement("raise", (), (LEAVES, ()))
     guards = [statement("if", (guard,), None, ((fails,), ())) for guard in dict.fromkeys(line.guards)]
@@ -76,30 +76,30 @@ class _Returned:
 
 
 class _Line:
-    """What is computed on the way, and what would lead off it."""
+    """The stored values and the guards along the path."""
 
     def __init__(self, program: Program, values: Values) -> None:
         self.program = program
         self.values = values
         self.memory: dict[str, Symbol] = {}
-        """what lies in each place now, as far as it was written"""
+        """the current values of the places that were written"""
         self.guards: list[Symbol] = []
         self.decided: dict[Symbol, bool | float] = {}
-        """values that a guard makes sure of: of conditions, and of how often loops go round"""
+        """values that a guard ensures, of conditions and of numbers of rounds"""
         self.fixed = fixed_places(program)
 
-    def call(self, function: Function, given: Sequence[Symbol], under: Symbol | None) -> list[Symbol]:
-        """What a function returns, if it is called where `under` holds; None: in any case."""
-        returned = _Frame(self, function, given).block(function.body, under)
+    def call(self, function: Function, arguments: Sequence[Symbol], under: Symbol | None) -> list[Symbol]:
+        """Inline a call of a function under a condition, None for an unconditional one; its results."""
+        returned = _Frame(self, function, arguments).block(function.body, under)
         return [] if returned is None else returned.values
 
     def read(self, place: str, symbol: Symbol, memory: dict[str, Symbol]) -> Symbol:
-        """What is read of a place."""
+        """The value of a place."""
         found = memory.get(place)
         return node("load", (), symbol.kind, (place, 0)) if found is None else _as(symbol, found)
 
     def expect_not(self, condition: Any, under: Symbol | None) -> None:
-        """Leave the line where a condition holds."""
+        """Add the guard that a condition does not hold where `under` does."""
         guard = condition if under is None else both(under, condition)
         if guard is True:
             raise _NoLineError
@@ -109,8 +109,8 @@ class _Line:
                 self.decided[guard] = False
                 self.decided[negation(guard)] = True
 
-    def settle(self, condition: Any) -> Any:
-        """A condition; where it follows from parameters alone, what it is in the sampled states, and a guard."""
+    def decide(self, condition: Any) -> Any:
+        """A condition, or its value in the sampled states, with a guard, if it depends on parameters alone."""
         if not isinstance(condition, Symbol) or condition.op == "constant" or not self._is_fixed(condition):
             return condition
         ways = self.ways(condition, None)
@@ -127,7 +127,7 @@ class _Line:
         )
 
     def ways(self, condition: Symbol, under: Symbol | None) -> set[bool]:
-        """Which ways the sampled states take."""
+        """The values that a condition has in the sampled states in which `under` holds."""
         chosen = [True] * len(self.values.states) if under is None else self.values.of(under)
         return {bool(value) for value, here in zip(self.values.of(condition), chosen) if here == 1.0}
 
@@ -135,23 +135,23 @@ class _Line:
 class _Frame:
     """One call of a function."""
 
-    def __init__(self, line: _Line, function: Function, given: Sequence[Symbol]) -> None:
+    def __init__(self, line: _Line, function: Function, arguments: Sequence[Symbol]) -> None:
         self.line = line
-        self.given = [_as(parameter, value) for parameter, value in zip(function.parameters, given)]
+        self.arguments = [_as(parameter, value) for parameter, value in zip(function.parameters, arguments)]
         self.memories = {0: dict(line.memory)}
-        """by version: as it was when the function was called, and after each call in it"""
+        """by version: at the beginning of the call, and after each call in it"""
         self.results: dict[int, list[Symbol]] = {}
         self.rounds: dict[int, tuple[int, list[Symbol]]] = {}
-        """of loops, by their depth: which round it is, and what its variables are"""
+        """of loops, by their depth: the current round, and the values of their variables"""
         self.outcomes: dict[Statement, list[Symbol]] = {}
         self.chosen: dict[Symbol, Symbol] = {}
-        """what is either of two values, and what it is"""
+        """the values of symbols that are assigned in branches"""
         self.known: dict[Symbol, Symbol] = {}
 
     # -- statements ------------------------------------------------------------------------------------------
 
     def block(self, block: Block, under: Symbol | None) -> _Returned | None:
-        """Do the statements of a block, where a condition holds."""
+        """Translate the statements of a block under a condition."""
         for each in block:
             returned: _Returned | None = getattr(self, f"_{each.op}")(each, under)
             if returned is not None:
@@ -174,10 +174,10 @@ class _Frame:
             return self.block(then, under)
         if not ways:
             raise _NoLineError
-        self._both_ways(condition, then, otherwise, under)
+        self._both_branches(condition, then, otherwise, under)
         return None
 
-    def _both_ways(self, condition: Symbol, then: Block, otherwise: Block, under: Symbol | None) -> None:
+    def _both_branches(self, condition: Symbol, then: Block, otherwise: Block, under: Symbol | None) -> None:
         line = self.line
         before, chosen = dict(line.memory), dict(self.chosen)
         left = []
@@ -243,7 +243,7 @@ class _Frame:
     # -- values ------------------------------------------------------------------------------------------------
 
     def value(self, symbol: Symbol) -> Symbol:
-        """A symbol of the function, on the line."""
+        """The value of a symbol of the function on the line."""
         waiting = [symbol]
         while waiting:  # not by recursion: the graph is deep
             one = waiting[-1]
@@ -254,16 +254,16 @@ class _Frame:
                 continue
             waiting.pop()
             if one not in self.known:
-                made = self._made(one, [self.known[arg] for arg in args])
+                made = self._translated(one, [self.known[arg] for arg in args])
                 self.known[one] = constant(self.line.decided[made]) if made in self.line.decided else made
         return self.known[symbol]
 
-    def _made(self, symbol: Symbol, args: list[Symbol]) -> Symbol:
+    def _translated(self, symbol: Symbol, args: list[Symbol]) -> Symbol:
         op, data = symbol.op, symbol.data
         if op == "add" and symbol.kind == "int" and args[0].op == "constant" and value_of(args[0]) == 0.0:
-            return args[1]  # whole numbers have no zero with a sign
+            return args[1]  # whole numbers have no signed zero
         if op == "select":
-            return lifted(select(self.line.settle(args[0]), *args[1:]))
+            return lifted(select(self.line.decide(args[0]), *args[1:]))
         if op in _SETTLED:
             return lifted(_SETTLED[op](*args))
         if op == "load":
@@ -280,7 +280,7 @@ class _Frame:
         if op == "index":
             return constant(self.rounds[data][0])
         if op == "parameter":
-            return self.given[int(data)]
+            return self.arguments[int(data)]
         if op == "phi":
             return self.chosen[symbol]
         return node(op, args, symbol.kind, data) if args else symbol
@@ -290,7 +290,7 @@ _SETTLED: dict[str, Callable[..., Any]] = {"and": both, "or": either, "not": neg
 
 
 def _as(wanted: Symbol, value: Symbol) -> Symbol:
-    """A value of the kind of a symbol, as C keeps it there."""
+    """A value converted to the kind of a symbol, as C stores it."""
     if wanted.kind == "bool":
         return truth(value)
     made: Symbol = node("select", (value, constant(1.0), constant(0.0)), "real") if value.kind == "bool" else value
@@ -298,12 +298,12 @@ def _as(wanted: Symbol, value: Symbol) -> Symbol:
 
 
 def _does(block: Block) -> bool:
-    """Whether a block does more than speak."""
+    """Whether a block does more than log messages."""
     return any(each.op != "warn" and (each.op != "if" or any(map(_does, each.blocks))) for each in block)
 
 
 def _raises(block: Block) -> bool:
-    """Whether a block ends in an error, whatever way it takes."""
+    """Whether a block ends in an error on all paths."""
     if not block:
         return False
     last = block[-1]

@@ -1,19 +1,19 @@
-/* The slave for several runs at once, one in each lane of vector registers, for whoever computes many of them.
+/* The slave for several runs at once, one in each lane of vector registers (SIMD).
 
-   It is no part of the FMU's library, and empty unless QUADCOSIM_LANES says how many lanes there are:
+   It is not part of the FMU's library, and empty unless QUADCOSIM_LANES is the number of lanes:
 
        cc -O2 -march=native -ffp-contract=off -DQUADCOSIM_LANES=8 -shared -fPIC lanes.c -o lanes.so
 
    A lane has the bits of an instance of the FMU, whatever the others do. The memory of all lanes is
-   double[places][lanes], aligned to 64 bytes; the first places are the variables by their value references, of
-   Integers and Booleans as doubles, those behind them are the slave's own. `active` has all bits of a lane that is
-   meant, or none; others stay as they are. `status` becomes 0 in an active lane, or the number of the error that an
-   instance would have failed with; such a lane is not to be used any more. `wanted` has for each variable whether anybody
-   reads it: of those that a step changes, others may keep the value of an earlier one. NULL: all are read.
+   double[places][lanes], aligned to 64 bytes; the first places are the variables by their value references, Integers
+   and Booleans as doubles, those behind them are the slave's own. `active` has all bits set in an active lane, and none
+   in others, which stay unchanged. `status` becomes 0 in an active lane, or the number of the error with which an
+   instance would have failed; such a lane must not be used any more. `wanted` states for each variable whether it is
+   read: the others may keep the value of an earlier step. NULL: all are read.
 
-   What an instance refuses when a value is set is not looked at here. Whoever writes into the memory makes sure that
-   Reals, the start time too, are finite, Integers whole numbers of 32 bits, Booleans 0 or 1; that nothing is written
-   but inputs, and before the first step parameters. */
+   Values that an instance would refuse are not checked here. The caller must ensure that Reals, the start time too, are
+   finite, Integers whole numbers of 32 bits, Booleans 0 or 1, and write only inputs and, before the first step,
+   parameters. */
 
 #ifdef QUADCOSIM_LANES
 
@@ -72,7 +72,7 @@ int quadcosim_places(void) { return PLACES; }
 EXPORT int quadcosim_variables(void);
 int quadcosim_variables(void) { return VARIABLES; }
 
-/* The status that is a divergence. */
+/* The status of a divergence. */
 EXPORT int quadcosim_divergence(void);
 int quadcosim_divergence(void) { return DIVERGENCE; }
 
@@ -80,15 +80,15 @@ int quadcosim_divergence(void) { return DIVERGENCE; }
 EXPORT void quadcosim_begin(double *memory);
 void quadcosim_begin(double *memory)
 {
-    const double *const volatile known = starts; /* of numbers that it knows gcc 12 stores wrong ones by AVX-512 */
+    const double *const volatile known = starts; /* gcc 12 stores constants wrongly by AVX-512 */
     const double *const start = known;
     for (int place = 0; place < PLACES; place++)
         for (int lane = 0; lane < LANES; lane++)
             memory[place * LANES + lane] = start[place];
 }
 
-/* Take over what was set, and compute outputs at the start time [s]: once at the end of initialisation, and before
-   that wherever an output is asked for after something was set. */
+/* Take over the set values, and compute outputs at the start time [s]: once at the end of initialisation, and before
+   that wherever an output is read after a value was set. */
 EXPORT void quadcosim_initialise(double *memory, const uint64_t *active, const double *start_time, int32_t *status);
 void quadcosim_initialise(double *memory, const uint64_t *active, const double *start_time, int32_t *status)
 {
@@ -100,8 +100,8 @@ void quadcosim_initialise(double *memory, const uint64_t *active, const double *
     tell_status(active, through, failed, status);
 }
 
-/* Of the straight line it is counted how often it was tried, and left: each time it is, the step is done twice. A run
-   that mostly leaves it, by its parameters or by what it does, does without. What is counted changes no bit. */
+/* Counts how often the straight line was tried, and left, in which case the step is done twice. If it is left too
+   often, it is no longer tried. This changes no bit of the results. */
 static struct { int64_t tried, left; } line;
 
 EXPORT void quadcosim_line(int64_t *tried, int64_t *left);
@@ -109,7 +109,7 @@ void quadcosim_line(int64_t *tried, int64_t *left) { *tried = line.tried, *left 
 
 #ifdef STRAIGHT_STEP
 
-enum { TRIALS = 256, OF_WHICH_ONE = 20 }; /* may leave the line, in the long run */
+enum { TRIALS = 256, OF_WHICH_ONE = 20 }; /* after the trials, one step of so many may leave the line */
 
 static int step_straight(q_place *v, q_mask live, const uint8_t *wanted, q_real t, q_real h)
 {
@@ -145,5 +145,5 @@ void quadcosim_do_step(double *memory, const uint64_t *active, const double *t, 
 }
 
 #else
-typedef int quadcosim_no_lanes; /* C wants something to compile */
+typedef int quadcosim_no_lanes; /* C does not allow an empty file */
 #endif

@@ -1,9 +1,9 @@
-/* Real numbers that are one double each, or one double for each of several runs that are computed together.
+/* Real numbers that are one double each, or one double for each of several runs computed together (SIMD lanes).
 
-   What is written on q_real, q_bits and q_mask, without a branch, is right for both: QUADCOSIM_LANES is 1, or a power
-   of two up to 64. The arithmetic is IEEE 754 in double precision, one rounding an operation, to the nearest; so one
-   lane has the bits of many, on every compiler and machine. This file has to be the first of those that compute:
-   it ends the contraction of a * b + c to one rounding for all that comes after it. */
+   Code on q_real, q_bits and q_mask without branches is valid for both: QUADCOSIM_LANES is 1, or a power of two up to
+   64. The arithmetic is IEEE 754 in double precision, with one rounding per operation, to the nearest; so the bits are
+   the same for any number of lanes, compiler and machine. This file must be included before any that computes: it
+   turns off the contraction of a * b + c to one rounding for the code after it. */
 
 #ifndef QUADCOSIM_LANES_H
 #define QUADCOSIM_LANES_H
@@ -19,7 +19,7 @@
 #if defined(__FAST_MATH__)
 #error "quadcosim: compile without -ffast-math, which changes the results"
 #endif
-/* 0, 1, 16, 32 and 64 compute double as double, whatever they make of narrower types; 2 and any other may not. */
+/* 0, 1, 16, 32 and 64 compute double as double; 2 and any other may not. */
 #if defined(FLT_EVAL_METHOD) && (FLT_EVAL_METHOD < 0 || FLT_EVAL_METHOD == 2 || FLT_EVAL_METHOD > 64)
 #error "quadcosim: compile for arithmetic in double precision, as with -msse2 -mfpmath=sse"
 #endif
@@ -27,10 +27,10 @@
 #if defined(__clang__)
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__GNUC__)
-/* gcc heeds no FP_CONTRACT. That nothing traps lets it compute both sides of a choice, so loops become vectors. */
+/* gcc ignores FP_CONTRACT. Without traps it can compute both sides of a selection, and vectorise loops. */
 #pragma GCC optimize("fp-contract=off", "no-trapping-math")
 #if QUADCOSIM_LANES > 1
-/* Operations on vectors are put in order before registers are given out: they wait less for one another. */
+/* Schedule operations on vectors before registers are allocated, for lower latency. */
 #pragma GCC optimize("schedule-insns")
 #endif
 #pragma GCC diagnostic ignored "-Wpsabi" /* lanes are passed within one file only */
@@ -40,7 +40,7 @@
 
 #define Q_ONE static inline __attribute__((unused))
 #define Q_SELDOM static __attribute__((unused, noinline, cold))
-#define Q_FLAT __attribute__((flatten)) /* what it calls is put into its place */
+#define Q_FLAT __attribute__((flatten)) /* inlines all functions that it calls */
 #if defined(_MSC_VER) && !defined(__clang__)
 #undef Q_ONE
 #undef Q_SELDOM
@@ -50,12 +50,12 @@
 #define Q_FLAT
 #endif
 
-#define Q_WHOLE ((int64_t)1 << DBL_MANT_DIG) /* whole numbers smaller than it are exact, and so is what rounds to one */
+#define Q_WHOLE ((int64_t)1 << DBL_MANT_DIG) /* smaller whole numbers are exact */
 
 /* -- the square root of one double, without libm --------------------------------------------------------------- */
 
-/* Correctly rounded, as IEEE 754 has it: one instruction where the machine has that. gcc's own function calls libm
-   for the errno of a negative number, unless -fno-math-errno is given; with it, loops become vectors. */
+/* Correctly rounded, as IEEE 754 requires: one instruction where the machine has it. gcc's own function calls libm for
+   the errno of a negative number, unless -fno-math-errno is given, which also lets it vectorise loops. */
 #if defined(__clang__)
 #if defined(__has_builtin) && __has_builtin(__builtin_elementwise_sqrt)
 #define Q_HARDWARE_SQRT(x) __builtin_elementwise_sqrt(x)
@@ -71,7 +71,7 @@ double q_llvm_sqrt(double) __asm__("llvm.sqrt.f64") __attribute__((const));
 #undef Q_HARDWARE_SQRT /* no doubles in hardware: the compiler would call libm */
 #endif
 
-/* Only where they are needed: they are long, and most of what a compiler has to read for one lane. */
+/* Included only where needed, since they take most of the compilation time for one lane. */
 #if QUADCOSIM_LANES > 1 || !defined(Q_HARDWARE_SQRT)
 #if defined(__SSE2__) || defined(_M_X64)
 #include <immintrin.h>
@@ -80,7 +80,7 @@ double q_llvm_sqrt(double) __asm__("llvm.sqrt.f64") __attribute__((const));
 #endif
 #endif
 
-/* Digit by digit, for a machine without the instruction. */
+/* The square root digit by digit, for a machine without the instruction. */
 Q_ONE double q_sqrt_by_digits(double x) {
     uint64_t bits, root = 0, rest, bit;
     int exponent;
@@ -92,13 +92,13 @@ Q_ONE double q_sqrt_by_digits(double x) {
     exponent += (int)(bits >> 52) - 1023;
     rest = (bits & 0xfffffffffffffu) | 0x10000000000000u;
     if (exponent & 1) rest += rest, exponent -= 1;
-    rest += rest; /* one more bit of the root than is kept */
+    rest += rest; /* one bit more than the result has */
     for (bit = (uint64_t)1 << 53; bit; bit >>= 1) {
         uint64_t trial = root + root + bit;
         if (trial <= rest) rest -= trial, root += bit;
         rest += rest;
     }
-    root = (root >> 1) + (root & 1); /* never a tie: a root that ends in this bit has a square of too many */
+    root = (root >> 1) + (root & 1); /* never a tie: the square of a root that ends in this bit has too many digits */
     bits = root + ((uint64_t)(exponent / 2 + 1022) << 52);
     memcpy(&scaled, &bits, sizeof scaled);
     return scaled;
@@ -166,10 +166,10 @@ Q_ONE q_real q_with_lane(q_real x, int lane, double value) {
     return x;
 }
 
-/* Of two numbers, either of which may be one for all lanes. */
+/* A number as a vector, also if it is one for all lanes. */
 #define Q_LANES_OF(x) ((x) - (q_real){0.0})
 
-/* A mask is a bit a lane where the machine has registers for that, else all bits of the lane or none. */
+/* A mask is one bit per lane where the machine has mask registers, else all bits of the lane or none. */
 #if defined(__AVX512DQ__) && QUADCOSIM_LANES == 8
 
 typedef __mmask8 q_mask;
@@ -231,7 +231,7 @@ Q_ONE q_real q_select(q_mask condition, q_real yes, q_real no) {
 
 Q_ONE int q_every(q_mask condition) { return !q_any(~condition); }
 
-/* As many lanes at once as the machine has in a register: gcc makes no vectors of a loop over a root. */
+/* As many lanes at once as a register of the machine has: gcc does not vectorise a loop over a root. */
 #if defined(__AVX512F__) && QUADCOSIM_LANES >= 8
 #define Q_ROOTS 8
 #define Q_ROOT(from, to) _mm512_storeu_pd(to, _mm512_sqrt_pd(_mm512_loadu_pd(from)))

@@ -1,4 +1,4 @@
-"""A slave in lanes has, in every lane, the bits of an instance alone, whatever the others do."""
+"""A slave in SIMD lanes has, in every lane, the bits of a single instance, whatever the other lanes do."""
 
 import itertools
 import shutil
@@ -28,13 +28,13 @@ from tests.fmu_kit.compiler.in_lanes import Alone, Together, Values, bits
 from tests.fmu_kit.compiler.twins import GUID, compiled
 
 PROBES = {"Arithmetic": 4, "Branches": 8, "Integers": 8, "Kept": 4, "Loops": 4, "Memory": 1, "Rare": 8}
-"""Slaves that do what slaves may do, and in how many lanes"""
+"""Slaves that use all features, with numbers of lanes"""
 FMU_ERROR, DIVERGENCE = (1 + ERRORS.index(name) for name in ("FmuError", "DivergenceError"))
 STRANGE = (0.0, -0.0, 1.0, -1.0, 3.0, 1e3, 1e200, -1e308)
 
 
 def _value(rng: np.random.Generator, variable: Variable, strange: float) -> float | int | bool:
-    """Near the start value, or, in a share of all cases, anything."""
+    """A random value near the start value or, with probability `strange`, a strange one."""
     if variable.type == "Boolean":
         return bool(rng.integers(2))
     if variable.type == "Integer":
@@ -46,7 +46,9 @@ def _value(rng: np.random.Generator, variable: Variable, strange: float) -> floa
     return float(variable.start + rng.normal() * max(abs(variable.start), 0.3) * 0.1)
 
 
-def _given(rng: np.random.Generator, variables: list[Variable], causality: str, share: float, strange: float) -> Values:
+def _random_values(
+    rng: np.random.Generator, variables: list[Variable], causality: str, share: float, strange: float
+) -> Values:
     return {
         k: _value(rng, variable, strange)
         for k, variable in enumerate(variables)
@@ -55,9 +57,9 @@ def _given(rng: np.random.Generator, variables: list[Variable], causality: str, 
 
 
 def in_lanes(sources: dict[str, bytes], lanes: int, folder: Path) -> None:
-    """The sources as `lanes.so`, which is that of the engine where it has the same in as many lanes."""
-    how = (OPTIONS, FOR_THIS_PROCESSOR, lanes)
-    content = libraries.cached_content("lanes", sources, how, lambda: compiled_lanes(sources, lanes))
+    """Compile the sources as `lanes.so`, from the cache of the engine if it is there."""
+    key = (OPTIONS, FOR_THIS_PROCESSOR, lanes)
+    content = libraries.cached_content("lanes", sources, key, lambda: compiled_lanes(sources, lanes))
     (folder / "lanes.so").write_bytes(content)
 
 
@@ -71,21 +73,21 @@ def test_in_a_lane_are_the_bits_of_the_fmu(model: str, tmp_path: Path) -> None:
     target = Target.parse(MODELS[model])
     shutil.copy(path / "binaries" / fmpy.platform / f"{model}.so", tmp_path / "alone.so")
     may_diverge = {DIVERGENCE} if model in ("QuadrotorPlant", "UnifiedController") else set()
-    assert _come_to(tmp_path, target, guid) >= {0, FMU_ERROR} | may_diverge
+    assert _statuses(tmp_path, target, guid) >= {0, FMU_ERROR} | may_diverge
 
 
 @pytest.mark.parametrize("name", PROBES)
-def test_whatever_a_slave_does_it_does_in_lanes(name: str, tmp_path: Path) -> None:
+def test_all_features_of_slaves_work_in_lanes(name: str, tmp_path: Path) -> None:
     compiler("cc")
     target = Target.parse(f"tests.fmu_kit.compiler.probes:{name}")
     program = precompute(trace(slave_class(target), modules_of(target)))
     compiled(program, tmp_path / "alone.so", "own")
     in_lanes(c_sources(program, GUID, STANDARDS[2]), PROBES[name], tmp_path)
-    assert _come_to(tmp_path, target, GUID) > {0}
+    assert _statuses(tmp_path, target, GUID) > {0}
 
 
-def _come_to(folder: Path, target: Target, guid: str) -> set[int]:
-    """Fly all lanes again and again, each beside an instance; returns the statuses that they came to."""
+def _statuses(folder: Path, target: Target, guid: str) -> set[int]:
+    """Simulate all lanes repeatedly, each beside an instance; the final statuses."""
     rng = np.random.default_rng(1)
     variables = list(slave_class(target).variables)
     together = Together(folder / "lanes.so")
@@ -94,7 +96,7 @@ def _come_to(folder: Path, target: Target, guid: str) -> set[int]:
     usual = (slave_class(target).usual_parameters, 0.0, 0.0, (0.0,))
     unusual: tuple[Mapping[str, float], float, float, tuple[float, ...]] = ({}, 0.3, 0.02, (0.0, 0.5, -1.0))
     found = {
-        status for flight in (usual, unusual, unusual) * 6 for status in _fly(together, alone, variables, rng, *flight)
+        status for case in (usual, unusual, unusual) * 6 for status in _simulate(together, alone, variables, rng, *case)
     }
     tried, left = together.lanes.line
     if target.model == "Loops":
@@ -104,7 +106,7 @@ def _come_to(folder: Path, target: Target, guid: str) -> set[int]:
     return found
 
 
-def _fly(
+def _simulate(
     together: Together,
     alone: list[Alone],
     variables: list[Variable],
@@ -114,9 +116,9 @@ def _fly(
     strange: float,
     starts: Sequence[float],
 ) -> list[int]:
-    """Both from initialisation on, each lane with its own values, times and steps, until it fails.
+    """Simulate lanes and instances, each with its own values, times and steps, until it fails; the statuses.
 
-    A share `changed` of the parameters is not what it is at the start, a share `strange` of what is given anything.
+    A share `changed` of the parameters differs from their start values, a share `strange` of the values is strange.
     Lanes start at one of `starts` [s].
     """
     usual = {
@@ -125,13 +127,13 @@ def _fly(
     together.begin()
     for lane, instance in enumerate(alone):
         instance.fmu.reset()
-        given = {
+        values = {
             **usual,
-            **_given(rng, variables, "parameter", changed, strange),
-            **_given(rng, variables, "input", 0.8, strange),
+            **_random_values(rng, variables, "parameter", changed, strange),
+            **_random_values(rng, variables, "input", 0.8, strange),
         }
-        instance.put(given)
-        together.put(lane, given)
+        instance.put(values)
+        together.put(lane, values)
     active = rng.random(together.count) < 0.9
     start = rng.choice(starts, together.count)
     period = float(rng.choice([0.001, 0.01, 0.25]))
@@ -145,9 +147,9 @@ def _fly(
         active &= together.status == 0
         h = period * rng.choice([0.5, 1.0, 1.0, 2.0], together.count)
         for lane in np.flatnonzero(active).tolist():
-            given = dict(_given(rng, variables, "input", 0.5, strange))
-            together.put(lane, given)
-            alone[lane].put(given)
+            inputs = dict(_random_values(rng, variables, "input", 0.5, strange))
+            together.put(lane, inputs)
+            alone[lane].put(inputs)
             alone[lane].step(t[lane], h[lane])
         before = together.held()
         together.step(active, t, h)
@@ -156,7 +158,7 @@ def _fly(
 
 
 def _expect_alike(together: Together, alone: list[Alone], active: NDArray[np.bool_], before: list[bytes]) -> None:
-    """Active lanes are as their instances, the others as before."""
+    """Assert that active lanes equal their instances, and others are unchanged."""
     for lane, (instance, held) in enumerate(zip(alone, before)):
         if active[lane]:
             assert together.status[lane] == instance.status
@@ -166,7 +168,7 @@ def _expect_alike(together: Together, alone: list[Alone], active: NDArray[np.boo
 
 
 @pytest.mark.parametrize("model", ["QuadrotorPlant", "UnifiedController"])
-def test_what_nobody_reads_is_left_out_and_changes_nothing_else(model: str, tmp_path: Path) -> None:
+def test_unread_variables_are_left_out_and_nothing_else_changes(model: str, tmp_path: Path) -> None:
     compiler("cc")
     path = Path(fmpy.extract(str(fmus.locate(f"native/{model}")), str(tmp_path)))
     in_lanes({file.name: file.read_bytes() for file in (path / "sources").iterdir()}, 8, tmp_path)
@@ -180,7 +182,7 @@ def test_what_nobody_reads_is_left_out_and_changes_nothing_else(model: str, tmp_
             each.put(lane, usual)
         each.initialise(active, np.zeros(8))
     for k in range(40):
-        inputs = _given(rng, variables, "input", 0.5, 0.0)
+        inputs = _random_values(rng, variables, "input", 0.5, 0.0)
         wanted = rng.random(all_read.lanes.variables) < (1.0 if k % 10 == 9 else 0.3)
         for each, read in ((all_read, None), (some_read, wanted)):
             for lane in range(8):
@@ -188,10 +190,10 @@ def test_what_nobody_reads_is_left_out_and_changes_nothing_else(model: str, tmp_
             each.step(active, np.full(8, 0.001 * k), np.full(8, 0.001), read)
             assert not each.status.any()
         same = [bits(a) == bits(b) for a, b in zip(all_read.memory, some_read.memory)]
-        others = [*wanted, *[True] * (len(same) - len(wanted))]  # what is the slave's own is read by itself
+        others = [*wanted, *[True] * (len(same) - len(wanted))]  # the slave's own places are read by itself
         assert all(itertools.compress(same, others))
         left_out += same.count(False)
-    assert left_out > 0, "what is not read is not computed"
+    assert left_out > 0, "unread variables are not computed"
 
 
 def test_lanes_are_refused_by_name() -> None:
@@ -201,7 +203,7 @@ def test_lanes_are_refused_by_name() -> None:
         compiled_lanes({"fmi2.c": b""}, 8)
 
 
-def test_without_a_compiler_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_compiler_what_to_install_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "")
     preferred_lanes.cache_clear()
     with pytest.raises(PackagingError, match="install one"):

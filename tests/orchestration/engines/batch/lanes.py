@@ -1,4 +1,4 @@
-"""Systems flown in lanes with their signals, beside the same systems flown one after the other."""
+"""Systems run in SIMD lanes with their signals, compared with the same systems run one after another."""
 
 from collections.abc import Sequence
 
@@ -23,28 +23,28 @@ def located(system: System) -> System:
 
 
 CROWD = 8
-"""Lanes of a batch of tests, on all machines: as many as there are at most in a register"""
+"""The lanes of a batch in tests, on all machines: the most that a register has"""
 
 
 def shape_of(system: System) -> Shape:
-    """What the batch makes of a system."""
+    """The shape of a system."""
     models = {name: read_model(path) for name, path in fmus.of_components(system.fmus).items()}
     return Shape(system=check_against_fmus(system, models).system, models=models, lanes=CROWD)
 
 
 def in_lanes(shape: Shape, systems: Sequence[System]) -> BatchResult:
-    """Systems of one shape flown at once, everything recorded."""
+    """The result of systems of one shape run at once, everything recorded."""
     assert len({outline(system) for system in systems}) == 1
     return Batch(shape, ScheduleCache()).run(group_of(systems), shape.board.columns[1:])
 
 
 def group_of(systems: Sequence[System]) -> Group:
-    """As a batch takes them."""
+    """The systems as a group for a batch."""
     return Group(systems=systems, timings=[timing(system) for system in systems])
 
 
 def assert_the_same_signals(shape: Shape, found: BatchResult, lane: int, alone: Result) -> None:
-    """The rows of a lane are those of the run flown alone, to the byte."""
+    """Assert that the rows of a lane are those of the same run alone, to the byte."""
     columns = ["time", *shape.board.columns[1:]]
     own = np.ascontiguousarray(alone.rows[:, [alone.columns.index(column) for column in columns]])
     rows = found.signals[lane]

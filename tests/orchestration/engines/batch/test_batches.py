@@ -1,4 +1,4 @@
-"""What runs in lanes come to is what the same runs come to alone: sums to 1e-12, all else to the last bit."""
+"""Runs in SIMD lanes have the results of the same runs alone: sums to 1e-12, all else to the last bit."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -28,8 +28,8 @@ from tests.orchestration.fmi.small import needs_compiler, small
 pytestmark = needs_compiler
 SUMS = ("rmse", "iae", "itae", "effort", "variation", "mean", "rms", "integral", "saturation_share", "share_", "near",
         "attitude_error")  # fmt: skip
-"""What is in the name of an objective that is a sum, or of functions that have no one value to the last bit, as the
-acos of numpy, which hangs on the processor"""
+"""Words in the names of objectives that are sums, or use functions whose last bit depends on the processor, as acos of
+numpy"""
 
 
 def assert_the_same_numbers(found: Mapping[str, Any], alone: Mapping[str, Any]) -> None:
@@ -77,7 +77,7 @@ LOOP = System(
 
 
 def objectives() -> dict[str, str]:
-    """Every function of everything that goes on from row to row in its own way."""
+    """Every function of every kind of signal."""
     every = {}
     for kind, x in X.items():
         for function in F:
@@ -108,7 +108,7 @@ def test_every_function_over_every_kind_of_signal(fmu: Path, kept: Kept, tmp_pat
         assert_the_same_numbers(found.metrics, alone)
 
 
-def test_what_is_held_is_not_summed_up_anew_where_nothing_but_a_step_happens(fmu: Path, kept: Kept) -> None:
+def test_held_signals_are_not_reduced_again_where_nothing_but_a_step_happens(fmu: Path, kept: Kept) -> None:
     values = ("controller.y", "plant.u2y", "noise.u4z", "controller.z * noise.u4z - plant.u2y")
     connections = tuple(replace(x, hold="zero") for x in LOOP.connections)
     for to in ("controller.u4z", "plant.u4z"):
@@ -149,7 +149,7 @@ def test_a_run_that_diverges_ends_as_it_does_alone_and_others_go_on(condition: s
         assert (found.metrics, found.message) == (alone.metrics, alone.divergence)
 
 
-def test_what_a_component_refuses_or_makes_infinite_is_left_to_be_flown_alone(fmu: Path, kept: Kept) -> None:
+def test_a_run_with_a_component_that_fails_or_becomes_infinite_is_left_to_be_run_alone(fmu: Path, kept: Kept) -> None:
     habits: Sequence[dict[str, float]] = ({}, {"fails_at": 0.3}, {"nan_at": 0.4}, {})
     crowd = [replace(of(LOOP, fmu, plant=habit), objectives={"peak": "max(plant.y)"}) for habit in habits]
     found = Batches().run(crowd)
@@ -208,7 +208,7 @@ def test_more_runs_than_lanes_of_many_timings_come_back_in_their_order() -> None
         assert_the_same_numbers(found.metrics, ran(what, "compiled").metrics)
 
 
-def test_a_component_that_cannot_be_flown_in_lanes_is_named(tmp_path: Path) -> None:
+def test_a_component_that_cannot_be_run_in_lanes_is_named(tmp_path: Path) -> None:
     parts = {"one": Component(fmu=str(small(tmp_path)), step=0.01)}
     with pytest.raises(UsageError, match=r"components.one: small.fmu: expected a native FMU of this project's kit"):
         Batches().run([System(stop_time=0.1, components=parts)])

@@ -1,4 +1,4 @@
-"""Runs in lanes have the signals of the same runs flown one after the other, to the byte."""
+"""Runs in SIMD lanes have the signals of the same runs one after another, to the byte."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -57,12 +57,12 @@ def crowds(draw: st.DrawFn) -> list[System]:
 def test_random_systems_have_the_same_signals_beside_any_others(
     fmu: Path, kept: Kept, crowd: list[System], instants: int
 ) -> None:
-    flown = [of(what, fmu) for what in crowd]
-    shape = shape_of(flown[0])
+    systems = [of(what, fmu) for what in crowd]
+    shape = shape_of(systems[0])
     with pytest.MonkeyPatch.context() as context:
         context.setattr(schedule_cache, "INSTANTS", instants)  # of a span
-        found = in_lanes(shape, flown)
-    for lane, what in enumerate(flown):
+        found = in_lanes(shape, systems)
+    for lane, what in enumerate(systems):
         assert_the_same_signals(shape, found, lane, ran(what, "compiled", load=kept.load))
 
 
