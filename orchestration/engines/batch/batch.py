@@ -187,10 +187,10 @@ class Batch:
     def stepwise(self, group: Group, record: Sequence[str] | None = None) -> Stepwise:
         """The same in steps: at each yield the caller processes windows, then sends the tracks that need another."""
         self._parameters = group.parameters
-        found: dict[Call, Floats] = {}
+        reductions: dict[Call, Floats] = {}
         for _ in range(self._shape.passes):
-            result = yield from self._run_once(group.systems, group.timings, found, record)
-            found = dict(result.reductions)
+            result = yield from self._run_once(group.systems, group.timings, reductions, record)
+            reductions = dict(result.reductions)
         return result
 
     @property
@@ -258,7 +258,7 @@ class Batch:
         doubtful = np.array([batch.doubtful >> lane & 1 for lane in range(count)], dtype=np.bool_)
         return BatchResult(
             outcome=outcome, time=time, component=component, steps=steps, doubtful=doubtful,
-            reductions={call: np.where(np.isfinite(found), found, np.nan) for call, found in values.items()},
+            reductions={call: np.where(np.isfinite(value), value, np.nan) for call, value in values.items()},
             signals=[rows[: batch.record_counts[lane]] for lane, rows in enumerate(recorded)],
         )  # fmt: skip
 
@@ -298,11 +298,11 @@ class Batch:
 
     def numbers(self, systems: Sequence[System]) -> dict[str, Floats]:
         """Parameters and the stop time that expressions name, in each of the runs that were simulated last."""
-        found = {
+        numbers = {
             name: np.array([self._number(lane, system, name) for lane, system in enumerate(systems)])
             for name in self._shape.numbers
         }
-        return {**found, STOP_TIME: np.array([nanoseconds(system.stop_time) / NANOSECONDS for system in systems])}
+        return {**numbers, STOP_TIME: np.array([nanoseconds(system.stop_time) / NANOSECONDS for system in systems])}
 
     def parameters(self, lane: int, system: System) -> dict[str, float]:
         """The parameters that the divergence monitor and the sources of a run use."""
@@ -441,14 +441,14 @@ class Batch:
     def _tracks_of(
         self, runs: Sequence[Run], timings: Sequence[Timing], schedules: Mapping[Timing, RunSchedule]
     ) -> list[Track]:
-        found: dict[Timing, list[int]] = {}
+        lanes_of: dict[Timing, list[int]] = {}
         for lane, timing in enumerate(timings):
-            found.setdefault(timing, []).append(lane)
+            lanes_of.setdefault(timing, []).append(lane)
         return [
             self._track(
                 lanes, schedules[timing].spans, same_sources=len({runs[lane].source_key for lane in lanes}) == 1
             )
-            for timing, lanes in found.items()
+            for timing, lanes in lanes_of.items()
         ]
 
     def _track(self, lanes: list[int], spans: Iterator[Span], *, same_sources: bool) -> Track:
@@ -457,13 +457,13 @@ class Batch:
 
     def _source_key(self, system: System, numbers: Mapping[str, float]) -> Hashable:
         """Everything besides the structure that determines the values of the sources of a run."""
-        found: list[Any] = []
+        parts: list[Any] = []
         for name, source in system.sources.items():
             if name in self._shape.seen or source.to:
-                found += [vars(source), system.seed if source.is_random else None]
+                parts += [vars(source), system.seed if source.is_random else None]
             if source.trajectory is not None:
-                found.append([numbers[each] for each in self._trajectories[source.trajectory]])
-        return repr(found)  # the repr of a source itself would be abbreviated
+                parts.append([numbers[each] for each in self._trajectories[source.trajectory]])
+        return repr(parts)  # the repr of a source itself would be abbreviated
 
     def _next_span(self, number: int, track: Track, runs: Sequence[Run]) -> None:
         """Hand the next span of a track to C."""
@@ -545,16 +545,16 @@ class Batch:
 
     def _structures(self, kind: Any, items: Iterable[Any]) -> Any:
         values = [*items]
-        found = self._memory.structures(kind, len(values))
-        found[: len(values)] = values
-        return found
+        array = self._memory.structures(kind, len(values))
+        array[: len(values)] = values
+        return array
 
     def _indices(self, indices: Sequence[int]) -> Any:
         return self._c.List(items=self._memory.permanent_address(np.array(indices, dtype=np.int64)), count=len(indices))
 
     def _arrays_of(self, size: int) -> dict[str, Floats]:
-        found = {name: self._array(size) for name in ("sigma", "quantum", "value")}
-        return {**found, "scale": self._array(1), "offset": self._array(1), "applied": self._array(2 * size)}
+        arrays = {name: self._array(size) for name in ("sigma", "quantum", "value")}
+        return {**arrays, "scale": self._array(1), "offset": self._array(1), "applied": self._array(2 * size)}
 
     def _channel(self, i: int) -> Any:
         x, ends, arrays = self._shape.system.connections[i], self._ends[i], self._of_channels[i]

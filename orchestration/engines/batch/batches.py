@@ -56,10 +56,10 @@ class Batches:
 
     def run(self, systems: Sequence[System]) -> list[RunSummary | None]:
         """The summaries of runs, in their order; None for one that must be run alone. Raises as `each`."""
-        found: list[RunSummary | None] = [None] * len(systems)
+        summaries: list[RunSummary | None] = [None] * len(systems)
         for place, summary, _ in self.each(systems):
-            found[place] = summary
-        return found
+            summaries[place] = summary
+        return summaries
 
     def each(
         self, systems: Sequence[System], record: Sequence[str] | None = None, parameters: ParameterColumns = NO_COLUMNS
@@ -120,12 +120,12 @@ def _summaries(
     count, c = len(systems), structures(shape.lanes)
     numbers = batch.numbers(systems)
     values = zip(shape.nodes, combined([*shape.nodes.values()], result.reductions, numbers, count))
-    found = {name: ((np.isfinite(value) & ~none).tolist(), value.tolist()) for name, (value, none) in values}
+    metric_values = {name: ((np.isfinite(value) & ~none).tolist(), value.tolist()) for name, (value, none) in values}
     for lane, system in enumerate(systems):
         steps = int(result.steps[lane])
         if result.outcome[lane] == c.RUNNING and not result.doubtful[lane]:
             end = nanoseconds(system.stop_time) / NANOSECONDS
-            metrics = {name: value[lane] if valid[lane] else None for name, (valid, value) in found.items()}
+            metrics = {name: value[lane] if valid[lane] else None for name, (valid, value) in metric_values.items()}
             yield RunSummary(
                 metrics=metrics_of(
                     shape.system, metrics, end=end, stop_time=system.stop_time, divergence_time=None, steps=steps

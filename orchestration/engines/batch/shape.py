@@ -130,13 +130,13 @@ class Shape:
     @cached_property
     def fed(self) -> Mapping[str, list[tuple[int, int]]]:
         """By component, its inputs from sources: the index among all their signals, and the place in its memory."""
-        found: dict[str, list[tuple[int, int]]] = {name: [] for name in self.names}
+        inputs: dict[str, list[tuple[int, int]]] = {name: [] for name in self.names}
         number = 0
         for source in self.system.sources.values():
             for end in source.to:
-                found[component_of(end)].append((number, self.place(end)[1]))
+                inputs[component_of(end)].append((number, self.place(end)[1]))
                 number += 1
-        return found
+        return inputs
 
     @cached_property
     def connected(self) -> Mapping[str, Places]:
@@ -148,10 +148,10 @@ class Shape:
 
     def read(self, name: str) -> Booleans:
         """Whether a connection or an expression reads each variable of a component."""
-        index, found = self.names.index(name), np.zeros(self.kernels[name].lanes.variables, dtype=np.bool_)
-        found[self.connected[name]] = True
-        found[[int(place) for owner, place in _SIGNAL.findall(self.expressions.text) if int(owner) == index]] = True
-        return found
+        index, is_read = self.names.index(name), np.zeros(self.kernels[name].lanes.variables, dtype=np.bool_)
+        is_read[self.connected[name]] = True
+        is_read[[int(place) for owner, place in _SIGNAL.findall(self.expressions.text) if int(owner) == index]] = True
+        return is_read
 
     @property
     def fed_changes(self) -> bool:
@@ -163,13 +163,13 @@ class Shape:
     @cached_property
     def nodes(self) -> Mapping[str, Node]:
         """Objectives and the condition of a good run, by name, with the objectives that they name inlined."""
-        found: dict[str, Node] = {}
+        nodes: dict[str, Node] = {}
         texts = dict(self.system.objectives)
         if self.system.criterion.good is not None:
             texts[GOOD] = self.system.criterion.good
         for name, text in texts.items():
-            found[name] = inlined(parse(text), found)
-        return found
+            nodes[name] = inlined(parse(text), nodes)
+        return nodes
 
     @cached_property
     def condition(self) -> Node | None:
@@ -180,13 +180,13 @@ class Shape:
     @cached_property
     def calls(self) -> Mapping[Call, Call]:
         """The reductions in the objectives, each over signals alone; those inside others first."""
-        found = {}
+        calls = {}
         for node in self.nodes.values():
             for call in sorted(reductions(node), key=_passes):
                 with_signals = scalars(call, self._vectors)[0]
                 assert isinstance(with_signals, Call)
-                found[call] = with_signals
-        return dict(sorted(found.items(), key=lambda pair: _passes(pair[0])))
+                calls[call] = with_signals
+        return dict(sorted(calls.items(), key=lambda pair: _passes(pair[0])))
 
     @cached_property
     def passes(self) -> int:
@@ -265,20 +265,20 @@ class Shape:
     def _signals(self) -> dict[str, Leaf]:
         """The recorded signals, and those of sources."""
         held = {end: self._kind_of(x) for x in self.system.connections for end in x.end}
-        found = {}
+        leaves = {}
         for signal in self.board.columns[1:]:
             index, place = self.place(signal)
             sampled = self.system.components[component_of(signal)].sampling is not None
             kind: Kind = "held" if sampled else held.get(signal, "continuous")
-            found[signal] = Leaf(code=f"SIGNAL({index}, {place})", kind=kind)
+            leaves[signal] = Leaf(code=f"SIGNAL({index}, {place})", kind=kind)
         number = 0
         for name, signals in self.seen.items():
             source = self.system.sources[name]
             kind = "held" if source.is_held else "continuous"
             for signal in signals:
-                found[signal] = Leaf(code=f"SEEN({number})", kind=kind)
+                leaves[signal] = Leaf(code=f"SEEN({number})", kind=kind)
                 number += 1
-        return found
+        return leaves
 
     def _kind_of(self, x: Connection) -> Kind:
         return "held" if x.hold == "zero" else "line"

@@ -188,12 +188,12 @@ class _Threads(Batch):
     def _tracks_of(
         self, runs: Sequence[Run], timings: Sequence[Timing], courses: Mapping[Timing, RunSchedule]
     ) -> list[Track]:
-        found: dict[int, Track] = {}
+        tracks: dict[int, Track] = {}
         for timing, course in courses.items():
             lanes = [lane for lane, own in enumerate(timings) if own == timing]
             for lane, spans in zip(lanes, itertools.tee(course.spans, len(lanes))):
-                found[lane] = self._track([lane], spans, same_sources=True)
-        return [found[lane] for lane in sorted(found)]
+                tracks[lane] = self._track([lane], spans, same_sources=True)
+        return [tracks[lane] for lane in sorted(tracks)]
 
     def _growth(self, call: Call, own: Call, values: Mapping[Call, Floats]) -> Floats:
         """As in a batch; a lane that has kept fewer values than others is filled with NaN, which does not grow."""
