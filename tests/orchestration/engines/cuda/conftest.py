@@ -5,21 +5,21 @@ import pytest
 from orchestration.engines.batch import batch
 from orchestration.engines.cuda import driver, fleet
 from orchestration.engines.cuda.driver import Gpu
-from tests.orchestration.engines.cuda import playing
+from tests.orchestration.engines.cuda import emulation
 
 
 @pytest.fixture(scope="package")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    if not playing.has_cpp():
+    if not emulation.has_cpp():
         pytest.skip("no C++: cc of this machine compiles C alone")
-    there = tmp_path_factory.mktemp("processor")
-    playing.make_driver(there)
-    return there
+    path = tmp_path_factory.mktemp("processor")
+    emulation.make_driver(path)
+    return path
 
 
 @pytest.fixture
 def gpu(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Gpu:
-    monkeypatch.setattr(driver, "LIBRARY", str(folder / playing.DRIVER))
-    monkeypatch.setattr(fleet, "compiled", lambda text, architecture: playing.played(text, folder))
+    monkeypatch.setattr(driver, "LIBRARY", str(folder / emulation.DRIVER))
+    monkeypatch.setattr(fleet, "compiled", lambda text, architecture: emulation.compiled_for_cpu(text, folder))
     monkeypatch.setattr(batch, "MOST_ROWS", 2**10)
     return Gpu()

@@ -1,5 +1,5 @@
-/* The functions of the driver of a GPU that are made use of, by the processor: an image is the path of a library that
-   was compiled with processor.h. */
+/* The functions of the GPU driver that are used, emulated by the CPU: an image is the path of a library that was
+   compiled with processor.h. */
 
 #define _GNU_SOURCE
 #include <dlfcn.h>

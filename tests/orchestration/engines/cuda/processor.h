@@ -1,4 +1,4 @@
-/* What CUDA has beside C++, for a processor that plays the threads of a GPU one after another. */
+/* The parts of CUDA beyond C++, for a CPU that executes the threads of a GPU one after another. */
 
 #include <stdint.h>
 #include <string.h>
@@ -17,7 +17,7 @@ static inline int __any_sync(unsigned, int condition) { return condition; }
 static inline void atomicAnd(unsigned long long *bits, unsigned long long other) { *bits &= other; }
 static inline void atomicOr(unsigned long long *bits, unsigned long long other) { *bits |= other; }
 
-/* As gpu.c calls it. */
+/* Called by gpu.c. */
 extern "C" void play(void (*kernel)(int64_t, int64_t), unsigned blocks, unsigned threads, void **given) {
     blockDim.x = threads;
     for (blockIdx.x = 0; blockIdx.x < blocks; blockIdx.x++)

@@ -1,4 +1,4 @@
-"""A processor that plays a GPU: its driver, and the text of CUDA compiled as C++."""
+"""Emulation of a GPU by the CPU: its driver, and the CUDA text compiled as C++."""
 
 import hashlib
 import subprocess
@@ -12,19 +12,19 @@ _CPP = ("-x", "c++", "-std=gnu++20", "-O0", "-ffp-contract=off", "-fPIC", "-shar
 
 
 def has_cpp() -> bool:
-    """Whether this machine's compiler takes C++."""
+    """Whether this machine's compiler supports C++."""
     tried = subprocess.run(["cc", "-x", "c++", "-fsyntax-only", "-"], input=b"", capture_output=True, check=False)
     return tried.returncode == 0
 
 
 def make_driver(folder: Path) -> None:
-    """Put the library that stands for the driver into a folder."""
+    """Write the library that replaces the driver to a folder."""
     sources = {"gpu.c": (HERE / "gpu.c").read_bytes()}
     (folder / DRIVER).write_bytes(compiled_here(sources, "gpu.c", options=("-fvisibility=default",)))
 
 
-def played(text: str, folder: Path) -> bytes:
-    """In place of what a GPU loads, where what the processor runs is."""
+def compiled_for_cpu(text: str, folder: Path) -> bytes:
+    """The path, for `cuModuleLoadData`, of a text compiled for the CPU."""
     path = folder / f"{hashlib.sha256(text.encode()).hexdigest()[:16]}.so"
     if not path.exists():
         source = path.with_suffix(".cu")
