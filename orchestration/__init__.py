@@ -1,9 +1,9 @@
-"""What flies FMUs under a realistic digital clock. Its Python API is the package `quadcosim`, and is found here too."""
+"""Runs FMUs under a realistic digital clock. Its Python API is the package `quadcosim`, and is found here too."""
 
 from importlib import import_module
 from typing import Any
 
-import orchestration.flight  # noqa: F401 - what is drawn and judged of a flight enters the tables of the rooms below
+import orchestration.flight  # noqa: F401 - registers figures and analyses of flights in the tables of lower rooms
 
 
 def __getattr__(name: str) -> Any:

@@ -39,7 +39,7 @@ def limit(
         float | None,
         typer.Option(
             "--tolerance",
-            help="Width of the last bracket; default of a PATH: a fiftieth of --scan.",
+            help="Width of the last bracket; default of a PATH: a fiftieth of --scan (of a period: a twentieth of it).",
             show_default=False,
         ),
     ] = None,
@@ -47,7 +47,7 @@ def limit(
         float | None,
         typer.Option(
             "--scan",
-            help="Step of the scan upward; default of a PATH: a twentieth of the range.",
+            help="Step of the scan upward; default of a PATH: a twentieth of the range (of a period: half of it).",
             metavar="STEP",
             show_default=False,
         ),

@@ -112,7 +112,7 @@ class NetworkLink(NamedTuple):
     slots: int
     """the number of slots in a cycle; 0: a frame can start whenever the link is free"""
     begins: int
-    """the stream of the begins of slots, in order"""
+    """the stream of slot start times, in order"""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -50,7 +50,7 @@ AGREE = 1e-10
 
 @dataclass(frozen=True, kw_only=True)
 class Linear:
-    """The components of a system expand_about its rest, and its objectives there."""
+    """The components of a system linearised about its rest, and its objectives expanded there."""
 
     parts: Components
     methods: Mapping[str, str]

@@ -1,4 +1,4 @@
-"""The value of a random quantity from which on means of squares are infinite."""
+"""The value of a random quantity at and above which mean squares are infinite."""
 
 from __future__ import annotations
 

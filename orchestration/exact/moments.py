@@ -60,7 +60,7 @@ class JumpLinear:
             )
 
     def _begin_where_smallest(self) -> None:
-        """The period begins where there is least to be solve_fixed_point for."""
+        """Rotate the stages so that the period begins where the second moments are fewest: least to solve for."""
         counts = [sum(n * n for n in sizes) for sizes in self._sizes]
         first = counts.index(min(counts))
         self._stages = [*self._stages[first:], *self._stages[:first]]

@@ -122,7 +122,7 @@ def _are_skipped(of: Jobs | Frames) -> Booleans:
 
 
 def _spans(begins: Integers, ends: Integers, scale: float) -> list[tuple[float, float]]:
-    """Begin and length of each bar in the unit of the axis."""
+    """Start and length of each bar in the unit of the axis."""
     return [(begin * scale, (end - begin) * scale) for begin, end in zip(begins.tolist(), ends.tolist(), strict=True)]
 
 

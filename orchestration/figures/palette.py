@@ -1,4 +1,4 @@
-"""Colours that are safe for colour-blind readers (Okabe and Ito, 2008), for figures and pages alike."""
+"""Colours that are safe for colour-blind readers (Okabe and Ito, 2008), for figures."""
 
 BLUE, ORANGE, GREEN, RED = "#0072b2", "#e69f00", "#009e73", "#d55e00"
 PURPLE, SKY, BROWN, GREY, BLACK = "#b0568c", "#56b4e9", "#7a5c1e", "#8a8a8a", "#222222"

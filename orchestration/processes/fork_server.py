@@ -29,9 +29,9 @@ LENGTH = struct.Struct("<Q")
 ANSWER = struct.Struct("<?q")
 """False and the process's id, or minus the error number if it cannot start; True and its exit code, at its end"""
 _READ_AT_START = ("PYTHON", "LD_", "LC_", "LANG", "OPENBLAS_", "OMP_", "MKL_", "MALLOC_", "GLIBC_", "COVERAGE_", "TZ")
-"""How the names of variables begin that a process reads when it starts, or when it loads a library"""
+"""Prefixes of the environment variables that are read only when a process starts or loads a library"""
 _PATIENCE = 10.0
-"""[s] in which a server must end that nobody needs any more"""
+"""[s] within which an unused server must exit"""
 _Pipes = tuple[IO[bytes] | None, IO[bytes] | None, IO[bytes] | None]
 
 

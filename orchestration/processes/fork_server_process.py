@@ -89,7 +89,7 @@ def _report_failure(channel: socket.socket, error: Exception) -> None:
 
 
 def _become(channel: socket.socket, streams: list[int], names: NamesInPlace) -> ForkRequest:
-    """Make this fork what a process is that was started with the environment, folder and streams of its request."""
+    """Give this fork the environment, folder and streams of its request, as if it had been started with them."""
     request: ForkRequest = pickle.loads(exactly(channel, *LENGTH.unpack(exactly(channel, LENGTH.size))))
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -28,9 +28,10 @@ class Counted(Protocol):
 class Watch:
     """Checks a process and its family against limits, in a thread, until the process ends or the watch is closed.
 
-    Time is that in which it computes or sleeps: a call that waits forever is noticed, and the load of the machine does
-    not matter. Against `allow` counts the processor time of all threads if that is more. Time in which a descendant
-    with its own limit lives does not count. On systems other than Linux it is wall-clock time, and memory is unlimited.
+    Time counts while it computes or sleeps: a call that waits forever is noticed, and the load of the machine does not
+    matter. A limit of `allow` applies to this time or to the processor time of all threads, whichever is larger. Time
+    in which a descendant with its own limit lives does not count. On systems other than Linux it is wall-clock time,
+    and memory is unlimited.
     """
 
     def __init__(

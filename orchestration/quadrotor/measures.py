@@ -1,19 +1,11 @@
 """Quantities of a flight that figures and studies share with the objectives of the system file."""
 
 from collections.abc import Mapping, Sequence
-from typing import Literal, get_args
 
 import numpy as np
 
 from orchestration.basics.simulator import Booleans, Floats
 from orchestration.quadrotor.wiring import COMMAND, POSITION, POSITION_REFERENCE
-
-SETTLED = 0.05
-"""[m] of position error in the last third of a flight, below which the flight counts as settled; as in system.toml"""
-
-Outcome = Literal["settled", "bounded", "diverged"]
-"""Outcome of a flight at its horizon; only `settled` meets the criterion"""
-OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)
 
 
 def desired(signals: Mapping[str, Floats]) -> Floats:

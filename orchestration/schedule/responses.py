@@ -18,7 +18,7 @@ from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS
 
 NO_DEADLINE = 2**60
-"""[ns], from which on a deadline counts as none"""
+"""[ns]; a deadline this late or later counts as none"""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -64,7 +64,7 @@ def _coefficients(spans: Floats, derivatives: Floats) -> Floats:
     ends = derivatives[1:] * spans[:, None, None] ** np.arange(ORDERS)[:, None]
     begin = scaled[:, 0].copy()
     for each in (scaled, ends):
-        each[:, 0] -= begin  # relative to its begin, which loses no digits far from the origin
+        each[:, 0] -= begin  # relative to its start, which loses no digits far from the origin
     result: Floats = np.einsum("ij,njk->nik", _exact_matrices()[0], np.concatenate([scaled, ends], axis=1))
     result[:, 0] += begin
     return result
