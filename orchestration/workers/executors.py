@@ -182,17 +182,17 @@ def _local_submit(stack: ExitStack, inputs: Inputs, workers: int) -> Submit:
 
 
 def _drain(tasks: Iterable[RunTask | TaskBatch], submit: Submit, most: int) -> Generator[list[TaskOutcome], None, None]:
-    """Keep `most` tasks in progress until none is left; yield the outcomes of those that finish."""
+    """Keep `most` tasks in progress; yield their outcomes as they finish, of several the one that was begun first."""
     waiting = iter(tasks)
-    in_progress = {submit(task) for task in islice(waiting, most)}
+    in_progress = [submit(task) for task in islice(waiting, most)]
     try:
         while in_progress:
-            done, in_progress = concurrent.futures.wait(
-                in_progress, timeout=1.0, return_when=concurrent.futures.FIRST_COMPLETED
-            )
-            for future in done:
+            done, _ = concurrent.futures.wait(in_progress, timeout=1.0, return_when=concurrent.futures.FIRST_COMPLETED)
+            finished = [future for future in in_progress if future in done]
+            in_progress = [future for future in in_progress if future not in done]
+            for future in finished:
                 yield future.result()
-            in_progress |= {submit(task) for task in islice(waiting, len(done))}
+            in_progress += [submit(task) for task in islice(waiting, len(finished))]
     finally:
         for future in in_progress:
             future.cancel()
