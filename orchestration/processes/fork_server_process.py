@@ -2,7 +2,7 @@
 
 `python -m orchestration.processes.fork_server_process MODULE` serves until the other end of the socket that is its
 standard input is closed. With each byte come four file descriptors: the channel from which a new process reads its
-`Request` and on which its id and its exit code are answered, and its standard streams.
+`ForkRequest` and on which its id and its exit code are answered, and its standard streams.
 """
 
 import contextlib
