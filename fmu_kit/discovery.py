@@ -1,6 +1,7 @@
 """The slaves that the modules of a folder define, found by reading their sources: nothing is imported."""
 
 import ast
+import functools
 import importlib.util
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,9 +24,9 @@ def slaves_in(folder: Path) -> list[Target]:
         name = ".".join((*package, path.stem)) if path.stem != "__init__" else ".".join(package)
         if not name:
             continue
-        for node in parse_source(path.read_text(encoding="utf-8"), path).body:
-            if isinstance(node, ast.ClassDef) and _is_concrete(name, node.name, root):
-                found.append(Target(name, node.name, root))
+        for known in _definitions(path.read_text(encoding="utf-8"), path):
+            if isinstance(known, _Class) and _is_concrete(name, known.name, root):
+                found.append(Target(name, known.name, root))
     return found
 
 
@@ -47,51 +48,74 @@ def _root_of(folder: Path) -> tuple[Path, tuple[str, ...]]:
 
 
 class _Class(NamedTuple):
-    """A class among the ancestors of a slave: its module, its name, and whether each of its methods is abstract."""
+    """A class of a module: its name, those of its bases, and whether each of its methods is abstract."""
+
+    name: str
+    bases: tuple[str, ...]
+    methods: tuple[tuple[str, bool], ...]
+
+
+class _Import(NamedTuple):
+    """A name that a module imports from another one, `level` packages above."""
+
+    name: str
+    level: int
+    module: str
+    original: str
+
+
+@functools.lru_cache(maxsize=1024)
+def _definitions(text: str, path: Path) -> tuple[_Class | _Import, ...]:
+    """The classes that a source defines and the names that it imports, on its top level, in their order."""
+    found: list[_Class | _Import] = []
+    for node in parse_source(text, path).body:
+        if isinstance(node, ast.ClassDef):
+            bases = tuple(base.id for base in node.bases if isinstance(base, ast.Name) and base.id != node.name)
+            found.append(_Class(node.name, bases, tuple(_methods(node))))
+        elif isinstance(node, ast.ImportFrom):
+            found += [_Import(a.asname or a.name, node.level, node.module or "", a.name) for a in node.names]
+    return tuple(found)
+
+
+class _Ancestor(NamedTuple):
+    """A class among the ancestors of a slave, with the module that defines it."""
 
     module: str
-    name: str
-    methods: tuple[tuple[str, bool], ...]
+    definition: _Class
 
 
 def _is_concrete(module: str, name: str, root: Path) -> bool:
     """Whether a class is derived from `Slave` and has no abstract method."""
     first: dict[str, bool] = {}
     for each in _ancestry(module, name, root):
-        first = dict(each.methods) | first
+        first = dict(each.definition.methods) | first
     return first.get("step") is False and not any(first.values())
 
 
-def _ancestry(module: str, name: str, root: Path | None, deepest: int = 20) -> list[_Class]:
+def _ancestry(module: str, name: str, root: Path | None, deepest: int = 20) -> list[_Ancestor]:
     """A class and its ancestors up to `Slave`, in method resolution order, through any modules between them.
 
     Empty for a name that is not a class derived from `Slave`.
     """
     if (module, name) == BASE:
-        return [_Class(module, name, (("step", True),))]
+        return [_Ancestor(module, _Class(name, (), (("step", True),)))]
     try:
         path = module_path(module, root)
-        body = parse_source(path.read_text(encoding="utf-8"), path).body
+        known = _definitions(path.read_text(encoding="utf-8"), path)
     except (OSError, PackagingError):
         return []
-    if deepest == 0:
+    last = next((one for one in reversed(known) if one.name == name), None)
+    if last is None or deepest == 0:
         return []
-    for node in reversed(body):
-        if isinstance(node, ast.ClassDef) and node.name == name:
-            bases = [base.id for base in node.bases if isinstance(base, ast.Name) and base.id != name]
-            above = [found for base in bases if (found := _ancestry(module, base, root, deepest - 1))]
-            own = _Class(module, name, tuple(_methods(node)))
-            return [own, *_linearised([*above, [found[0] for found in above]])] if above else []
-        if isinstance(node, ast.ImportFrom):
-            package = module if path.name == "__init__.py" else module.rpartition(".")[0]
-            base = importlib.util.resolve_name("." * node.level + (node.module or ""), package)
-            for alias in node.names:
-                if (alias.asname or alias.name) == name:
-                    return _ancestry(base, alias.name, root, deepest - 1)
-    return []
+    if isinstance(last, _Import):
+        package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+        base = importlib.util.resolve_name("." * last.level + last.module, package)
+        return _ancestry(base, last.original, root, deepest - 1)
+    above = [found for base in last.bases if (found := _ancestry(module, base, root, deepest - 1))]
+    return [_Ancestor(module, last), *_linearised([*above, [found[0] for found in above]])] if above else []
 
 
-def _linearised(lineages: list[list[_Class]]) -> Iterator[_Class]:
+def _linearised(lineages: list[list[_Ancestor]]) -> Iterator[_Ancestor]:
     """The C3 linearisation of the ancestors of several bases; ends early where there is none."""
     while lineages := [line for line in lineages if line]:
         first = next((line[0] for line in lineages if not any(line[0] in other[1:] for other in lineages)), None)
