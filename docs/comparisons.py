@@ -29,7 +29,21 @@ from orchestration.comparison.limits import GridLimit
 from orchestration.comparison.outcome import as_json
 from orchestration.comparison.run import compare
 from orchestration.comparison.survival import FATES, RESIDUAL, SETTLING, survived
-from orchestration.figures.palette import BLUE, BROWN, GREEN, GREY, ORANGE, PURPLE, RED
+from orchestration.figures.palette import (
+    BLUE,
+    BROWN,
+    CHARCOAL,
+    GREEN,
+    GREY,
+    ORANGE,
+    PALE_GREEN,
+    PURPLE,
+    RED,
+    SAND,
+    SILVER,
+    UMBER,
+    VIOLET,
+)
 from orchestration.figures.style import DOCS
 from orchestration.quadrotor.initial_conditions import Starts
 from orchestration.results import display_names as labels
@@ -56,15 +70,15 @@ COLORS = {
     "unified": RED,
     "unified, no coupling": BLUE,
     "unified, mean": ORANGE,
-    "no coupling, mean": "#5b3f8f",
+    "no coupling, mean": VIOLET,
     "geometric": GREEN,
-    "geometric, published gains": "#8ecf9b",
+    "geometric, published gains": PALE_GREEN,
     "geometric, mean": BROWN,
     "cascade, one rate": GREY,
-    "cascade, no rate derivative": "#3a3a3a",
-    "cascade, filter of 5 ms scaled": "#6f4f28",
-    "cascade, filter of 1 ms scaled": "#c9a66b",
-    "cascade, no velocity integral": "#b0b0b0",
+    "cascade, no rate derivative": CHARCOAL,
+    "cascade, filter of 5 ms scaled": UMBER,
+    "cascade, filter of 1 ms scaled": SAND,
+    "cascade, no velocity integral": SILVER,
     "unified, predictor": PURPLE,
     "no coupling, predictor": BROWN,
     "mean, predictor": GREEN,
@@ -73,9 +87,9 @@ COLORS = {
     "unified, tuned for its period": BLUE,
     "unified, mean, tuned for 10 ms": PURPLE,
     "unified, mean, tuned for its period": BROWN,
-    "geometric, tuned for 10 ms": "#5b3f8f",
+    "geometric, tuned for 10 ms": VIOLET,
     "geometric, tuned for its period": GREEN,
-    "cascade, one rate, tuned for 10 ms": "#b0b0b0",
+    "cascade, one rate, tuned for 10 ms": SILVER,
     "cascade, one rate, tuned for its period": GREY,
 }
 """Colours of controllers, the same in every figure"""

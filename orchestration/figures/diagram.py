@@ -11,6 +11,7 @@ from matplotlib.patches import FancyBboxPatch
 
 from orchestration.basics.errors import UsageError
 from orchestration.figures.names import FORMATS
+from orchestration.figures.palette import CONTINUOUS, LINE, SAMPLED, SOURCE
 from orchestration.figures.style import SCREEN, save
 from orchestration.system.description import describe_faults, describe_rate, describe_source
 from orchestration.system.model import System
@@ -20,7 +21,6 @@ MOST = 40
 """Boxes in a row that are still legible"""
 PITCH, WIDTH, HEIGHT, LANE = 4.2, 2.6, 1.5, 0.75
 """Between boxes, of a box, between lanes [inch]"""
-CONTINUOUS, SAMPLED, SOURCE, LINE = "#dcebf5", "#fbe6d0", "#ececec", "#444444"
 
 
 @dataclass(frozen=True, kw_only=True)

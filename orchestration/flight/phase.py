@@ -67,7 +67,10 @@ def _draw_surfaces(panel: Axes, runs: Sequence[Run]) -> None:
 
 
 def surface(error: Floats, parameters: Mapping[str, float]) -> Floats | None:
-    """The rate of the error on the sliding surface (19)-(21) [m/s]; None if the controller has no such surface."""
+    """The rate of the error on the sliding surface (19)-(21) [m/s]; None if the controller has no such surface.
+
+    Where `surface` of the law is 0, solved for the rate: this package does not import the sources of FMUs.
+    """
     names = [f"controller.{name}" for name in (SURFACE_GAIN, SURFACE_EXPONENT, BOUNDARY_LAYER)]
     if not all(name in parameters for name in names):
         return None

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from orchestration.figures.palette import BLUE, GREEN, GREY, ORANGE, RED
+from orchestration.figures.palette import BLUE, GREEN, GREY, INDIGO, ORANGE, RED
 from orchestration.figures.style import SCREEN, save
 from orchestration.interop.compare import Agreement
 from orchestration.interop.table import TOLERANCE
@@ -20,7 +20,7 @@ _KINDS = {
     "velocity": ("plant.velocity", "s", GREEN),
     "quaternion": ("plant.quaternion", "^", ORANGE),
     "angular velocity": ("plant.angular_velocity", "D", RED),
-    "command": ("controller.", "P", "#5b4a8a"),
+    "command": ("controller.", "P", INDIGO),
 }
 """Of the quadrotor, by name: prefix of the signals, marker, colour; any other system has one by component"""
 
