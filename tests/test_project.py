@@ -43,9 +43,8 @@ def test_every_make_target_that_is_named_exists(named: list[str]) -> None:
 
 @pytest.mark.parametrize("text", [RUN, CONTRIBUTING, ARCHITECTURE], ids=["workflow", "contributing", "architecture"])
 def test_every_path_that_is_named_exists(text: str) -> None:
-    named = set(
-        re.findall(r"(?<![\w/.-])(?:tests|docs|orchestration|controller_fmu|fmu_kit|examples)/[\w./-]*\w", text)
-    )
+    folders = "tests|docs|orchestration|controller_fmu|plant_fmu|fmu_kit|examples"
+    named = set(re.findall(rf"(?<![\w/.-])(?:{folders})/[\w./-]*\w", text))
     assert len(named) >= 3
     assert not [path for path in named if not (ROOT / path).exists()]
 
