@@ -76,7 +76,7 @@ def test_a_single_task_without_execution_time_has_the_instants_of_sampling(
 
 
 def _told(found, stop=1000 * MS):
-    """The instants, those after the end as one."""
+    """The instants, those after the end as one; what is measured at the end no sample reads."""
 
     def message(m):
         index, k, sent, arrival = m
@@ -88,7 +88,7 @@ def _told(found, stop=1000 * MS):
     return [
         i._replace(
             arrivals=[*map(message, i.arrivals)],
-            measured=[*map(message, i.measured)],
+            measured=[message(m) for m in i.measured if m[2] < stop],
             samples=[*map(sample, i.samples)],
         )
         for i in found
