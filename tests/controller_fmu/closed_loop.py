@@ -1,5 +1,9 @@
-"""What the tests of every law share: states and models to try it at, and rates by differences along its flow."""
+"""What the tests of every law share: states and models to try it at, and rates by differences along its flow.
 
+Strategies are created once: that takes longer than drawing from them.
+"""
+
+import functools
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -11,14 +15,17 @@ from fmu_kit.algebra import Inertia, Quaternion, Vec3
 from fmu_kit.trajectory import Trajectory
 
 
+@functools.cache
 def between(low: float, high: float) -> st.SearchStrategy[float]:
     return st.floats(low, high)
 
 
+@functools.cache
 def triple(component: st.SearchStrategy[float]) -> st.SearchStrategy[Vec3]:
     return st.builds(Vec3, component, component, component)
 
 
+@functools.cache
 @st.composite
 def inertias(draw: st.DrawFn) -> Inertia:
     """A full, positive definite J = A Aᵀ + ½."""
@@ -28,6 +35,7 @@ def inertias(draw: st.DrawFn) -> Inertia:
     return Inertia(xx=xx, yy=yy, zz=zz, xy=xy, xz=xz, yz=yz)
 
 
+@functools.cache
 def quaternions() -> st.SearchStrategy[Quaternion]:
     component = between(-1.0, 1.0)
     return (

@@ -1,6 +1,7 @@
 """An operator has the same value at an instant and over the rows of a run."""
 
 import math
+from itertools import product
 
 import numpy as np
 import pytest
@@ -36,17 +37,17 @@ def of(word: str, *operands: Node) -> Node:
     return Operation(word, operands[: 1 if word in ("neg", "not") else 2])
 
 
-@pytest.mark.parametrize("word", OPERATORS)
 @given(a=st.floats(0.01, 0.99), b=st.floats(0.01, 0.99))
-def test_it_is_the_same_at_an_instant_and_over_a_run(word: str, a: float, b: float) -> None:
-    at_once, over_rows = both(of(word, Name("a"), Name("b")), a, b)
-    assert at_once == pytest.approx(over_rows, rel=0.0 if word in EXACT else 1e-14, abs=0.0)
+def test_it_is_the_same_at_an_instant_and_over_a_run(a: float, b: float) -> None:
+    for word in OPERATORS:
+        at_once, over_rows = both(of(word, Name("a"), Name("b")), a, b)
+        assert at_once == pytest.approx(over_rows, rel=0.0 if word in EXACT else 1e-14, abs=0.0), word
 
 
 @pytest.mark.parametrize("word", TRUTHS)
-@given(a=st.sampled_from([0.0, -0.0, 1.0, 2.5, -3.0, math.nan, math.inf]), b=st.sampled_from([0.0, 1.0, 2.5, math.nan]))
-def test_a_truth_value_is_0_or_1(word: str, a: float, b: float) -> None:
-    assert set(both(of(word, Name("a"), Name("b")), a, b)) in ({0.0}, {1.0})
+def test_a_truth_value_is_0_or_1(word: str) -> None:
+    for a, b in product((0.0, -0.0, 1.0, 2.5, -3.0, math.nan, math.inf), (0.0, 1.0, 2.5, math.nan)):
+        assert set(both(of(word, Name("a"), Name("b")), a, b)) in ({0.0}, {1.0})
 
 
 _trees: st.SearchStrategy[Node] = st.recursive(
