@@ -512,7 +512,7 @@ def project(here: Path) -> Path:
     """A copy of the sources in which no FMU has been built."""
     copy = here / "project"
     for package in ("fmu_kit", "controller_fmu", "plant_fmu", "orchestration"):
-        shutil.copytree(ROOT / package, copy / package, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(ROOT / package, copy / package)
     shutil.copy(ROOT / "pyproject.toml", copy)
     (copy / "fmus").mkdir()
     return copy
