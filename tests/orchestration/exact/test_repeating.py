@@ -57,7 +57,7 @@ def tasks_of_any(draw: st.DrawFn, number: int, component: str | None) -> Task:
     )  # fmt: skip
 
 
-@settings(max_examples=200, derandomize=True, deadline=None)
+@settings(max_examples=120, derandomize=True, deadline=None)
 @given(timetables())
 def test_a_hundred_common_periods_later_the_same_happens(system: System) -> None:
     try:

@@ -109,13 +109,13 @@ def flight(case: Case) -> System:
 SIZES = st.sampled_from((1, 7, position.INSTANTS))
 
 
-@settings(max_examples=120)
+@settings(max_examples=60)
 @given(systems(), SIZES)
 def test_steps_rows_and_events_are_the_same_over_random_systems(what: System, size: int) -> None:
     same(what, size=size)
 
 
-@settings(max_examples=80)
+@settings(max_examples=50)
 @given(systems_of_fixed_steps(), SIZES)
 def test_and_with_components_of_fixed_step_to_whose_points_instants_move(
     drawn: tuple[System, list[str]], size: int
