@@ -7,6 +7,7 @@ import os
 import sys
 from pathlib import Path
 
+import fmpy  # noqa: F401 - once, before the processes of the tools are forked: half of them use it
 import numpy as np
 
 from orchestration.interop.catalogue import TOOLS

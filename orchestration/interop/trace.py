@@ -81,7 +81,8 @@ def _exchanged(
     the same step.
     """
     for i, (sender, output) in enumerate(loop.feeding(component).values()):
-        outputs = [line["outputs"][loop.ports[sender].outputs.index(output)] for line in steps[sender]]
+        place = loop.ports[sender].outputs.index(output)
+        outputs = [line["outputs"][place] for line in steps[sender]]
         values = [line["inputs"][i] for line in steps[component][1:]]
         yield sender, values, outputs[: len(values)], outputs[1 : len(values) + 1]
 
