@@ -59,11 +59,11 @@ def cell(comparison: Comparison, index: int, out: Path | None, *, workers: int, 
 
 
 def flight(
-    comparison: Comparison, index: int | None, start: int, out: Path | None, *, engine: EngineChoice
+    comparison: Comparison, index: int | None, start: int, out: Path | None, *, engine: EngineChoice, figures: bool
 ) -> CommandResult:
     """Keep one run of a cell; raises `UsageError` without a cell or a directory."""
     if index is None or out is None:
         raise UsageError("--start: expected --cell K, the cell of the run, and --out DIR for its files")
-    run.flight(comparison, index, start, out, engine=engine)
+    run.flight(comparison, index, start, out, engine=engine, figures=figures)
     inform(f"results in {out}")
     return CommandResult(document={"directory": out}, lines=[])

@@ -49,7 +49,7 @@ def compare(
     if time_limit is not None and (cell is not None or start is not None):
         raise UsageError("--time-limit: expected no --cell; the limit is for whole comparisons")
     if start is not None:
-        return command.flight(loaded, cell, start, out, engine=how)
+        return command.flight(loaded, cell, start, out, engine=how, figures=figures)
     if cell is not None:
         return command.cell(loaded, cell, out, workers=workers, engine=how)
     flags = (" --native" if native else "") + (f" --engine {engine}" if engine != "auto" else "")

@@ -154,14 +154,16 @@ def stored_cell(comparison: Comparison, index: int, folder: Path | None) -> Cell
     return next((cell for cell in summaries if cell.cell == index), None)
 
 
-def flight(comparison: Comparison, index: int, start: int, out: Path, *, engine: EngineChoice = "auto") -> None:
+def flight(
+    comparison: Comparison, index: int, start: int, out: Path, *, engine: EngineChoice = "auto", figures: bool = True
+) -> None:
     """Run one initial condition of a cell by itself, and keep it in a run directory."""
     runs = comparison.runs_of(comparison.cell(index))
     if not 0 <= start < len(runs):
         raise UsageError(f"--start {start}: expected a number from 0 to {len(runs) - 1}")
     comparison, files, how = _prepared(comparison, [runs[start]], engine)
     request = comparison.request(runs[start], files.start_values_of(comparison.study.origin))
-    keep_run(out, lambda to: fly(request, recorder=to, engine=how.engine))
+    keep_run(out, lambda to: fly(request, recorder=to, engine=how.engine), figures=figures)
 
 
 def _prepared(

@@ -134,7 +134,9 @@ def test_a_cell_with_another_count_or_median_is_not_the_same() -> None:
 
 
 def test_one_flight_of_a_cell_is_kept_as_that_of_a_scenario(table: str, folder: Path, main: Main) -> None:
-    main("compare", folder / "small.toml", "--native", "--cell", "4", "--start", "2", "--out", folder / "flight")
+    one = ("--cell", "4", "--start", "2", "--no-figures", "--out", folder / "flight")
+    main("compare", folder / "small.toml", "--native", *one)
+    assert not [*(folder / "flight").glob("*.png")]
     runs = pd.read_csv(folder / "out" / "runs.csv")
     (row,) = runs[runs["design_index"] == 4 * 6 + 2].to_dict("records")
     assert (row["condition"], row["controller"], row["period"], row["start"]) == ("noise", "coupled", 0.02, 2)
