@@ -43,6 +43,12 @@ def slow(flight: Result) -> Result:
 
 
 @pytest.fixture(scope="module")
+def path(flight: Result) -> Figure:
+    """The path of the flight."""
+    return draw(flight, ["path"])["path"]
+
+
+@pytest.fixture(scope="module")
 def tank() -> Result:
     return quadcosim.run(quadcosim.load_system(TANK))
 
@@ -163,8 +169,8 @@ def test_a_flight_that_rests_where_it_should_is_drawn_too(tmp_path: Path) -> Non
 # -- the path ---------------------------------------------------------------------------------------------
 
 
-def test_a_metre_is_as_long_along_each_axis_of_the_path(flight: Result) -> None:
-    axes: Any = draw(flight, ["path"])["path"].axes[0]
+def test_a_metre_is_as_long_along_each_axis_of_the_path(path: Figure) -> None:
+    axes: Any = path.axes[0]
     spans = np.array([abs(np.subtract(*limits)) for limits in (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())])
     scales = np.array(axes.get_box_aspect()) / spans
     assert scales == pytest.approx(scales[0])
@@ -184,8 +190,8 @@ def test_the_path_fills_its_figure_and_hides_nothing_of_it(flight: Result, style
     assert max(seen.width / width, (seen.height + legend.get_window_extent().y1) / height) > 0.9
 
 
-def test_the_path_shows_reference_start_and_end(flight: Result) -> None:
-    axes: Any = draw(flight, ["path"])["path"].axes[0]
+def test_the_path_shows_reference_start_and_end(path: Figure) -> None:
+    axes: Any = path.axes[0]
     lines = {line.get_label(): np.transpose(line.get_data_3d()) for line in axes.get_lines()}
     assert lines["start"][0].tolist() == lines["flown"][0].tolist()
     assert lines["end"][0].tolist() == lines["flown"][-1].tolist()
