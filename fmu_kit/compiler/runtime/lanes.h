@@ -71,10 +71,12 @@ double q_llvm_sqrt(double) __asm__("llvm.sqrt.f64") __attribute__((const));
 #undef Q_HARDWARE_SQRT /* no doubles in hardware: the compiler would call libm */
 #endif
 
-/* Included only where needed, since they take most of the compilation time for one lane. */
+/* Included only where needed, since they take most of the compilation time for one lane, and <immintrin.h> by far. */
 #if QUADCOSIM_LANES > 1 || !defined(Q_HARDWARE_SQRT)
-#if defined(__SSE2__) || defined(_M_X64)
+#if QUADCOSIM_LANES > 1 && defined(__AVX__)
 #include <immintrin.h>
+#elif defined(__SSE2__) || defined(_M_X64)
+#include <emmintrin.h>
 #elif defined(__aarch64__)
 #include <arm_neon.h>
 #endif
