@@ -107,6 +107,7 @@ class Batch:
     def __init__(self, shape: Shape, schedules: ScheduleCache, memory: Memory | None = None) -> None:
         self._shape, self._schedules, self._lanes = shape, schedules, shape.lanes
         self._memory = Memory() if memory is None else memory
+        kernels = list(shape.kernels.values())  # before the loop is compiled: they refuse what has none
         self._library = shape.library
         self._source_values: OrderedDict[Hashable, tuple[Floats, Floats]] = OrderedDict()
         self._parameters = NO_COLUMNS
@@ -120,7 +121,6 @@ class Batch:
             if not names_job_measure(name)
             for variable in [shape.variable(name)]
         }
-        kernels = list(shape.kernels.values())
         self.memories = [self._array(kernel.lanes.places) for kernel in kernels]
         """of the components, shape (places, lanes)"""
         self._read = [shape.read(name) for name in shape.names]
