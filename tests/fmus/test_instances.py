@@ -69,10 +69,8 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.usefixtures("python_inside")
 @pytest.mark.parametrize("imported", ["before", "after"])
-@pytest.mark.parametrize("order", [(1.0, 2.0), (2.0, 1.0), (3.0, 2.0, 1.0, 2.0)], ids=str)
-def test_each_version_runs_its_own_law(
-    order: tuple[float, ...], imported: str, versions: dict[float, Path], installed: Path
-) -> None:
+def test_each_version_runs_its_own_law(imported: str, versions: dict[float, Path], installed: Path) -> None:
+    order = (3.0, 2.0, 1.0, 2.0)
     result = run_script("two_versions", installed, imported, *(versions[factor] for factor in order))
     thrust, *torque = law_command(0.02)
     for factor, command in zip(order, result["commands"], strict=True):
