@@ -13,7 +13,13 @@ from orchestration.system.model import System
 from tests.examples.common import NAMES, example
 from tests.native import assert_near, assert_the_same, natives
 
-SHORTER = {"minimum_variance": 100.0, "double_integrator": 30.0, "four_components": 25.0}
+SHORTER = {
+    "minimum_variance": 100.0,
+    "double_integrator": 30.0,
+    "four_components": 25.0,
+    "lqg": 20.0,
+    "distributed_servo": 3.0,
+}
 """[s]; of runs that are long for the sake of their statistics"""
 
 

@@ -178,9 +178,9 @@ def test_in_single_precision_nothing_is_computed_with_doubles(exported: dict[str
 
 
 def test_without_texts_there_are_none(exported: dict[str, Path]) -> None:
-    source = exported["UnifiedController"]
+    source = exported["QuadrotorPlant"]
     assert b"expected a finite value" in made(source, "cc").read_bytes()
-    assert b"expected a finite value" not in made(source, "cc", "-DUNIFIEDCONTROLLER_NO_TEXTS", "-O0").read_bytes()
+    assert b"expected a finite value" not in made(source, "cc", "-DQUADROTORPLANT_NO_TEXTS", "-O0").read_bytes()
 
 
 def test_numbers_too_large_or_too_small_for_single_precision_are_its_largest_and_smallest() -> None:
