@@ -1,7 +1,9 @@
-"""Fly several instances of both FMUs at once, each call from some thread; print whether each flew as if alone."""
+"""Fly several instances of both FMUs at once, each call from some thread; print what each flew, by way."""
 
+import functools
 import json
 import sys
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
@@ -12,6 +14,7 @@ import fmpy
 
 from tests.fmus.flights import FLIGHTS, STEPS
 from tests.fmus.instance import Instance
+from tests.fmus.process import in_a_copy
 
 SWITCH_INTERVAL = 1e-5
 """[s]; Python's own 5 ms would let most calls run through."""
@@ -63,10 +66,10 @@ def flight_of(name: str) -> str:
     return name.rpartition(" ")[0]
 
 
-WAYS = {way.__name__: way for way in (in_new_threads, in_a_pool, each_in_its_own)}
+WAYS = (in_new_threads, in_a_pool, each_in_its_own)
 
 
-def main(fmus: dict[str, Path], way: str) -> dict[str, list[list[str]]]:
+def flown(fmus: dict[str, Path], way: Callable[[dict[str, Instance]], Rows]) -> Rows:
     with ExitStack() as stack:
         folders = {model: Path(stack.enter_context(TemporaryDirectory())) for model in fmus}
         for model, fmu in fmus.items():
@@ -77,10 +80,15 @@ def main(fmus: dict[str, Path], way: str) -> dict[str, list[list[str]]]:
                 instance = stack.enter_context(Instance(fmus[flight.model], unpacked=folder, anew=folder is None))
                 flight.begin(instance)
                 instances[f"{name} {number}"] = instance
-        return WAYS[way](instances)
+        return way(instances)
+
+
+def main(fmus: dict[str, Path]) -> dict[str, Rows]:
+    """By each way, in processes that have loaded no other."""
+    return {way.__name__: in_a_copy(functools.partial(flown, fmus, way)) for way in WAYS}
 
 
 if __name__ == "__main__":
     sys.setswitchinterval(SWITCH_INTERVAL)
-    plant, controller, name_of_way = sys.argv[1:]
-    print(json.dumps(main({"QuadrotorPlant": Path(plant), "UnifiedController": Path(controller)}, name_of_way)))
+    plant, controller = map(Path, sys.argv[1:])
+    print(json.dumps(main({"QuadrotorPlant": plant, "UnifiedController": controller})))
