@@ -47,7 +47,7 @@ def times(found, what):
 LATE = st.floats(0.0, 0.03)
 
 
-@settings(deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(
     period=st.floats(0.01, 0.2), offset=st.floats(0.0, 0.1), share=st.floats(0.0, 0.9), ratio=st.floats(0.9, 1.1),
     delays=st.tuples(LATE, LATE, LATE, LATE), losses=st.tuples(*2 * [st.sampled_from([0.0, 0.3])]),
