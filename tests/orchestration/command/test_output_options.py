@@ -165,8 +165,12 @@ def test_shells_propose_the_values_that_there_are(
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_there_is_a_script_for_each_shell(shell: str, main: Main) -> None:
-    assert "_QUADCOSIM_COMPLETE" in main("--show-completion", shell).stdout
+def test_there_is_a_script_for_each_shell(shell: str, main: Main, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("typer.completion._get_shell_name", lambda: shell)
+    shown = main("--show-completion").stdout
+    assert "_QUADCOSIM_COMPLETE" in shown
+    monkeypatch.setenv("_QUADCOSIM_COMPLETE", f"source_{shell}")
+    assert main().stdout.strip() == shown.strip()
 
 
 def test_who_stops_reading_gets_no_traceback() -> None:
