@@ -20,7 +20,7 @@ from orchestration.command import cli
 from tests.commands import Done, Main
 from tests.fmus.making import MAKINGS, Making
 
-hypothesis.settings.register_profile("ci", derandomize=True, deadline=None)
+hypothesis.settings.register_profile("ci", derandomize=True, deadline=None, max_examples=60)
 hypothesis.settings.register_profile("local", deadline=None)
 hypothesis.settings.register_profile("quick", derandomize=True, deadline=None, max_examples=20)  # make check
 hypothesis.settings.load_profile("ci" if os.environ.get("CI") else "local")
