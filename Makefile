@@ -18,8 +18,8 @@ export OPENBLAS_NUM_THREADS ?= 1
 # Third-party masters that need a separate environment are run if it exists: make interop makes it.
 export QUADCOSIM_COFMUPY ?= $(abspath $(wildcard $(COFMUPY)))
 
-# Tests make and remove tens of thousands of temporary files, on some disks in a tenth of the time: they are in memory
-# where Linux has 4 GB for files there that may be executed. $(IN_FOLDER) COMMAND: with a temporary folder of its own.
+# Tests make and remove tens of thousands of temporary files, which is slow on some disks: they are in memory where Linux
+# has 4 GB for files there that may be executed. $(IN_FOLDER) COMMAND: with a temporary folder of its own.
 IN_MEMORY = $(shell awk '$$2 == "/dev/shm" && $$4 !~ /noexec/ {found = 1} END {exit !found}' /proc/mounts 2>/dev/null \
 	&& test "$$(df -Pk /dev/shm | awk 'END {print $$4}')" -gt 4000000 && echo "-p /dev/shm")
 IN_FOLDER = folder=$$(mktemp -d $(IN_MEMORY)) && trap 'rm -rf "$$folder"' EXIT && trap 'exit 130' INT TERM && TMPDIR=$$folder

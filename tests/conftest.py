@@ -38,7 +38,7 @@ gc.disable()  # while thousands of tests are collected, of which none is garbage
 
 
 def pytest_collection_finish() -> None:
-    """Garbage is looked for less often than by default, which takes a tenth of the time, and not in what is there."""
+    """To save time, garbage is looked for less often than by default, and not in what has been collected."""
     gc.freeze()
     gc.enable()
     gc.set_threshold(5000)

@@ -56,7 +56,6 @@ def kept() -> Iterator[Kept]:
     instances.close()
 
 
-@settings(max_examples=60, derandomize=True, deadline=None)
 @given(systems_on_computers(), st.sampled_from((1, 7, 2**13)))
 def test_random_systems_on_computers_run_the_same_in_schedules_of_any_length(
     fmu: Path, kept: Kept, what: System, instants: int

@@ -109,13 +109,11 @@ def flight(case: Case) -> System:
 SIZES = st.sampled_from((1, 7, position.INSTANTS))
 
 
-@settings(max_examples=60)
 @given(systems(), SIZES)
 def test_steps_rows_and_events_are_the_same_over_random_systems(what: System, size: int) -> None:
     same(what, size=size)
 
 
-@settings(max_examples=50)
 @given(systems_of_fixed_steps(), SIZES)
 def test_and_with_components_of_fixed_step_to_whose_points_instants_move(
     drawn: tuple[System, list[str]], size: int
@@ -132,7 +130,6 @@ NAMES = [*MEASUREMENT, "position", "velocity", "quaternion", "angular_velocity"]
 SENSORS = st.dictionaries(st.sampled_from(NAMES), st.just(0.0) | st.floats(1e-3, 1.0), max_size=3)
 
 
-@settings(max_examples=60)
 @given(st.data())
 def test_and_over_random_timings_of_the_quadrotor(data: st.DataObject) -> None:
     sensors: dict[str, Any] = {"noise": data.draw(SENSORS), "quantisation": data.draw(SENSORS)}
