@@ -1,8 +1,6 @@
 import fnmatch
 from pathlib import Path
 
-import pytest
-
 from orchestration.basics.documents import read_toml
 
 ROOT = Path(__file__).parents[1]
@@ -20,8 +18,7 @@ def test_packages_have_files_beside_their_modules():
     assert {file.name for file in FILES} >= {"loop.c", "instance.h", "system.toml", "UnifiedController.html"}
 
 
-@pytest.mark.parametrize("file", [str(file) for file in FILES])
-def test_a_file_beside_modules_is_in_the_wheel(file):
-    path = ROOT / file
-    assert (path.parent / "__init__.py").is_file(), "expected a folder that is a package"
-    assert any(fnmatch.fnmatch(path.name, pattern) for pattern in SETTINGS["package-data"]["*"])
+def test_files_beside_modules_are_in_the_wheel():
+    assert [file for file in FILES if not (ROOT / file.parent / "__init__.py").is_file()] == [], "expected packages"
+    patterns = SETTINGS["package-data"]["*"]
+    assert [file for file in FILES if not any(fnmatch.fnmatch(file.name, pattern) for pattern in patterns)] == []
