@@ -57,7 +57,7 @@ DATA = Path(__file__).parent / "data"
 RESULTS = ROOT / "results" / "comparisons"
 NAMES = (
     "periods", "fast_inner", "tuned", "tuned_mean", "delays", "inertias", "mismatches", "losses", "jitters", "vehicles",
-    "positions", "negative_thrust",
+    "positions", "negative_thrust", "motors",
 )  # fmt: skip
 RATES = 20.0
 """Ratio of the periods of outer and inner loops, where the inner ones are fast"""
