@@ -5,7 +5,6 @@ was stopped: its stores are in `results/findings`.
 """
 
 import dataclasses
-import resource
 import sys
 import time
 from collections.abc import Callable, Mapping
@@ -71,16 +70,9 @@ def main() -> None:
     )  # fmt: skip
     for section in [one for one in sections if one.__name__ in sys.argv[1:] or not sys.argv[1:]]:
         print(f"\n## {section.__name__}", flush=True)
-        before = _processor_time()
         for line in section():
             print(line, flush=True)
-        print(f"{_processor_time() - before:.0f} s of processor time", flush=True)
-    print(f"\n{(time.perf_counter() - began) / 60:.1f} min, {_processor_time() / 60:.1f} min of processor time")
-
-
-def _processor_time() -> float:
-    """CPU time [s] of this process and of its ended child processes."""
-    return sum(sum(resource.getrusage(who)[:2]) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    print(f"\n{(time.perf_counter() - began) / 60:.1f} min")
 
 
 # -- sections ---------------------------------------------------------------------------------------------
