@@ -171,7 +171,7 @@ def _meets_demand(tasks: Sequence[Periodic], preemptive: bool) -> bool:
     for task, first in zip(tasks, allowed, strict=True):
         assert task.period is not None
         count = max(math.ceil((longest - first) / Fraction(task.period)), 0) + 1
-        times.update(math.floor(first + k * task.period) for k in range(count))
+        times.update(math.ceil(first + k * task.period) for k in range(count))
     return all(_demand(tasks, allowed, time) + _blocking(tasks, allowed, time, preemptive) <= time for time in times)
 
 

@@ -77,6 +77,11 @@ def test_all_deadlines_are_met_where_the_demand_test_holds() -> None:
     assert earliest_deadline(tasks, preemptive=True, switch=1) == [None, None]
     late = [replace(tasks[0], jitter=2), tasks[1]]
     assert earliest_deadline(late, preemptive=True, switch=0) == [None, None]
+    fraction = [
+        Periodic(execution=28, period=Fraction(115, 2), deadline=40),
+        Periodic(execution=45, period=109, deadline=76),
+    ]
+    assert earliest_deadline(fraction, preemptive=True, switch=0) == [None, None]  # the job due at 97.5 ends at 101
 
 
 # -- against the scheduler ---------------------------------------------------------------------------------------------
