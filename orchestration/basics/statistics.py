@@ -80,7 +80,7 @@ def refutes(successes: int, trials: int, share: float, confidence: float) -> boo
 
     That is, at this rate so few or fewer would be observed with a probability of at most 1 - confidence.
     """
-    tail = sum(math.comb(trials, k) * share**k * (1.0 - share) ** (trials - k) for k in range(successes + 1))
+    tail = sum(_binomial(k, trials, share) for k in range(successes + 1))
     return tail <= 1.0 - confidence
 
 

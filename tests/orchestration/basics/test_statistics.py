@@ -48,6 +48,8 @@ def test_a_share_is_refuted_if_so_few_successes_are_too_unlikely() -> None:
     assert not refutes(23, 29, 0.9, 0.95)
     assert refutes(22, 29, 0.9, 0.95)
     assert refutes(23, 29, 0.9, 0.93)
+    assert refutes(4464, 5000, 0.9, 0.95)
+    assert not refutes(4466, 5000, 0.9, 0.95)
     assert not refutes(29, 29, 0.9, 0.05)
 
 
