@@ -78,5 +78,5 @@ def first_time(group: Sequence[LoopEvent], corners: Sequence[Sequence[Fraction]]
 
 
 def last_time(group: Sequence[LoopEvent], corners: Sequence[Sequence[Fraction]]) -> Fraction:
-    """The latest time of an event of a group, over all draws."""
-    return max(event.at(corner) for event in group for corner in corners)
+    """The latest time of an event of a group, over all draws, and 1 ns: others of its instant may come before it."""
+    return max(event.at(corner) for event in group for corner in corners) + 1

@@ -77,7 +77,7 @@ class FamilyBuilder:
             else:
                 instant.receive(x, instant.pop(x, in_transit[x.name]))
                 in_transit[x.name] -= 1
-        verb = {"sample": "samples", "measure": "is linear_loop_of", "arrive": "arrives"}[event.kind]
+        verb = {"sample": "samples", "measure": "is measured", "arrive": "arrives"}[event.kind]
         base = f"{event.subject} {verb}{', lost' if lost and event.subject == self._lossy else ''}"
         for i in itertools.count(1):
             name = base if i == 1 else f"{base} ({i})"

@@ -58,6 +58,10 @@ class CertifiedLoop:
         """Whether a component is a digital task."""
         return self.system.components[name].sampling is not None
 
+    def feeds_through(self, name: str) -> bool:
+        """Whether inputs of a component in continuous time act on its outputs at once: on those read later."""
+        return not self.is_sampled(name) and bool(self.components[name].D.any())
+
 
 def loop_of(rest: AtRest) -> CertifiedLoop:
     """The loop of a system at rest; raises `UsageError` for an unsupported one."""

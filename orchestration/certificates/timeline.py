@@ -1,7 +1,8 @@
 """The family of maps of the periods of a loop, from the loop and the quantities that vary in it.
 
 A period is divided at instants at which no draw is open: within a piece each varying quantity has one draw. The events
-of a piece follow one another in an order; where the order depends on the draw there is a letter for each order.
+of a piece follow one another in an order; where the order depends on the draw there is a letter for each order, and one
+for a single value at which events of one instant are in an order that matters and that no other value has.
 """
 
 from __future__ import annotations
@@ -46,6 +47,7 @@ class LoopTimeline:
                 raise UsageError(f"{each.path}: samples of {each.name} depend on the time to the next one")
         self._lossy = next((each.name for each in varying if each.kind == LOSS), None)
         self._events = self._all_events()
+        self._queued = frozenset(event.subject for event in self._events if event.kind != "sample")
         self._groups = self._groups_by_draw()
 
     def largest(self) -> float:
@@ -71,7 +73,7 @@ class LoopTimeline:
                 )
         layout = StateLayout(loop=self.loop, kept=frozenset([self._lossy] if self._lossy else []))
         for size in (LARGEST, None):
-            builder = FamilyBuilder(layout, size or len(layout.places), self._lossy, self._queued())
+            builder = FamilyBuilder(layout, size or len(layout.places), self._lossy, self._queued)
             letters: list[Letter] = []
             for piece, ((begin, i), end) in enumerate(zip(begins, ends)):
                 events = [*self._groups[i], *self._deterministic_events(begin, end)]
@@ -100,17 +102,16 @@ class LoopTimeline:
                             wait += loop.period / len(loop.samples_of(name))
                             if any(by):
                                 raise UsageError(f"connections.{x.name}.order: expected gauss-seidel beside jitter")
-                        last = 2 if not loop.is_sampled(x.receiver) else 0
-                        found.append(LoopEvent(time + wait, slopes, (last, rank, place), "arrive", x.name))
+                        order = (1, rank, k, place) if not wait else (0, rank, place)  # at once, or before all samples
+                        if not loop.is_sampled(x.receiver):
+                            order = (2, rank, place)
+                        found.append(LoopEvent(time + wait, slopes, order, "arrive", x.name))
         return found
 
-    def _queued(self) -> frozenset[str]:
-        """The connections whose messages may be in transit."""
-        return frozenset(event.subject for event in self._events if event.kind != "sample")
-
     def _is_late(self, x: Connection) -> bool:
+        """Whether its messages do not arrive with the sample that sends or reads them."""
         own = (*self._slopes((DELAY,), x.name), *self._slopes((LATENCY,), x.sender))
-        return lowest(x.delay) > 0.0 or any(own)
+        return lowest(x.delay) > 0.0 or any(own) or self.loop.feeds_through(x.receiver)
 
     def _slopes(self, kinds: Sequence[str], name: str) -> tuple[int, ...]:
         return tuple(int(each.kind in kinds and each.name == name) for each in self._timed)
@@ -169,8 +170,7 @@ class LoopTimeline:
         number = f" {piece[0] + 1}" if piece[1] > 1 else ""
         found = []
         for box in self._boxes(events, draws):
-            middle = [(low + high) / 2 for low, high in box]
-            in_order = sorted(events, key=lambda event: (event.at(middle), event.rank))
+            in_order = _in_order(events, [(low + high) / 2 for low, high in box])
             ranges = tuple((float(low) / NANOSECONDS, float(high) / NANOSECONDS) for low, high in box)
             for lost, these in ((False, moves), (True, lost_moves)):
                 if these:
@@ -198,15 +198,55 @@ class LoopTimeline:
             (limit,) = draws.largest
             cuts = {Fraction(0), limit}
             cuts |= {-distance / slope for distance, (slope,) in pairs if slope and 0 < -distance / slope < limit}
-            return [[each] for each in itertools.pairwise(sorted(cuts))] or [[(Fraction(0), Fraction(0))]]
+            between = [*itertools.pairwise(sorted(cuts))]
+            orders = [self._order_that_matters(events, [(low + high) / 2]) for low, high in between]
+            single = [
+                (cut, cut)
+                for cut in sorted(cuts)
+                if self._order_that_matters(events, [cut])
+                not in (order for order, ends in zip(orders, between) if cut in ends)
+            ]
+            return [[each] for each in sorted([*between, *single])]
+        corners = draws.corners()
+        middle = [sum(along, Fraction(0)) / len(corners) for along in zip(*corners)]
+        one_order = self._order_that_matters(events, middle)
+        changes = any(self._order_that_matters(events, corner) != one_order for corner in corners)
         for distance, slopes in pairs:
-            ends = [distance + sum(s * x for s, x in zip(slopes, corner)) for corner in draws.corners()]
-            if min(ends) < 0 < max(ends):
-                raise UsageError(f"{self._paths_text()}: expected values that do not change the order of events")
+            ends = [distance + sum(s * x for s, x in zip(slopes, corner)) for corner in corners]
+            changes = changes or min(ends) < 0 < max(ends)
+        if changes:
+            raise UsageError(f"{self._paths_text()}: expected values that do not change the order of events")
         return draws.boxes()
+
+    def _order_that_matters(
+        self, events: Sequence[LoopEvent], point: Sequence[Fraction]
+    ) -> set[tuple[LoopEvent, LoopEvent]]:
+        """The pairs of events, in order, of which one may have an effect on the other."""
+        return {pair for pair in itertools.combinations(_in_order(events, point), 2) if self._interact(*pair)}
+
+    def _interact(self, a: LoopEvent, b: LoopEvent) -> bool:
+        """Whether the order of two events of one instant may matter."""
+        return bool(self._touched(a) & self._touched(b))
+
+    def _touched(self, event: LoopEvent) -> set[str]:
+        """The components that an event reads or changes; of those in continuous time, whose states no instant changes,
+        only those with inputs that act on outputs at once. Messages stay in order, so their queues do not count.
+        """
+        if event.kind == "sample":
+            at_once = [x for x in self.loop.system.connections if x.name not in self._queued]
+            ends = [{x.sender, x.receiver} for x in at_once if event.subject in (x.sender, x.receiver)]
+            names = {event.subject}.union(*ends)
+        else:
+            x = self.loop.connection(event.subject)
+            names = {x.receiver if event.kind == "arrive" else x.sender}
+        return {name for name in names if self.loop.is_sampled(name) or self.loop.feeds_through(name)}
 
     def _paths_text(self) -> str:
         return " and ".join(dict.fromkeys(each.path for each in self.varying))
+
+
+def _in_order(events: Sequence[LoopEvent], point: Sequence[Fraction]) -> list[LoopEvent]:
+    return sorted(events, key=lambda event: (event.at(point), event.rank))
 
 
 def _moves(piece: tuple[int, int], run: int) -> tuple[tuple[tuple[int, int], ...], tuple[tuple[int, int], ...]]:

@@ -1,10 +1,19 @@
 """Loops as matrices that are written down here: letters of which stability is known."""
 
+from fractions import Fraction
+
 import numpy as np
 
 from orchestration.basics.simulator import Floats
 from orchestration.certificates.certificate import Cells, Certificate
 from orchestration.certificates.family import Factor, Letter, LoopFamily
+from orchestration.certificates.parts import CertifiedLoop
+from orchestration.schedule.plan import Plan
+from orchestration.stability.matrices import Matrices
+from orchestration.system.component import Component
+from orchestration.system.connection import Connection
+from orchestration.system.model import System
+from orchestration.system.sampling import Sampling
 
 HOVER_A = np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 19.62, 0.0], [0.0, 0.0, 0.0, 0.5], [0.0, 0.0, 0.0, 0.0]])
 HOVER_B = np.array([[0.0], [0.0], [0.0], [1.0]])
@@ -47,3 +56,37 @@ def certificate_of(family: LoopFamily, form: Floats) -> Certificate:
         of=("here",), radius=0.0, family=family, cells=cells,
         coordinates=np.eye(len(form)), memory=0, forms={(0, ()): form},
     )  # fmt: skip
+
+
+def through_a_filter() -> CertifiedLoop:
+    """An oscillator under a law that reads what a filter passes on at the same instants, once a second.
+
+    It is stable if the law reads what is passed on at its own instant, and if it reads what was at the one before, but
+    not in turn.
+    """
+
+    def matrices(inputs: str, outputs: str, D: Floats) -> Matrices:
+        nothing = np.zeros((0, 0))
+        B, C = np.zeros((0, len(inputs))), np.zeros((len(outputs), 0))
+        return Matrices(inputs=tuple(inputs), outputs=tuple(outputs), A=nothing, B=B, C=C, D=D)
+
+    plant = Matrices(
+        inputs=("u",), outputs=("p", "v"), A=np.array([[0.0, 1.0], [-2.4, 0.15]]), B=np.array([[0.0], [1.0]]),
+        C=np.eye(2), D=np.zeros((2, 1)),
+    )  # fmt: skip
+    every = Sampling(period=1.0)
+    system = System(
+        stop_time=10.0,
+        components={
+            "plant": Component(fmu="plant.fmu", step=0.1), "filter": Component(fmu="filter.fmu", sampling=every),
+            "law": Component(fmu="law.fmu", sampling=every),
+        },
+        connections=(
+            Connection(name="measurement", start=("plant.p", "plant.v"), end=("filter.p", "filter.v")),
+            Connection(name="between", start=("filter.x", "filter.y"), end=("law.x", "law.y")),
+            Connection(name="command", start=("law.u",), end=("plant.u",)),
+        ),
+    )  # fmt: skip
+    law = matrices("xy", "u", np.array([[0.8, 0.05]]))
+    components = {"plant": plant, "filter": matrices("pv", "xy", np.eye(2)), "law": law}
+    return CertifiedLoop(system=system, components=components, period=Fraction(10**9), order=Plan(system).sampled)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from orchestration.basics.errors import UsageError
+from orchestration.certificates.breaking import unstable_sequence
 from orchestration.certificates.events import BOXES, DELAY, JITTER, LATENCY, LOSS, SHIFT, Varying
 from orchestration.certificates.family import LoopFamily
 from orchestration.certificates.parts import CertifiedLoop, loop_of
@@ -20,6 +21,7 @@ from orchestration.stability.monodromy import growth_of_loop
 from orchestration.system.model import System
 from orchestration.system.paths import changed
 from tests.examples.common import example
+from tests.orchestration.certificates.loops import through_a_filter
 
 PERIOD = 0.5
 COMMAND = Varying(kind=DELAY, name="command", path="connections.command.delay_jitter")
@@ -126,6 +128,18 @@ def test_where_the_order_depends_on_the_draw_there_is_a_letter_for_each(system: 
     assert at_once == pytest.approx(
         just_after, abs=1e-12
     )  # a command that arrives at a sample comes after it or before
+
+
+@pytest.mark.parametrize(("kind", "name"), [(JITTER, "filter"), (DELAY, "between")])
+def test_a_draw_of_0_may_have_an_order_of_its_own(kind: str, name: str) -> None:
+    """A law reads what a filter passes on at its own instant, and as soon as that is late only at its next one."""
+    timeline = LoopTimeline(through_a_filter(), [Varying(kind=kind, name=name, path=name)])
+    at_once, late = timeline.family([0.02]).letters
+    assert (at_once.ranges, late.ranges) == (((0.0, 0.0),), ((0.0, 0.02),))
+    assert unstable_sequence(timeline.family([0.0])) is None
+    broken = unstable_sequence(timeline.family([0.02]))
+    assert broken is not None
+    assert sorted(letter for letter, _ in broken[0]) == [0, 1]
 
 
 def test_samples_that_are_all_late_by_the_same_are_not_late(system: System, instances: Instances) -> None:
