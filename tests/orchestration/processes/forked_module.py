@@ -1,9 +1,12 @@
 """What `test_fork_server` has forked: does what its first argument says, and sends what is asked."""
 
+import atexit
+import ctypes
 import os
 import signal
 import sys
 import tempfile
+import threading
 import time
 from pathlib import Path
 
@@ -16,7 +19,7 @@ tempfile.gettempdir()  # which is remembered
 
 
 def main(what: str, *arguments: str) -> None:
-    """`look`, `fail`, `exit`, `kill`, `print` or `look late`."""
+    """`look`, `fail`, `exit`, `kill`, `print`, `look late` or `end in parts`."""
     if what == "look late":
         while os.getppid() == IMPORTED_BY:
             time.sleep(0.01)
@@ -49,3 +52,10 @@ def main(what: str, *arguments: str) -> None:
         os.kill(os.getpid(), int(arguments[0]))
     if what == "print":
         print(arguments[0], file=sys.stderr)
+    if what == "end in parts":
+        os.dup2(2, 1)
+        print("of Python")
+        ctypes.CDLL(None).puts(b"of C")
+        atexit.register(print, "at exit")
+        if "thread" in arguments:
+            threading.Timer(0.1, print, ("of a thread",)).start()

@@ -83,6 +83,13 @@ def test_how_it_ends_is_how_a_python_would() -> None:
     assert ending("no such thing")[0] == 0
 
 
+@pytest.mark.parametrize("thread", [[], ["thread"]])
+def test_nothing_that_is_left_to_do_is_lost_at_its_end(thread: list[str], capfd: pytest.CaptureFixture[str]) -> None:
+    with Child(module("end in parts", *thread), environment=subprocesses.environment(PYTHONUNBUFFERED="")) as child:
+        assert child.ending(PATIENCE).code == 0
+    assert {*capfd.readouterr().err.splitlines()} == {"of Python", "of C", "at exit", *(f"of a {x}" for x in thread)}
+
+
 def test_its_errors_go_where_those_of_this_process_go_now(capfd: pytest.CaptureFixture[str]) -> None:
     for text in ("one", "two"):
         with Child(module("print", text)) as child:
