@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -369,33 +370,36 @@ def test_zero_initial_quaternion_is_refused() -> None:
     assert_initialisation_fails(slave, "initial.quaternion = (0.0, 0.0, 0.0, 0.0)", "expected", "not zero")
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-@pytest.mark.parametrize(
-    "name", [v.name for v in QUADROTOR if v.causality in ("input", "parameter") and v.type == "Real"]
-)
-def test_value_that_is_not_finite_is_refused(name: str, value: float) -> None:
-    assert_fails(lambda: put(instance(), {name: value}), f"{name} = {value}", "expected a finite value")
+INPUTS = [v.name for v in QUADROTOR if v.causality == "input"]
+PARAMETERS = [v.name for v in QUADROTOR if v.causality == "parameter" and v.type == "Real"]
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-@pytest.mark.parametrize("name", [v.name for v in QUADROTOR if v.causality == "input"])
-def test_input_that_is_not_finite_is_refused_between_steps(name: str, value: float) -> None:
-    assert_fails(lambda: put(started(), {name: value}), f"{name} = {value}", "expected a finite value")
+def test_value_that_is_not_finite_is_refused(value: float) -> None:
+    for name in (*INPUTS, *PARAMETERS):
+        assert_fails(partial(put, instance(), {name: value}), f"{name} = {value}", "expected a finite value")
 
 
-@pytest.mark.parametrize("name", [v.name for v in QUADROTOR if v.variability == "fixed"])
-def test_fixed_parameter_cannot_be_set_after_initialisation(name: str) -> None:
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_input_that_is_not_finite_is_refused_between_steps(value: float) -> None:
+    for name in INPUTS:
+        assert_fails(partial(put, started(), {name: value}), f"{name} = {value}", "expected a finite value")
+
+
+def test_fixed_parameter_cannot_be_set_after_initialisation() -> None:
     slave = started()
-    index = slave._index[name]
-    set_value = slave.set_real if QUADROTOR[index].type == "Real" else slave.set_integer
-    assert_fails(lambda: set_value([index], [1]), name, "a fixed parameter cannot be set after initialisation")
+    for variable in [v for v in QUADROTOR if v.variability == "fixed"]:
+        set_value = slave.set_real if variable.type == "Real" else slave.set_integer
+        index = slave._index[variable.name]
+        expected = (variable.name, "a fixed parameter cannot be set after initialisation")
+        assert_fails(partial(set_value, [index], [1]), *expected)
 
 
-@pytest.mark.parametrize("name", [v.name for v in QUADROTOR if v.causality in ("output", "local")])
-def test_outputs_and_locals_cannot_be_set(name: str) -> None:
-    causality = next(v.causality for v in QUADROTOR if v.name == name)
-    assert_fails(lambda: put(instance(), {name: 1.0}), name, f"causality {causality} cannot be set")
-    assert_fails(lambda: put(started(), {name: 1.0}), name, f"causality {causality} cannot be set")
+def test_outputs_and_locals_cannot_be_set() -> None:
+    for variable in [v for v in QUADROTOR if v.causality in ("output", "local")]:
+        expected = (variable.name, f"causality {variable.causality} cannot be set")
+        assert_fails(partial(put, instance(), {variable.name: 1.0}), *expected)
+        assert_fails(partial(put, started(), {variable.name: 1.0}), *expected)
 
 
 @given(st.permutations(list({**BODY, **MOVING})))
