@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from orchestration.basics.simulator import Floats
 from orchestration.figures.palette import BLACK, GREY
 from orchestration.figures.run import Run
+from orchestration.figures.shades import CLIPPED, OUTSIDE
 from orchestration.figures.style import Style
 from orchestration.results import display_names as labels
 
@@ -19,8 +20,6 @@ Lines: TypeAlias = Sequence[tuple[Floats, Floats]]
 """Times [s] and values, shape (n,) each"""
 
 TIME = "time [s]"
-OUTSIDE, CLIPPED = 0.015, 3.0
-"""Largest share of the time that counts as a peak, and smallest ratio of its range to that of the rest"""
 
 
 def positive(values: Floats) -> Floats:

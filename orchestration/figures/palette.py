@@ -7,6 +7,8 @@ UMBER, SAND, CHARCOAL, SILVER = "#6f4f28", "#c9a66b", "#3a3a3a", "#b0b0b0"
 
 CYCLE = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY, BROWN, GREY)
 """For lines of one kind in turn: neighbours differ in brightness too"""
+MOST_LINES = len(CYCLE)
+"""In one panel; more get further panels"""
 DASHES = ("-", "--", "-.", ":")
 """Of overlaid lines, so that they differ in grey print too"""
 MARKS = ("o", "s", "D", "^", "v", "P", "X", "*")

@@ -1,4 +1,4 @@
-"""The range of values of a map's colours; the maps of a report follow the same rules (`report/page/map.js`)."""
+"""The range of values of a map's colours, and what else ranges leave out; a report follows the same rules."""
 
 from dataclasses import dataclass
 
@@ -14,6 +14,8 @@ LEAST = 0.05
 """smallest range as a share of the largest value, so that tiny differences do not look large"""
 WIDE = 50.0
 """ratio of the largest to the smallest value above which colours and axes are logarithmic"""
+OUTSIDE, CLIPPED = 0.015, 3.0
+"""Of lines: largest share of the time that counts as a peak, and smallest ratio of its range to that of the rest"""
 
 
 @dataclass(frozen=True, kw_only=True)

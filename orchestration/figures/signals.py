@@ -6,14 +6,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from orchestration.figures.lines import TIME, abreast, legend_of_runs, quantity, set_time_axis, wrapped
-from orchestration.figures.palette import CYCLE
+from orchestration.figures.palette import CYCLE, DASHES, MOST_LINES
 from orchestration.figures.run import Run, title
 from orchestration.figures.style import Style
 from orchestration.results import display_names as labels
 from orchestration.system.variable_names import component_of
-
-MOST_LINES = 8
-"""in one panel; more get further panels"""
 
 Panel = tuple[str, str | None, list[str]]
 """Name of the connection or component, unit, columns"""
@@ -68,6 +65,6 @@ def _draw(panel: Axes, run: Run, columns: Sequence[str], *, alone: bool) -> None
         panel.plot(
             run.time, run[column], drawstyle="steps-post" if held else "default",
             color=CYCLE[k % len(CYCLE)] if alone else run.color,
-            linestyle="-" if alone else ("-", "--", "-.", ":")[k % 4],
+            linestyle="-" if alone else DASHES[k % len(DASHES)],
             label=labels.signal(column, run.described) if run.place == 0 else None,
         )  # fmt: skip

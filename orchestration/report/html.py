@@ -1,11 +1,13 @@
 """A report as one HTML file that contains its data, the code of the page and the plotting library."""
 
 import html
+import json
 import re
 from importlib import resources
 from pathlib import Path
 
 from orchestration.basics.errors import UsageError
+from orchestration.figures import palette, shades
 from orchestration.report.model import Report, as_json
 
 SCRIPTS = (
@@ -13,6 +15,13 @@ SCRIPTS = (
     "tables.js", "page.js",
 )  # fmt: skip
 """In the order of loading; each depends only on those before it"""
+FIGURES = {
+    "CYCLE": palette.CYCLE,
+    "NOT_GOOD": {"bad": palette.NOT_GOOD, "diverged": palette.DIVERGED},
+    "SHADES": {name: getattr(shades, name) for name in ("OUTER", "MOST", "LEAST", "WIDE")},
+    "PEAKS": {name: getattr(shades, name) for name in ("OUTSIDE", "CLIPPED")},
+}
+"""What the page shows as figures do: colours, and what ranges leave out"""
 _PAGE = resources.files("orchestration.report") / "page"
 _PLACE = re.compile(r"\{\{(\w+)\}\}")
 
@@ -36,6 +45,7 @@ def as_html(report: Report) -> str:
         "style": _text("style.css"),
         "data": _in_script(as_json(report)),
         "plotly": get_plotlyjs(),
+        "figures": json.dumps(FIGURES),
         "script": "\n".join(_text(name) for name in SCRIPTS),
     }
     return _PLACE.sub(lambda place: parts[place[1]], _text("page.html"))

@@ -2,15 +2,13 @@
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
+from orchestration.figures.palette import MOST_LINES
 from orchestration.report.known_layouts import layout_for
 from orchestration.report.model import Line, Panel, ReportLayout
 from orchestration.results import display_names as labels
 from orchestration.results.column_info import ColumnInfo
 from orchestration.system.model import System
 from orchestration.system.variable_names import component_of
-
-MOST_LINES = 8
-"""in one panel"""
 
 About = Mapping[str, ColumnInfo]
 """By column"""

@@ -1,10 +1,9 @@
 // A study over its axes: cells of a grid, or points of a sample, each of which opens its run.
 
-const NOT_GOOD = { bad: "#c9ced4", diverged: "#5f666d" };
+const { NOT_GOOD, SHADES: { OUTER, MOST, LEAST, WIDE } } = FIGURES;
 const MARKS = { good: "circle", bad: "x-thin-open", diverged: "triangle-down-open" };
 const MOST_SYMBOLS = 2500;
 const VALUE = "value";
-const [OUTER, MOST, LEAST, WIDE] = [0.02, 2.5, 0.05, 50]; // as in figures: figures/shades.py
 
 const map = { x: null, y: null, metric: null, fixed: {}, row: null, rows: [], isGrid: false, shades: null };
 

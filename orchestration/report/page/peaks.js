@@ -1,7 +1,7 @@
 // Short peaks that would flatten the rest: clipped in their panel, with a note, and shown in full in an inset, as in
-// figures (the constants: figures/lines.py).
+// figures.
 
-const [OUTSIDE, CLIPPED] = [0.015, 3];
+const { OUTSIDE, CLIPPED } = FIGURES.PEAKS;
 
 /** The range of a signal but for a small share of the time. */
 function withoutPeaks({ x, y }) {

@@ -3,8 +3,8 @@
 const root = document.documentElement;
 const prefersDark = window.matchMedia("(prefers-color-scheme: dark)");
 const PALETTES = {
-  light: ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C6D31"],
-  dark: ["#56B4E9", "#FF8A3D", "#2FCC9F", "#E8A0C6", "#F2C14E", "#9AD0F5", "#FFFFFF", "#C9A86A"],
+  light: FIGURES.CYCLE,
+  dark: ["#56b4e9", "#ff8a3d", "#2fcc9f", "#f2c14e", "#e8a0c6", "#9ad0f5", "#c9a86a", "#b0b0b0"],
 };
 const COLORS = [];
 const redraws = [];
