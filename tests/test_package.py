@@ -1,9 +1,8 @@
 import fnmatch
-from pathlib import Path
 
 from orchestration.basics.documents import read_toml
+from tests.places import ROOT
 
-ROOT = Path(__file__).parents[1]
 SETTINGS = read_toml(ROOT / "pyproject.toml", "settings")["tool"]["setuptools"]
 PACKAGES = [pattern.removesuffix("*") for pattern in SETTINGS["packages"]["find"]["include"]]
 FILES = [

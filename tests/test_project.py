@@ -10,8 +10,8 @@ import pytest
 import yaml
 
 from orchestration.basics.documents import read_toml
+from tests.places import ROOT
 
-ROOT = Path(__file__).parents[1]
 SETTINGS = read_toml(ROOT / "pyproject.toml", "project")
 PROJECT = SETTINGS["project"]
 WORKFLOW = yaml.safe_load((ROOT / ".github/workflows/ci.yml").read_text(encoding="utf-8"))

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterable
-from pathlib import Path
 
 import pandas as pd
 
@@ -10,10 +9,9 @@ import quadcosim
 from docs.finding_texts import fates, up_to
 from docs.theory import ATTITUDE, PAPER, scaled
 from orchestration.quadrotor.scenario import Scenario
+from tests.places import ROOT
 
-PAGES = "\n".join(
-    page.read_text(encoding="utf-8") for page in sorted((Path(__file__).parents[2] / "docs" / "findings").glob("*.md"))
-)
+PAGES = "\n".join(page.read_text(encoding="utf-8") for page in sorted((ROOT / "docs" / "findings").glob("*.md")))
 DECIMAL = re.compile(r"-?\d+\.?\d*")
 
 

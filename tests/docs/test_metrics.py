@@ -9,8 +9,9 @@ from orchestration.basics.documents import read_toml
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.system.request import system_of
 from quadcosim import Result, run
+from tests.places import ROOT
 
-PAGE = (Path(__file__).parents[2] / "docs" / "metrics.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "metrics.md").read_text(encoding="utf-8")
 ROWS = [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in re.findall(r"^\| `.*\|$", PAGE, re.M)]
 UNITS = str.maketrans({"·": ".", "²": "2"})
 

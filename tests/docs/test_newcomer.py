@@ -18,8 +18,8 @@ from docs.newcomer.readers import reader_of
 from orchestration.basics.documents import read_toml
 from orchestration.command.cli import app
 from tests.commands import Main
+from tests.places import ROOT
 
-ROOT = Path(__file__).parents[2]
 PAGES = pages(ROOT)
 BLOCKS = [block for page in PAGES for block in blocks_of(page, ROOT)]
 LINES = [(block, line) for block in BLOCKS if block.is_shell and not block.name for line in block.lines]

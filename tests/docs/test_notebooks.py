@@ -9,8 +9,9 @@ import pytest
 from nbclient import NotebookClient
 
 from tests.patience import PATIENCE
+from tests.places import ROOT
 
-FOLDER = Path(__file__).parents[2] / "docs" / "notebooks"
+FOLDER = ROOT / "docs" / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 
 

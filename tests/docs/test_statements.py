@@ -3,13 +3,12 @@
 import json
 import re
 import shlex
-from pathlib import Path
 
 import pytest
 
 from orchestration.command.cli import main
+from tests.places import ROOT
 
-ROOT = Path(__file__).parents[2]
 SOURCES = (*(ROOT / "controller_fmu").rglob("*"), *(ROOT / "fmu_kit").rglob("*"))
 TEXTS = (
     ROOT / "README.md",

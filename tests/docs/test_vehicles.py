@@ -9,8 +9,9 @@ import pytest
 
 from orchestration.command.cli import main
 from orchestration.quadrotor.vehicle import load_vehicle, names
+from tests.places import ROOT
 
-PAGE = (Path(__file__).parents[2] / "docs" / "vehicles.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "vehicles.md").read_text(encoding="utf-8")
 
 
 def commands() -> list[tuple[str, str, str]]:

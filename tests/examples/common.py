@@ -1,15 +1,14 @@
 """What the tests of the examples share: their systems as a user has them, and the largest value that is good."""
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from orchestration.building import fmus
 from orchestration.system.model import System
 from orchestration.system.paths import changed
 from orchestration.system.system_file import load_system
+from tests.places import EXAMPLES
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 NAMES = sorted(path.parent.name for path in EXAMPLES.glob("*/system.toml"))
 
 

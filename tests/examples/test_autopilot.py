@@ -9,9 +9,9 @@ import quadcosim
 from benchmarks.execution import LAWS
 from docs import processor
 from quadcosim import System
-from tests.examples.common import EXAMPLES
 from tests.native import NATIVE
 from tests.orchestration.fmi.small import needs_compiler
+from tests.places import EXAMPLES
 
 FOLDER = EXAMPLES / "autopilot"
 PAGE = (FOLDER / "README.md").read_text("utf-8")

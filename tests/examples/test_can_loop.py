@@ -1,14 +1,13 @@
 """A servo over a CAN bus: when what arrives, and how much of the bus others may use."""
 
-from pathlib import Path
-
 import pytest
 
 from orchestration.runs.simulation import run
 from orchestration.system.paths import changed
 from orchestration.system.system_file import load_system
+from tests.places import EXAMPLES
 
-SYSTEM = load_system(Path(__file__).parents[2] / "examples" / "three_servos" / "can.toml")
+SYSTEM = load_system(EXAMPLES / "three_servos" / "can.toml")
 OTHERS = "networks.bus.messages.others.period"
 FULL = 0.27 / 0.91 * 1e-3
 """[s] from one frame of the others to the next, where the bus is full"""

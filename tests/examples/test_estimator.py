@@ -11,9 +11,9 @@ import pytest
 import quadcosim
 from fmu_kit.algebra import Quaternion, Vec3
 from quadcosim import System
-from tests.examples.common import EXAMPLES
 from tests.native import assert_the_same
 from tests.orchestration.fmi.small import needs_compiler
+from tests.places import EXAMPLES
 
 FOLDER = EXAMPLES / "estimator"
 QUIET = {

@@ -4,7 +4,7 @@ import pytest
 
 from orchestration.building import fmus
 from orchestration.checks.validation.validator import validate
-from tests.examples.common import EXAMPLES
+from tests.places import EXAMPLES
 
 
 @pytest.mark.parametrize("name", ["water_tank/TankController", "dc_servo/PidController", "four_components/Car"])

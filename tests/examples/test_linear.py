@@ -14,10 +14,10 @@ from orchestration.quadrotor.fmu_choice import FmuChoice
 from orchestration.stability.monodromy import growth_of_loop
 from orchestration.system.component import Parameter
 from quadcosim import Scenario, Timing
-from tests.examples.common import EXAMPLES
 from tests.native import native
 from tests.orchestration.fmi.small import needs_compiler
 from tests.orchestration.stability.test_linearise import closed
+from tests.places import EXAMPLES
 
 pytestmark = needs_compiler
 FOLDER = EXAMPLES / "linear"

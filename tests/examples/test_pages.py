@@ -8,7 +8,8 @@ import pytest
 
 from orchestration.system.paths import value_at
 from tests.commands import Main
-from tests.examples.common import EXAMPLES, NAMES, example
+from tests.examples.common import NAMES, example
+from tests.places import EXAMPLES
 
 PAGES = [*(EXAMPLES / name / "README.md" for name in NAMES), EXAMPLES.parent / "README.md"]
 COMMANDS = [

@@ -8,9 +8,9 @@ import pytest
 from orchestration.runs.result import Result
 from orchestration.signals.waypoints import read_waypoints
 from quadcosim import DisturbanceChoice, ReferenceChoice, Scenario, load_scenario, run
-from tests.examples.common import EXAMPLES
 from tests.orchestration.engines.batch.lanes import located
 from tests.orchestration.fmi.small import needs_compiler
+from tests.places import EXAMPLES
 
 pytestmark = needs_compiler
 FOLDER = EXAMPLES / "references"

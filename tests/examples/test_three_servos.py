@@ -1,15 +1,14 @@
 """Three servos on one processor, which comes with TrueTime: what is done, and who is lost."""
 
-from pathlib import Path
-
 import pytest
 
 from orchestration.runs.simulation import run
 from orchestration.schedule.resources import timeline_of
 from orchestration.system.paths import changed
 from orchestration.system.system_file import load_system
+from tests.places import EXAMPLES
 
-SYSTEM = load_system(Path(__file__).parents[2] / "examples" / "three_servos" / "system.toml")
+SYSTEM = load_system(EXAMPLES / "three_servos" / "system.toml")
 DONE = {"fixed-priority": [50, 200, 250], "earliest-deadline-first": [135, 162, 203]}
 
 

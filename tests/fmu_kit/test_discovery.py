@@ -6,8 +6,7 @@ import pytest
 
 from fmu_kit.bundle import PackagingError, Target
 from fmu_kit.discovery import slave_beside, slaves_in
-
-ROOT = Path(__file__).parents[2]
+from tests.places import ROOT
 
 TANK = """
 from fmu_kit.slave import Slave

@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.patience import PATIENCE
-
-ROOT = Path(__file__).resolve().parents[2]
+from tests.places import ROOT
 
 
 def run(

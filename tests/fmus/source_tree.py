@@ -6,7 +6,8 @@ from pathlib import Path
 from subprocess import CompletedProcess
 
 from orchestration.building.models import MODELS
-from tests.fmus.process import ROOT, run
+from tests.fmus.process import run
+from tests.places import ROOT
 
 PACKAGES = ("fmu_kit", "controller_fmu", "plant_fmu")
 

@@ -24,8 +24,9 @@ from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT
 from tests.fmus.archive import files_of
 from tests.fmus.instance import Instance
 from tests.fmus.making import PAIR
-from tests.fmus.process import ROOT, run
+from tests.fmus.process import run
 from tests.fmus.source_tree import copy_sources, python
+from tests.places import ROOT
 
 SOURCES = {
     "UnifiedController": "controller_fmu/sliding_mode/law.py",

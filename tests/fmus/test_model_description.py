@@ -17,7 +17,7 @@ from tests.fmus.archive import files_of
 from tests.fmus.expected import MEASUREMENT
 from tests.fmus.instance import Instance
 from tests.fmus.interface_table import TABLES, Row
-from tests.fmus.process import ROOT
+from tests.places import ROOT
 
 MAJOR, MINOR = map(int, PYTHON_REQUIRED.removeprefix(">=").split("."))
 

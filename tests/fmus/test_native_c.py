@@ -11,12 +11,12 @@ from fmu_kit.bundle import Target
 from orchestration.building import fmus
 from orchestration.building.models import MODELS
 from orchestration.checks.validation.validator import validate
-from tests.examples.common import EXAMPLES
 from tests.fmus.expected import COMMAND, MEASUREMENT, law_command
 from tests.fmus.making import PAIR
 from tests.fmus.process import run
 from tests.fmus.test_c_host import GUIDE_HOST, NOT_PYTHON, STEPS, H, arguments, compiled
 from tests.native import natives
+from tests.places import EXAMPLES
 
 LIFE = Path(__file__).with_name("life.c")
 OF_LIBC = {"__cxa_finalize", "__stack_chk_fail", "calloc", "free", "malloc", "memcmp", "memcpy", "memmove", "memset"}

@@ -8,7 +8,7 @@ import pytest
 
 import quadcosim
 from quadcosim import Component, System
-from tests.fmus.process import ROOT
+from tests.places import ROOT
 
 
 def test_an_fmu_is_built_and_flies_as_its_equation_says(tmp_path: Path) -> None:

@@ -31,7 +31,8 @@ from orchestration.processes.limits import Limits
 from tests.fmus.archive import files_of
 from tests.fmus.damage import DESCRIPTION, Damage, description, root, source, without, write_fmu
 from tests.fmus.foreign import lag, needs_compiler
-from tests.fmus.process import ROOT, run
+from tests.fmus.process import run
+from tests.places import ROOT
 
 # -- sound FMUs -----------------------------------------------------------------------------------------
 

@@ -13,8 +13,8 @@ import pytest
 
 import orchestration
 import quadcosim
+from tests.places import ROOT
 
-ROOT = Path(__file__).parents[2]
 CLASSES = [name for name in quadcosim.__all__ if inspect.isclass(getattr(quadcosim, name))]
 DATACLASSES = [name for name in CLASSES if dataclasses.is_dataclass(getattr(quadcosim, name))]
 

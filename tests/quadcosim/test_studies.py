@@ -16,6 +16,7 @@ from orchestration.tuning.tuning_file import load_tuning
 from quadcosim import Axis, QuadcosimError, Result, Scenario, Study, Swept, Timing, UsageError
 from tests.orchestration.tuning.test_tuning import FILE
 from tests.patience import PATIENCE
+from tests.places import EXAMPLES
 from tests.quadcosim.conftest import native
 
 PERIODS = Axis(name="timing.period", values=(0.01, 0.02))
@@ -183,7 +184,7 @@ def test_workers_need_no_guard_of_the_main_module_and_ctrl_c_keeps_what_was_flow
 
 
 def test_a_limit_is_a_table_of_what_was_tried(capsys: pytest.CaptureFixture[str]) -> None:
-    tank = Path(__file__).parents[2] / "examples" / "water_tank" / "system.toml"
+    tank = EXAMPLES / "water_tank" / "system.toml"
     system = quadcosim.changed(quadcosim.load_system(tank), {"stop_time": 5.0})
     found = quadcosim.limit(system, "connections.valve.delay", first=0.0, last=0.2, scan=0.1, tolerance=0.05)
     assert found.to_pandas()["value"].tolist() == [one.value for one in found.tried]

@@ -29,6 +29,7 @@ from tests.examples.common import example
 from tests.native import native
 from tests.orchestration.flight.test_margin import DOUBLE
 from tests.orchestration.studies.common import one_line
+from tests.places import EXAMPLES
 
 COMMAND, SAMPLE = "connections.command.delay_jitter", "components.controller.sampling.jitter"
 LOST = "connections.command.loss"
@@ -208,7 +209,7 @@ def test_the_command_writes_what_it_checks(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(certificates, "SHARES", (0.95,))
-    file = Path(__file__).resolve().parents[3] / "examples" / "double_integrator" / "system.toml"
+    file = EXAMPLES / "double_integrator" / "system.toml"
     slow, other = (("--set", f"components.controller.sampling.period={period}") for period in (1.0, 0.9))
     path = tmp_path / "certificate.json"
     document = json.loads(output_of(capsys, "margin", file, *slow, "--of", COMMAND, "--out", path, "--json"))

@@ -22,8 +22,8 @@ from quadcosim import Scenario, Timing, load_run, run, save_run
 from tests.commands import Done, Main
 from tests.native import native
 from tests.patience import PATIENCE
+from tests.places import EXAMPLES, ROOT
 
-ROOT = Path(__file__).resolve().parents[3]
 SCRIPT = shutil.which("quadcosim", path=str(Path(sys.executable).parent))
 SHORT = ("--native", "--stop-time", "0.5")
 
@@ -212,7 +212,7 @@ def test_the_fmus_are_those_that_are_named(main: Main, tmp_path: Path) -> None:
 
 
 def test_set_takes_whatever_a_path_of_a_system_can_be(main: Main) -> None:
-    tank = Path(__file__).parents[3] / "examples" / "water_tank" / "system.toml"
+    tank = EXAMPLES / "water_tank" / "system.toml"
     shown = main("show", tank, "--set", "connections.valve.hold=first", "--set", "seed=3").stdout
     assert "hold first" in shown
     given = {"connections.valve.hold=fist": "fist: expected one of zero, first", "seed=1.5": "expected a whole number"}

@@ -4,6 +4,7 @@ import inspect
 import json
 import logging
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -17,6 +18,7 @@ from orchestration.basics.terminal import configure
 from orchestration.command.cli import app
 from orchestration.command.command_result import CommandResult
 from tests.commands import Main
+from tests.places import ROOT
 
 GROUP: Any = typer.main.get_command(app)
 COMMANDS = sorted(GROUP.commands)
@@ -49,9 +51,12 @@ def test_every_command_has_the_same_manners_and_a_group_in_the_help(command: str
     assert inspect.unwrap(of_it.callback).__annotations__["return"] in (CommandResult, "CommandResult")
 
 
-def test_help_explains_each_exit_code(main: Main) -> None:
-    text = " ".join(main("--help").stdout.split())
-    assert all(f"{code} " in text.partition("Exit codes:")[2] for code in (0, 1, 2, 130, 141))
+def test_help_and_the_page_explain_the_same_exit_codes(main: Main) -> None:
+    helped = " ".join(main("--help").stdout.split()).partition("Exit codes: ")[2].rstrip(".").split(", ")
+    rows = re.findall(r"^\| (\d+) \| (.*) \|$", (ROOT / "docs/terminal.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert [code for code, _ in rows] == ["0", "1", "2", "130", "141"]
+    for (code, meaning), text in zip(rows, helped, strict=True):
+        assert f"{code} {meaning}".startswith(text)
 
 
 REPORTS = {

@@ -17,6 +17,7 @@ from orchestration.system.model import System
 from orchestration.system.system_file import load_system
 from quadcosim import schedule
 from tests.commands import Main
+from tests.places import EXAMPLES
 
 SYSTEM = """
 [computers.cpu]
@@ -41,9 +42,6 @@ period = 0.005
 bytes = 8
 identifier = 1
 """
-
-
-EXAMPLES = Path(__file__).parents[3] / "examples"
 
 
 def run_of(system: System, window: Window | None = None) -> Run:

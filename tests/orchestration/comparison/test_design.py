@@ -11,6 +11,7 @@ from orchestration.comparison.file import load_comparison
 from orchestration.system.model import System
 from orchestration.system.paths import value_at
 from quadcosim import UsageError
+from tests.places import ROOT
 
 FILE = """
 [base]
@@ -214,10 +215,8 @@ def test_a_cell_that_there_is_not_is_refused(comparison: Comparison) -> None:
 
 # -- files of the repository ------------------------------------------------------------------------------------------
 
-REPOSITORY = Path(__file__).parents[3]
 
-
-@pytest.mark.parametrize("path", sorted((REPOSITORY / "studies" / "comparisons").glob("*.toml")), ids=lambda p: p.stem)
+@pytest.mark.parametrize("path", sorted((ROOT / "studies" / "comparisons").glob("*.toml")), ids=lambda p: p.stem)
 def test_every_comparison_of_the_repository_loads_and_has_200_starts_or_more(path: Path) -> None:
     comparison = load_comparison(path)
     assert len(comparison.initial_conditions) >= 200
@@ -226,7 +225,7 @@ def test_every_comparison_of_the_repository_loads_and_has_200_starts_or_more(pat
 
 
 def test_the_file_of_the_page_is_one(tmp_path: Path) -> None:
-    (text,) = re.findall(r"```toml\n(.*?)```", (REPOSITORY / "docs" / "compare.md").read_text("utf-8"), re.DOTALL)
+    (text,) = re.findall(r"```toml\n(.*?)```", (ROOT / "docs" / "compare.md").read_text("utf-8"), re.DOTALL)
     for name in re.findall(r'^file = "(.*?)"', text, re.M):
         for value in range(10, 130, 10):
             made = tmp_path / "page" / "of" / name.format(vehicle="small", milli=value)

@@ -48,11 +48,12 @@ from tests.orchestration.engines.moving import moving
 from tests.orchestration.engines.random_systems import systems, systems_of_fixed_steps
 from tests.orchestration.fmi.small import needs_compiler, small
 from tests.orchestration.quadrotor.signals_table import flights, scenario_of
+from tests.places import ROOT
 
 pytestmark = needs_compiler
 ENGINES = st.sampled_from(("python", "compiled"))
 FLIGHTS = dict(flights())
-EXAMPLES = sorted(Path(__file__).parents[3].glob("examples/*/system.toml"))
+EXAMPLES = sorted(ROOT.glob("examples/*/system.toml"))
 
 
 @pytest.fixture(scope="module")

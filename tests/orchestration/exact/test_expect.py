@@ -21,9 +21,9 @@ from orchestration.quadrotor.timing import Timing
 from orchestration.system.source import Source
 from quadcosim import UsageError, limit
 from tests.commands import Main
-from tests.examples.common import EXAMPLES
 from tests.examples.common import native_example as example
 from tests.orchestration.fmi.small import needs_compiler
+from tests.places import EXAMPLES
 
 
 def expected(name: str, **changes: Any) -> Expected:

@@ -13,9 +13,9 @@ from orchestration.exact.expect import expect
 from orchestration.system.criterion import Criterion
 from quadcosim import UsageError, run
 from tests.commands import Main
-from tests.examples.common import EXAMPLES
 from tests.examples.common import native_example as example
 from tests.orchestration.exact.common import GAIN
+from tests.places import EXAMPLES
 
 START, LOSS, BURST = (
     "components.plant.parameters.initial.x",

@@ -21,8 +21,8 @@ from orchestration.system.paths import changed
 from orchestration.system.sampling import SamplingOnArrival
 from orchestration.system.system_file import load_system
 from quadcosim import run
-from tests.examples.common import EXAMPLES
 from tests.examples.common import native_example as example
+from tests.places import EXAMPLES
 
 DELAY, DELAY_JITTER, LOSS = (f"connections.command.{key}" for key in ("delay", "delay_jitter", "loss"))
 

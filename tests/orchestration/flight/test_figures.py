@@ -25,8 +25,9 @@ from orchestration.runs.run_labels import labels_of_runs
 from orchestration.system.criterion import Criterion
 from quadcosim import Result, UsageError
 from tests.native import native
+from tests.places import EXAMPLES
 
-TANK = Path(__file__).parents[3] / "examples" / "water_tank" / "system.toml"
+TANK = EXAMPLES / "water_tank" / "system.toml"
 NARROW = replace(STYLES["paper"], width=COLUMNS["single"])
 WINDOW = (0.3, 0.6)
 

@@ -14,6 +14,7 @@ from orchestration.runs.draw import runs_of
 from quadcosim import Result, UsageError
 from tests.commands import Main
 from tests.native import native
+from tests.places import EXAMPLES
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +51,7 @@ def test_what_cannot_be_filmed_is_refused(tmp_path: Path, monkeypatch: pytest.Mo
     with pytest.raises(UsageError, match=r"film = a.avi: expected a file that ends in .gif or .mp4"):
         filming.writer(Path("a.avi"))
     monkeypatch.chdir(tmp_path)
-    tank = Path(__file__).parents[3] / "examples" / "water_tank" / "system.toml"
+    tank = EXAMPLES / "water_tank" / "system.toml"
     main("run", tank, "--stop-time", "1", "--no-figures", "--out", "tank")
     done = main("plot", "tank", "--film", "tank.gif", code=2)
     assert "--film: expected runs of a quadrotor" in done.stderr

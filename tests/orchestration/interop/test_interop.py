@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,6 +14,7 @@ from quadcosim import QuadcosimError, Scenario, UsageError
 from tests.native import NATIVE
 from tests.orchestration.interop.common import LOOP, components_of, farthest
 from tests.orchestration.studies.common import one_line
+from tests.places import ROOT
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +84,7 @@ def test_the_table_has_every_tool_in_order(compared: Compared) -> None:
 
 def test_the_page_has_the_table_that_was_found(compared: Compared) -> None:
     scenario, found = compared
-    page = (Path(__file__).parents[3] / "docs" / "interop.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "interop.md").read_text(encoding="utf-8")
     block = page.partition(f"<!-- step {scenario.timing.plant_interval} -->")[2].partition("<!-- end -->")[0]
     columns = slice(1, 4)  # tool, order, first inputs: no rounding moves them, nor does the length of the flight
 

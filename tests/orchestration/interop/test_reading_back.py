@@ -9,7 +9,7 @@ import pytest
 from orchestration.interop.catalogue import TOOLS
 from orchestration.interop.reading_back import READERS
 from tests.commands import Main
-from tests.examples.common import EXAMPLES
+from tests.places import EXAMPLES
 
 NAMES = [f"{name.removesuffix(', SSP')} {version(TOOLS[name].packages[0])}" for name in READERS]
 

@@ -15,8 +15,9 @@ from orchestration.system.model import System
 from orchestration.system.paths import changed
 from quadcosim import QuadcosimError, UsageError
 from tests.commands import Main
-from tests.examples.common import EXAMPLES, example
+from tests.examples.common import example
 from tests.orchestration.studies.common import one_line
+from tests.places import EXAMPLES
 
 CARRIED: dict[str, dict[str, Any]] = {
     "double_integrator": {},

@@ -24,10 +24,10 @@ from orchestration.studies.study import Study
 from orchestration.system.paths import changed
 from orchestration.system.system_file import load_system
 from quadcosim import Scenario, Timing
-from tests.examples.common import EXAMPLES
 from tests.native import NATIVE
 from tests.orchestration.studies.common import axis, sweep
 from tests.patience import PATIENCE
+from tests.places import EXAMPLES
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 Show = Callable[[Path], Any]

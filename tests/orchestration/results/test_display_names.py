@@ -1,15 +1,14 @@
 """Names for people: there for every metric, with the units that the FMUs give."""
 
-from pathlib import Path
-
 import pytest
 
 import quadcosim
 from orchestration.results import display_names as labels
 from orchestration.results.column_info import ColumnInfo
 from quadcosim import Scenario
+from tests.places import ROOT
 
-METRICS_PAGE = Path(__file__).parents[3] / "docs" / "metrics.md"
+METRICS_PAGE = ROOT / "docs" / "metrics.md"
 
 
 def test_every_metric_of_a_flight_has_a_name_and_its_unit_and_is_on_the_page() -> None:

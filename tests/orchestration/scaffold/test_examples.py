@@ -8,8 +8,7 @@ from orchestration.building import consent
 from orchestration.scaffold import examples
 from orchestration.studies.study_file import load_study
 from tests.commands import Main
-
-ROOT = Path(__file__).parents[3]
+from tests.places import ROOT
 
 
 def test_what_pages_name_is_written_and_runs(main: Main, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -31,8 +31,9 @@ from tests.orchestration.engines.random_systems import systems, systems_of_fixed
 from tests.orchestration.engines.stubs import Stub, continuous, events, sampled, system, wire
 from tests.orchestration.quadrotor.strategies import Case, cases
 from tests.orchestration.schedule import second_clock
+from tests.places import ROOT
 
-PAGE = Path(__file__).parents[3] / "docs" / "timing.md"
+PAGE = ROOT / "docs" / "timing.md"
 
 
 def moved(outputs: Mapping[str, float], t: float, h: float, inputs: Mapping[str, float]) -> dict[str, float]:

@@ -18,9 +18,10 @@ from orchestration.system.paths import changed
 from orchestration.system.system_file import load_system
 from quadcosim import Linearised, QuadcosimError, StateSpace, Timing, UsageError, linearise
 from tests.commands import Main
-from tests.examples.common import EXAMPLES, example
+from tests.examples.common import example
 from tests.native import native
 from tests.orchestration.studies.test_systems import DELAY, PERIOD
+from tests.places import EXAMPLES
 
 
 @pytest.fixture(scope="module")

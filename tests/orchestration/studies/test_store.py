@@ -38,6 +38,7 @@ from orchestration.workers.provenance import Sources, imported, simulation_sourc
 from orchestration.workers.row import Row
 from quadcosim import QuadcosimError, Scenario, UsageError
 from tests.orchestration.studies.common import METRICS, OBJECTIVES, files_in, one_line, row
+from tests.places import ROOT
 
 NUMBERS = [name for name in METRICS if name not in TEXTS]
 # SQLite has one zero and keeps a NaN as NULL.
@@ -182,7 +183,7 @@ class Writer:
     def __init__(self, path: Path) -> None:
         self.process = subprocess.Popen(
             [sys.executable, "-c", WRITER, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-            cwd=Path(__file__).resolve().parents[3],
+            cwd=ROOT,
         )  # fmt: skip
         self.expect(0)
 

@@ -11,8 +11,8 @@ from orchestration.system.distribution import Distribution
 from orchestration.system.model import System
 from quadcosim import Scenario, UsageError
 from tests.orchestration.studies.common import GRID, at, one_line, starts
+from tests.places import ROOT
 
-REPOSITORY = Path(__file__).resolve().parents[3]
 ONE = '[[axes]]\nname = "seed"\nvalues = [1]\n'
 
 
@@ -37,7 +37,7 @@ def flown(folder: Path, text: str, index: int = 0) -> System:
 # -- good files -------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("path", sorted((REPOSITORY / "studies").glob("*.toml")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", sorted((ROOT / "studies").glob("*.toml")), ids=lambda path: path.stem)
 def test_every_study_of_the_repository_loads_and_all_its_runs_are_scenarios(path: Path) -> None:
     study, known = load_study(path), starts()
     assert study.name == path.stem

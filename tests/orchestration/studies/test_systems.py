@@ -28,8 +28,9 @@ from orchestration.system.paths import changed
 from quadcosim import Scenario, Timing, UsageError, run
 from tests.commands import Main
 from tests.orchestration.studies.common import bits, error_line, one_line, sweep
+from tests.places import EXAMPLES
 
-FILE = Path(__file__).resolve().parents[3] / "examples" / "double_integrator" / "system.toml"
+FILE = EXAMPLES / "double_integrator" / "system.toml"
 PERIOD, DELAY = "components.controller.sampling.period", "connections.command.delay"
 K_D = "components.controller.parameters.k_d"
 AT_REST = {"components.plant.parameters.initial.x": 0.0, "components.plant.parameters.initial.v": 0.0}

@@ -13,8 +13,8 @@ from orchestration.studies.axes import Axis
 from orchestration.tuning.exact import ExactTuning, ExactTuningResult, search_exactly
 from orchestration.tuning.tune import Tuned, tune
 from orchestration.tuning.tuning_file import load_tuning
-from tests.examples.common import EXAMPLES
 from tests.orchestration.exact.common import servo
+from tests.places import EXAMPLES
 
 FILE = EXAMPLES / "distributed_servo" / "tuning.toml"
 GAINS = "components.controller.parameters"

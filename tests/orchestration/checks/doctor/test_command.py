@@ -17,7 +17,7 @@ from orchestration.checks.doctor.report import DoctorReport, as_tables, examine
 from orchestration.processes.limits import Limits
 from tests.commands import Main
 from tests.fmus.foreign import lag, needs_compiler
-from tests.fmus.process import ROOT, run
+from tests.fmus.process import run
 from tests.orchestration.checks.doctor.common import (
     AARCH64,
     LINUX64,
@@ -27,6 +27,7 @@ from tests.orchestration.checks.doctor.common import (
     for_machine,
     requiring,
 )
+from tests.places import ROOT
 
 
 @pytest.fixture

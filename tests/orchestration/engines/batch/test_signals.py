@@ -16,10 +16,11 @@ from tests.orchestration.engines.random_systems import TIMES, systems
 from tests.orchestration.engines.test_compiled import Kept, of, ran
 from tests.orchestration.fmi.small import needs_compiler
 from tests.orchestration.quadrotor.signals_table import flights, scenario_of
+from tests.places import ROOT
 
 pytestmark = needs_compiler
 FLIGHTS = dict(flights())
-EXAMPLES = sorted(Path(__file__).parents[4].glob("examples/*/system.toml"))
+EXAMPLES = sorted(ROOT.glob("examples/*/system.toml"))
 
 
 def plain(system: System) -> System:

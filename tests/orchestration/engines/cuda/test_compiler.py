@@ -1,7 +1,6 @@
 """The resources that the CUDA text uses of a GPU's processor, by its compiler: no GPU is needed."""
 
 from collections.abc import Mapping
-from pathlib import Path
 
 import pytest
 
@@ -14,13 +13,14 @@ from orchestration.schedule.schedule_cache import ScheduleCache
 from orchestration.system.system_file import load_system
 from tests.orchestration.engines.batch.lanes import group_of, located, shape_of
 from tests.orchestration.fmi.small import needs_compiler
+from tests.places import EXAMPLES
 
 MOST = {"plant": 168, "controller": 255}
 """Registers of a thread: of 65,536 in a processor, for 384 threads, and for 256, with the largest possible number"""
 LOOP = 128
 """The same of the loop without the steps of components, for 512 threads"""
 ARCHITECTURE = "sm_90"
-EXAMPLE = Path(__file__).parents[4] / "examples" / "double_integrator" / "system.toml"
+EXAMPLE = EXAMPLES / "double_integrator" / "system.toml"
 
 
 @pytest.fixture(autouse=True)

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -29,12 +28,13 @@ from orchestration.system.system_file import load_system
 from tests.orchestration.engines.batch.lanes import group_of, located, shape_of
 from tests.orchestration.engines.batch.test_batches import F
 from tests.orchestration.fmi.small import needs_compiler
+from tests.places import EXAMPLES
 
 pytestmark = needs_compiler
 
 
 c = structures(1)
-EXAMPLE = Path(__file__).parents[4] / "examples" / "four_components" / "system.toml"
+EXAMPLE = EXAMPLES / "four_components" / "system.toml"
 X, MASS, INERTIA = (f"components.plant.parameters.{name}" for name in ("initial.position.x", "mass", "inertia.xx"))
 PERIOD = "components.controller.sampling.period"
 NOISE = {"position": 0.01, "velocity": 0.02}

@@ -17,8 +17,7 @@ from quadcosim import Scenario, UsageError
 from tests.commands import Main
 from tests.orchestration.interop.test_systems import CARRIED, carried
 from tests.orchestration.studies.common import error_line, one_line
-
-EXAMPLES = Path(__file__).parents[4] / "examples"
+from tests.places import EXAMPLES
 
 
 @pytest.fixture(autouse=True)
