@@ -48,29 +48,31 @@ class Timing:
     hold: Hold = "zero"
     """The command of the plant between arrivals: the last one (zero), or the line through the last two (first)."""
     clock: Clock = "master"
-    """What decides when the controller samples: the master, or the FMU by its own sample_period."""
+    """What decides when the controller samples: the master, or the FMU by its parameters sample_period and
+    sample_offset."""
     delay: Varying = 0.0
     """The time d from a sample to the application of its command [s], or its distribution; it may exceed the period."""
     delay_jitter: Varying = 0.0
-    """The largest random addition J_d to the delay of each command [s], or the distribution of the addition."""
+    """The largest random addition J_d to the delay of each command [s], or the distribution of the addition
+    itself."""
     jitter: Varying = 0.0
-    """The largest random lateness J of each sampling instant [s], or the distribution of the lateness; it is less than
-    the period."""
+    """The largest lateness J of a sample [s], drawn for each, or the distribution of the lateness itself; it is less
+    than the period."""
     jitter_distribution: Spread = "uniform"
-    """The distribution of both over [0, J]; normal is centred at J/2 with standard deviation J/6, truncated to it."""
+    """The distribution over [0, J], and over [0, J_d], of what is given by its largest value; normal is centred at J/2
+    with standard deviation J/6, cut to the range."""
     measurement_loss: Varying = 0.0
-    """The probability that a measurement is lost, or a trace of 0 and 1, 1 for one that is lost."""
+    """The probability that a measurement is lost, or values of 0 and 1, as of a trace: 1 for a lost one."""
     command_loss: Varying = 0.0
     """The probability that a command is lost, or likewise."""
     burst_length: float | None = None
-    """The mean number of losses in a row (Gilbert-Elliott); without it, losses are independent."""
+    """The mean number of losses in a row (Gilbert-Elliott); default: losses are independent."""
     clock_ratio: float = 1.0
     """The seconds r that the controller believes pass per true second."""
     noise: dict[str, float] = field(default_factory=dict)
-    """The standard deviation of normal noise on a measurement, in its unit, by its name; a vector's name stands for its
-    components."""
+    """The standard deviation of normal noise by measurement, in its unit; a vector's name stands for its components."""
     quantisation: dict[str, float] = field(default_factory=dict)
-    """The step to which a measurement is rounded, in its unit, by its name, likewise."""
+    """The step to which a measurement is rounded, in its unit, by measurement, likewise."""
 
     def __post_init__(self) -> None:
         require_positive(self, "period", "plant_interval", "clock_ratio", place=_PLACE)

@@ -47,7 +47,8 @@ class Task:
     offset: float = 0.0
     """The time of the first release [s], in the computer's time."""
     jitter: Varying = 0.0
-    """The largest lateness of a release [s], drawn for each, or its distribution; it is less than the period."""
+    """The largest lateness J of a release [s], drawn for each, or the distribution of the lateness itself; it is less
+    than the period."""
     arrivals: Arrivals | None = None
     """Random releases, in place of a period."""
     on: str | None = None
@@ -139,7 +140,8 @@ class Message:
     offset: float = 0.0
     """The time of the first message [s]."""
     jitter: Varying = 0.0
-    """The largest lateness of a message [s], drawn for each, or its distribution; it is less than the period."""
+    """The largest lateness J of a message [s], drawn for each, or the distribution of the lateness itself; it is less
+    than the period."""
     arrivals: Arrivals | None = None
     """Random arrivals, in place of a period."""
     deadline: float | None = None

@@ -37,10 +37,10 @@ class Connection:
     delay_jitter: Varying = 0.0
     """The largest random addition J_d to the delay [s], or the distribution of the addition itself."""
     jitter_distribution: Spread = "uniform"
-    """The distribution over [0, J_d] of an addition whose largest value is given; normal is centred at J_d/2, cut to
-    the range."""
+    """The distribution over [0, J_d] of an addition whose largest value is given; normal is centred at J_d/2 with
+    standard deviation J_d/6, cut to the range."""
     loss: Varying = 0.0
-    """The probability that a message is lost, or values of 0 and 1, as of a trace: 1 for a lost message."""
+    """The probability that a message is lost, or values of 0 and 1, as of a trace: 1 for a lost one."""
     burst_length: float | None = None
     """The mean number of losses in a row (Gilbert-Elliott); default: losses are independent."""
     hold: Hold = "zero"
