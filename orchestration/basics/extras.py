@@ -22,10 +22,11 @@ Parameters = ParamSpec("Parameters")
 Result = TypeVar("Result")
 
 
-def extra_of(package: str | None) -> str | None:
-    """The extra that installs a package; None if none does."""
+def lack_of(package: str | None) -> str | None:
+    """That a package is missing, with the extra that installs it; None if none does."""
     top = (package or "").partition(".")[0]
-    return next((extra for extra, packages in EXTRAS.items() if top in packages), None)
+    extra = next((extra for extra, packages in EXTRAS.items() if top in packages), None)
+    return None if extra is None else f"{package} is not installed; this needs: pip install 'quadcosim[{extra}]'"
 
 
 def needs(*packages: str) -> Callable[[Callable[Parameters, Result]], Callable[Parameters, Result]]:
@@ -53,11 +54,9 @@ def explains_missing(function: Callable[Parameters, Result]) -> Callable[Paramet
         try:
             return function(*args, **kwargs)
         except ModuleNotFoundError as error:
-            extra = extra_of(error.name)
-            if extra is None:
+            lack = lack_of(error.name)
+            if lack is None:
                 raise
-            raise QuadcosimError(
-                f"{error.name} is not installed; this needs: pip install 'quadcosim[{extra}]'"
-            ) from None
+            raise QuadcosimError(lack) from None
 
     return call

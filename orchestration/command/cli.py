@@ -11,7 +11,7 @@ import typer
 import typer.core
 
 from orchestration.basics.errors import QuadcosimError, SimulatorError, UsageError, no_utf8, worded_by
-from orchestration.basics.extras import extra_of
+from orchestration.basics.extras import lack_of
 from orchestration.basics.terminal import inform, report_error
 from orchestration.building import consent
 from orchestration.command import (
@@ -149,8 +149,8 @@ def _report(error: Exception) -> int:
         text = str(error)
     elif misuse is not None:
         text = f"{misuse} (see --help)"
-    elif isinstance(error, ModuleNotFoundError) and (extra := extra_of(error.name)) is not None:
-        text = f"{error.name} is not installed; this command needs: pip install 'quadcosim[{extra}]'"
+    elif isinstance(error, ModuleNotFoundError) and (lack := lack_of(error.name)) is not None:
+        text = lack
     elif isinstance(error, ImportError) and (variables := misleading_variables()):
         text = f"{error}; try without {' '.join(variables)}, which may make Python load modules of another installation"
     else:

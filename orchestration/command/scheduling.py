@@ -12,7 +12,7 @@ from orchestration.basics.terminal import inform
 from orchestration.command import registry
 from orchestration.command.command_result import CommandResult
 from orchestration.command.flags import assigned
-from orchestration.figures.names import FORMATS
+from orchestration.figures.names import expect_figure
 
 if TYPE_CHECKING:
     from orchestration.runs.scheduling import Scheduled
@@ -48,8 +48,8 @@ def schedule(
     """Simulate the computers and networks of a system: response times, missed deadlines, bounds of theory."""
     if until is not None and not 0.0 < until < float("inf"):
         raise UsageError(f"--until {until:g}: expected a positive number of seconds")
-    if out is not None and out.suffix[1:] not in FORMATS:
-        raise UsageError(f"--out {out}: expected a figure ending in one of {', '.join(FORMATS)}")
+    if out is not None:
+        expect_figure(out)
     from orchestration.runs import scheduling
     from orchestration.system.paths import changed
     from orchestration.system.request import system_of

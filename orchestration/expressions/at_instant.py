@@ -5,7 +5,7 @@ from typing import Any, TypeAlias
 
 from orchestration.basics.errors import UsageError
 from orchestration.expressions.operators import OPERATORS, PYTHON
-from orchestration.expressions.scalars import scalars
+from orchestration.expressions.scalars import A_NUMBER, scalar, scalars
 from orchestration.expressions.syntax import Call, Name, Node, Number, Operation, Sampled, children, is_over_run
 
 Current: TypeAlias = Callable[[Sequence[float]], float]
@@ -19,11 +19,8 @@ def compiled(node: Node, places: Mapping[str, int]) -> Current:
     """
     vectors: dict[str, Sequence[str]] = {}
     _check(node, places, vectors)
-    found = scalars(node, vectors)
-    if len(found) != 1:
-        raise UsageError("it is a vector; expected a number, such as norm(…)")
     written = _Lines(places)
-    result = written.value(found[0])
+    result = written.value(scalar(node, vectors))
     scope: dict[str, Any] = dict(PYTHON)
     # The text has only numbers, indices and operators, whatever the expression is.
     exec("\n    ".join(["def current(values):", *written.lines, f"return {result}"]), scope)
@@ -46,7 +43,7 @@ def _check(node: Node, places: Mapping[str, int], vectors: dict[str, Sequence[st
     if isinstance(node, Call) and not OPERATORS[node.function].joins:
         sizes = [len(scalars(argument, vectors)) for argument in node.arguments]
         if max(sizes) > 1:
-            raise UsageError(f"{node.function} of a vector; expected a number, such as norm(…)")
+            raise UsageError(f"{node.function} of a vector; {A_NUMBER}")
 
 
 class _Lines:

@@ -9,8 +9,9 @@ import numpy as np
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
 from orchestration.expressions.operators import applied
-from orchestration.expressions.recorded import STOP_TIME, TIME, Recorded
+from orchestration.expressions.recorded import STOP_TIME, TIME, Recorded, alone, unknown
 from orchestration.expressions.reductions import Course, Fold
+from orchestration.expressions.scalars import IS_VECTOR
 from orchestration.expressions.syntax import Call, Name, Node, Number, Operation, Sampled, is_over_run, names
 
 
@@ -37,7 +38,7 @@ class SpanValues:
         """The values of an expression at the rows."""
         data = self._at(node, "rows")
         if isinstance(data, np.ndarray) and data.ndim > 1:
-            raise UsageError("it is a vector; expected a number, as norm(…)")
+            raise UsageError(IS_VECTOR)
         return data
 
     def _at(self, node: Node, place: str) -> Any:
@@ -53,8 +54,7 @@ class SpanValues:
             case Name(name):
                 return self._named(name, place)
             case Sampled(connection, _):
-                expected = "inside max, mean, rms, share or growth_share"
-                raise UsageError(f"sampled({connection}, …): expected {expected}")
+                raise alone(connection)
             case Call() if is_over_run(node):
                 return self._known[node]
             case Operation(word, operands) | Call(word, operands):
@@ -73,7 +73,7 @@ class SpanValues:
             return _between(recorded.signals[name], recorded.ends.get(name), place)
         if name in recorded.vectors:
             return np.array([self._named(part, place) for part in recorded.vectors[name]])
-        raise UsageError(f"there is no {name}; expected a recorded signal, time, stop_time or an objective above it")
+        raise unknown(name)
 
     def _course(self, node: Node, function: str) -> Course:
         recorded, first = self._recorded, int(self._recorded.goes_on)

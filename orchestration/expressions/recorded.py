@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, TypeAlias
 
+from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Booleans, Floats
 
 TIME, STOP_TIME = "time", "stop_time"
@@ -39,6 +40,16 @@ class Recorded:
 
 Spans: TypeAlias = Callable[[], Iterator[Recorded]]
 """The spans of a run, in order; can be iterated repeatedly"""
+
+
+def unknown(name: str) -> UsageError:
+    """The error for a name that an objective cannot have."""
+    return UsageError(f"there is no {name}; expected a recorded signal, time, stop_time or an objective above it")
+
+
+def alone(connection: str) -> UsageError:
+    """The error for samples of a connection that are not reduced to a number."""
+    return UsageError(f"sampled({connection}, …): expected inside max, mean, rms, share or growth_share")
 
 
 def vectors(signals: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:

@@ -6,6 +6,9 @@ from orchestration.basics.errors import UsageError
 from orchestration.expressions.operators import OPERATORS
 from orchestration.expressions.syntax import Call, Name, Node, Operation, Sampled, is_over_run
 
+A_NUMBER = "expected a number, as norm(…)"
+IS_VECTOR = f"it is a vector; {A_NUMBER}"
+
 
 def scalars(node: Node, vectors: Mapping[str, Sequence[str]]) -> list[Node]:
     """The expression in terms of signals only: one, or several for a vector.
@@ -18,20 +21,21 @@ def scalars(node: Node, vectors: Mapping[str, Sequence[str]]) -> list[Node]:
         case Operation(sign, operands):
             return [Operation(sign, parts) for parts in _side_by_side(sign, operands, vectors)]
         case Call(function, arguments) if is_over_run(node):
-            return [Call(function, tuple(_one(argument, vectors) for argument in arguments))]
+            return [Call(function, tuple(scalar(argument, vectors) for argument in arguments))]
         case Call(function, arguments) if OPERATORS[function].joins:
             return [Call(function, tuple(part for argument in arguments for part in scalars(argument, vectors)))]
         case Call(function, arguments):
             return [Call(function, parts) for parts in _side_by_side(function, arguments, vectors)]
         case Sampled(connection, argument):
-            return [Sampled(connection, _one(argument, vectors))]
+            return [Sampled(connection, scalar(argument, vectors))]
     return [node]
 
 
-def _one(node: Node, vectors: Mapping[str, Sequence[str]]) -> Node:
+def scalar(node: Node, vectors: Mapping[str, Sequence[str]]) -> Node:
+    """The expression of a number in terms of signals only; raises `UsageError` for a vector."""
     found = scalars(node, vectors)
     if len(found) > 1:
-        raise UsageError("it is a vector; expected a number, as norm(…)")
+        raise UsageError(IS_VECTOR)
     return found[0]
 
 

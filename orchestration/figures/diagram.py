@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 
 from orchestration.basics.errors import UsageError
-from orchestration.figures.names import FORMATS
+from orchestration.figures.names import expect_figure
 from orchestration.figures.palette import CONTINUOUS, LINE, SAMPLED, SOURCE
 from orchestration.figures.style import SCREEN, save
 from orchestration.system.description import describe_faults, describe_rate, describe_source
@@ -47,8 +47,7 @@ class _Arrow:
 
 def write(system: System, path: Path) -> Path:
     """Draw a system into a file in the format of its ending; raises `UsageError` for an unknown ending."""
-    if path.suffix[1:] not in FORMATS:
-        raise UsageError(f"--out {path}: expected a figure ending in one of {', '.join(FORMATS)}")
+    expect_figure(path)
     style = replace(SCREEN, formats=(path.suffix[1:],))
     with style.applied():
         figure = draw(system)

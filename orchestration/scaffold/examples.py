@@ -3,8 +3,8 @@
 import shutil
 from pathlib import Path
 
-from orchestration.basics.errors import UsageError
 from orchestration.building import consent
+from orchestration.scaffold.folder import expect_new
 
 FOLDERS = ("examples", "studies", "gains")
 """written together: studies read gains"""
@@ -22,8 +22,7 @@ def write(where: Path) -> list[Path]:
     origin = _SHIPPED if _SHIPPED.is_dir() else Path(__file__).parents[2]
     written = [where / name for name in FOLDERS]
     for folder in written:
-        if folder.exists():
-            raise UsageError(f"{folder}: exists already; expected a folder that does not exist")
+        expect_new(folder)
     for name, folder in zip(FOLDERS, written):
         for file in sorted((origin / name).rglob("*")):
             if file.suffix in KEPT:

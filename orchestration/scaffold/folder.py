@@ -27,8 +27,7 @@ def write(kind: Kind, name: str, where: Path, *, author: str, license: str) -> l
     module = module_name(model)
     _expect_usable(name, model, module)
     folder = where / name
-    if folder.exists():
-        raise UsageError(f"{folder}: exists already; expected a folder that does not exist")
+    expect_new(folder)
     names = {"Name": model, "module": module, "folder": name, "author": _quoted(author), "license": _quoted(license)}
     files = {
         f"{module}.py": "law.py",
@@ -42,6 +41,12 @@ def write(kind: Kind, name: str, where: Path, *, author: str, license: str) -> l
         (folder / file).write_text(Template(text).substitute(names), encoding="utf-8")
     consent.agree(folder)
     return [folder / file for file in files]
+
+
+def expect_new(folder: Path) -> None:
+    """Raise `UsageError` for a folder that exists."""
+    if folder.exists():
+        raise UsageError(f"{folder}: exists already; expected a folder that does not exist")
 
 
 def class_name(name: str) -> str:

@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from orchestration.basics.errors import UsageError
 from orchestration.expressions.operators import OPERATORS
+from orchestration.expressions.recorded import alone, unknown
 from orchestration.expressions.syntax import Call, Name, Node, Number, Operation, Sampled
 
 Moment: TypeAlias = Literal["row", "end", "middle"]
@@ -129,9 +129,7 @@ class ExpressionWriter:
     def leaf(self, name: str) -> Leaf:
         """The leaf of a name; raises `UsageError` for an unknown one."""
         if name not in self._leaves:
-            raise UsageError(
-                f"there is no {name}; expected a recorded signal, time, stop_time or an objective above it"
-            )
+            raise unknown(name)
         return self._leaves[name]
 
     def _code(self, node: Node, place: Moment, into: Section) -> str:
@@ -141,8 +139,7 @@ class ExpressionWriter:
             case Operation(sign) if OPERATORS[sign].gives_truth:
                 return f"TRUE({self._truth(node, place, into)})"
             case Sampled(connection, _):
-                expected = "inside max, mean, rms, share or growth_share"
-                raise UsageError(f"sampled({connection}, …): expected {expected}")
+                raise alone(connection)
             case Operation(word, operands) | Call(word, operands) if node not in self._reductions:
                 return OPERATORS[word].lanes(*(self.value(operand, place, into) for operand in operands))
         return self._reductions[node]

@@ -17,10 +17,9 @@ from orchestration.requests.ssp.structure import Node, Path_, Structure, Wire, d
 from orchestration.requests.ssp.timing import expect_tables, from_text
 from orchestration.system.component import Parameter
 from orchestration.system.conversion import Conversion, OtherQuantity, between
+from orchestration.system.proposal import TAKEN
 from orchestration.system.variable_names import component_of
 
-TAKEN = frozenset(("rows", "time", "stop_time", "sampled"))
-"""Names that no component can have"""
 CLOCK = (SAMPLE_PERIOD, SAMPLE_OFFSET)
 
 

@@ -153,7 +153,7 @@ def test_a_tool_that_is_not_installed_is_named_with_the_way_to_install_it(
 
     monkeypatch.setattr(importlib.metadata, "version", without)
     line = error_line(interop(code=1))
-    assert line == f"{package} is not installed; this command needs: pip install 'quadcosim[interop]'"
+    assert line == f"{package} is not installed; this needs: pip install 'quadcosim[interop]'"
 
 
 @pytest.mark.parametrize("python", [None, "", "nowhere/python", sys.executable])
