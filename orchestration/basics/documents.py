@@ -91,9 +91,9 @@ def tables_in(text: str) -> dict[str, Any]:
     return tables
 
 
-def read_json(path: Path, what: str) -> Any:
+def read_json(path: Path) -> Any:
     """The value of a JSON file; raises `UsageError` if it is not JSON, which has no `NaN` and `Infinity`."""
-    text = read_text(path, what)
+    text = read_text(path, "JSON file")
     try:
         value = json.loads(text, parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as error:

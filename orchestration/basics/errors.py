@@ -2,7 +2,7 @@
 
 import difflib
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 
 LONGEST = 4000
@@ -68,6 +68,13 @@ def expected_name(name: str, known: Sequence[str]) -> str:
     close = _closest(name, known)
     hint = "" if close is None else f"did you mean {close}? "
     return f"{hint}expected one of {', '.join(known)}"
+
+
+def listed(names: Iterable[str], most: int = 12) -> str:
+    """Names for a message: the first `most` of them, and how many more there are."""
+    known = list(names)
+    first = ", ".join(known[:most]) or "(none)"
+    return first if len(known) <= most else f"{first} and {len(known) - most} more"
 
 
 def no_such_key(table: str, key: str, known: Sequence[str], beside: str = "") -> str:

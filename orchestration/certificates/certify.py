@@ -39,16 +39,14 @@ class CertificateOnStep:
     step: int
 
 
-def find_certificate(
-    family: LoopFamily, of: Sequence[str], first: int = 0, radius: float = RADIUS
-) -> CertificateOnStep | None:
+def find_certificate(family: LoopFamily, of: Sequence[str], first: int = 0) -> CertificateOnStep | None:
     """A certificate that the checker accepts, from a step of the ladder on; None if none was found."""
     parts = parts_of(family)
     for step, (labels, memory) in enumerate(LADDER):
         if step < first:
             continue
         certificate = Certificate(
-            of=tuple(of), radius=radius, family=family, cells=tuple(_cells_of(family, labels, 1)),
+            of=tuple(of), radius=RADIUS, family=family, cells=tuple(_cells_of(family, labels, 1)),
             coordinates=_coordinates(family, parts), memory=memory, forms={},
         )  # fmt: skip
         if inequalities_of(certificate) > LARGEST:

@@ -9,7 +9,7 @@ from orchestration.basics.errors import QuadcosimError, UsageError, expected_nam
 from orchestration.basics.simulator import Simulator
 from orchestration.engines.compiled import CompiledLoop, Condition, reason_unavailable
 from orchestration.engines.master import Master
-from orchestration.engines.room import Room, private
+from orchestration.engines.room import Room
 from orchestration.system.model import System
 from orchestration.system.times import nanoseconds
 
@@ -31,7 +31,7 @@ def create_master(
     simulators: Mapping[str, Simulator],
     *,
     condition: Condition,
-    room: Room = private,
+    room: Room,
     **others: Any,
 ) -> Master:
     """The master of a run, with an engine; default: the compiled loop where available.

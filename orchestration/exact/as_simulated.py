@@ -87,7 +87,7 @@ class SimulatedEffects(LoopEffects):
         change, costs = self._maps[duration]
         whole = np.eye(len(piece.Z))
         whole[: self.size, : self.size] = change
-        return piece.charged(costs, 1.0).mapped(whole)
+        return piece.charged(costs).mapped(whole)
 
     def tick(self, piece: Piece, grid: int) -> Piece:
         """As `Effects`: noise is drawn anew at its points."""

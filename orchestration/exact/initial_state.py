@@ -57,7 +57,7 @@ def initial_state_of(
     rest = {name: _outputs(loop.simulation.instances[name], part.outputs) for name, part in parts.items()}
     received_at_rest = [channel.received for channel in loop.simulation.master.channels]
     return InitialState(
-        states={name: tangents[name].coordinates_of(saved[name], 0.0) for name in parts},
+        states={name: tangents[name].coordinates_of(saved[name]) for name in parts},
         outputs={name: outputs[name] - rest[name] for name in parts},
         received={x.name: now - then for x, now, then in zip(system.connections, received, received_at_rest)},
     )

@@ -45,11 +45,10 @@ class Piece:
         W = change @ self.W @ change.T
         return Piece(change @ self.Z, W if covariance is None else W + covariance, self.M, self.c)
 
-    def charged(self, Q: Floats, weight: float) -> Piece:
-        """With `weight` times the costs z'Q z of the present state added, Q of its first numbers."""
+    def charged(self, Q: Floats) -> Piece:
+        """With the costs z'Q z of the present state added, Q of its first numbers."""
         n = Q.shape[-1]
         head = self.Z[:n]
         return Piece(
-            self.Z, self.W, self.M + weight * (head.T @ Q @ head),
-            self.c + weight * np.einsum("kij,ij->k", Q, self.W[:n, :n]),
+            self.Z, self.W, self.M + head.T @ Q @ head, self.c + np.einsum("kij,ij->k", Q, self.W[:n, :n])
         )  # fmt: skip

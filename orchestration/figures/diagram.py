@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 
-from orchestration.basics.errors import UsageError
+from orchestration.basics.errors import UsageError, listed
 from orchestration.figures.names import expect_figure
 from orchestration.figures.palette import CONTINUOUS, LINE, SAMPLED, SOURCE
 from orchestration.figures.style import SCREEN, save
@@ -115,23 +115,22 @@ def _arrows(system: System, places: Mapping[str, int]) -> list[_Arrow]:
         for receiver in dict.fromkeys(map(component_of, source.to)):
             inputs = [variable_of(end) for end in source.to if component_of(end) == receiver]
             start, end = places[f"sources.{name}"], places[receiver]
-            arrows.append(_Arrow(start=start, end=end, name="", text=_listed(inputs), is_late=False))
+            arrows.append(_Arrow(start=start, end=end, name="", text=_few(inputs), is_late=False))
     for x in system.connections:
         arrows.append(
             _Arrow(
                 start=places[x.sender],
                 end=places[x.receiver],
                 name="" if x.name.isdecimal() else x.name,
-                text="\n".join(filter(None, (_listed([variable_of(end) for end in x.start]), describe_faults(x)))),
+                text="\n".join(filter(None, (_few([variable_of(end) for end in x.start]), describe_faults(x)))),
                 is_late=bool(x.delay or x.delay_jitter or x.loss),
             )
         )
     return arrows
 
 
-def _listed(names: Sequence[str], most: int = 4) -> str:
-    stems = list(dict.fromkeys(name.rpartition(".")[0] or name for name in names)) if len(names) > most else list(names)
-    return ", ".join(stems[:most]) + (f" and {len(stems) - most} more" if len(stems) > most else "")
+def _few(names: Sequence[str], most: int = 4) -> str:
+    return listed(names if len(names) <= most else {name.rpartition(".")[0] or name: None for name in names}, most)
 
 
 def _lanes(arrows: Sequence[_Arrow]) -> dict[_Arrow, int]:

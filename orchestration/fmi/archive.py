@@ -1,6 +1,5 @@
 """The archive of an FMU, opened once for all checks, and its model description."""
 
-import math
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
@@ -61,7 +60,7 @@ class _Files(Mapping[str, bytes]):
         return len(self._names)
 
 
-def read_archive(path: Path, size_limit: float = math.inf) -> Archive:
+def read_archive(path: Path, size_limit: float) -> Archive:
     """Open an archive after checking that it is intact; it stays open.
 
     Raises `UnreadableFmuError` if it is no archive, is damaged, unpacks to more than `size_limit` MB, or has no model

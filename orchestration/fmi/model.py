@@ -17,7 +17,7 @@ import fmpy
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from fmu_kit.archive import read_source_hash
-from orchestration.basics.errors import UsageError, no_utf8
+from orchestration.basics.errors import UsageError, listed, no_utf8
 from orchestration.basics.units import BASE, BaseUnits, Unit, named
 from orchestration.fmi.archive import expect_honest_size
 from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
@@ -134,7 +134,9 @@ class Model:
         near = difflib.get_close_matches(name, list(self.variables), n=3)
         hint = f"did you mean {' or '.join(near)}? " if near else ""
         settable = [v.name for v in self.variables.values() if v.causality == "parameter"]
-        raise UsageError(f"{place}: {self.name} has no such variable; {hint}its parameters are {_listed(settable)}")
+        raise UsageError(
+            f"{place}: {self.name} has no such variable; {hint}its parameters are {listed(settable, most=20)}"
+        )
 
     def base_units(self, unit: str | None) -> BaseUnits | None:
         """A unit in base units, by the FMU's definitions; None if they do not define it."""
@@ -255,12 +257,12 @@ def _dependencies(description: ModelDescription, variables: Mapping[str, Variabl
     for variable in variables.values():
         names.setdefault((variable.type, variable.reference), []).append(variable.name)
     inputs = {v.name for v in variables.values() if v.causality == "input"}
-    listed = description.initialUnknowns
-    nothing: frozenset[str] | None = frozenset() if listed else None
+    unknowns = description.initialUnknowns
+    nothing: frozenset[str] | None = frozenset() if unknowns else None
     dependencies: dict[str, frozenset[str] | None] = {
         v.name: nothing for v in variables.values() if v.causality == "output"
     }
-    for unknown in listed:
+    for unknown in unknowns:
         needed = unknown.dependencies
         which = (
             None if needed is None else frozenset(n for v in needed for n in names[v.type, v.valueReference]) & inputs
@@ -268,8 +270,3 @@ def _dependencies(description: ModelDescription, variables: Mapping[str, Variabl
         for name in names.get((unknown.variable.type, unknown.variable.valueReference), ()):
             dependencies[name] = which
     return dependencies
-
-
-def _listed(names: list[str], most: int = 20) -> str:
-    shown = ", ".join(names[:most]) or "(none)"
-    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"

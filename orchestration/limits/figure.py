@@ -147,7 +147,7 @@ def draw_limit(request: Request, result: LimitResult, folder: Path, style: Style
     return written
 
 
-def draw_spectral_radius(request: Request, result: LimitResult, folder: Path, style: Style = SCREEN) -> list[Path]:
+def draw_spectral_radius(request: Request, result: LimitResult, folder: Path, style: Style) -> list[Path]:
     """Draw the spectral radius of the loop over the quantity; the paths, empty if no linear loop is known.
 
     Raises `UsageError` where linear theory does not apply, and `LostError` as `isolated_call` does.

@@ -76,7 +76,7 @@ class Starts:
         return InitialConditions(size=size, values=values)
 
 
-def starts_in(table: Mapping[str, Any], beside: Sequence[str] = ()) -> Starts:
+def starts_in(table: Mapping[str, Any], beside: Sequence[str]) -> Starts:
     """The ensemble that a table of a file describes; keys `beside` are accepted too. Raises `UsageError`."""
     names = [field.name for field in dataclasses.fields(Starts)]
     for key in table:

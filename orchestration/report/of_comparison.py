@@ -26,9 +26,9 @@ def comparison_report(
     path: Path,
     command: str,
     *,
-    required: Sequence[int] = (),
-    most: int | None = None,
-    progress: Progress | None = None,
+    required: Sequence[int],
+    most: int | None,
+    progress: Progress | None,
 ) -> Report:
     """The report of a comparison with its store at `path`: that of its study, and its cells."""
     study = comparison.study

@@ -94,7 +94,7 @@ def metric(name: str) -> str:
     return METRICS[name][0] if name in METRICS else words(name)
 
 
-def metric_with_unit(name: str, of: str | None = None) -> str:
+def metric_with_unit(name: str, of: str | None) -> str:
     """The display name of a metric with its unit: the unit from its FMUs, else the quadrotor's."""
     return with_unit(metric(name), of or METRICS.get(name, ("", None))[1])
 

@@ -127,7 +127,7 @@ _TEXT, _NUMBER = (str, type(None)), (int, float, type(None))
 
 def _object(path: Path, **types: tuple[type, ...]) -> dict[str, Any]:
     """The object in a JSON file; raises `UsageError` unless the values by these names have one of these types."""
-    content = read_json(path, "JSON file")
+    content = read_json(path)
     if not isinstance(content, dict):
         raise UsageError(f"{path}: expected an object")
     for name, kinds in types.items():

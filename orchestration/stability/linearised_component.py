@@ -173,12 +173,12 @@ class Tangent(LinearSimulator):
         scale = np.abs(measured).max(axis=(0, 2), initial=0.0)[:, None]
         return float((np.abs(measured - np.array(predicted)) / np.maximum(scale, 1e-300)).max(initial=0.0))
 
-    def coordinates_of(self, saved: bytes, time: float) -> Floats:
-        """The coordinates of a saved state as its deviation from rest; the next step is at `time` [s].
+    def coordinates_of(self, saved: bytes) -> Floats:
+        """The coordinates of a state saved at time 0 as its deviation from rest.
 
         Raises `UsageError` for one that no input reaches, or from which the component is not linear.
         """
-        state, h = _State(saved, time), self._ladder[0]
+        state, h = _State(saved, 0.0), self._ladder[0]
         found: Floats = self._axes.T @ self._deviation(state)
         outputs, later = self._stepped(state, self._held, h)
         at_rest, _ = self._stepped(self._rest, self._held, h)

@@ -28,7 +28,7 @@ from orchestration.stability.operating_point import (
 )
 from orchestration.system.distribution import highest
 from orchestration.system.model import System
-from orchestration.system.placement import expect_unscheduled
+from orchestration.system.placement import expect_fixed_periods
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
 from orchestration.system.variable_names import component_of, variable_of
 
@@ -132,7 +132,7 @@ def at_rest(
 
 
 def _expect_period(system: System) -> Fraction:
-    expect_unscheduled(system, "has no fixed period, which a linearised loop needs")
+    expect_fixed_periods(system)
     for name, component in system.components.items():
         if component.sampling is not None and component.sampling.clock == "fmu":
             raise UsageError(f"{name} has its own clock")

@@ -50,7 +50,7 @@ def draw_study(
 
 
 def study_figures(
-    study: Study, store: Path, metric: str | None = None, style: Style = SCREEN
+    study: Study, store: Path, metric: str | None, style: Style = SCREEN
 ) -> tuple[dict[str, Figure], list[sensitivity.Index]]:
     """The figures of a metric over the axes of `study` by name, and the sensitivity indices that they show, if any.
 

@@ -3,7 +3,7 @@
 import difflib
 from collections.abc import Iterable, Mapping
 
-from orchestration.basics.errors import UsageError, expected_name
+from orchestration.basics.errors import UsageError, expected_name, listed
 from orchestration.expressions.syntax import Name, names, parse, parts
 from orchestration.fmi.model import NUMERIC, Model, Variable
 from orchestration.fmi.values import convert_value
@@ -115,7 +115,7 @@ def _check_pair(place: str, x: Connection, start: End, end: End) -> None:
     if output is None or output.causality not in ("output", "local"):
         raise UsageError(f"{place}.from: {_wrong_causality(start, 'output', model.names('output'))}")
     if output.kind not in NUMERIC:
-        raise UsageError(f"{place}.from: {start[0]} is a {output.kind}; only {_list(NUMERIC)} can be connected")
+        raise UsageError(f"{place}.from: {start[0]} is a {output.kind}; only {listed(NUMERIC)} can be connected")
     receiver = _expect_input(f"{place}.to", end[0], end)
     _check_kinds(place, start[0], output, end[0], receiver)
     if not (x.stated or x.converts):
@@ -139,7 +139,7 @@ def _check_units(
 
 def _check_kinds(place: str, start: str, output: Variable, end: str, receiver: Variable) -> None:
     if receiver.kind not in BECOMES[output.kind]:
-        expected = _list(kind for kind in NUMERIC if kind in BECOMES[output.kind])
+        expected = listed(kind for kind in NUMERIC if kind in BECOMES[output.kind])
         raise UsageError(f"{place}: {start} is a {output.kind}, {end} a {receiver.kind}; expected {expected}")
 
 
@@ -148,7 +148,7 @@ def _expect_input(place: str, end: str, found: End) -> Variable:
     if variable is None or variable.causality != "input":
         raise UsageError(f"{place}: {_wrong_causality(found, 'input', model.names('input'))}")
     if variable.kind not in NUMERIC:
-        raise UsageError(f"{place}: {end} is a {variable.kind}; only {_list(NUMERIC)} can be connected")
+        raise UsageError(f"{place}: {end} is a {variable.kind}; only {listed(NUMERIC)} can be connected")
     return variable
 
 
@@ -157,14 +157,14 @@ def _missing_variables(model: Model, causality: str, missing: list[str]) -> str:
     names = model.names(causality)
     near = difflib.get_close_matches(missing[0], names, n=1)
     hint = f"; did you mean {near[0]}?" if near else ""
-    return f"{model.name} has no {causality} {', '.join(missing)}; its {causality}s are {_list(names)}{hint}"
+    return f"{model.name} has no {causality} {', '.join(missing)}; its {causality}s are {listed(names)}{hint}"
 
 
 def _wrong_causality(end: End, expected: str, valid: Iterable[str]) -> str:
     name, model, variable = end
     if variable is None:
         return _missing_variables(model, expected, [variable_of(name)])
-    return f"{name} is {_with_article(variable)}; expected an {expected}: {_list(valid)}"
+    return f"{name} is {_with_article(variable)}; expected an {expected}: {listed(valid)}"
 
 
 def _with_article(variable: Variable) -> str:
@@ -186,9 +186,3 @@ def expect_parameter(place: str, model: Model, name: str, value: Parameter, *, i
             f"{word} {bound:g}" for word, bound in (("at least", low), ("at most", high)) if bound is not None
         )
         raise UsageError(f"{place} = {value}: expected {bounds}")
-
-
-def _list(names: Iterable[str], most: int = 12) -> str:
-    listed = list(names)
-    shown = ", ".join(listed[:most]) or "(none)"
-    return shown if len(listed) <= most else f"{shown} and {len(listed) - most} more"

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+from orchestration.basics.errors import listed
 from orchestration.basics.units import in_brackets
 from orchestration.system.component import Component
 from orchestration.system.computers import Message, Task
@@ -13,6 +14,9 @@ from orchestration.system.placement import PlacedMessage, PlacedTask, placed_mes
 from orchestration.system.sampling import Sampling, SamplingOnArrival, TaskSampling
 from orchestration.system.source import Source
 from orchestration.system.variable_names import variable_of
+
+MOST = 6
+"""names in a cell; more are counted"""
 
 
 def as_text(system: System, units: Mapping[str, str] = {}, follows: str = "") -> str:
@@ -26,7 +30,7 @@ def as_text(system: System, units: Mapping[str, str] = {}, follows: str = "") ->
         for x in system.connections
     ]
     sources = [
-        (name, describe_source(s), ", ".join(_shortened(s.to)) or "(objectives)") for name, s in system.sources.items()
+        (name, describe_source(s), _shortened(s.to) if s.to else "(objectives)") for name, s in system.sources.items()
     ]
     named = [in_brackets(name, units.get(name)) for name in system.objectives]
     criterion = system.criterion
@@ -104,8 +108,8 @@ def describe_sampling(sampling: Sampling) -> str:
 def describe_signals(x: Connection) -> str:
     """The variables that it carries, vectors as a whole; with the names at the receiver where they differ."""
     names, others = (list(map(variable_of, ends)) for ends in (x.start, x.end))
-    carried = ", ".join(_shortened(names))
-    return carried if names == others else f"{carried} -> {', '.join(_shortened(others))}"
+    carried = _shortened(names)
+    return carried if names == others else f"{carried} -> {_shortened(others)}"
 
 
 def describe_faults(x: Connection) -> str:
@@ -155,15 +159,11 @@ def describe_varying(of: Varying, formatted: Callable[[float], str] | None = Non
     values = [formatted(value) for value in of.values or ()]
     if of.probabilities is not None:
         values = [f"{value} ({share:g})" for value, share in zip(values, of.probabilities, strict=True)]
-    return f"one of {', '.join(_first_few(values))}"
+    return f"one of {listed(values, MOST)}"
 
 
 def _largest(jitter: Varying, spread: str) -> str:
     return describe_varying(jitter) if isinstance(jitter, Distribution) else f"{seconds(jitter)} {spread}"
-
-
-def _first_few(names: list[str], most: int = 6) -> list[str]:
-    return names if len(names) <= most else [*names[: most - 1], f"{len(names) - most + 1} more"]
 
 
 def seconds(value: float) -> str:
@@ -182,8 +182,8 @@ def _parameters(component: Component) -> str:
     return ", ".join(f"{name} = {value}" for name, value in component.parameters.items())
 
 
-def _shortened(names: Sequence[str], most: int = 6) -> list[str]:
-    """Scalars of a vector under its name, as `position.{x,y,z}`; at most `most` names."""
+def _shortened(names: Sequence[str]) -> str:
+    """Scalars of a vector under its name, as `position.{x,y,z}`; at most `MOST` names."""
     groups: dict[str, list[str]] = {}
     for name in names:
         stem, dot, last = name.rpartition(".")
@@ -192,7 +192,7 @@ def _shortened(names: Sequence[str], most: int = 6) -> list[str]:
         f"{stem}{parts[0]}" if len(parts) == 1 else f"{stem}.{{{','.join(part[1:] for part in parts)}}}"
         for stem, parts in groups.items()
     ]
-    return _first_few(named, most)
+    return listed(named, MOST)
 
 
 def _table(rows: Sequence[Sequence[str]]) -> list[str]:

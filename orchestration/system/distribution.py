@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 from orchestration.basics.records import record
 from orchestration.system.choices import TraceOrder
-from orchestration.system.requirements import is_finite, require, require_bursts, require_share
+from orchestration.system.requirements import is_finite, require, require_loss
 
 if TYPE_CHECKING:
     from orchestration.basics.simulator import Floats
@@ -200,8 +200,7 @@ def require_losses(of: object, burst_length: float | None, *names: str, place: s
     for name in names:
         losses = getattr(of, name)
         if not isinstance(losses, Distribution):
-            require_share(of, name, place=place)
-            require_bursts(of, burst_length, name, place=place)
+            require_loss(of, name, burst_length, place)
             continue
         is_table = losses.values is not None or losses.file is not None
         require(is_table, place + name, "a formula", "a probability, or values or a file of 0 and 1")

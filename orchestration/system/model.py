@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field, replace
 from typing import Any, ClassVar
 
-from orchestration.basics.errors import UsageError
+from orchestration.basics.errors import UsageError, listed
 from orchestration.basics.records import record
 from orchestration.expressions.syntax import is_number, parse
 from orchestration.system.component import Component
@@ -63,8 +63,8 @@ class System:
             "networks": self.networks,
             "objectives": self.objectives,
         }
-        listed = [f"{what}: {', '.join(_few([*names]))}" for what, names in named.items() if names]
-        return f"<System of {self.stop_time:g} s; {'; '.join(listed)}>"
+        parts = [f"{what}: {listed(names, most=6)}" for what, names in named.items() if names]
+        return f"<System of {self.stop_time:g} s; {'; '.join(parts)}>"
 
     @property
     def fmus(self) -> dict[str, str]:
@@ -180,10 +180,6 @@ TASK_CAUSES, MESSAGE_CAUSES = ("execution", "jitter", "arrivals"), ("jitter", "a
 """The random streams of a task, and of a message"""
 
 
-def _few(names: list[str], most: int = 6) -> list[str]:
-    return names if len(names) <= most else [*names[: most - 1], f"… {len(names)} in all"]
-
-
 def _require_names(table: str, names: Iterable[str], without: str = "") -> None:
     """Raise `UsageError` for a name that cannot be part of a path and of a message of one line."""
     for name in names:
@@ -204,13 +200,13 @@ def expressions(system: System) -> list[tuple[str, str]]:
 
 
 @functools.lru_cache(maxsize=256)
-def _require_expressions(listed: tuple[tuple[str, str], ...]) -> None:
+def _require_expressions(texts: tuple[tuple[str, str], ...]) -> None:
     """Raise `UsageError` for one that is not valid, or for a criterion that is no condition; cached for studies."""
-    for place, text in listed:
+    for place, text in texts:
         try:
             node = parse(text)
         except UsageError as error:
             raise UsageError(f"{place}: {error}") from error
         if place.startswith("criterion."):
-            condition = parse(dict(listed).get(f"objectives.{text.strip()}", text))
+            condition = parse(dict(texts).get(f"objectives.{text.strip()}", text))
             require(not is_number(condition) and not is_number(node), place, text, "a condition, as in peak < 2.5")

@@ -87,13 +87,13 @@ def released_by(system: "System") -> dict[str, tuple[str, ...]]:
     return found
 
 
-def expect_unscheduled(system: "System", why: str) -> None:
-    """Raise `UsageError`, saying `why`, for a system with instants that the scheduler computes."""
+def expect_fixed_periods(system: "System") -> None:
+    """Raise `UsageError` for a system with instants that the scheduler computes."""
     placed = [task.place for task in tasks_of(system).values()]
     placed += [message.place for message in messages_by_connection(system).values()]
     placed += [f"components.{name}.sampling.on" for name in _by_arrivals(system)]
     if placed:
-        raise UsageError(f"{placed[0]}: {why}")
+        raise UsageError(f"{placed[0]}: has no fixed period, which a linearised loop needs")
 
 
 def _by_arrivals(system: "System") -> dict[str, str]:

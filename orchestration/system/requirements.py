@@ -39,23 +39,15 @@ def require_not_negative(of: object, *names: str, place: str = "") -> None:
         require(is_finite(value) and value >= 0.0, place + name, value, "zero or a positive number")
 
 
-def require_share(of: object, *names: str, place: str = "") -> None:
-    """Require the fields `names` to be probabilities."""
-    for name in names:
-        value = getattr(of, name)
-        require(is_number(value) and 0.0 <= value <= 1.0, place + name, value, "a probability in [0, 1]")
-
-
-def require_bursts(of: object, length: float | None, *losses: str, place: str = "") -> None:
-    """Require probabilities in the fields `losses` that allow bursts of mean `length`; None: independent losses."""
+def require_loss(of: object, name: str, burst_length: float | None, place: str) -> None:
+    """Require the field `name` to be a probability that allows bursts of this mean length; None: independent losses."""
+    loss, length = getattr(of, name), burst_length
+    require(is_number(loss) and 0.0 <= loss <= 1.0, place + name, loss, "a probability in [0, 1]")
     if length is None:
         return
     require(is_number(length) and 1.0 <= length < math.inf, f"{place}burst_length", length, "at least 1 loss")
     possible = length / (length + 1.0)
-    for name in losses:
-        loss = getattr(of, name)
-        fits = loss <= possible or loss == 1.0
-        require(fits, place + name, loss, f"at most {possible:g} in bursts of {length:g}")
+    require(loss <= possible or loss == 1.0, place + name, loss, f"at most {possible:g} in bursts of {length:g}")
 
 
 def require_own_clock(of: Any, place: str = "") -> None:

@@ -92,7 +92,7 @@ def _with_constants_at_rest(system: System) -> System:
     return replace(system, sources=sources)
 
 
-def complete_export(request: Request, announce: Callable[[str], None] | None = None) -> Export:
+def complete_export(request: Request, announce: Callable[[str], None] | None) -> Export:
     """As `export_of`; raises `UsageError` for the first feature that an SSP lacks."""
     export = export_of(request, announce)
     if export.unsupported:

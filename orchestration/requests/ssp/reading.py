@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from orchestration.basics.errors import UsageError
+from orchestration.basics.errors import UsageError, listed
 from orchestration.basics.units import BaseUnits
 from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.fmi.model import Model, read_model
@@ -98,7 +98,7 @@ def _components(
     for name in timing:
         if name not in names.values():
             raise UsageError(
-                f"components.{name}: the SSP has no such component; expected one of {_list(names.values())}"
+                f"components.{name}: the SSP has no such component; expected one of {listed(names.values())}"
             )
     found = {}
     for place, name in names.items():
@@ -251,12 +251,7 @@ def _named(place: str, table: Mapping[str, Any], signals: Sequence[Signal]) -> l
         whole = [s for s in signals if (component_of(s.start), component_of(s.end)) == (start, end)]
         matching = whole or [s for s in signals if (s.start, s.end) == (start, end)]
         if not matching:
-            known = _list(f"{s.start} -> {s.end}" for s in signals)
+            known = listed(f"{s.start} -> {s.end}" for s in signals)
             raise UsageError(f"{place}: {start} -> {end} is not in the SSP, or named before; expected of {known}")
         found += matching
     return found
-
-
-def _list(names: Any, most: int = 12) -> str:
-    listed = list(names)
-    return ", ".join(listed[:most]) + (f" and {len(listed) - most} more" if len(listed) > most else "")
