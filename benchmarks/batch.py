@@ -30,7 +30,7 @@ from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.runs.many_runs import located, run_many
 from orchestration.runs.prepared import prepared
-from orchestration.schedule.schedule_cache import ScheduleCache, timing
+from orchestration.schedule.schedule_cache import ScheduleCache, schedule_key
 from orchestration.studies.axes import Axis
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import sweep
@@ -90,7 +90,7 @@ def bare_step(shape: Shape, batch: Batch, period: float, stop_time: float) -> tu
 
 def batch_step(batch: Batch, runs: list[System]) -> float:
     """CPU time of a step of the plant [s], with events and objectives."""
-    group = Group(systems=runs, timings=[timing(system) for system in runs])
+    group = Group(systems=runs, timings=[schedule_key(system) for system in runs])
     begin = time.process_time()
     result = batch.run(group)
     return (time.process_time() - begin) / float(result.steps.sum())

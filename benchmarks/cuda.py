@@ -18,7 +18,7 @@ from orchestration.engines.cuda.compiler import image
 from orchestration.engines.cuda.driver import Gpu
 from orchestration.engines.cuda.fleet import Fleet, expect_gpu
 from orchestration.engines.cuda.program import Code, line, program
-from orchestration.schedule.schedule_cache import ScheduleCache, timing
+from orchestration.schedule.schedule_cache import ScheduleCache, schedule_key
 from orchestration.system.model import System
 from orchestration.system.paths import changed
 
@@ -35,7 +35,7 @@ def groups(one: System, count: int, lanes: int) -> list[Group]:
     """The flight from `count` initial positions, in groups."""
     crowd = [changed(one, {X: place}) for place in np.linspace(0.0, 1.0, count).tolist()]
     some = (crowd[i : i + lanes] for i in range(0, count, lanes))
-    return [Group(systems=each, timings=[timing(system) for system in each]) for each in some]
+    return [Group(systems=each, timings=[schedule_key(system) for system in each]) for each in some]
 
 
 def expect_same(by_threads: Sequence[BatchResult], in_lanes: Sequence[BatchResult]) -> None:
@@ -50,7 +50,7 @@ def print_resources(architecture: str) -> None:
     """Print the resources of straight-line code on a processor."""
     shape, (one, *_) = systems(0.01, STOP_TIME)
     batch = Batch(shape, ScheduleCache())
-    next(batch.stepwise(Group(systems=[one], timings=[timing(one)])))
+    next(batch.stepwise(Group(systems=[one], timings=[schedule_key(one)])))
     codes = {name: Code.of(name, model) for name, model in shape.models.items()}
     numbers = {
         name: {place: float(memory[i, 0]) for place, i in code.constant.items()}

@@ -71,11 +71,11 @@ class Files:
 def files_of(system: System, fmus_too: Iterable[str] = (), tables_too: Iterable[str] = ()) -> Files:
     """The files of a system, FMUs built if need be; raises `UsageError` for an FMU that does not exist."""
     of_components = {system.fmus[name]: path for name, path in fmus.of_components(system.fmus).items()}
-    tables = {**tables_of(system), **{name: Path(name) for name in tables_too}}
+    tables = {**files_read_by(system), **{name: Path(name) for name in tables_too}}
     return Files(fmus=of_components | {name: fmus.locate(name) for name in fmus_too}, tables=tables)
 
 
-def tables_of(system: System) -> dict[str, Path]:
+def files_read_by(system: System) -> dict[str, Path]:
     """The files that a system reads beside its FMUs, by its names for them."""
     return {str(file): file for file in input_files(system).values()}
 

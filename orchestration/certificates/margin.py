@@ -17,7 +17,7 @@ from orchestration.certificates.breaking import LONGEST, BreakingSequence, break
 from orchestration.certificates.causes import Cause, ScheduledLoop, cause_at
 from orchestration.certificates.events import DELAY, JITTER, LOSS, Varying
 from orchestration.certificates.family import LoopFamily
-from orchestration.certificates.parts import CertifiedLoop, loop_of
+from orchestration.certificates.parts import CertifiedLoop, certified_loop
 from orchestration.certificates.repeated import least_repeated
 from orchestration.certificates.timeline import LoopTimeline
 from orchestration.exact.scheduled import without_scheduler
@@ -107,7 +107,7 @@ def _linear_loop_of(request: Request) -> CertifiedLoop:
     instances = Instances()
     try:
         with errors_in_own_terms(request), at_rest(without_scheduler(rested(request)), instances) as rest:
-            return loop_of(rest)
+            return certified_loop(rest)
     finally:
         instances.close()
 

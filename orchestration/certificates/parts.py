@@ -63,7 +63,7 @@ class CertifiedLoop:
         return not self.is_sampled(name) and bool(self.components[name].D.any())
 
 
-def loop_of(rest: AtRest) -> CertifiedLoop:
+def certified_loop(rest: AtRest) -> CertifiedLoop:
     """The loop of a system at rest; raises `UsageError` for an unsupported one."""
     from scipy.linalg import expm  # comes with an extra
 

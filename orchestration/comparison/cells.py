@@ -129,7 +129,7 @@ def cell_summaries(comparison: Comparison, table: "pd.DataFrame") -> list[CellSu
     return summaries
 
 
-def frame_of(comparison: Comparison, rows: Iterable[tuple[int, dict[str, Any]]]) -> "pd.DataFrame":
+def table_of_runs(comparison: Comparison, rows: Iterable[tuple[int, dict[str, Any]]]) -> "pd.DataFrame":
     """A table of runs that are not in a store, from their indices and metrics."""
     import pandas as pd
 

@@ -15,7 +15,7 @@ from orchestration.expressions.at_instant import compiled
 from orchestration.expressions.syntax import is_truth, names, parse
 from orchestration.studies.axes import Value
 from orchestration.studies.linked_settings import Key
-from orchestration.studies.study_file import AxisTable, axis_of, load, loop_of
+from orchestration.studies.study_file import AxisTable, axis_of, control_loop_of, load
 from orchestration.system.parameters import parameters_in
 from orchestration.system.request import ControlLoop
 
@@ -92,7 +92,7 @@ def load_comparison(path: str | Path) -> Comparison:
 
 def _comparison(file: ComparisonFile, path: Path) -> Comparison:
     folder = path.parent
-    base = loop_of(file, folder)
+    base = control_loop_of(file, folder)
     axis = axis_of(file.axis, folder)
     vehicles = _vehicles(file.vehicles, base, folder)
     keys = [(entry.name, value) for entry in vehicles for value in axis.values or ()]

@@ -12,7 +12,7 @@ from orchestration.basics.progress import CountProgress
 from orchestration.basics.terminal import inform
 from orchestration.building.inputs import Files
 from orchestration.comparison.bandwidth import Bandwidths, bandwidths
-from orchestration.comparison.cells import CellSummary, cell_summaries, frame_of
+from orchestration.comparison.cells import CellSummary, cell_summaries, table_of_runs
 from orchestration.comparison.design import Comparison
 from orchestration.comparison.outcome import Outcome, outcome_of, write
 from orchestration.engines.wiring import check_against_fmus
@@ -134,7 +134,7 @@ def rerun_cells(
     systems = [study.system(i, starts) for i in chain(*runs)]
     with RunEvaluator(files, workers, how.engine) as pool:
         flights = pool.run_all(systems, in_lanes=how.in_lanes, on_gpu=how.on_gpu)
-    return cell_summaries(comparison, frame_of(comparison, zip(chain(*runs), flights)))
+    return cell_summaries(comparison, table_of_runs(comparison, zip(chain(*runs), flights)))
 
 
 def agree(one: CellSummary, other: CellSummary) -> bool:

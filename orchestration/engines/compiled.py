@@ -21,7 +21,7 @@ from orchestration.engines.room import Room, loop_in, private
 from orchestration.engines.run_structures import RunStructures
 from orchestration.engines.running_system import RunningSystem, SampledComponent, Terminated
 from orchestration.engines.shared_tables import SharedTables
-from orchestration.engines.sources import Values
+from orchestration.engines.sources import SourceValues
 from orchestration.engines.structures import address, structures
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.fmi3 import Fmi3Instance
@@ -39,7 +39,7 @@ _Look, _Stopped, _Collect = (dict(c.Loop._fields_)[name] for name in ("look", "s
 _EXACT = 2**53
 """Up to here a float represents every integer"""
 
-Condition = Callable[[Board], tuple[Sequence[Step] | None, Sequence[Values]]]
+Condition = Callable[[Board], tuple[Sequence[Step] | None, Sequence[SourceValues]]]
 """The program of the condition of divergence, None if there is none, and the sources in it"""
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from orchestration.engines.board import Board
-from orchestration.engines.sources import Values
+from orchestration.engines.sources import SourceValues
 from orchestration.engines.structures import constants
 from orchestration.engines.watch import is_named
 from orchestration.expressions.operators import OPERATORS
@@ -38,10 +38,10 @@ def operators() -> str:
 def program(
     condition: str | None,
     board: Board,
-    sources: Mapping[str, Values],
+    sources: Mapping[str, SourceValues],
     signals_of: Mapping[str, Sequence[str]],
     numbers: Mapping[str, float],
-) -> tuple[Sequence[Step] | None, Sequence[Values]]:
+) -> tuple[Sequence[Step] | None, Sequence[SourceValues]]:
     """The steps of the program, None if there is none, and the sources in it, whose signals are numbered in order.
 
     The arguments are those of `watch`.

@@ -3,14 +3,21 @@
 from collections.abc import Sequence
 
 from orchestration.basics.simulator import Floats, Transfer
-from orchestration.engines.sources import Values
+from orchestration.engines.sources import SourceValues
 
 
 class Feed:
     """A source that sets some inputs of one component, to those of its values that are at `places`."""
 
     def __init__(
-        self, component: str, values: Values, places: Sequence[int], into: Floats, transfer: Transfer, *, count: int
+        self,
+        component: str,
+        values: SourceValues,
+        places: Sequence[int],
+        into: Floats,
+        transfer: Transfer,
+        *,
+        count: int,
     ) -> None:
         self.component, self.into, self.transfer = component, into, transfer
         """the component, the array of the inputs, and the call that sets them"""

@@ -11,7 +11,7 @@ from orchestration.engines.channel import Channel, of_each
 from orchestration.engines.feeds import Feed
 from orchestration.engines.structures import address, structures
 from orchestration.fmi.native import NativeInstance
-from orchestration.fmi.transfers import TransferCall, bounds_of
+from orchestration.fmi.transfers import TransferCall, range_of
 from orchestration.system.connection import Connection
 
 c = structures(1)
@@ -92,7 +92,7 @@ class RunStructures:
     def _part(self, component: int, call: TransferCall) -> Any:
         instance, part = self.instances[component], call.part
         kind = "boolean32" if part.type == "Boolean" and part.buffer.dtype != bool else part.buffer.dtype.name
-        low, high = bounds_of(part.buffer.dtype) if part.buffer.dtype.kind in "iu" else (0.0, 0.0)
+        low, high = range_of(part.buffer.dtype) if part.buffer.dtype.kind in "iu" else (0.0, 0.0)
         return c.Part(
             function=instance.address(call.function),
             fmu=instance.handle,

@@ -15,7 +15,7 @@ from orchestration.basics.simulator import Floats, Simulator, Transfer
 from orchestration.engines.board import Board
 from orchestration.engines.channel import Channel
 from orchestration.engines.feeds import Feed
-from orchestration.engines.sources import Values
+from orchestration.engines.sources import SourceValues
 from orchestration.engines.watch import Watch
 from orchestration.engines.wires import Wires
 from orchestration.schedule.cursor import Cursor
@@ -25,7 +25,7 @@ from orchestration.schedule.timetable import Timetable
 from orchestration.system.model import System
 from orchestration.system.variable_names import variable_of
 
-Sources = Sequence[tuple[Sequence[str], Values]]
+Sources = Sequence[tuple[Sequence[str], SourceValues]]
 """Signals of each source, and their values"""
 
 

@@ -17,7 +17,7 @@ from orchestration.signals.spline import Spline
 from orchestration.system.times import NANOSECONDS, Grid, exact_nanoseconds
 
 
-class Values(Protocol):
+class SourceValues(Protocol):
     """The values of a source over time."""
 
     def at(self, t: float) -> Sequence[float]:
@@ -30,7 +30,7 @@ class Values(Protocol):
         """As `over`, with the bits of `at`."""
 
 
-class Constant:
+class ConstantValues:
     """Constant values."""
 
     def __init__(self, values: Sequence[float]) -> None:
@@ -47,7 +47,7 @@ class Constant:
     each = over
 
 
-class Table:
+class TableValues:
     """Columns (n, m) over increasing times (n,) [s], linear between rows; the ends are held."""
 
     def __init__(self, time: Floats, columns: Floats) -> None:
@@ -73,7 +73,7 @@ class Table:
         return values
 
 
-class Held(Table):
+class HeldValues(TableValues):
     """A table whose rows hold until the next."""
 
     def at(self, t: float) -> Sequence[float]:
@@ -167,17 +167,17 @@ def spline_values(curve: Spline) -> Callable[[Floats], Floats]:
     return lambda t: curve.at(t).reshape(len(t), -1)
 
 
-def gusts(air: Dryden, stop_time: float, stream: np.random.Generator) -> Table:
+def gusts(air: Dryden, stop_time: float, stream: np.random.Generator) -> TableValues:
     """The wind from 0 to `stop_time` [s]: north, east, down [m/s]; a longer run begins with the same values."""
     count = math.ceil(stop_time / air.step) + 2
     values = air.velocities(stream.standard_normal((count, DRAWS)).tolist())
-    return Table(air.step * np.arange(count, dtype=np.float64), np.array(values))
+    return TableValues(air.step * np.arange(count, dtype=np.float64), np.array(values))
 
 
 class Scaled:
     """Values times a factor."""
 
-    def __init__(self, values: Values, factor: float) -> None:
+    def __init__(self, values: SourceValues, factor: float) -> None:
         self._values, self._factor = values, factor
 
     def at(self, t: float) -> Sequence[float]:

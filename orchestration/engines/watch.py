@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from orchestration.basics.errors import UsageError
 from orchestration.engines.board import Board
-from orchestration.engines.sources import Values
+from orchestration.engines.sources import SourceValues
 from orchestration.expressions.at_instant import Current, compiled
 from orchestration.expressions.syntax import Node, Operation, names, parse, text
 
@@ -16,7 +16,7 @@ Watch = Callable[[float], str | None]
 def watch(
     condition: str | None,
     board: Board,
-    sources: Mapping[str, Values],
+    sources: Mapping[str, SourceValues],
     signals_of: Mapping[str, Sequence[str]],
     numbers: Mapping[str, float],
 ) -> Watch:

@@ -10,12 +10,12 @@ from orchestration.basics.simulator import Floats
 from orchestration.engines.job_numbers import job_numbers
 from orchestration.engines.sources import (
     BuiltIn,
-    Constant,
-    Held,
+    ConstantValues,
+    HeldValues,
     Moving,
     Scaled,
-    Table,
-    Values,
+    SourceValues,
+    TableValues,
     WhiteNoise,
     gusts,
     motion_values,
@@ -107,11 +107,11 @@ def signals_of(system: System, models: Mapping[str, Model]) -> set[str]:
     return signals.union(columns_of(system)) - {"time"}
 
 
-def source_values(system: System, name: str, parameters: Mapping[str, float], streams: Streams) -> Values:
+def source_values(system: System, name: str, parameters: Mapping[str, float], streams: Streams) -> SourceValues:
     """The values of a source in a run; `parameters` are those of the component of a trajectory, as COMPONENT.NAME."""
     source = system.sources[name]
     if source.constant is not None:
-        return Constant([source.constant] * len(source.to))
+        return ConstantValues([source.constant] * len(source.to))
     if source.noise is not None and source.period is not None:
         return WhiteNoise(source.noise, source.period, len(source.to), streams.of(f"sources.{name}", VALUE))
     if not source.is_built_in:
@@ -132,7 +132,7 @@ def source_signals(system: System, parameters: Mapping[str, float], t: Floats) -
     return signals
 
 
-def _of_file_or_signal(system: System, name: str, streams: Streams) -> Values:
+def _of_file_or_signal(system: System, name: str, streams: Streams) -> SourceValues:
     source = system.sources[name]
     quantities = [MOTION.index(".".join(signal.split(".")[-2:])) for signal in source.signals(name) if source.is_motion]
     if source.signal is not None:
@@ -144,7 +144,7 @@ def _of_file_or_signal(system: System, name: str, streams: Streams) -> Values:
     if source.is_motion:
         return Moving(spline_values(read_waypoints(source.file, source.parameters)), quantities)
     table = read_table(source.file, table_columns(source), system.stop_time)
-    return Held(*table) if source.interpolation == "previous" else Table(*table)
+    return HeldValues(*table) if source.interpolation == "previous" else TableValues(*table)
 
 
 def table_columns(source: Source) -> Sequence[str]:

@@ -13,7 +13,7 @@ from orchestration.fmi.foreign import isolated_call
 from orchestration.fmi.model import Model
 from orchestration.stability.known_loops import LOOPS
 from orchestration.system.model import System
-from orchestration.system.randomness import is_random
+from orchestration.system.randomness import depends_on_seed
 from orchestration.system.request import Request
 
 AGREE = 1e-3
@@ -32,7 +32,7 @@ def infinite_means_warning(request: Request, systems: Sequence[System], files: F
         return None
     chosen: dict[str, System] = {}
     for system in systems:
-        if len(chosen) < MOST and is_random(system) and _averages(system):
+        if len(chosen) < MOST and depends_on_seed(system) and _averages(system):
             once = replace(system, seed=0)
             chosen.setdefault(once.to_toml(), once)
     if not chosen:

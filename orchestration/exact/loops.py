@@ -25,7 +25,7 @@ from orchestration.exact.moments import JumpLinear
 from orchestration.exact.objective_means import ObjectiveMeans
 from orchestration.exact.repeating import periodic_schedule
 from orchestration.exact.scheduled import without_scheduler
-from orchestration.exact.timing import links_of, tasks_of
+from orchestration.exact.timing import links_of, sampled_tasks
 from orchestration.exact.timing_chain import TimingChain
 from orchestration.expressions.syntax import Call
 from orchestration.fmi.model import Model
@@ -259,11 +259,11 @@ class Loops:
     ) -> tuple[Sequence[SampledTask], Sequence[RandomLink]]:
         """The tasks and links, those of a scheduler included: over its period, or up to a `horizon` [s]."""
         unscheduled = [
-            task.period for task in tasks_of(system) if not has_scheduled_instants(_sampling(system, task.name))
+            task.period for task in sampled_tasks(system) if not has_scheduled_instants(_sampling(system, task.name))
         ]
         steps = [link.step for link in links_of(system) if link.step is not None]
         schedule = periodic_schedule(system, horizon=horizon, other_periods=[*unscheduled, *steps, *effects.grids])
-        tasks, links = tasks_of(system, schedule), links_of(system, schedule)
+        tasks, links = sampled_tasks(system, schedule), links_of(system, schedule)
         expect_same_steps(system, tasks, linear.parts, repeating=horizon is None)
         if self.simulated:
             expect_rows(system, tasks, links)

@@ -16,7 +16,7 @@ from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
 
 
-def tasks_of(system: System, schedule: PeriodicSchedule = NO_SCHEDULE) -> list[SampledTask]:
+def sampled_tasks(system: System, schedule: PeriodicSchedule = NO_SCHEDULE) -> list[SampledTask]:
     """The sampled components, in the order of those that are due at once; some sample by a schedule.
 
     Raises `UsageError` for one that keeps its own clock.

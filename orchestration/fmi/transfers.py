@@ -69,7 +69,7 @@ class TransferLayout:
             return lambda values: values
         if dtype.kind == "b" or self._variable(names[0]).kind == "Boolean":
             return lambda values: values != 0.0
-        low, high = bounds_of(dtype)
+        low, high = range_of(dtype)
 
         def whole(values: Floats) -> Numbers:
             rounded = np.rint(values)
@@ -117,7 +117,7 @@ class TransferLayout:
         return self._model.variable(name, f"{self._name}.{name}")
 
 
-def bounds_of(dtype: np.dtype[Any]) -> tuple[float, float]:
+def range_of(dtype: np.dtype[Any]) -> tuple[float, float]:
     """The smallest and the largest float that an integer type holds: the largest of 64 bits is no float."""
     of = np.iinfo(dtype)
     high = float(of.max)

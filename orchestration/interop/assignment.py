@@ -51,7 +51,7 @@ class AssignedLoop:
         return {name: behind[component, name] for name in self.ports[component].inputs}
 
 
-def loop_of(export: Export) -> AssignedLoop:
+def assigned_loop(export: Export) -> AssignedLoop:
     """The loop of a system; raises `UsageError` for a connection with scale or offset."""
     for x in export.system.connections:
         if x.converts:

@@ -13,7 +13,7 @@ from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.foreign import isolated_call
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.instances import open_instance
-from orchestration.interop.assignment import AssignedLoop, loop_of
+from orchestration.interop.assignment import AssignedLoop, assigned_loop
 from orchestration.interop.catalogue import Tool
 from orchestration.interop.copies import expect_traceable, traced_copy
 from orchestration.interop.job import Job
@@ -47,7 +47,7 @@ class ToolRuns:
             self._fmus = {part.name: part.fmu.absolute() for part in export.parts}
             self._system = _with_fmus(system, self._fmus)
             self._clocks = {part.name for part in export.parts if part.model.has_clock}
-            self.loop = loop_of(export)
+            self.loop = assigned_loop(export)
             self.step = export.step
             """[s]"""
             _expect_common_grid(system, export.step)

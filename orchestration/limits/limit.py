@@ -23,7 +23,7 @@ from orchestration.results import html
 from orchestration.results.criterion import bound_of, judged_objective
 from orchestration.stability.known_loops import LocalLimit
 from orchestration.stability.local_limit import local_limits
-from orchestration.system.randomness import has_random_timing, is_random
+from orchestration.system.randomness import depends_on_seed, has_random_timing
 from orchestration.system.request import Request, errors_in_own_terms, system_of
 from orchestration.workers.choice import single_run_execution
 from orchestration.workers.executors import RunEvaluator
@@ -122,7 +122,7 @@ def find(
     with errors_in_own_terms(loop):
         checks = [check_against_fmus(varied.at(value), models) for value in span.values()]
     units, metric = checks[0].units, judged_objective(varied.system)
-    random = is_random(varied.at(span.last))
+    random = depends_on_seed(varied.at(span.last))
     seeds = math.ceil(math.log(1.0 - confidence) / math.log(RELIABILITY)) if random else 1
     local = _local(varied, span, files)
     mean_square = _mean_square(varied, span, files, local) if random else MeanSquareLimit()

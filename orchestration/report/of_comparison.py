@@ -9,7 +9,7 @@ from orchestration.comparison.cells import Share as CellShare
 from orchestration.comparison.design import START, Comparison
 from orchestration.report.model import ComparisonCells, Report, ReportCell, ReportShare
 from orchestration.report.number_format import number
-from orchestration.report.of_study import Stored, axes_of, read, report_of
+from orchestration.report.of_study import Stored, axes_of, read, study_report
 from orchestration.report.reruns import Progress
 from orchestration.report.subset import evenly
 from orchestration.report.tables import ColumnAxis
@@ -33,7 +33,7 @@ def comparison_report(
     """The report of a comparison with its store at `path`: that of its study, and its cells."""
     study = comparison.study
     stored = _with_sizes(read(path, study), comparison)
-    of_study = report_of(
+    of_study = study_report(
         comparison.name, stored, study, command, required=required, most=most, progress=progress,
         axes=[*axes_of(stored, study), ColumnAxis(name=SIZE, quantity=Quantity(name=SIZE))],
         choose=_from_each_cell(comparison, stored),

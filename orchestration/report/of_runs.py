@@ -30,7 +30,7 @@ _CODED = 4.0 * 4.0 / 3.0
 """Characters of a number"""
 
 
-def report_of(results: Mapping[str, Result], command: str) -> Report:
+def runs_report(results: Mapping[str, Result], command: str) -> Report:
     """The report of runs by name; raises `UsageError` for more than `MOST_RUNS`."""
     if len(results) > MOST_RUNS:
         raise UsageError(f"{len(results)} runs: expected at most {MOST_RUNS}; a study holds more")

@@ -16,7 +16,7 @@ from orchestration.report.model import Report, ReportRun, ReportShare, Setting
 from orchestration.report.number_format import percent
 from orchestration.report.reruns import Progress, Rerun, fastest, rerun
 from orchestration.report.subset import MOST_IN_BATCHES, MOST_SINGLY, points_for, select
-from orchestration.report.tables import ColumnAxis, Row, is_good, share_of, shares_along, table_of
+from orchestration.report.tables import ColumnAxis, Row, is_good, report_table, share_of, shares_along
 from orchestration.report.tracks import Tracks
 from orchestration.results import display_names as labels
 from orchestration.results.column_info import column_infos
@@ -73,7 +73,7 @@ class Embedded:
     contents: Sequence[str]
 
 
-def report_of(
+def study_report(
     name: str,
     stored: Stored,
     study: Study | None,
@@ -108,7 +108,7 @@ def report_of(
         words=words,
         layouts=tuple(tracks.layouts),
         runs=tuple(embedded.runs),
-        table=table_of(
+        table=report_table(
             stored.rows, axes, stored.metrics, stored.units, blobs,
             tracks=embedded.places, messages=messages_of(stored.rows, embedded.places),
             is_grid=json.loads(stored.about.get("grid", "null")) is not None,

@@ -37,7 +37,7 @@ def report_of(
     if kinds[0] == "run":
         if required or most is not None:
             raise UsageError("--run and --flights: expected a study or a comparison with them")
-        return of_runs.report_of(dict(_runs(what)), command)
+        return of_runs.runs_report(dict(_runs(what)), command)
     return _of_many(what[0], kinds[0], command, store=store, required=required, most=most, progress=progress)
 
 
@@ -80,11 +80,13 @@ def _of_many(
     if kind == "store":
         file = path / STORE if path.is_dir() else path
         name = file.resolve().parent.name
-        return of_study.report_of(name, of_study.read(file), None, command, required=required, most=most)
+        return of_study.study_report(name, of_study.read(file), None, command, required=required, most=most)
     if kind == "study":
         study = load_study(path)
         stored = of_study.read(store_path(study.name, store), study)
-        return of_study.report_of(study.name, stored, study, command, required=required, most=most, progress=progress)
+        return of_study.study_report(
+            study.name, stored, study, command, required=required, most=most, progress=progress
+        )
     comparison = load_comparison(path)
     file = store_path(comparison.name, store)
     return of_comparison.comparison_report(comparison, file, command, required=required, most=most, progress=progress)

@@ -37,7 +37,7 @@ class ColumnAxis:
     logarithmic: bool = False
 
 
-def table_of(
+def report_table(
     rows: Sequence[Row],
     axes: Sequence[ColumnAxis],
     metrics: Sequence[str],

@@ -46,7 +46,7 @@ def report(
         if paths:
             raise UsageError("report: expected results or paths, not both")
         named = {f"run {number}" if len(results) > 1 else "run": one for number, one in enumerate(results, start=1)}
-        return html.write(of_runs.report_of(named, "quadcosim.report(...) in Python"), to)
+        return html.write(of_runs.runs_report(named, "quadcosim.report(...) in Python"), to)
     return html.write(report_of(paths, command, store=folder, required=runs, most=flights, progress=progress), to)
 
 

@@ -80,9 +80,9 @@ def request_from_tables(tables: dict[str, Any], folder: Path) -> Scenario | Syst
 
 
 def _from_ssp(path: Path, timing: dict[str, Any] | None, folder: Path) -> System:
-    from orchestration.requests.ssp.reading import tables_of  # which loads XML, needed for no other file
+    from orchestration.requests.ssp.reading import tables_of_ssp  # which loads XML, needed for no other file
 
-    return system_from_tables(tables_of(path, timing), folder)
+    return system_from_tables(tables_of_ssp(path, timing), folder)
 
 
 @contextmanager

@@ -18,7 +18,7 @@ from orchestration.engines.engine import Engine, create_master
 from orchestration.engines.feeds import Feed
 from orchestration.engines.master import Master
 from orchestration.engines.room import Room, private
-from orchestration.engines.sources import Values
+from orchestration.engines.sources import SourceValues
 from orchestration.engines.watch import watch
 from orchestration.engines.wiring import fixed_steps
 from orchestration.fmi.instance import Instance, Loader
@@ -209,7 +209,7 @@ def _set_clock(instance: Instance, component: Component, model: Model, first: in
         instance.set(SAMPLE_OFFSET, sampling.clock_ratio * (first / NANOSECONDS))
 
 
-def _feeds(system: System, sources: Mapping[str, Values], instances: Mapping[str, Instance]) -> list[Feed]:
+def _feeds(system: System, sources: Mapping[str, SourceValues], instances: Mapping[str, Instance]) -> list[Feed]:
     feeds = []
     for name, values in sources.items():
         ends = system.sources[name].to

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from orchestration.basics.errors import UsageError
 from orchestration.building import fmus
-from orchestration.engines.sources import Values
+from orchestration.engines.sources import SourceValues
 from orchestration.engines.wiring import check_against_fmus, signals_of, source_values
 from orchestration.fmi.model import Model, read_model
 from orchestration.results.column_info import ColumnInfo, column_infos
@@ -46,7 +46,7 @@ class ResolvedRequest:
         """The unit and the description of each column."""
         return column_infos(self.system, self.models, ("time", *signals_of(self.system, self.models)))
 
-    def sources(self, streams: Streams) -> dict[str, Values]:
+    def sources(self, streams: Streams) -> dict[str, SourceValues]:
         """The values of the sources in a run, by name."""
         return {name: source_values(self.system, name, self.parameters, streams) for name in self.system.sources}
 

@@ -164,7 +164,7 @@ class TimedComponent:
         return time
 
 
-class SampledComponent(TimedComponent):
+class ClockedComponent(TimedComponent):
     """A component that samples by its own clock."""
 
     def __init__(

@@ -5,13 +5,14 @@ from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from orchestration.schedule.frame import Frame
+from orchestration.schedule.common_timetable import CommonTimetable
 from orchestration.schedule.spans import Span
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import Timetable
 from orchestration.system import placement
 from orchestration.system.distribution import content
 from orchestration.system.model import System
+from orchestration.system.randomness import has_random_timing
 
 INSTANTS = 2**15
 """Approximate number of a span"""
@@ -21,7 +22,7 @@ _KEPT = 8
 
 
 @dataclass(frozen=True)
-class Timing:
+class ScheduleKey:
     """The key of a schedule: everything in a system that determines it."""
 
     regular: Hashable
@@ -30,11 +31,9 @@ class Timing:
     """the seed and the streams; None: nothing is random"""
 
 
-def timing(system: System) -> Timing:
+def schedule_key(system: System) -> ScheduleKey:
     """The key of the schedule of a system."""
     samplings = [c.sampling for c in system.components.values() if c.sampling is not None]
-    is_random = any(each.is_random for each in samplings) or any(x.is_random for x in system.connections)
-    is_random = is_random or placement.is_random(system)
     regular = (
         system.stop_time,
         tuple((name, c.step, c.sampling) for name, c in system.components.items()),
@@ -46,7 +45,8 @@ def timing(system: System) -> Timing:
         placement.content_of(system),
         tuple((source.to, source.period) for source in system.sources.values() if source.period is not None),
     )
-    return Timing(regular, (system.seed, tuple(sorted(system.streams.items()))) if is_random else None)
+    drawn = (system.seed, tuple(sorted(system.streams.items()))) if has_random_timing(system) else None
+    return ScheduleKey(regular, drawn)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,25 +62,25 @@ class ScheduleCache:
     """Makes the schedules of runs, and caches the last ones."""
 
     def __init__(self) -> None:
-        self._frames: OrderedDict[Hashable, Frame] = OrderedDict()
+        self._common_parts: OrderedDict[Hashable, CommonTimetable] = OrderedDict()
         self._kept: OrderedDict[Hashable, tuple[Mapping[str, int], Sequence[Span]]] = OrderedDict()
 
-    def of(self, outline: Hashable, timing: Timing, system: System) -> RunSchedule:
+    def of(self, outline: Hashable, timing: ScheduleKey, system: System) -> RunSchedule:
         """The schedule of a system with this outline and timing; raises `UsageError` as `Timetable`."""
         key = outline, timing
         if key in self._kept:
             self._kept.move_to_end(key)
             first_samples, spans = self._kept[key]
             return RunSchedule(first_samples=first_samples, spans=iter(spans))
-        table = Timetable(system, Streams(system.seed, system.streams), frame=self._frame(outline, timing, system))
+        table = Timetable(system, Streams(system.seed, system.streams), common=self._common(outline, timing, system))
         return RunSchedule(first_samples=table.first_samples, spans=self._spans(key, table))
 
-    def _frame(self, outline: Hashable, timing: Timing, system: System) -> Frame:
+    def _common(self, outline: Hashable, timing: ScheduleKey, system: System) -> CommonTimetable:
         key = outline, timing.regular
-        if key not in self._frames:
-            _keep(self._frames, key, Frame(system, {}))
-        self._frames.move_to_end(key)
-        return self._frames[key]
+        if key not in self._common_parts:
+            _keep(self._common_parts, key, CommonTimetable(system, {}))
+        self._common_parts.move_to_end(key)
+        return self._common_parts[key]
 
     def _spans(self, key: Hashable, table: Timetable) -> Iterator[Span]:
         found: list[Span] = []

@@ -13,12 +13,12 @@ import numpy as np
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Booleans, Integers
+from orchestration.schedule.common_timetable import CommonTimetable
 from orchestration.schedule.fixed_step import FixedStep, Misalignment
-from orchestration.schedule.frame import Frame
 from orchestration.schedule.lookahead import Lookahead
 from orchestration.schedule.random_timing import (
+    ClockedComponent,
     Link,
-    SampledComponent,
     ScheduledComponent,
     TimedComponent,
 )
@@ -36,29 +36,29 @@ class Timetable:
         system: System,
         streams: Streams,
         fixed: Mapping[str, FixedStep] | None = None,
-        frame: Frame | None = None,
+        common: CommonTimetable | None = None,
     ) -> None:
-        """`fixed` has the components of fixed step; `frame` is that of the system, if known.
+        """`fixed` has the components of fixed step; `common` is that of the system, if known.
 
-        Raises `UsageError` as `Frame`.
+        Raises `UsageError` as `CommonTimetable`.
         """
-        self._frame = frame = frame or Frame(system, fixed or {})
-        self._plan, self._fixed, self.stop = frame.plan, frame.fixed, frame.stop
+        self._common = common = common or CommonTimetable(system, fixed or {})
+        self._plan, self._fixed, self.stop = common.plan, common.fixed, common.stop
         self._begin, self._end = 0, self.stop + 1
         self._misaligned: list[Misalignment] = []
-        self._connections = frame.system.connections
+        self._connections = common.system.connections
         self._links: list[Link] = []
         for i, x in enumerate(self._connections):
             stepped = self._fixed.get(x.sender if i in self._plan.measured else x.receiver)
             self._links.append(Link(i, x, streams, stepped, self._misaligned))
-        self._lookahead = Lookahead(frame.system, frame.resources, streams) if frame.uses_scheduler else None
+        self._lookahead = Lookahead(common.system, common.resources, streams) if common.uses_scheduler else None
         self._tasks = [self._timed(name, streams) for name in self._plan.sampled]
         self.first_samples = {
             name: task.first for name, task in zip(self._plan.sampled, self._tasks) if task.first < self.stop
         }
         """[ns], by sampled component, of those that sample before the end"""
         own = [j for j in self._plan.posted if j not in self._plan.over_networks]
-        self._posted = {i: [self._links[j] for j in own if frame.sender[j] == i] for i in frame.points}
+        self._posted = {i: [self._links[j] for j in own if common.sender[j] == i] for i in common.points}
         self._over_networks = [self._links[j] for j in self._plan.posted if j in self._plan.over_networks]
         self._posted_before = dict.fromkeys((link.index for link in self._over_networks), 0)
         self._in_flight = _NO_MESSAGES
@@ -67,7 +67,7 @@ class Timetable:
     def _timed(self, name: str, streams: Streams) -> TimedComponent:
         if self._lookahead is not None and name in self._lookahead.samples:
             return ScheduledComponent(name, self._plan, self._links, self._lookahead, self._fixed, self._misaligned)
-        return SampledComponent(name, self._plan, self._links, streams, self._fixed, self._misaligned)
+        return ClockedComponent(name, self._plan, self._links, streams, self._fixed, self._misaligned)
 
     def next_schedule(self, most: int) -> Schedule | None:
         """The next instants, about `most` of them; None at the end.
@@ -98,7 +98,7 @@ class Timetable:
     def _window(self, most: int) -> Schedule | None:
         """The schedule of the next window with instants."""
         while self._begin < self._end:
-            schedule = self._span(most).schedule(self._frame.continuous)
+            schedule = self._span(most).schedule(self._common.continuous)
             if self._misaligned:
                 self._end = min(self._end, min(self._misaligned).time)
                 schedule = schedule.part(0, int(np.searchsorted(schedule.times[:-1], self._end)))
@@ -109,10 +109,10 @@ class Timetable:
     def _span(self, most: int) -> Span:
         """The next window, of about `most` instants, or none."""
         begin = self._begin
-        self._begin = end = min(self._end, begin + max(int(most * self._frame.mean_interval), 1))
+        self._begin = end = min(self._end, begin + max(int(most * self._common.mean_interval), 1))
         for task in self._tasks:
             task.draw_until(end)
-        found = InstantCollector(len(self._frame.continuous))
+        found = InstantCollector(len(self._common.continuous))
         posted, later = self._post(begin, end, found)
         measured = self._measure(begin, end, found)
         sampled, samples, exchanged, sent = self._sample(end, found)
@@ -121,7 +121,7 @@ class Timetable:
             task.drop_before(end)
         return Span(
             end=end,
-            regular=self._frame.regular(begin, end),
+            regular=self._common.regular(begin, end),
             own=found.instants(),
             posted=posted,
             measured=measured,
@@ -137,7 +137,7 @@ class Timetable:
         for component, links in self._posted.items():
             if not links:
                 continue
-            grid = self._frame.points[component]
+            grid = self._common.points[component]
             first, last = grid.index_from(begin), grid.index_from(end)
             points = grid.between(first, last)
             for place, link in enumerate(links):
@@ -145,9 +145,9 @@ class Timetable:
                 tables.append(sent.table())
                 later.append(self._not_arrived(sent, found))
         for link in self._over_networks:
-            component = int(self._frame.sender[link.index])
+            component = int(self._common.sender[link.index])
             k, points, arrivals = self._network_messages(link, end)
-            found.add(points, self._frame.place[component])
+            found.add(points, self._common.place[component])
             sent = _Sent(link, k, points, arrivals, points, 0, component, link.index)
             tables.append(sent.table())
             later.append(self._not_arrived(sent, found))
@@ -181,7 +181,7 @@ class Timetable:
                     taken = task.measured(i)
                     now = slice(*np.searchsorted(taken, (begin, end)).tolist())
                     tables.append(task.messages(now)[:, i])
-                    found.add(taken[now], self._frame.place[self._frame.sender[link.index]])
+                    found.add(taken[now], self._common.place[self._common.sender[link.index]])
         table = np.concatenate(tables)
         return table[np.argsort(table[:, 2], kind="stable")]
 
@@ -193,7 +193,7 @@ class Timetable:
             [_NO_MESSAGES[:, :4].reshape(0, 0, 4)],
             [_NO_MESSAGES],
         )
-        sender, place = self._frame.sender, self._frame.place
+        sender, place = self._common.sender, self._common.place
         for task in self._tasks:  # in the order of one instant
             to_end, count = np.searchsorted(task.times, (end, min(end, self.stop))).tolist()
             now = task.times[:count]
@@ -216,7 +216,8 @@ class Timetable:
         """The messages that arrive later; the receivers of the others are stepped at once."""
         at_once = sent.arrival == sent.time
         found.add(
-            sent.time if at_once.all() else sent.time[at_once], self._frame.place[self._frame.receiver[sent.link.index]]
+            sent.time if at_once.all() else sent.time[at_once],
+            self._common.place[self._common.receiver[sent.link.index]],
         )
         return _NO_MESSAGES if at_once.all() else sent.table(sent.arrival > sent.time)
 
@@ -227,7 +228,7 @@ class Timetable:
             return table[:, :4]
         now = table[:, 3] < end
         self._in_flight, table = table[~now], table[now]
-        found.add_each(table[:, 3], self._frame.place[self._frame.receiver[table[:, 0]]])
+        found.add_each(table[:, 3], self._common.place[self._common.receiver[table[:, 0]]])
         return np.ascontiguousarray(table[np.lexsort(table[:, [1, 7, 6, 5, 4, 3]].T), :4])
 
 

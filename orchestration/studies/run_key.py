@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.basics.identity import IdentityCache
-from orchestration.building.inputs import Files, tables_of
+from orchestration.building.inputs import Files, files_read_by
 from orchestration.results.own_metrics import OwnMetric
 from orchestration.studies.study import Study
 from orchestration.system.component import Component
@@ -124,7 +124,7 @@ def _plain(value: Any, hashes: Mapping[str, str]) -> Any:
 def study_parts(study: Study) -> dict[str, str]:
     """The parts of a study that determine its runs, by name, so that a difference can be named."""
     system = study.origin
-    tables = Files(fmus={}, tables=tables_of(system)).hashes
+    tables = Files(fmus={}, tables=files_read_by(system)).hashes
     parts: dict[str, Any] = {key: getattr(system, key) for key in ("stop_time", "seed")}
     for name, component in system.components.items():
         parts |= _parts(f"components.{name}", component, tables, without=("fmu",))

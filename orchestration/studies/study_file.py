@@ -105,7 +105,7 @@ def base_of(file: HasBase, folder: Path) -> Request:
     return load_request(folder / file.scenario) if file.scenario else request_from_tables(file.base, folder)
 
 
-def loop_of(file: HasBase, folder: Path) -> ControlLoop:
+def control_loop_of(file: HasBase, folder: Path) -> ControlLoop:
     """Likewise for files that need initial conditions; raises `UsageError` for a system without known ones."""
     base = base_of(file, folder)
     if not isinstance(base, ControlLoop):

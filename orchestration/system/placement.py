@@ -102,7 +102,7 @@ def _by_arrivals(system: "System") -> dict[str, str]:
     return {name: each.on for name, each in samplings.items() if isinstance(each, SamplingOnArrival)}
 
 
-def is_random(system: "System") -> bool:
+def has_random_schedule(system: "System") -> bool:
     """Whether the seed changes when its tasks run and its frames are sent."""
     tasks, messages = placed_tasks(system.computers), [*placed_messages(system.networks)]
     has_random = any(each.task.is_random for each in tasks) or any(each.message.is_random for each in messages)

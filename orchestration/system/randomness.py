@@ -4,7 +4,7 @@ from orchestration.system import placement
 from orchestration.system.model import System
 
 
-def is_random(system: System) -> bool:
+def depends_on_seed(system: System) -> bool:
     """Whether the seed changes its runs."""
     return (
         has_random_timing(system)
@@ -18,5 +18,5 @@ def has_random_timing(system: System) -> bool:
     return (
         any(one.sampling is not None and one.sampling.is_random for one in system.components.values())
         or any(x.is_random for x in system.connections)
-        or placement.is_random(system)
+        or placement.has_random_schedule(system)
     )

@@ -8,7 +8,7 @@ from typing import Any, Literal
 from orchestration.basics.errors import UsageError
 from orchestration.basics.records import record
 from orchestration.basics.typed_tables import table_of
-from orchestration.studies.study_file import AxisTable, axis_of, base_of, load, loop_of
+from orchestration.studies.study_file import AxisTable, axis_of, base_of, control_loop_of, load
 from orchestration.system.model import System
 from orchestration.tuning.exact import ExactTuning
 from orchestration.tuning.tuning import Tuning
@@ -78,7 +78,7 @@ def _tuning(file: TuningFile, path: Path) -> Tuning | ExactTuning:
         return ExactTuning(base=base_of(file, path.parent), **common)
     if file.cost.bad is None:
         raise UsageError("cost.bad: expected a value")
-    base, starts = loop_of(file, path.parent), dict(file.starts)
+    base, starts = control_loop_of(file, path.parent), dict(file.starts)
     judged = starts.pop(JUDGED, DEFAULT_JUDGED)
     if isinstance(judged, bool) or not isinstance(judged, int):
         raise UsageError(f"starts.{JUDGED} = {judged!r}: expected a valid integer")

@@ -11,7 +11,7 @@ from typing import Any
 from orchestration.basics.errors import QuadcosimError
 from orchestration.engines.batch.kernels import preferred_lanes
 from orchestration.engines.batch.shape import outline
-from orchestration.schedule.schedule_cache import timing
+from orchestration.schedule.schedule_cache import schedule_key
 from orchestration.workers.task import RunTask, TaskBatch
 
 SAMPLE = 8
@@ -32,7 +32,7 @@ def chunks(tasks: Iterable[RunTask], total: int, workers: int, on_gpu: bool = Fa
     while window := list(islice(waiting, order)):
         yield from (task for task in window if task.keep_signals)
         places: dict[Any, int] = {}
-        rest = [(task, (outline(task.system), timing(task.system))) for task in window if not task.keep_signals]
+        rest = [(task, (outline(task.system), schedule_key(task.system))) for task in window if not task.keep_signals]
         for _, key in rest:
             places.setdefault(key, len(places))
         ordered = [task for task, _ in sorted(rest, key=lambda pair: places[pair[1]])]

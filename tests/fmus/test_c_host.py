@@ -10,7 +10,7 @@ import fmpy
 import pytest
 
 from orchestration.checks.doctor.dependencies import needed
-from orchestration.checks.doctor.fmu import read_fmu
+from orchestration.checks.doctor.fmu import inspected
 from orchestration.checks.doctor.machine import this_machine
 from orchestration.checks.doctor.pythons import BY_LOADER, THIS_PYTHON, PythonLibrary
 from orchestration.checks.doctor.verdict import INSTALL_LIBPYTHON, other_host, satisfies
@@ -188,7 +188,7 @@ def plain(built: dict[str, Path], tmp_path: Path) -> Path:
 @pytest.mark.usefixtures("library")
 def test_a_c_program_started_as_the_doctor_says_finds_python(host: Path, plain: Path, tmp_path: Path) -> None:
     """Without the loader the host must have Python: what it lacks is what doctor must give."""
-    fmu = read_fmu(plain)
+    fmu = inspected(plain)
     given = arguments(fmu.path, tmp_path / "unpacked", MEASUREMENT)
     alone = run(str(host), "libc.so.6", *given)
     assert alone.returncode == 1
@@ -204,7 +204,7 @@ def test_a_c_program_started_as_the_doctor_says_finds_python(host: Path, plain: 
 def test_the_doctor_knows_what_the_loader_finds_and_what_it_must_be_told(
     found_by: str, built: dict[str, Path], plain: Path
 ) -> None:
-    fmu = read_fmu(built["UnifiedController"])
+    fmu = inspected(built["UnifiedController"])
     python = PythonLibrary(path=Path("/a/libpython3.11.so.1.0"), version="3.11", found_by=found_by)
     machine = replace(this_machine([fmu]), python_libraries=(python,), temp_folder=Path("/tmp/Jürgen"))
     host = other_host(fmu, machine)
@@ -213,7 +213,7 @@ def test_the_doctor_knows_what_the_loader_finds_and_what_it_must_be_told(
     assert other_host(fmu, replace(machine, python_libraries=())).needs[0].startswith("a shared libpython")
     (mine, plains) = (
         {d.name: d.versions for part in one.platforms if part.platform == "linux64" for d in needed(part)}
-        for one in (fmu, read_fmu(plain))
+        for one in (fmu, inspected(plain))
     )
     assert mine.keys() >= plains.keys() >= {"libstdc++.so.6"}
     assert all(set(mine[name]) >= set(versions) for name, versions in plains.items())

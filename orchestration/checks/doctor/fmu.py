@@ -101,7 +101,7 @@ class InspectedFmu:
     """None if it is not made by pythonfmu."""
 
 
-def read_fmu(path: Path, size_limit: float = math.inf) -> InspectedFmu:
+def inspected(path: Path, size_limit: float = math.inf) -> InspectedFmu:
     """The requirements of a file; raises `UnreadableFmuError` if it is no FMU, or unpacks to over `size_limit` MB."""
     archive = read_archive(path, size_limit)
     description = read_root(archive)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.basics.errors import QuadcosimError, UsageError
-from orchestration.checks.doctor.fmu import CO_SIMULATION, KINDS, InspectedFmu, read_fmu
+from orchestration.checks.doctor.fmu import CO_SIMULATION, KINDS, InspectedFmu, inspected
 from orchestration.fmi.archive import OtherVersionError, UnreadableFmuError
 from orchestration.processes import subprocesses
 from orchestration.processes.channel import Parent
@@ -88,7 +88,7 @@ def _try(path: Path, folder: Path, size_limit: float, send: Callable[[object], N
     restrict(size_limit)
     importlib.import_module("pydantic")  # as every command that runs an FMU: it may be that of another Python
     try:
-        fmu = read_fmu(path, size_limit)
+        fmu = inspected(path, size_limit)
     except UnreadableFmuError as error:
         send({"error": error})
         return

@@ -15,7 +15,7 @@ from orchestration.engines import initial
 from orchestration.engines.batch.memory import Memory
 from orchestration.engines.batch.shape import Ends, Shape, changes_of, ends_of
 from orchestration.engines.job_numbers import job_numbers
-from orchestration.engines.sources import Values
+from orchestration.engines.sources import SourceValues
 from orchestration.engines.structures import address, structures
 from orchestration.engines.wires import clock_of
 from orchestration.engines.wiring import source_values
@@ -23,7 +23,7 @@ from orchestration.expressions.recorded import STOP_TIME
 from orchestration.expressions.syntax import Call, names_job_measure
 from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.fmi.values import convert_value, number_of
-from orchestration.schedule.schedule_cache import RunSchedule, ScheduleCache, Timing
+from orchestration.schedule.schedule_cache import RunSchedule, ScheduleCache, ScheduleKey
 from orchestration.schedule.spans import Instants, Span
 from orchestration.schedule.streams import NOISE, Streams
 from orchestration.system.model import System
@@ -61,7 +61,7 @@ class Group:
     """Runs that are simulated together, at most as many as there are lanes."""
 
     systems: Sequence[System]
-    timings: Sequence[Timing]
+    timings: Sequence[ScheduleKey]
     parameters: ParameterColumns = field(default_factory=lambda: NO_COLUMNS)
     """of each run, overriding those of its system"""
 
@@ -71,15 +71,15 @@ Stepwise = Generator[None, Sequence[int], BatchResult]
 
 
 @dataclass(kw_only=True)
-class Run:
+class LaneRun:
     """The state of one lane during a run."""
 
     system: System
     streams: Streams
     numbers: Mapping[str, float]
     """as `Batch.parameters`"""
-    seen: list[Values]
-    given: list[Values]
+    seen: list[SourceValues]
+    given: list[SourceValues]
     source_key: Hashable
     """everything that determines the values of its sources"""
     noise: dict[int, np.random.Generator] = field(default_factory=dict)
@@ -201,7 +201,7 @@ class Batch:
     def _run_once(
         self,
         systems: Sequence[System],
-        timings: Sequence[Timing],
+        timings: Sequence[ScheduleKey],
         known: Mapping[Call, Floats],
         record: Sequence[str] | None,
     ) -> Stepwise:
@@ -231,7 +231,7 @@ class Batch:
         for name in ("outcome", "outcome_component", "outcome_time", "steps", "record_counts"):
             getattr(self._batch, name)[:] = [0] * self._lanes
 
-    def _pass(self, runs: Sequence[Run], tracks: Sequence[Track]) -> Generator[None, Sequence[int], None]:
+    def _pass(self, runs: Sequence[LaneRun], tracks: Sequence[Track]) -> Generator[None, Sequence[int], None]:
         batch = self._batch
         batch.track_count = len(tracks)
         for i, track in enumerate(tracks):
@@ -279,7 +279,7 @@ class Batch:
 
     # -- values at the start ---------------------------------------------------------------------------------------
 
-    def _run(self, lane: int, system: System) -> Run:
+    def _run(self, lane: int, system: System) -> LaneRun:
         shape = self._shape
         streams = Streams(system.seed, system.streams)
         parameters = self.parameters(lane, system)
@@ -291,7 +291,7 @@ class Batch:
         }
         given = [values_of[name] for name, source in system.sources.items() if source.to]
         seen = [values_of[name] for name in shape.seen]
-        return Run(
+        return LaneRun(
             system=system, streams=streams, numbers=parameters, seen=seen, given=given,
             source_key=self._source_key(system, parameters), noise=noisy,
         )  # fmt: skip
@@ -370,7 +370,7 @@ class Batch:
             for i, call in enumerate(shape.inner):
                 self._numbers[len(shape.numbers) + 1 + i, lane] = known[call][lane] if known else 0.0
 
-    def _initialise(self, runs: Sequence[Run]) -> Booleans:
+    def _initialise(self, runs: Sequence[LaneRun]) -> Booleans:
         """Do the first exchange as `Master` does; the lanes in which it fails."""
         shape, wrong = self._shape, np.zeros(self._lanes, dtype=np.bool_)
         for lane, run in enumerate(runs):
@@ -439,9 +439,9 @@ class Batch:
     # -- schedules -------------------------------------------------------------------------------------------------
 
     def _tracks_of(
-        self, runs: Sequence[Run], timings: Sequence[Timing], schedules: Mapping[Timing, RunSchedule]
+        self, runs: Sequence[LaneRun], timings: Sequence[ScheduleKey], schedules: Mapping[ScheduleKey, RunSchedule]
     ) -> list[Track]:
-        lanes_of: dict[Timing, list[int]] = {}
+        lanes_of: dict[ScheduleKey, list[int]] = {}
         for lane, timing in enumerate(timings):
             lanes_of.setdefault(timing, []).append(lane)
         return [
@@ -465,7 +465,7 @@ class Batch:
                 parts.append([numbers[each] for each in self._trajectories[source.trajectory]])
         return repr(parts)  # the repr of a source itself would be abbreviated
 
-    def _next_span(self, number: int, track: Track, runs: Sequence[Run]) -> None:
+    def _next_span(self, number: int, track: Track, runs: Sequence[LaneRun]) -> None:
         """Hand the next span of a track to C."""
         into = self._tracks[number]
         span = track.span = track.ahead
@@ -494,7 +494,7 @@ class Batch:
         for lane in track.lanes:
             self._draw_noise(lane, runs[lane], span)
 
-    def _values_at(self, run: Run, instants: Instants) -> tuple[Floats, Floats]:
+    def _values_at(self, run: LaneRun, instants: Instants) -> tuple[Floats, Floats]:
         """The values of sources at some instants; those that runs have in common are computed once."""
         key = instants, run.source_key
         if key not in self._source_values:
@@ -508,7 +508,7 @@ class Batch:
         self._source_values.move_to_end(key)
         return self._source_values[key]
 
-    def _draw_noise(self, lane: int, run: Run, span: Span) -> None:
+    def _draw_noise(self, lane: int, run: LaneRun, span: Span) -> None:
         for i, stream in run.noise.items():
             count = span.count_of(i, self._shape.wires.table(i))
             noise = stream.standard_normal((count, len(self._ends[i].start)))

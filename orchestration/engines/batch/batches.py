@@ -17,7 +17,7 @@ from orchestration.engines.watch import watch
 from orchestration.engines.wiring import check_against_fmus, source_values
 from orchestration.fmi.model import read_model
 from orchestration.results.objectives import Metrics, metrics_of
-from orchestration.schedule.schedule_cache import ScheduleCache, timing
+from orchestration.schedule.schedule_cache import ScheduleCache, schedule_key
 from orchestration.schedule.streams import Streams
 from orchestration.system.model import System
 from orchestration.system.references import connect_references
@@ -70,7 +70,7 @@ class Batches:
         first and are valid until the next run. `parameters` of each run override those of its system, which many may
         share. Raises `UsageError` for systems that cannot be run in lanes.
         """
-        known = {id(system): (outline(system), timing(system)) for system in systems}
+        known = {id(system): (outline(system), schedule_key(system)) for system in systems}
         shapes: dict[Hashable, list[int]] = {}
         for place, system in enumerate(systems):
             shapes.setdefault(known[id(system)][0], []).append(place)

@@ -34,7 +34,7 @@ _RESOURCES = re.compile(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Resources:
+class KernelResources:
     """The resources of a processor that a function uses."""
 
     registers: int | None
@@ -51,10 +51,12 @@ class Image:
     log: str
 
     @property
-    def resources(self) -> dict[str, Resources]:
+    def resources(self) -> dict[str, KernelResources]:
         """The resources of functions, by their names in the log."""
         return {
-            name: Resources(registers=None if registers is None else int(registers), spilled=int(stores) + int(loads))
+            name: KernelResources(
+                registers=None if registers is None else int(registers), spilled=int(stores) + int(loads)
+            )
             for name, stores, loads, registers in (match.groups() for match in _RESOURCES.finditer(self.log))
         }
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from orchestration.basics.errors import QuadcosimError
 from orchestration.basics.simulator import Floats
-from orchestration.engines.batch.batch import Batch, BatchResult, Group, Run, Stepwise, Track
+from orchestration.engines.batch.batch import Batch, BatchResult, Group, LaneRun, Stepwise, Track
 from orchestration.engines.batch.batches import Batches
 from orchestration.engines.batch.shape import Shape
 from orchestration.engines.cuda.compiler import compiled, expect_compiler
@@ -20,7 +20,7 @@ from orchestration.engines.cuda.memory import SharedMemory
 from orchestration.engines.cuda.program import Code, Known, program
 from orchestration.engines.structures import address
 from orchestration.expressions.syntax import Call
-from orchestration.schedule.schedule_cache import RunSchedule, ScheduleCache, Timing
+from orchestration.schedule.schedule_cache import RunSchedule, ScheduleCache, ScheduleKey
 from orchestration.system.model import System
 
 _MESSAGES, _VALUES = 16, 1024
@@ -186,7 +186,7 @@ class _Threads(Batch):
             kept.count = 0
 
     def _tracks_of(
-        self, runs: Sequence[Run], timings: Sequence[Timing], courses: Mapping[Timing, RunSchedule]
+        self, runs: Sequence[LaneRun], timings: Sequence[ScheduleKey], courses: Mapping[ScheduleKey, RunSchedule]
     ) -> list[Track]:
         tracks: dict[int, Track] = {}
         for timing, course in courses.items():

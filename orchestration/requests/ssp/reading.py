@@ -35,7 +35,7 @@ class Signal:
     """whether suppressUnitConversion is set somewhere on the way, so that the conversion includes that of units"""
 
 
-def tables_of(path: Path, timing: Mapping[str, Any] | None) -> dict[str, Any]:
+def tables_of_ssp(path: Path, timing: Mapping[str, Any] | None) -> dict[str, Any]:
     """The tables of the system file for an SSP with a `timing`; None: that of its annotation.
 
     A component is stepped as in `timing`, else in continuous time with the step in the SSP's annotations. Components in

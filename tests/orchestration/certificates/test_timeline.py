@@ -13,7 +13,7 @@ from orchestration.basics.errors import UsageError
 from orchestration.certificates.breaking import unstable_sequence
 from orchestration.certificates.events import BOXES, DELAY, JITTER, LATENCY, LOSS, SHIFT, Varying
 from orchestration.certificates.family import LoopFamily
-from orchestration.certificates.parts import CertifiedLoop, loop_of
+from orchestration.certificates.parts import CertifiedLoop, certified_loop
 from orchestration.certificates.timeline import LoopTimeline
 from orchestration.fmi.reuse import Instances
 from orchestration.stability.loop_at_rest import at_rest
@@ -46,7 +46,7 @@ def system() -> System:
 
 def loop(system: System, instances: Instances) -> CertifiedLoop:
     with at_rest(system, instances) as rest:
-        return loop_of(rest)
+        return certified_loop(rest)
 
 
 def radius_of(family: LoopFamily, value: float) -> float:

@@ -10,7 +10,7 @@ from scipy.stats import binomtest
 
 from orchestration.comparison import equal_terms, fronts
 from orchestration.comparison.bandwidth import Bandwidths
-from orchestration.comparison.cells import cell_summaries, frame_of
+from orchestration.comparison.cells import cell_summaries, table_of_runs
 from orchestration.comparison.design import Comparison, Condition, Controller, VehicleEntry
 from orchestration.comparison.limits import first_ends, limits
 from orchestration.comparison.outcome import as_json, outcome_of
@@ -71,7 +71,7 @@ def table(comparison: Comparison) -> pd.DataFrame:
             "total_variation.torque": 10.0 / error if good else None,
         }
         rows.append((index, metrics))
-    return frame_of(comparison, rows)
+    return table_of_runs(comparison, rows)
 
 
 def test_a_cell_tells_survival_settling_and_residual_apart(comparison: Comparison, table: pd.DataFrame) -> None:

@@ -27,7 +27,7 @@ from orchestration.fmi.instance import Instance
 from orchestration.fmi.instances import open_here
 from orchestration.fmi.model import read_model
 from orchestration.fmi.native import NativeInstance
-from orchestration.fmi.transfers import bounds_of
+from orchestration.fmi.transfers import range_of
 from orchestration.recording.recording import InMemory
 from orchestration.runs import simulation
 from orchestration.runs.outcome import RunInterrupted
@@ -296,7 +296,7 @@ def test_the_largest_number_that_an_input_holds_is_the_last_that_is_written(
 
 @pytest.mark.parametrize("dtype", ["int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64"])
 def test_the_bounds_of_a_type_are_the_last_floats_that_it_holds(dtype: str) -> None:
-    low, high = bounds_of(np.dtype(dtype))
+    low, high = range_of(np.dtype(dtype))
     of = np.iinfo(dtype)
     assert int(low) == of.min
     assert int(high) <= of.max

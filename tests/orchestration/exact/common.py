@@ -9,7 +9,7 @@ from orchestration.exact.effects import ContinuousEffects
 from orchestration.exact.linear import Components, Continuous, SampledSystem
 from orchestration.exact.moments import JumpLinear
 from orchestration.exact.objectives import Mean
-from orchestration.exact.timing import links_of, tasks_of
+from orchestration.exact.timing import links_of, sampled_tasks
 from orchestration.exact.timing_chain import TimingChain
 from orchestration.system.component import Component
 from orchestration.system.connection import Connection
@@ -78,7 +78,7 @@ def loop(
     system: System, components: Components, noise: dict[str, float], signals: tuple[str, ...], nodes: int
 ) -> JumpLinear:
     """Of which the cost is the sum of the squares of some signals."""
-    tasks = tasks_of(system)
+    tasks = sampled_tasks(system)
     effects = ContinuousEffects(system, components, [task.name for task in tasks], noise)
     count = len(signals)
     effects.charge([Mean(signals=signals, c=0.0, g=np.zeros(count), Q=np.eye(count))])

@@ -13,7 +13,7 @@ from orchestration.building.inputs import files_of
 from orchestration.exact.expect import Expected, expect, expected_of
 from orchestration.exact.linear import SampledSystem
 from orchestration.exact.loops import Loops, expect_same_steps
-from orchestration.exact.timing import tasks_of
+from orchestration.exact.timing import sampled_tasks
 from orchestration.flight.hover_loop import HoverLoop
 from orchestration.quadrotor.fmu_choice import FmuChoice
 from orchestration.quadrotor.scenario import Scenario
@@ -217,6 +217,6 @@ def test_a_task_that_minds_how_long_its_step_is_has_no_jitter() -> None:
     with pytest.raises(
         UsageError, match=r"components\.controller\.sampling\.jitter: the samples of controller depend on"
     ):
-        expect_same_steps(system, tasks_of(system), {"controller": minding})
+        expect_same_steps(system, sampled_tasks(system), {"controller": minding})
     regular = example("minimum_variance")
-    expect_same_steps(regular, tasks_of(regular), {"controller": minding})
+    expect_same_steps(regular, sampled_tasks(regular), {"controller": minding})

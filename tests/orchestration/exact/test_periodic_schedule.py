@@ -12,7 +12,7 @@ from orchestration.exact.expect import expect
 from orchestration.exact.linear import Components, SampledSystem
 from orchestration.exact.loops import expect_same_steps
 from orchestration.exact.repeating import periodic_schedule
-from orchestration.exact.timing import tasks_of
+from orchestration.exact.timing import sampled_tasks
 from orchestration.system.computers import Arrivals, Computer, Message, Network, Task
 from orchestration.system.criterion import Criterion
 from orchestration.system.distribution import Distribution
@@ -241,7 +241,7 @@ def test_a_task_that_minds_how_long_its_step_is_has_to_sample_regularly() -> Non
     for load, fits in ((0.0, True), (0.001, False)):
         computer = Computer(tasks={"load": Task(period=0.004, execution=load)})
         system = on_a_computer("distributed_servo", computer, period=0.006, execution=0.001, priority=2)
-        tasks = tasks_of(system, periodic_schedule(system))
+        tasks = sampled_tasks(system, periodic_schedule(system))
         if fits:
             expect_same_steps(system, tasks, parts)
         else:

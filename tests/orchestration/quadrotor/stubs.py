@@ -11,7 +11,7 @@ import numpy.typing as npt
 from orchestration.basics.errors import SimulatorError
 from orchestration.basics.simulator import Floats, Simulator, Transfer
 from orchestration.engines.master import Master
-from orchestration.engines.sources import Constant, Values
+from orchestration.engines.sources import ConstantValues, SourceValues
 from orchestration.engines.watch import watch
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
@@ -25,7 +25,7 @@ Call = tuple[Any, ...]
 
 
 class Stub:
-    """Values by name, and calls into a log that several stubs share."""
+    """SourceValues by name, and calls into a log that several stubs share."""
 
     name = "stub"
 
@@ -165,7 +165,7 @@ class Feedback(Counting):
         v["thrust"] = -4.0 * v["position.x"] - 3.0 * v["velocity.x"] - v["torque.x"]
 
 
-AT_ORIGIN = Constant([0.0, 0.0, 0.0])
+AT_ORIGIN = ConstantValues([0.0, 0.0, 0.0])
 """The reference that stays at the origin."""
 
 
@@ -217,7 +217,7 @@ class StubRun:
         controller: Simulator | None = None,
         *,
         seed: int = 0,
-        reference: Values = AT_ORIGIN,
+        reference: SourceValues = AT_ORIGIN,
         start: bool = True,
     ) -> None:
         self.timing = timing

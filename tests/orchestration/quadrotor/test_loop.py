@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestration.basics.errors import SimulatorError
-from orchestration.engines.sources import Constant
+from orchestration.engines.sources import ConstantValues
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.wiring import MEASUREMENT
 from orchestration.system.choices import Hold
@@ -337,7 +337,7 @@ def test_a_state_just_inside_the_region_does_not_diverge() -> None:
 
 
 def test_the_distance_is_that_to_the_reference() -> None:
-    far = Constant([300.0, 0.0, 0.0])
+    far = ConstantValues([300.0, 0.0, 0.0])
     plant = Straying(**{})
     plant.values["position.x"] = 250.0
     assert StubRun(Timing(), 0.05, plant, reference=far).master.divergence is None

@@ -57,7 +57,7 @@ def test_the_page_forbids_itself_to_load_anything() -> None:
 )
 def test_the_summary_has_the_outcome_of_a_run_and_its_time(stop_time: float, period: float, said: str) -> None:
     flown = run(dataclasses.replace(NATIVE, stop_time=stop_time, timing=Timing(period=period)))
-    assert of_runs.report_of({"r": flown}, "").summary.startswith(said)
+    assert of_runs.runs_report({"r": flown}, "").summary.startswith(said)
 
 
 @pytest.mark.parametrize(

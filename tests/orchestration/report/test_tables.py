@@ -12,7 +12,7 @@ from orchestration.report.blobs import Blobs
 from orchestration.report.of_study import Stored, _difference, is_sample
 from orchestration.report.reruns import Rerun
 from orchestration.report.subset import LEAST_POINTS, MOST_POINTS, evenly, points_for, select
-from orchestration.report.tables import ColumnAxis, share_of, shares_along, table_of
+from orchestration.report.tables import ColumnAxis, report_table, share_of, shares_along
 from orchestration.results.quantities import quantity
 from orchestration.studies.axes import Axis
 from orchestration.studies.study import Study
@@ -37,7 +37,7 @@ def column_axis(name: str, unit: str | None = None) -> ColumnAxis:
 
 def test_a_table_has_axes_words_and_the_metrics_that_some_run_has() -> None:
     blobs = Blobs()
-    made = table_of(
+    made = report_table(
         [{**each, "never": None} for each in ROWS], [column_axis("period", "s"), column_axis("law")],
         ["good", "error", "never", "steps"], {"error": "N.m"}, blobs, tracks={5: 0}, messages={7: "fell"}, is_grid=True,
     )  # fmt: skip

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fmu_kit.trajectory import Trajectory
-from orchestration.engines.sources import BuiltIn, Table
+from orchestration.engines.sources import BuiltIn, TableValues
 from orchestration.quadrotor.wiring import REFERENCE
 from orchestration.signals.table_file import read_table
 from quadcosim import UsageError
@@ -19,10 +19,10 @@ def row(t: float | str, value: float | str = 0.0) -> str:
     return ",".join(map(str, (t, *[value] * len(REFERENCE))))
 
 
-def table(tmp_path: Path, *rows: str, header: str = HEADER) -> Table:
+def table(tmp_path: Path, *rows: str, header: str = HEADER) -> TableValues:
     file = tmp_path / "reference.csv"
     file.write_text("\n".join((header, *rows)) + "\n", encoding="utf-8")
-    return Table(*read_table(file, REFERENCE, STOP))
+    return TableValues(*read_table(file, REFERENCE, STOP))
 
 
 def refused(tmp_path: Path, *rows: str, header: str = HEADER) -> str:

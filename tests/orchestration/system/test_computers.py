@@ -8,13 +8,13 @@ import pytest
 
 from orchestration.basics.errors import UsageError
 from orchestration.building.inputs import Files
-from orchestration.schedule.schedule_cache import timing
+from orchestration.schedule.schedule_cache import schedule_key
 from orchestration.studies.run_key import run_key
 from orchestration.system.computers import Message, Network
 from orchestration.system.frames import frame_nanoseconds
 from orchestration.system.paths import changed, value_at
 from orchestration.system.placement import SHARED, punctual
-from orchestration.system.randomness import is_random
+from orchestration.system.randomness import depends_on_seed
 from orchestration.system.sampling import SamplingOnArrival, TaskSampling
 from orchestration.system.system_file import is_system, load_system
 
@@ -132,7 +132,7 @@ def test_every_key_has_a_path(file, path, value):
     assert value_at(system, path) != value
     new = changed(system, {path: value})
     assert value_at(new, path) == value
-    assert timing(new) != timing(system)
+    assert schedule_key(new) != schedule_key(system)
     hashes = {name: name for name in ("plant.fmu", "controller.fmu", "filter.fmu", "trace.csv")}
     files = Files(fmus={}, tables={})
     object.__setattr__(files, "hashes", {str(file.parent / name): name for name in hashes})
@@ -143,16 +143,16 @@ def test_every_key_has_a_path(file, path, value):
 
 def test_a_trace_that_is_written_anew_has_another_schedule(file):
     system = load_system(file)
-    before = timing(system)
+    before = schedule_key(system)
     (file.parent / "trace.csv").write_text("time\n0.001\n0.003\n0.004\n", encoding="utf-8")
-    assert timing(system) != before
+    assert schedule_key(system) != before
 
 
 def test_a_system_is_random_where_anything_is_drawn(file):
     system = load_system(file)
     calm = replace(system, **punctual(system))
-    assert is_random(system)
-    assert is_random(calm)  # arrivals are random
+    assert depends_on_seed(system)
+    assert depends_on_seed(calm)  # arrivals are random
     assert calm.computers["node"].tasks["control"].execution == 0.001
     by_chance = {"tasks": "radio", "messages": "load"}
     without: dict[str, Any] = {
@@ -163,8 +163,8 @@ def test_a_system_is_random_where_anything_is_drawn(file):
         for table, (part, _) in SHARED.items()
     }
     calm = replace(calm, **without)
-    assert not is_random(calm)
-    assert is_random(changed(calm, {"networks.bus.error": 0.1}))
+    assert not depends_on_seed(calm)
+    assert depends_on_seed(changed(calm, {"networks.bus.error": 0.1}))
 
 
 CONTROL, ANGLE = "computers.node.tasks.control", "networks.bus.messages.angle"

@@ -6,7 +6,7 @@ import fmpy
 import pytest
 
 from orchestration.checks.doctor.as_lines import as_text
-from orchestration.checks.doctor.fmu import InspectedFmu, read_fmu
+from orchestration.checks.doctor.fmu import InspectedFmu, inspected
 from orchestration.checks.doctor.loading import try_loading
 from orchestration.checks.doctor.report import DoctorReport, examine
 from orchestration.checks.doctor.verdict import judge
@@ -26,7 +26,7 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def problems(path: Path) -> dict[str, str | None]:
     """What is wrong with the binaries, by folder."""
-    return {part.platform: part.problem for part in read_fmu(path).platforms}
+    return {part.platform: part.problem for part in inspected(path).platforms}
 
 
 def lines(read: InspectedFmu) -> list[str]:
@@ -45,7 +45,7 @@ def test_one_that_is_sound_loads_and_needs_nothing_more(fmu: Path) -> None:
 def test_a_library_in_a_folder_of_fmi_2_is_none_of_fmi_3(fmu: Path, tmp_path: Path) -> None:
     path = changed(fmu, tmp_path / "a.fmu", {HERE: None, "binaries/linux64/Small.so": files_of(fmu)[HERE]})
     assert try_loading(path, Limits()).failure == f"has no binary for {fmpy.platform_tuple}, only for linux64"
-    assert any(line.endswith("; FMI 3.0 has no such platform") for line in lines(read_fmu(path)))
+    assert any(line.endswith("; FMI 3.0 has no such platform") for line in lines(inspected(path)))
 
 
 def test_a_header_that_contradicts_its_folder_is_a_problem(fmu: Path, tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.checks.doctor.fmu import read_fmu
+from orchestration.checks.doctor.fmu import inspected
 from orchestration.fmi.archive import UnreadableFmuError
 from tests.orchestration.checks.doctor.common import (
     AARCH64,
@@ -30,7 +30,7 @@ def plant(built: dict[str, Path]) -> Path:
 
 def test_the_fmus_of_this_project_need_the_standard_library_only(built: dict[str, Path]) -> None:
     for path in built.values():
-        fmu = read_fmu(path)
+        fmu = inspected(path)
         assert [part.platform for part in fmu.platforms] == ["linux64", "win64"]
         assert [part.problem for part in fmu.platforms] == [None, None]
         assert fmu.kinds == ("CoSimulation",)
@@ -40,14 +40,14 @@ def test_the_fmus_of_this_project_need_the_standard_library_only(built: dict[str
 
 
 def test_the_declared_python_is_read(plant: Path, tmp_path: Path) -> None:
-    assert read_fmu(requiring(plant, tmp_path / "a.fmu", "&gt;=3.10,&lt;4")).requires_python == ">=3.10,<4"
+    assert inspected(requiring(plant, tmp_path / "a.fmu", "&gt;=3.10,&lt;4")).requires_python == ">=3.10,<4"
     undeclared = described(requiring(plant, tmp_path / "b.fmu", "3"), tmp_path / "c.fmu", "<Python ", "<Java ")
-    assert read_fmu(undeclared).requires_python is None
+    assert inspected(undeclared).requires_python is None
 
 
 def test_an_execution_tool_is_named(plant: Path, tmp_path: Path) -> None:
     old, new = 'needsExecutionTool="false"', 'needsExecutionTool="true"'
-    assert read_fmu(described(plant, tmp_path / "a.fmu", old, new)).needs_tool == f"quadcosim {version('quadcosim')}"
+    assert inspected(described(plant, tmp_path / "a.fmu", old, new)).needs_tool == f"quadcosim {version('quadcosim')}"
 
 
 # -- binaries -------------------------------------------------------------------------------------------------
@@ -56,25 +56,25 @@ def test_an_execution_tool_is_named(plant: Path, tmp_path: Path) -> None:
 def test_a_header_that_contradicts_its_folder_is_a_problem(plant: Path, tmp_path: Path) -> None:
     files = files_of(plant)
     elsewhere = {LINUX64: for_machine(files[LINUX64], AARCH64), WIN64: files[LINUX64]}
-    linux, windows = read_fmu(changed(plant, tmp_path / "a.fmu", elsewhere)).platforms
+    linux, windows = inspected(changed(plant, tmp_path / "a.fmu", elsewhere)).platforms
     assert linux.problem == "a binary for Linux, aarch64, expected Linux, x86-64 in this folder"
     assert windows.problem == "a binary for Linux, x86-64, expected Windows, x86-64 in this folder"
 
 
 def test_a_folder_without_the_library_of_the_model_is_a_problem(plant: Path, tmp_path: Path) -> None:
     files = {LINUX64: None, "binaries/linux64/Other.so": files_of(plant)[LINUX64]}
-    linux, _ = read_fmu(changed(plant, tmp_path / "a.fmu", files)).platforms
+    linux, _ = inspected(changed(plant, tmp_path / "a.fmu", files)).platforms
     assert (linux.binary, linux.problem) == (None, f"expected {LINUX64}")
 
 
 def test_a_library_that_is_none_is_a_problem(plant: Path, tmp_path: Path) -> None:
-    linux, _ = read_fmu(changed(plant, tmp_path / "a.fmu", {LINUX64: b"version https://"})).platforms
+    linux, _ = inspected(changed(plant, tmp_path / "a.fmu", {LINUX64: b"version https://"})).platforms
     assert linux.problem == f"{LINUX64}: begins with b'vers', expected an ELF, PE or Mach-O file"
 
 
 def test_a_folder_that_the_standard_does_not_name_is_read_as_well(plant: Path, tmp_path: Path) -> None:
     other = "binaries/x86_64-linux/QuadrotorPlant.so"
-    fmu = read_fmu(changed(plant, tmp_path / "a.fmu", {other: files_of(plant)[LINUX64]}))
+    fmu = inspected(changed(plant, tmp_path / "a.fmu", {other: files_of(plant)[LINUX64]}))
     (part,) = (part for part in fmu.platforms if part.platform == "x86_64-linux")
     assert part.problem is None
     assert part.binary is not None
@@ -84,7 +84,7 @@ def test_a_folder_that_the_standard_does_not_name_is_read_as_well(plant: Path, t
 def test_for_other_processors_the_folders_are_those_of_fmi_3(plant: Path, tmp_path: Path) -> None:
     arm = for_machine(files_of(plant)[LINUX64], AARCH64)
     files = {"binaries/aarch64-linux/QuadrotorPlant.so": arm, "binaries/aarch32-linux/QuadrotorPlant.so": arm}
-    parts = read_fmu(changed(plant, tmp_path / "a.fmu", files)).platforms
+    parts = inspected(changed(plant, tmp_path / "a.fmu", files)).platforms
     assert {part.platform: part.problem for part in parts if part.platform.startswith("aarch")} == {
         "aarch64-linux": None,
         "aarch32-linux": "a binary for Linux, aarch64, expected Linux, arm in this folder",
@@ -100,7 +100,7 @@ def test_what_lies_where_a_library_looks_comes_with_the_fmu(plant: Path, tmp_pat
         ("/lib", set()),
     ):
         elf = with_run_path(files[LINUX64], RUNPATH, run_path)
-        fmu = read_fmu(changed(plant, tmp_path / "a.fmu", {**libraries, LINUX64: elf}))
+        fmu = inspected(changed(plant, tmp_path / "a.fmu", {**libraries, LINUX64: elf}))
         (linux,) = (part for part in fmu.platforms if part.platform == "linux64")
         assert linux.bundled == bundled
 
@@ -130,26 +130,26 @@ def test_imports_are_those_that_are_neither_bundled_nor_standard(
 ) -> None:
     bundled = {"resources/helper.py": b"", "resources/helpers/more.py": b"", "resources/numpy.csv": b""}
     path = changed(plant, tmp_path / "a.fmu", {**bundled, "resources/extra.py": source.encode()})
-    python = read_fmu(path).python
+    python = inspected(path).python
     assert python is not None
     assert python.imports == imports
 
 
 def test_a_source_that_this_python_cannot_read_is_a_problem(plant: Path, tmp_path: Path) -> None:
-    python = read_fmu(changed(plant, tmp_path / "a.fmu", {"resources/old.py": b"print 'hello'"})).python
+    python = inspected(changed(plant, tmp_path / "a.fmu", {"resources/old.py": b"print 'hello'"})).python
     assert python is not None
     assert len(python.problems) == 1
     assert python.problems[0].startswith("resources/old.py: not Python 3.")
 
 
 def test_an_entry_that_is_not_there_is_a_problem(plant: Path, tmp_path: Path) -> None:
-    python = read_fmu(changed(plant, tmp_path / "a.fmu", {"resources/slavemodule.txt": b"gone\n"})).python
+    python = inspected(changed(plant, tmp_path / "a.fmu", {"resources/slavemodule.txt": b"gone\n"})).python
     assert python is not None
     assert python.problems == ("resources/slavemodule.txt names gone, but there is no resources/gone.py",)
 
 
 def test_an_fmu_without_pythons_entry_has_no_sources(plant: Path, tmp_path: Path) -> None:
-    assert read_fmu(changed(plant, tmp_path / "a.fmu", {"resources/slavemodule.txt": None})).python is None
+    assert inspected(changed(plant, tmp_path / "a.fmu", {"resources/slavemodule.txt": None})).python is None
 
 
 # -- what is no FMU -------------------------------------------------------------------------------------------
@@ -157,7 +157,7 @@ def test_an_fmu_without_pythons_entry_has_no_sources(plant: Path, tmp_path: Path
 
 def refusal(path: Path, size_limit: float = math.inf) -> str:
     with pytest.raises(UnreadableFmuError) as error:
-        read_fmu(path, size_limit)
+        inspected(path, size_limit)
     return str(error.value)
 
 

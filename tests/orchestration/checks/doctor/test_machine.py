@@ -9,7 +9,7 @@ import pytest
 
 from orchestration.checks.doctor.as_lines import as_text
 from orchestration.checks.doctor.binaries import LINUX, MACOS, WINDOWS
-from orchestration.checks.doctor.fmu import read_fmu
+from orchestration.checks.doctor.fmu import inspected
 from orchestration.checks.doctor.machine import this_machine
 from orchestration.checks.doctor.report import DoctorReport, as_tables
 from orchestration.checks.doctor.verdict import judge
@@ -46,7 +46,7 @@ def test_where_nothing_can_be_had_there_is_still_a_report(
     monkeypatch.setattr(platform, "system", lambda: name)
     monkeypatch.setattr(sys, "executable", "")
     monkeypatch.delattr(os, "confstr")
-    fmu = read_fmu(built["QuadrotorPlant"])
+    fmu = inspected(built["QuadrotorPlant"])
     machine = this_machine([fmu])
     assert machine.glibc is None
     assert machine.shared is (True if name == "Windows" else None)
@@ -57,7 +57,7 @@ def test_where_nothing_can_be_had_there_is_still_a_report(
 
 
 def test_libraries_are_looked_for_under_the_names_that_binaries_give(built: dict[str, Path]) -> None:
-    machine = this_machine([read_fmu(path) for path in built.values()])
+    machine = this_machine([inspected(path) for path in built.values()])
     assert set(machine.found) == {"libstdc++.so.6", "libgcc_s.so.1", "libc.so.6"}
     for library in machine.found.values():
         assert library is not None

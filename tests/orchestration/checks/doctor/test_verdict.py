@@ -9,7 +9,7 @@ import pytest
 from orchestration.checks.doctor.as_lines import as_text
 from orchestration.checks.doctor.binaries import MACOS, WINDOWS, Dependency
 from orchestration.checks.doctor.dependencies import missing_versions
-from orchestration.checks.doctor.fmu import InspectedFmu, read_fmu
+from orchestration.checks.doctor.fmu import InspectedFmu, inspected
 from orchestration.checks.doctor.machine import Library, Machine
 from orchestration.checks.doctor.pythons import ON_PATH, PRELOADED, THIS_PYTHON, PythonLibrary
 from orchestration.checks.doctor.report import DoctorReport, as_tables
@@ -35,7 +35,7 @@ def plant(built: dict[str, Path]) -> Path:
 
 @pytest.fixture
 def fmu(plant: Path) -> InspectedFmu:
-    return read_fmu(plant)
+    return inspected(plant)
 
 
 def judged(fmu: InspectedFmu, **changes: Any) -> Verdict:
@@ -92,7 +92,7 @@ def test_a_machine_without_a_binary_is_told_so(fmu: InspectedFmu) -> None:
 
 def test_the_header_decides_not_the_folder(plant: Path, tmp_path: Path) -> None:
     files = {LINUX64: for_machine(files_of(plant)[LINUX64], AARCH64)}
-    fmu = read_fmu(changed(plant, tmp_path / "arm.fmu", files))
+    fmu = inspected(changed(plant, tmp_path / "arm.fmu", files))
     assert needs(judged(fmu))[0] == ("an FMU with a binary for Linux, x86-64",)
     on_arm = judged(fmu, architecture="aarch64")
     assert needs(on_arm) == ((), ())
@@ -103,7 +103,7 @@ def test_the_header_decides_not_the_folder(plant: Path, tmp_path: Path) -> None:
 def test_on_arm_the_folder_of_fmi_3_goes_before_that_of_x86(plant: Path, tmp_path: Path) -> None:
     elf = files_of(plant)[LINUX64]
     files = {"binaries/aarch64-linux/QuadrotorPlant.so": for_machine(elf, AARCH64)}
-    fmu = read_fmu(changed(plant, tmp_path / "both.fmu", files))
+    fmu = inspected(changed(plant, tmp_path / "both.fmu", files))
     on_arm = judged(fmu, architecture="aarch64")
     assert needs(on_arm) == ((), ())
     assert on_arm.problems == ()
@@ -148,7 +148,7 @@ def test_a_library_without_versions_is_taken_as_it_is(fmu: InspectedFmu) -> None
 def test_what_the_fmu_brings_along_need_not_be_there(plant: Path, tmp_path: Path) -> None:
     elf = with_run_path(files_of(plant)[LINUX64], 29, "$ORIGIN")
     files = {LINUX64: elf, "binaries/linux64/libgcc_s.so.1": b""}
-    fmu = read_fmu(changed(plant, tmp_path / "a.fmu", files))
+    fmu = inspected(changed(plant, tmp_path / "a.fmu", files))
     assert "libgcc_s.so.1" not in machine_for(fmu).found
     assert judged(fmu).good
 
@@ -157,7 +157,7 @@ def test_what_the_fmu_brings_along_need_not_be_there(plant: Path, tmp_path: Path
 
 
 def test_a_python_that_is_too_old_is_told_which_is_wanted(plant: Path, tmp_path: Path) -> None:
-    fmu = read_fmu(requiring(plant, tmp_path / "a.fmu", "&gt;=3.12"))
+    fmu = inspected(requiring(plant, tmp_path / "a.fmu", "&gt;=3.12"))
     python, other = needs(judged(fmu))
     assert python == ("Python >=3.12; this is 3.11.7",)
     (text,) = other
@@ -169,7 +169,7 @@ def test_a_python_that_is_too_old_is_told_which_is_wanted(plant: Path, tmp_path:
 
 
 def test_a_requirement_that_cannot_be_understood_is_a_problem(plant: Path, tmp_path: Path) -> None:
-    verdict = judged(read_fmu(requiring(plant, tmp_path / "a.fmu", "newest")))
+    verdict = judged(inspected(requiring(plant, tmp_path / "a.fmu", "newest")))
     assert verdict.problems == ("Python requires = newest: expected a version specifier such as >=3.10",)
     assert not verdict.good
 
@@ -193,7 +193,7 @@ def test_the_start_of_another_host_hangs_on_where_its_python_is(fmu: InspectedFm
 
 def test_packages_that_the_sources_import_must_be_there(plant: Path, tmp_path: Path) -> None:
     source = {"resources/extra.py": b"import numpy, scipy"}
-    fmu = read_fmu(changed(plant, tmp_path / "a.fmu", source))
+    fmu = inspected(changed(plant, tmp_path / "a.fmu", source))
     verdict = judged(fmu, modules={"numpy": True, "scipy": False})
     assert verdict.python_host.needs == ("scipy where this Python can import it",)
     assert verdict.other_host.start == PRELOAD
@@ -206,7 +206,7 @@ def test_packages_that_the_sources_import_must_be_there(plant: Path, tmp_path: P
 def test_an_fmu_without_python_needs_none(plant: Path, tmp_path: Path) -> None:
     """A binary that is not pythonfmu's: any library of this machine that does without Python."""
     files = {LINUX64: _library_without_python(), "resources/slavemodule.txt": None}
-    fmu = read_fmu(changed(plant, tmp_path / "a.fmu", files))
+    fmu = inspected(changed(plant, tmp_path / "a.fmu", files))
     verdict = judged(fmu, python_libraries=(), temp_folder=Path("/tmp/é"))
     assert needs(verdict) == ((), ())
     assert verdict.other_host.start is None
@@ -232,7 +232,7 @@ def test_pythonfmu_needs_a_temp_folder_that_its_uri_does_not_escape(folder: str,
 
 
 def test_windows_takes_the_python_on_path_if_it_satisfies(plant: Path, tmp_path: Path) -> None:
-    fmu = read_fmu(requiring(plant, tmp_path / "a.fmu", "&gt;=3.10"))
+    fmu = inspected(requiring(plant, tmp_path / "a.fmu", "&gt;=3.10"))
 
     def start(*libraries: tuple[str, str, str]) -> str | None:
         verdict = judged(fmu, system=WINDOWS, python_libraries=pythons(*libraries))
@@ -264,7 +264,7 @@ def test_python_that_is_not_on_path_is_no_missing_library_of_windows(fmu: Inspec
 
 def test_of_a_mach_o_binary_nothing_is_claimed(plant: Path, tmp_path: Path) -> None:
     header = bytes.fromhex("cffaedfe0c000001")
-    fmu = read_fmu(changed(plant, tmp_path / "a.fmu", {"binaries/darwin64/QuadrotorPlant.dylib": header}))
+    fmu = inspected(changed(plant, tmp_path / "a.fmu", {"binaries/darwin64/QuadrotorPlant.dylib": header}))
     machine = machine_for(fmu, system=MACOS, architecture="aarch64", python_libraries=())
     verdict = judge(fmu, machine, None)
     assert needs(verdict) == ((), ())

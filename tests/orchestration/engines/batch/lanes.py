@@ -11,7 +11,7 @@ from orchestration.engines.structures import structures
 from orchestration.engines.wiring import check_against_fmus
 from orchestration.fmi.model import read_model
 from orchestration.runs.result import Result
-from orchestration.schedule.schedule_cache import ScheduleCache, timing
+from orchestration.schedule.schedule_cache import ScheduleCache, schedule_key
 from orchestration.system.model import System
 
 
@@ -40,7 +40,7 @@ def in_lanes(shape: Shape, systems: Sequence[System]) -> BatchResult:
 
 def group_of(systems: Sequence[System]) -> Group:
     """The systems as a group for a batch."""
-    return Group(systems=systems, timings=[timing(system) for system in systems])
+    return Group(systems=systems, timings=[schedule_key(system) for system in systems])
 
 
 def assert_the_same_signals(shape: Shape, found: BatchResult, lane: int, alone: Result) -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from orchestration.basics.errors import QuadcosimError
 from orchestration.engines.batch.batch import Batch
-from orchestration.engines.cuda.compiler import Resources, image
+from orchestration.engines.cuda.compiler import KernelResources, image
 from orchestration.engines.cuda.program import Code, line, program
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.schedule.schedule_cache import ScheduleCache
@@ -28,7 +28,7 @@ def _nvrtc() -> None:
     pytest.importorskip("nvidia.cuda_nvrtc", reason="no NVRTC: pip install 'quadcosim[cuda]'")
 
 
-def assert_it_spills_nothing(resources: Mapping[str, Resources], kernel: str, most: int) -> None:
+def assert_it_spills_nothing(resources: Mapping[str, KernelResources], kernel: str, most: int) -> None:
     assert sum(each.spilled for each in resources.values()) == 0
     registers = resources[kernel].registers
     assert registers is not None

@@ -23,7 +23,7 @@ _KEPT = 8
 """Spans whose regular instants are cached"""
 
 
-class Frame:
+class CommonTimetable:
     """The common part of all timetables of a system."""
 
     def __init__(self, system: System, fixed: Mapping[str, FixedStep]) -> None:
