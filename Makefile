@@ -10,7 +10,8 @@ BIN := .venv/bin
 COFMUPY := .venv-cofmupy/bin/python
 # Parallel test processes: one more than two cores, since tests wait for child processes and time limits.
 WORKERS ?= 3
-export CI
+# Tests try the same examples on every run.
+export CI ?= true
 # Tests start many processes, which share compiled modules.
 unexport PYTHONDONTWRITEBYTECODE
 # Threads of numpy's BLAS would cost each 0.1 s without benefit.
@@ -21,7 +22,7 @@ export QUADCOSIM_COFMUPY ?= $(abspath $(wildcard $(COFMUPY)))
 # Tests make and remove tens of thousands of temporary files, which is slow on some disks: they are in memory where Linux
 # has 4 GB for files there that may be executed. $(IN_FOLDER) COMMAND: with a temporary folder of its own.
 IN_MEMORY = $(shell awk '$$2 == "/dev/shm" && $$4 !~ /noexec/ {found = 1} END {exit !found}' /proc/mounts 2>/dev/null \
-	&& test "$$(df -Pk /dev/shm | awk 'END {print $$4}')" -gt 4000000 && echo "-p /dev/shm")
+	&& test -w /dev/shm && test "$$(df -Pk /dev/shm | awk 'END {print $$4}')" -gt 4000000 && echo "-p /dev/shm")
 IN_FOLDER = folder=$$(mktemp -d $(IN_MEMORY)) && trap 'rm -rf "$$folder"' EXIT && trap 'exit 130' INT TERM && TMPDIR=$$folder
 
 .PHONY: demo newcomer check test tests coverage lint bench figures findings interop release site clean
