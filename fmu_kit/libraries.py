@@ -52,8 +52,8 @@ def _processor() -> tuple[str, ...]:
 
 
 def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file and its folders, which other processes may write at the same time; raises `OSError`."""
+    """Write a file and its folders, which other processes and threads may write at the same time; raises `OSError`."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    fresh = path.with_name(f"{path.name}.{os.getpid()}")
+    fresh = path.with_name(f"{path.name}.{os.urandom(6).hex()}")
     fresh.write_bytes(content)
     fresh.replace(path)

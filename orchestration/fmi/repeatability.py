@@ -5,16 +5,17 @@ bit is relied upon. It is tested once for the content of an FMU on a machine, in
 kept in the user's cache directory.
 """
 
+import contextlib
 import functools
 import hashlib
 import json
-import os
 import platform
 import sys
 import tempfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from fmu_kit.libraries import write_atomically
 from orchestration.fmi.model import read_model
 from orchestration.processes import subprocesses
 from orchestration.processes.child import Child
@@ -93,16 +94,6 @@ def _tested(content: str, path: Path) -> Repeatability:
         if shown.pop("fresh", False):
             result = Repeatability(**shown)
             break
-    _keep(_place(content), result)
+    with contextlib.suppress(OSError):  # where nothing can be written, each process repeats the test
+        write_atomically(_place(content), json.dumps(asdict(result)).encode())
     return result
-
-
-def _keep(path: Path, result: Repeatability) -> None:
-    """Write it for later processes; where nothing can be written, each repeats the test."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        fresh = path.with_name(f"{path.name}.{os.getpid()}")
-        fresh.write_text(json.dumps(asdict(result)), encoding="utf-8")
-        fresh.replace(path)
-    except OSError:
-        pass
