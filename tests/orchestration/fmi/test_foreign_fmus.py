@@ -1,7 +1,6 @@
 """What third-party FMUs force: each habit of theirs does in a run of a system what the documents say."""
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -29,6 +28,7 @@ from orchestration.system.source import Source
 from tests.fmus.archive import files_of
 from tests.fmus.damage import write_fmu
 from tests.orchestration.fmi.small import BINARY, CLOCK, SIZE, needs_compiler, nothing_known, small
+from tests.orchestration.processes.test_child import gone
 
 pytestmark = needs_compiler
 
@@ -368,17 +368,7 @@ def test_the_process_of_an_isolated_fmu_ends_with_its_parent(tmp_path: Path) -> 
         env=subprocesses.environment(),
         check=False,
     )
-    pid = int(done.stdout)
-    for _ in range(100):
-        try:
-            os.kill(pid, 0)
-        except ProcessLookupError:
-            return
-        if Path(f"/proc/{pid}/stat").is_file() and Path(f"/proc/{pid}/stat").read_text().split()[2] == "Z":
-            return
-        subprocess.run(["sleep", "0.1"], check=True)
-    os.kill(pid, signal.SIGKILL)
-    raise AssertionError("it still lives")
+    assert gone(int(done.stdout))
 
 
 @pytest.mark.parametrize("load", ["open_here", "IsolatedInstance"])

@@ -84,11 +84,10 @@ def test_a_process_is_stopped_at_its_limits(program: str, limits: dict[str, floa
 
 
 @linux_only
-@pytest.mark.parametrize("then", ["sys.exit(0)", "time.sleep(600)"])
-def test_what_a_process_has_started_does_not_outlive_it(then: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("then", "code"), [("sys.exit(0)", 0), ("while True: print('x' * 1000)", None)])
+def test_what_a_process_has_started_does_not_outlive_it(then: str, code: int | None, tmp_path: Path) -> None:
     file = tmp_path / "pid"
-    ending = python(FORK.format(then=then), file, time=2.0)
-    assert ending.code == (0 if then == "sys.exit(0)" else None)
+    assert python(FORK.format(then=then), file, output=0.5).code == code
     assert gone(int(file.read_text()))
 
 
@@ -109,11 +108,15 @@ def test_no_file_may_grow_beyond_its_limit(tmp_path: Path) -> None:
     assert "File too large" in python(program, tmp_path / "file").last_line
 
 
+TELLS_ITS_LIMIT = "import resource; parent.receive(); print(*resource.getrlimit(resource.RLIMIT_CPU))"
+
+
 @linux_only
 def test_the_system_limits_a_process_whose_parent_is_killed() -> None:
-    program = "import resource, time; time.sleep(0.2); print(*resource.getrlimit(resource.RLIMIT_CPU))"
-    seconds = 2 * (os.cpu_count() or 1) + 1
-    assert python(program, time=2.0).last_line == f"{seconds} {seconds + 1}"
+    seconds = 600 * (os.cpu_count() or 1) + 1
+    with Child([sys.executable, "-c", f"{TALKS}\n{TELLS_ITS_LIMIT}"], limits=Limits(time=600.0)) as child:
+        child.send("limited")
+        assert child.ending().last_line == f"{seconds} {seconds + 1}"
 
 
 UNDER_A_LIMIT = """
@@ -122,6 +125,7 @@ from orchestration.processes.child import Child
 from orchestration.processes.limits import Limits
 resource.setrlimit(resource.RLIMIT_CPU, ({soft}, {hard}))
 with Child([sys.executable, "-c", sys.argv[1]], limits=Limits()) as child:
+    child.send("limited")
     ending = child.ending()
 print(ending.code, ending.reached, ending.last_line, sep="|")
 """
@@ -137,8 +141,7 @@ def under_a_limit(program: str, *, soft: int, hard: int) -> list[str]:
 @linux_only
 @pytest.mark.parametrize(("soft", "hard", "left"), [(40, 40, "39 40"), (30, 50, "30 50")])
 def test_an_existing_limit_of_processor_time_holds_for_a_confined_process(soft: int, hard: int, left: str) -> None:
-    program = "import resource, time; time.sleep(0.2); print(*resource.getrlimit(resource.RLIMIT_CPU))"
-    assert under_a_limit(program, soft=soft, hard=hard) == ["0", "None", left]
+    assert under_a_limit(TELLS_ITS_LIMIT, soft=soft, hard=hard) == ["0", "None", left]
 
 
 @linux_only
@@ -149,10 +152,13 @@ def test_a_process_ended_by_an_existing_limit_of_processor_time_is_reported_so()
 
 BUSY = """
 import os, time
-os.sched_setaffinity(0, {sorted(os.sched_getaffinity(0))[0]})
-while time.process_time() < 0.12:
+os.sched_setaffinity(0, {{{core}}})
+parent.send("ready")
+parent.receive()
+end = time.process_time() + 0.12
+while time.process_time() < end:
     pass
-print("done")
+parent.send("done")
 """
 
 
@@ -165,10 +171,13 @@ def test_time_spent_waiting_for_a_processor_does_not_count() -> None:
             other = subprocess.Popen([sys.executable, "-c", spin], start_new_session=True)
             stack.callback(other.wait)
             stack.callback(other.kill)
+        one = stack.enter_context(Child([sys.executable, "-c", f"{TALKS}\n{BUSY.format(core=core)}"]))
+        assert one.receive() == "ready"
+        one.allow(0.5)
         started = time.monotonic()
-        ending = python(BUSY, time=0.5)
+        one.send("begin")
+        assert one.receive() == "done"
         took = time.monotonic() - started
-    assert (ending.last_line, ending.reached) == ("done", None)
     assert took > 0.5, "expected it to have waited for longer than its limit"
 
 
