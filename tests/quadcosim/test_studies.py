@@ -172,14 +172,14 @@ def script(folder: Path, *, runs: int, stop: float) -> subprocess.Popen[str]:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 def test_workers_need_no_guard_of_the_main_module_and_ctrl_c_keeps_what_was_flown(tmp_path: Path) -> None:
-    with script(tmp_path, runs=200, stop=0.5) as process:
+    with script(tmp_path, runs=2000, stop=0.5) as process:
         assert process.stdout is not None
         while process.stdout.readline() != "done 1\n":
             assert process.poll() is None
         process.send_signal(signal.SIGINT)
         _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode != 0
-    assert "of 200 runs done" in err.splitlines()[-1]
+    assert "of 2000 runs done" in err.splitlines()[-1]
     assert (tmp_path / "study.sqlite").is_file()
 
 

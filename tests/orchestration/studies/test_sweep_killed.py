@@ -38,7 +38,7 @@ from tests.orchestration.studies.common import (
     workers_of,
 )
 from tests.orchestration.studies.kills import disturbed
-from tests.orchestration.workers.sick import ABORTS, KILLED, SPENT, sick_plant
+from tests.orchestration.workers.sick import ABORTS, KILLED, SPENT, WAIT, WAITS, sick_plant
 from tests.patience import PATIENCE
 
 # -- killed -----------------------------------------------------------------------------------------------
@@ -86,7 +86,10 @@ def test_the_death_of_a_worker_loses_nothing_though_the_fmu_is_moved_away_meanwh
 def test_a_run_whose_worker_is_killed_from_outside_stops_the_sweep_and_has_no_row(
     tmp_path: Path, main: Main, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "study.toml").write_text('[base]\nstop_time = 0.2\n[[axes]]\nname = "seed"\nvalues = [1]\n')
+    plant = f"[base.plant]\nfmu = '{sick_plant(tmp_path).name}'\n"
+    axis = f'[[axes]]\nname = "mass"\nsets = ["plant.mass"]\nvalues = [{WAITS}]\n'
+    (tmp_path / "study.toml").write_text(f"[base]\nstop_time = 0.2\n{plant}{axis}")
+    monkeypatch.setenv(WAIT, "until it is killed")
     with start("sweep", "study.toml", "--engine", "compiled", cwd=tmp_path) as coordinator:
         while coordinator.poll() is None:
             for process in workers_of(coordinator.pid):
@@ -96,6 +99,7 @@ def test_a_run_whose_worker_is_killed_from_outside_stops_the_sweep_and_has_no_ro
     assert coordinator.returncode == 1
     assert len(err.splitlines()) == 1, err
     assert rows_in(tmp_path / STORE) == 0
+    monkeypatch.delenv(WAIT)
     monkeypatch.chdir(tmp_path)
     assert main("sweep", "study.toml", "--engine", "compiled").stdout == f"{STORE}: 1 runs, 1 of them new\n"
 

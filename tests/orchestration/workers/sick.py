@@ -7,8 +7,10 @@ from orchestration.quadrotor.wiring import DEFAULT_PLANT
 from tests.fmus.archive import files_of
 from tests.fmus.damage import with_its_guid, write_fmu
 
-ABORTS, KILLED, SPENT = 1.11, 1.13, 1.14
-"""Masses at which the first step aborts, kills the process, or leaves it dying for the next run."""
+ABORTS, KILLED, SPENT, WAITS = 1.11, 1.13, 1.14, 1.15
+"""Masses at which the first step aborts, kills the process, leaves it dying for the next run, or waits while `WAIT`."""
+WAIT = "QUADCOSIM_WAIT"
+"""environment variable that is set"""
 
 _BEFORE = "        body, wind, actuators = self._body, self._wind, self._actuators\n"
 _SICKNESS = f"""
@@ -18,6 +20,8 @@ _SICKNESS = f"""
             os.abort()
         if mass == {KILLED}:
             os.kill(os.getpid(), 9)
+        while mass == {WAITS} and "{WAIT}" in os.environ:
+            pass
         if mass != {SPENT} and "QUADCOSIM_SPENT" in os.environ:
             os.abort()
         if mass == {SPENT}:
