@@ -35,7 +35,7 @@ def test_five_commands_lead_to_the_limit_plot_of_ones_own_controller(here: Path,
         "hover_pd/hover_pd.py", "hover_pd/test_hover_pd.py", "hover_pd/system.toml", "hover_pd/README.md",
     ]  # fmt: skip
     built = Path("hover_pd", "native", "HoverPd.fmu")
-    assert main("build", "hover_pd", "--native").stdout.split() == [str(built.resolve())]
+    assert main("build", "hover_pd", "--native").stdout.splitlines() == [str(built.resolve())]
     with zipfile.ZipFile(built) as archive:
         said = fromstring(archive.read("modelDescription.xml")).attrib
         page = archive.read("documentation/index.html").decode()

@@ -139,7 +139,7 @@ def test_two_names_of_one_library_are_one(elf: bytes, tmp_path: Path) -> None:
 def test_a_preloaded_python_goes_before_all_others(elf: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = put(elf, tmp_path, "libpython3.9.so.1.0")
     put(elf, tmp_path, f"libpython3.{sys.version_info[1]}.so.1.0")
-    monkeypatch.setenv("LD_PRELOAD", f"libother.so {path}")
+    monkeypatch.setenv("LD_PRELOAD", f"libother.so {path.name}")
     first = python_libraries(linux(tmp_path))[0]
     assert (first.path, first.version, first.found_by) == (path, "3.9", PRELOADED)
 
