@@ -1,8 +1,10 @@
 """Settings and fixtures that all tests share."""
 
+import atexit
 import gc
 import math
 import os
+import shutil
 import signal
 import tempfile
 from collections.abc import Iterator
@@ -31,6 +33,13 @@ providers._get_local_constants = lambda: providers._local_constants
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell's background job, from which commands would inherit it
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+if not os.access(os.path.expanduser("~"), os.W_OK):  # libraries are kept there, and what matplotlib knows of fonts
+    os.environ["HOME"] = tempfile.mkdtemp(prefix="home-of-tests-")
+    atexit.register(shutil.rmtree, os.environ["HOME"], ignore_errors=True)
+
+for variable in ("COLUMNS", "FORCE_COLOR", "GITHUB_ACTIONS", "PY_COLORS", "TERMINAL_WIDTH"):
+    os.environ.pop(variable, None)  # they ask for what is printed in colours or in another width
 
 DATA = Path(__file__).parent / "data"
 
@@ -83,9 +92,11 @@ def built(making: Making, tmp_path_factory: pytest.TempPathFactory) -> dict[str,
 def main(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Main:
     """The command `quadcosim` in this process, which saves the imports: for what does not hang on the process.
 
-    It does not say how far it is, as it does where work takes long: how fast the machine is changes no test.
+    It does not say how far it is, as it does where work takes long, nor which FMUs it builds: how fast the machine is
+    and which test was the first to need an FMU changes no test.
     """
     monkeypatch.setattr(terminal, "SPARSE", math.inf)
+    monkeypatch.setattr(fmus, "_announce_build", lambda path, announce: None)
 
     def call(*arguments: str | Path, code: int = 0) -> Done:
         capsys.readouterr()
