@@ -83,9 +83,9 @@ def test_a_figure_that_there_is_not_is_refused_with_those_there_are(result: Resu
 
 def test_csv_has_units_in_its_head_and_the_same_numbers(result: Result, tmp_path: Path) -> None:
     signals, events = result.to_csv(tmp_path)
-    table = pd.read_csv(signals)
-    assert {"time [s]", "plant.position.x [m]", "plant.torque.x [N.m]", "controller.attitude_error.w"} < set(table)
-    assert table.to_numpy().tobytes() == result.rows.tobytes()
+    names = {"time [s]", "plant.position.x [m]", "plant.torque.x [N.m]", "controller.attitude_error.w"}
+    assert names < set(pd.read_csv(signals))
+    assert np.loadtxt(signals, delimiter=",", skiprows=1).tobytes() == result.rows.tobytes()
     assert list(pd.read_csv(events)) == ["time [s]", "event", "what", "sample"]
     assert len(pd.read_csv(events)) == len(result.events)
 
