@@ -12,6 +12,8 @@ import fmpy
 import platformdirs
 import pytest
 
+from orchestration.fmi import repeatability
+
 COMPILER = shutil.which("gcc") or shutil.which("cc")
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler")
 
@@ -123,6 +125,12 @@ def small(
         archive.writestr("modelDescription.xml", described)
         archive.writestr(f"binaries/{place}/Small{fmpy.sharedLibraryExtension}", library)
     return path
+
+
+def known(fmu: Path) -> Path:
+    """The FMU, of which it is known whether its runs repeat: else its first run finds it out, in most of a second."""
+    repeatability.of(fmu)
+    return fmu
 
 
 @functools.cache

@@ -14,7 +14,7 @@ from orchestration.system.component import Component
 from orchestration.system.model import System
 from quadcosim import QuadcosimError
 from tests.commands import Main
-from tests.orchestration.fmi.small import needs_compiler, small
+from tests.orchestration.fmi.small import known, needs_compiler, small
 from tests.orchestration.studies.common import (
     PERIODS,
     RUNS,
@@ -49,7 +49,7 @@ def test_a_dask_cluster_makes_the_same_rows(
 
 @needs_compiler
 def test_a_run_that_hangs_in_a_dask_worker_is_a_failed_row_with_the_reason(tmp_path: Path, cluster: Cluster) -> None:
-    fmu = small(tmp_path, "ENDS=if (m->s.gain == 3.0) for (;;) usleep(1000)")
+    fmu = known(small(tmp_path, "ENDS=if (m->s.gain == 3.0) for (;;) usleep(1000)"))
     gain = "components.it.parameters.gain"
     system = System(stop_time=0.1, components={"it": Component(fmu=str(fmu), step=0.01)})
     hangs = Study(name="hangs", base=system, axes=(Axis(name=gain, targets=(gain,), values=(1.0, 3.0)),))

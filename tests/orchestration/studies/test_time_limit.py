@@ -11,7 +11,7 @@ from orchestration.studies.study import Study
 from orchestration.system.component import Component
 from orchestration.system.model import System
 from tests.commands import Main
-from tests.orchestration.fmi.small import needs_compiler, small
+from tests.orchestration.fmi.small import known, needs_compiler, small
 from tests.orchestration.studies.common import sweep
 
 pytestmark = [needs_compiler, pytest.mark.skipif(sys.platform != "linux", reason="/proc of Linux")]
@@ -36,7 +36,7 @@ step = 0.01
 
 @pytest.mark.parametrize("waits", ["for (;;)", "for (;;) usleep(1000)"])
 def test_a_run_that_hangs_is_a_failed_row_with_the_reason(waits: str, tmp_path: Path) -> None:
-    path = small(tmp_path, f"ENDS=if (m->s.gain == 3.0) {waits}")
+    path = known(small(tmp_path, f"ENDS=if (m->s.gain == 3.0) {waits}"))
     system = System(
         stop_time=0.1, components={"it": Component(fmu=str(path), step=0.01)}, objectives={"last": "max(it.y)"}
     )
@@ -53,7 +53,7 @@ def test_a_run_that_hangs_is_a_failed_row_with_the_reason(waits: str, tmp_path: 
 
 
 def test_the_command_limits_each_run(tmp_path: Path, main: Main) -> None:
-    small(tmp_path, "ENDS=if (m->s.gain == 3.0) for (;;) usleep(1000)")
+    known(small(tmp_path, "ENDS=if (m->s.gain == 3.0) for (;;) usleep(1000)"))
     (tmp_path / "system.toml").write_text(SYSTEM)
     (tmp_path / "study.toml").write_text(STUDY)
     done = main(
