@@ -17,6 +17,7 @@ from orchestration.basics.errors import UsageError
 from orchestration.certificates.breaking import FINE, SCAN
 from orchestration.certificates.causes import EXECUTION, Cause
 from orchestration.exact.loops import Loops
+from orchestration.exact.mean_square import AGREE
 from orchestration.fmi.model import Model
 from orchestration.stability.operating_point import deterministic
 from orchestration.system.computers import Task
@@ -30,8 +31,6 @@ LONGEST = 4
 """turns after which a sequence repeats; a turn has as many jobs as there are in a period of the loop"""
 MOST_JOBS = 64
 """after which a sequence repeats"""
-AGREE = 1e-6
-"""of a radius, from order to order"""
 
 Word = tuple[int, ...]
 """by turn, 0 or 1: nothing, or the value"""

@@ -89,11 +89,11 @@ class Comparison:
     axis: Axis
     """The quantity that is varied, with increasing values."""
     starts: Ensemble
-    """The initial conditions, the same for all."""
+    """The initial conditions, the same for every controller."""
     front: Front = field(default_factory=Front)
     """The two objectives of the trade-off."""
     native: bool = False
-    """Whether to use the native twins of its FMUs."""
+    """Whether it is run with the native twins of its FMUs."""
 
     def __post_init__(self) -> None:
         for kind in ("controllers", "vehicles", "conditions"):

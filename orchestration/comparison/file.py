@@ -85,7 +85,7 @@ class ComparisonFile:
 def load_comparison(path: str | Path) -> Comparison:
     """Read a comparison file; paths in it are relative to its folder.
 
-    Raises `UsageError` for a file that cannot be read, an unknown key (with the known ones) or an invalid value.
+    Raises `UsageError` for a file that cannot be read, an unknown key (naming the known ones) or an invalid value.
     """
     return load(Path(path), "comparison file", ComparisonFile, _comparison)
 

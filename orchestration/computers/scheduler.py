@@ -76,14 +76,14 @@ class _Job:
 class _TaskState:
     """The state of a task: its jobs that have not ended, the oldest first, and those that still have to write."""
 
-    __slots__ = ("carriers", "jobs", "next_late", "next_nominal", "number", "part", "sampled_at", "samples",
+    __slots__ = ("carriers", "jobs", "next_nominal", "number", "part", "sampled_at", "samples",
                  "started_at", "unwritten")  # fmt: skip
 
     def __init__(self, part: ScheduledTask, carriers: list[int]) -> None:
         self.part, self.carriers = part, carriers
         self.jobs: deque[_Job] = deque()
         self.unwritten: deque[_Job] = deque()
-        self.number = self.samples = self.next_nominal = self.next_late = 0
+        self.number = self.samples = self.next_nominal = 0
         self.started_at = self.sampled_at = NONE
 
 

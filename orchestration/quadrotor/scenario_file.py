@@ -33,7 +33,7 @@ ScenarioFile = table_of(
 def load_scenario(path: str | Path) -> Scenario:
     """Read a scenario file; paths in it are relative to its folder.
 
-    Raises `UsageError` for a file that cannot be read, an unknown key (with the known ones) or a value of the wrong
+    Raises `UsageError` for a file that cannot be read, an unknown key (naming the known ones) or a value of the wrong
     type.
     """
     path = Path(path)

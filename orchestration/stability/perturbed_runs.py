@@ -22,6 +22,7 @@ from orchestration.basics.simulator import Floats, Transfer
 from orchestration.fmi.instance import Instance, Loader
 from orchestration.fmi.reuse import Instances
 from orchestration.runs.prepared import prepared
+from orchestration.stability.linearised_component import PULSE
 from orchestration.stability.operating_point import (
     deterministic,
     exchanged_signals,
@@ -34,8 +35,6 @@ from orchestration.system.distribution import highest
 from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
 
-PULSE = 1e-6
-"""of an input: of its value, or absolute where that is smaller than 1"""
 LARGE, SMALL = 1e3, 1e-7
 """of the initial difference: sizes between which it is followed, linear and above rounding"""
 FEWEST, MOST = 100, 400

@@ -68,7 +68,7 @@ class StudyFile:
 def load_study(path: str | Path) -> Study:
     """Read a study file; paths in it are relative to its folder.
 
-    Raises `UsageError` for an unreadable file, an unknown key (naming the known ones) or an invalid value.
+    Raises `UsageError` for a file that cannot be read, an unknown key (naming the known ones) or an invalid value.
     """
     return load(Path(path), "study file", StudyFile, _study)
 

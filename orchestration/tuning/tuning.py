@@ -34,7 +34,7 @@ class Tuning(TuningProblem):
     judged: int
     """The number of initial conditions that it is judged on."""
     native: bool = False
-    """Whether native FMUs are used."""
+    """Whether it is run with the native twins of its FMUs."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -58,7 +58,7 @@ class TuningFile:
 def load_tuning(path: str | Path) -> Tuning | ExactTuning:
     """Read a tuning file; paths in it are relative to its folder.
 
-    Raises `UsageError` for an unreadable file, an unknown key (naming the known ones) or an invalid value.
+    Raises `UsageError` for a file that cannot be read, an unknown key (naming the known ones) or an invalid value.
     """
     return load(Path(path), "tuning file", TuningFile, _tuning)
 
