@@ -29,6 +29,10 @@ Complexes = npt.NDArray[np.complex128]
 FREQUENCIES = 800
 """at which the bound is evaluated, from `LOWEST` to π by period"""
 LOWEST = 1e-4
+POORLY_DAMPED = 0.1
+"""poles whose distance from the unit circle is less, relative to their angle: peaks too narrow for these frequencies"""
+AROUND = 40
+"""frequencies to each side of such a peak"""
 ALIASES = 40
 """to each side; those beyond are B/(jω), whose sum is known"""
 LONGEST = 4
@@ -63,11 +67,23 @@ def certain_jitter(loop: SampledLoop) -> float:
 
     0 for a loop that is unstable without jitter.
     """
-    if _radius(loop, (0.0,)) >= 1.0:
+    poles = np.linalg.eigvals(_turn(loop, (0.0,)))
+    if np.abs(poles).max() >= 1.0:
         return 0.0
-    omega = np.geomspace(LOWEST, math.pi, FREQUENCIES)
+    omega = np.concatenate([np.geomspace(LOWEST, math.pi, FREQUENCIES), *map(_around, poles)])
     largest = float((np.abs(np.exp(1j * omega) - 1.0) * _gains(loop, omega)).max())
     return loop.period * _periods(1.0 / largest)
+
+
+def _around(pole: complex) -> Floats:
+    """Frequencies around the peak that a poorly damped pole makes, up to as far as others are; else none."""
+    angle, distance = abs(float(np.angle(pole))), 1.0 - abs(pole)
+    far = 0.5 * POORLY_DAMPED * angle
+    if distance >= 2.0 * far:
+        return np.zeros(0)
+    off = np.geomspace(0.1 * distance, far, AROUND)
+    omega: Floats = np.concatenate([angle - off, [angle], angle + off])
+    return omega[omega <= math.pi]
 
 
 def _gains(loop: SampledLoop, omega: Floats) -> Floats:
@@ -141,7 +157,12 @@ def _patterns() -> list[tuple[float, ...]]:
 
 
 def _radius(loop: SampledLoop, late: Sequence[float]) -> float:
-    """The spectral radius over one turn of delays d + `late` [s], by sample: arrivals never overtake each other."""
+    """The spectral radius over one turn of delays d + `late` [s]."""
+    return float(np.abs(np.linalg.eigvals(_turn(loop, late))).max())
+
+
+def _turn(loop: SampledLoop, late: Sequence[float]) -> Floats:
+    """The map over one turn of delays d + `late` [s], by sample: arrivals never overtake each other."""
     T, n, m = loop.period, len(loop.A), len(loop.F)
     count = len(late)
     oldest = math.ceil((loop.delay + max(late)) / T - _INSTANT) + 1  # commands before this sample's that may matter
@@ -158,7 +179,7 @@ def _radius(loop: SampledLoop, late: Sequence[float]) -> float:
             A, B = held(round(at - cursor, 13))
             x, cursor = A @ x + B @ sent[acting], at
         total = np.vstack([x, *sent[:oldest]]) @ total
-    return float(np.abs(np.linalg.eigvals(total)).max())
+    return total
 
 
 def _pieces(arrival: list[float], k: int, oldest: int, begin: float, end: float, T: float) -> list[tuple[float, int]]:

@@ -43,7 +43,10 @@ def test_breaking_jitter_of_delays_that_are_all_late_is_the_constant_limit() -> 
 
 def test_no_sequence_breaks_a_jitter_that_is_certain_and_one_breaks_more() -> None:
     random = np.random.default_rng(4)
-    for loop in (integrator(0.5), integrator(1.2), integrator(0.3, 0.7), SampledLoop(**DOUBLE, period=1.0)):
+    A, B, F = [[0.0, 1.0], [-2.2, -0.065]], [[0.0], [1.0]], [[-0.502, -0.21]]
+    hardly_damped = SampledLoop(A=np.array(A), B=np.array(B), F=np.array(F), period=1.0)  # 1.2e-4 per period
+    double = SampledLoop(**DOUBLE, period=1.0)
+    for loop in (integrator(0.5), integrator(1.2), integrator(0.3, 0.7), double, hardly_damped):
         certain, broken = certain_jitter(loop), breaking_jitter(loop, 5.0)
         assert broken is not None
         assert 0.0 < certain < broken[0]
