@@ -133,11 +133,11 @@ def on_path(comparison: Comparison) -> Comparison:
 
 
 def by_horizon(rows: Any) -> dict[str, dict[str, int]]:
-    """The numbers of runs that have diverged, and that have settled, by each of `HORIZONS`."""
+    """The numbers of runs that have diverged by each of `HORIZONS`, and that stay within 5 cm from then to the end."""
     alive, settling, end = survived(rows), rows[SETTLING].to_numpy(float), rows["divergence_time"].astype(float)
     return {
         "diverged_by": {f"{t:g}": int((~alive & (end <= t)).sum()) for t in HORIZONS},
-        "settled_by": {f"{t:g}": int((alive & (settling <= t)).sum()) for t in HORIZONS},
+        "inside_from": {f"{t:g}": int((alive & (settling <= t)).sum()) for t in HORIZONS},
     }
 
 
@@ -215,11 +215,11 @@ def lines(name: str, content: Any) -> Iterator[str]:
         (low, high), (least, most) = shares
         values = ", ".join(f"{key} {_numbers(cell[key])}" for key in REPORTED)
         where = ", ".join(cell[key] for key in ("vehicle", "condition", "controller"))
-        by = "/".join(str(count) for count in cell["settled_by"].values())
+        by = "/".join(str(count) for count in cell["inside_from"].values())
         yield (f"  cell {cell['cell']}: {where}, {cell['value']:g}: of {cell['count']} {cell['survives']} survive "
                f"({low:.1%} to {high:.1%}, {cell['diverged_late']} lost late), {cell['settles']} settle "
-               f"({least:.1%} to {most:.1%}; by 20/30/40/60 s {by}); {values}; from the path {_number(cell['on_path'])}"
-               )  # fmt: skip
+               f"({least:.1%} to {most:.1%}; inside from 20/30/40/60 s on {by}); {values}; from the path "
+               f"{_number(cell['on_path'])}")  # fmt: skip
     for key, fate, by_size in _ends_by_size(name):
         yield f"  {', '.join(key)}: by size of the initial error half {fate} up to {', '.join(by_size)}"
 

@@ -11,12 +11,12 @@ from orchestration.comparison.survival import FATES, survived
 
 
 def fates(table: pd.DataFrame) -> str:
-    """How many survive and settle, and by when: whether another horizon would change the result."""
+    """How many survive and settle, and from when on: whether another horizon would change the result."""
     by = {name: "/".join(map(str, counts.values())) for name, counts in comparisons.by_horizon(table).items()}
     alive = survived(table)
     return (
         f"{len(table)} flights, {alive.sum()} survive (diverged by {'/'.join(f'{t:g}' for t in comparisons.HORIZONS)} "
-        f"s: {by['diverged_by']}), {FATES['settle'](table).sum()} settle (by then: {by['settled_by']})"
+        f"s: {by['diverged_by']}), {FATES['settle'](table).sum()} settle (inside from then on: {by['inside_from']})"
     )
 
 

@@ -244,15 +244,15 @@ def wind() -> list[str]:
 
 
 def monte_carlo() -> list[str]:
-    """How many survive and stay within 5 cm, and rank correlations of the survivors' errors with each axis."""
+    """How many survive and settle, and rank correlations of the survivors' errors with each axis."""
     table = run_study_file("monte_carlo")
     draw("monte_carlo", "ultimate_bound")
-    lines, alive, kinds = [fates(table)], survived(table), {"survive": survived, "stay within 5 cm": figures.good_runs}
+    lines, alive = [fates(table)], survived(table)
     groups = {"all": table}
     for axis, edge in RANDOM.items():
         groups |= {f"{axis} < {edge:g}": table[table[axis] < edge], f"{axis} >= {edge:g}": table[table[axis] >= edge]}
     for name, group in groups.items():
-        lines.append(f"{name}: " + "; ".join(f"{kind} {share(has(group))}" for kind, has in kinds.items()))
+        lines.append(f"{name}: " + "; ".join(f"{fate} {share(has(group))}" for fate, has in FATES.items()))
     for name, group in {
         "survive": table[alive],
         "loss < 0.25": table[alive & (table["loss"] < RANDOM["loss"])],

@@ -16,8 +16,9 @@ def lines(comparison: Comparison, outcome: Outcome) -> Iterator[str]:
     for (vehicle, condition), group in groupby(outcome.cells, lambda cell: (cell.vehicle, cell.condition)):
         cells = [*group]
         yield (
-            f"{vehicle}, {condition}: of {len(comparison.initial_conditions)} runs, those that survive / settle by "
-            f"{comparison.study.origin.stop_time:g} s, and the share that survives with its 95 % interval"
+            f"{vehicle}, {condition}: of {len(comparison.initial_conditions)} runs of "
+            f"{comparison.study.origin.stop_time:g} s, those that survive / settle, "
+            "and the share that survives with its 95 % interval"
         )
         rows = [[axis, *names]]
         for value in comparison.values:

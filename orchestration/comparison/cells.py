@@ -70,7 +70,7 @@ class CellSummary:
     survives: Share
     """have not diverged by the horizon"""
     settles: Share
-    """have settled by the horizon"""
+    """stay within 5 cm throughout the last third"""
     diverged: int
     diverged_late: int
     """of these, in the second half of the horizon: if there are any, the share still depends on the horizon"""
@@ -106,7 +106,7 @@ def cell_summaries(comparison: Comparison, table: "pd.DataFrame") -> list[CellSu
     summaries = []
     for index, rows in done.groupby(numbers, sort=True):
         cell = cells[int(index)]
-        alive = rows[survived(rows)]
+        alive, settling = rows[survived(rows)], rows[settled(rows)]
         summaries.append(
             CellSummary(
                 cell=cell.index,
@@ -116,11 +116,11 @@ def cell_summaries(comparison: Comparison, table: "pd.DataFrame") -> list[CellSu
                 value=cell.value,
                 count=len(rows),
                 survives=Share.of(len(alive), len(rows)),
-                settles=Share.of(int(settled(rows).sum()), len(rows)),
+                settles=Share.of(len(settling), len(rows)),
                 diverged=len(rows) - len(alive),
                 diverged_late=int(diverged_late(rows, comparison.study.origin.stop_time).sum()),
                 medians={
-                    "settling_time": Median.of(alive[SETTLING].to_numpy(float)),
+                    "settling_time": Median.of(settling[SETTLING].to_numpy(float)),
                     "residual": Median.of(alive[RESIDUAL].to_numpy(float)),
                     **{name: Median.of(alive[name].to_numpy(float)) for name in reported_objectives(comparison)},
                 },

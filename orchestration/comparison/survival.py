@@ -1,7 +1,7 @@
-"""The outcomes of the runs of a comparison: which survive, and which of these settle by the horizon.
+"""The outcomes of the runs of a comparison: which survive, and which of these settle.
 
-A run survives if it has not diverged by its horizon. It settles if its error stays within the band of the objective
-from some time on, its settling time. The largest error after that is its residual.
+A run survives if it has not diverged by its horizon. It settles if its outcome is `settled`: the error stays within
+5 cm throughout the last third. The largest error there is its residual.
 """
 
 from collections.abc import Callable, Mapping
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     """A mask of the rows of a table of runs"""
 
 SETTLING = "settling_time"
-"""The objective that is the time at which a run settles; it has no value for one that does not"""
+"""The objective that is the time from which a run stays within 5 cm; a run that settles has one"""
 RESIDUAL = "ultimate_bound"
 """The objective that is the largest error at the end"""
 
@@ -25,8 +25,8 @@ def survived(table: "pd.DataFrame") -> "pd.Series":
 
 
 def settled(table: "pd.DataFrame") -> "pd.Series":
-    """Mask of the runs that survive and settle by their horizon."""
-    return survived(table) & table[SETTLING].notna()
+    """Mask of the runs that settle."""
+    return table["outcome"].eq("settled")
 
 
 def diverged_late(table: "pd.DataFrame", horizon: float) -> "pd.Series":
