@@ -34,7 +34,7 @@ class Point:
 
 
 def points(comparison: Comparison, table: "pd.DataFrame") -> Iterator[Point]:
-    """The controllers that survive half the initial conditions or more, at each value of the axis."""
+    """The controllers that survive half the initial conditions or more, at each value where all survive one of them."""
     done = table[table["status"] == "done"]
     for (vehicle, condition, value), rows in done.groupby([VEHICLE, CONDITION, comparison.axis.name], sort=False):
         alive = rows[survived(rows)]
@@ -43,6 +43,8 @@ def points(comparison: Comparison, table: "pd.DataFrame") -> Iterator[Point]:
         names = [one.name for one in comparison.controllers if counts.get(one.name, 0) >= enough]
         alive = alive[alive[CONTROLLER].isin(names)]
         by_all = alive[START].value_counts() == len(names)
+        if not by_all.any():
+            continue
         common = alive[alive[START].isin(by_all[by_all].index)]
         medians = [(name, *_medians(comparison, common[common[CONTROLLER] == name])) for name in names]
         for name, error, effort in medians:
@@ -65,7 +67,5 @@ def _medians(comparison: Comparison, rows: "pd.DataFrame") -> tuple[Median, Medi
 
 def _dominates(one: tuple[float | None, float | None], other: tuple[float | None, float | None]) -> bool:
     """Whether `one` is no worse in both and better in one."""
-    if None in one or None in other:
-        return False
     pairs = [(a, b) for a, b in zip(one, other) if a is not None and b is not None]
     return all(a <= b for a, b in pairs) and any(a < b for a, b in pairs)

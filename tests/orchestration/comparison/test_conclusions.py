@@ -154,6 +154,7 @@ def test_within_a_peak_torque_only_what_needs_no_more_counts(comparison: Compari
 def test_the_front_is_over_initial_conditions_that_all_survive_and_omits_controllers_that_survive_few(
     comparison: Comparison, table: pd.DataFrame
 ) -> None:
+    """There is none where each survives from half of them, and no two from the same."""
     found = [*fronts.points(comparison, table)]
     at = {(one.controller, one.value): one for one in found}
     assert at["slow", 0.02].starts == at["fast", 0.02].starts == 28
@@ -164,6 +165,8 @@ def test_the_front_is_over_initial_conditions_that_all_survive_and_omits_control
     worse = table.copy()
     worse.loc[worse["controller"] == "fast", "total_variation.torque"] /= 10.0
     assert {one.controller for one in fronts.points(comparison, worse) if one.on_front and one.value < 0.04} == {"fast"}
+    lost = (table["start"] % 2 == 0) == (table["controller"] == "fast")
+    assert not [*fronts.points(comparison, table.assign(outcome=lost.map({True: "diverged", False: "settled"})))]
 
 
 def test_pairs_are_counted_and_compared_start_by_start(comparison: Comparison, table: pd.DataFrame) -> None:
