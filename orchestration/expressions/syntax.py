@@ -4,6 +4,7 @@ import ast
 import difflib
 import functools
 import math
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -40,7 +41,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Name:
-    """A signal, an objective, `time` or `stop_time`."""
+    """A signal, an objective, `time` or `stop_time`; in quotes if it is not of identifiers, as `"ball.der(h)"`."""
 
     text: str
 
@@ -97,6 +98,8 @@ class JobMeasure:
     task: str
 
 
+_IDENTIFIERS = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*|\[\d+(,\d+)*\])*")
+"""A name that needs no quotes"""
 Node: TypeAlias = Number | Name | Operation | Call | Sampled | JobMeasure
 
 
@@ -124,7 +127,8 @@ def parse_job_measures(text: str) -> Node:
 
 def names_job_measure(name: str) -> bool:
     """Whether a name is the text of a function over a measure of jobs."""
-    return name.endswith(")")
+    function, bracket, _ = name.partition("(")
+    return bool(bracket) and function in OVER_RUN
 
 
 def has_job_measure(node: Node) -> bool:
@@ -160,7 +164,7 @@ def text(node: Node) -> str:
         case Number(value):
             return f"{value:g}"
         case Name(name):
-            return name
+            return name if names_job_measure(name) or _IDENTIFIERS.fullmatch(name) else repr(name)
         case Sampled(connection, argument):
             return f"{SAMPLED}({connection}, {text(argument)})"
         case JobMeasure(what, task):
@@ -235,6 +239,8 @@ def _node(tree: ast.expr, text: str, depth: int) -> Node:
             return Number(number)
         case ast.Name() | ast.Attribute() | ast.Subscript():
             return Name(_dotted(tree, text))
+        case ast.Constant(value=str(name)) if name and not names_job_measure(name):
+            return Name(name)
         case ast.UnaryOp(op=ast.UAdd()):
             return build(tree.operand)
         case ast.UnaryOp(op=op) if type(op) in _SIGNS:

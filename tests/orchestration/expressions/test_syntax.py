@@ -8,7 +8,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestration.basics.errors import UsageError
-from orchestration.expressions.syntax import Call, Name, Number, Operation, Sampled, names, parse, text
+from orchestration.expressions.syntax import (
+    Call,
+    Name,
+    Number,
+    Operation,
+    Sampled,
+    names,
+    names_job_measure,
+    parse,
+    text,
+)
 
 
 def test_arithmetic_binds_as_in_python():
@@ -26,6 +36,11 @@ def test_an_element_of_an_array_is_a_name():
     assert parse("motor.u[1, 2]") == Name("motor.u[1,2]")
 
 
+def test_a_name_of_other_characters_is_in_quotes():
+    assert parse('max("ball.der(h)")') == Call("max", (Name("ball.der(h)"),))
+    assert not names_job_measure("ball.der(h)")
+
+
 def test_sampled_names_a_connection_not_a_signal():
     tree = parse("rms(sampled(measurement, controller.e))")
     assert tree == Call("rms", (Sampled("measurement", Name("controller.e")),))
@@ -36,8 +51,8 @@ def test_sampled_names_a_connection_not_a_signal():
     "source",
     [
         "__import__('os')", "().__class__", "[x for x in y]", "lambda: 1", "a if b else c", "f'{x}'", "x := 1",
-        "open('f')", "max(x, key=1)", "max(*x)", "a @ b", "a // b", "a & b", "{}", "'text'", "x.y()", "1j", "...",
-        "x[0:1]", "x['a']", "await x", "x is y", "x in y", "",
+        "open('f')", "max(x, key=1)", "max(*x)", "a @ b", "a // b", "a & b", "{}", "''", "'max(x)'", "x.y()", "1j",
+        "...", "x[0:1]", "x['a']", "await x", "x is y", "x in y", "",
     ],
 )  # fmt: skip
 def test_what_is_not_part_of_the_language_is_rejected_in_one_line(source):
@@ -82,7 +97,7 @@ def test_any_text_is_an_expression_or_wrong_usage(source):
 _trees = st.recursive(
     st.one_of(
         st.floats(0, 1e6, allow_nan=False).map(lambda v: Number(float(f"{v:g}"))),
-        st.sampled_from([Name("a.b"), Name("c.u[1]"), Name("peak")]),
+        st.sampled_from([Name("a.b"), Name("c.u[1]"), Name("peak"), Name("ball.der(h)"), Name("c.it's 1st")]),
     ),
     lambda inner: st.one_of(
         st.tuples(st.sampled_from("+-*/"), inner, inner).map(lambda t: Operation(t[0], t[1:])),
