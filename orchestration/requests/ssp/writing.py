@@ -80,6 +80,10 @@ def _sources(parts: Iterable[Part]) -> dict[str, Path]:
     return found
 
 
+_ESCAPES = {ord(character): f"%{ord(character):02X}" for character in "%#?"}
+"""Of the name of a file in a URI that would otherwise end there; other tools do not decode more than they need to"""
+
+
 def _source(part: Part) -> str:
     return f"resources/{part.fmu.name}"
 
@@ -155,7 +159,7 @@ def _add_component(elements: Element, part: Part) -> None:
         elements,
         "ssd:Component",
         name=part.name,
-        source=_source(part),
+        source=_source(part).translate(_ESCAPES),
         type="application/x-fmu-sharedlibrary",
         implementation="CoSimulation",
     )

@@ -118,6 +118,10 @@ def test_the_quadrotor_has_the_same_run_to_the_bit(tmp_path: Path) -> None:
 
 def test_the_command_writes_both_files_and_run_takes_them(tmp_path: Path, main: Main) -> None:
     system = dataclasses.replace(carried("water_tank"), stop_time=1.0)
+    named = tmp_path / "50% #1?.fmu"
+    named.write_bytes(Path(system.components["tank"].fmu).read_bytes())
+    components = {**system.components, "tank": dataclasses.replace(system.components["tank"], fmu=str(named))}
+    system = dataclasses.replace(system, components=components)
     (tmp_path / "tank.toml").write_text(system.to_toml())
     done = main("ssp", tmp_path / "tank.toml", "--out", tmp_path / "tank.ssp")
     assert done.stdout == f"{tmp_path / 'tank.ssp'}\n"
