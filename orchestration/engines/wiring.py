@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from fmu_kit.trajectory import Trajectory
-from orchestration.basics.errors import UsageError
+from orchestration.basics.errors import UsageError, at_place
 from orchestration.basics.simulator import Floats
 from orchestration.engines.job_numbers import job_numbers
 from orchestration.engines.sources import (
@@ -93,11 +93,12 @@ def _parameters(system: System, models: Mapping[str, Model]) -> dict[str, float]
     parameters = {}
     for name, model in models.items():
         values = system.components[name].parameters
-        for variable in model.variables.values():
-            value = values.get(variable.name, variable.start)
-            is_one = variable.causality == "parameter" or variable.is_constant
-            if is_one and variable.kind in NUMERIC and value is not None:
-                parameters[f"{name}.{variable.name}"] = number_of(variable, value)
+        with at_place(f"components.{name}.parameters"):
+            for variable in model.variables.values():
+                value = values.get(variable.name, variable.start)
+                is_one = variable.causality == "parameter" or variable.is_constant
+                if is_one and variable.kind in NUMERIC and value is not None:
+                    parameters[f"{name}.{variable.name}"] = number_of(variable, value)
     return parameters
 
 

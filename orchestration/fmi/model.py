@@ -7,6 +7,7 @@ import math
 import zipfile
 from collections import Counter
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -19,7 +20,13 @@ from fmpy.model_description import ModelDescription, ModelVariable
 from fmu_kit.archive import read_source_hash
 from orchestration.basics.errors import UsageError, listed, no_utf8
 from orchestration.basics.units import BASE, BaseUnits, Unit, named
-from orchestration.fmi.archive import expect_honest_size
+from orchestration.fmi.archive import (
+    OtherVersionError,
+    UnreadableFmuError,
+    expect_honest_size,
+    read_archive,
+    read_root,
+)
 from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 
 Kind = Literal["Real", "Integer", "Boolean", "Enumeration", "String", "Binary", "Clock"]
@@ -175,11 +182,26 @@ def read_description(path: Path) -> ModelDescription:
     except UnicodeEncodeError as error:
         raise no_utf8(error) from error
     except Exception as error:  # fmpy passes on any exception of the readers of zip and XML
-        raise UsageError(f"{path}: expected an FMU with a modelDescription.xml: {error}") from error
+        _expect_version(path)
+        raise UsageError(f"{path}: expected an FMU with a valid modelDescription.xml: {error}") from error
+    kinds = {"model exchange": description.modelExchange, "scheduled execution": description.scheduledExecution}
     if description.fmiMajorVersion not in (2, 3) or description.coSimulation is None:
-        kind = "co-simulation" if description.coSimulation is not None else "model exchange only"
+        kind = "co-simulation" if description.coSimulation is not None else " and ".join(k for k in kinds if kinds[k])
         raise UsageError(f"{path}: FMI {description.fmiVersion}, {kind}; expected FMI 2.0 or 3.0 for co-simulation")
+    token = "guid" if description.fmiMajorVersion == 2 else "instantiationToken"
+    for name, value in ((token, description.guid), ("modelIdentifier", description.coSimulation.modelIdentifier)):
+        if value is None:
+            raise UsageError(f"{path}: its modelDescription.xml has no {name}")
     return description
+
+
+def _expect_version(path: Path) -> None:
+    """Raise `UsageError` for an FMU that says to be of a version of FMI that is not supported."""
+    with suppress(UnreadableFmuError):
+        try:
+            read_root(read_archive(path, math.inf))
+        except OtherVersionError as error:
+            raise UsageError(f"{path}: {str(error).partition(';')[0]}") from None
 
 
 def read_model(path: str | Path) -> Model:
@@ -199,6 +221,10 @@ def read_model(path: str | Path) -> Model:
 @functools.lru_cache(maxsize=64)
 def _read_model(path: Path, changed: int, size: int) -> Model:
     description = read_description(path)
+    for declared in description.modelVariables:
+        if not 0 <= declared.valueReference < 2**32:
+            what = f"{declared.name}: valueReference = {declared.valueReference}"
+            raise UsageError(f"{path}: {what}: expected a whole number of 32 bits without a sign")
     variables = {v.name: v for declared in description.modelVariables for v in _scalars(declared)}
     return Model(
         path=path,

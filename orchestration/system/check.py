@@ -27,10 +27,11 @@ def check(system: System, models: Mapping[str, Model]) -> None:
                 names = [v.name for v in models[name].variables.values() if v.causality in ("output", "local")]
                 has_no = f"{place}.record: {models[name].name} has no variable {recorded}"
                 raise UsageError(f"{has_no}; {expected_name(recorded, names)}")
-            if variable.kind not in NUMERIC or variable.causality not in ("output", "local"):
-                raise UsageError(
-                    f"{place}.record: {recorded} is {_with_article(variable)}; expected an output or a local"
-                )
+            if variable.kind not in NUMERIC:
+                raise UsageError(f"{place}.record: {recorded} is a {variable.kind}; expected one of {listed(NUMERIC)}")
+            if variable.causality not in ("output", "local"):
+                what = f"{recorded} is {_with_article(variable)}"
+                raise UsageError(f"{place}.record: {what}; expected an output or a local")
     for x in system.connections:
         for what, ends, causality in (("from", x.start, "output"), ("to", x.end, "input")):
             model = models[component_of(ends[0])]

@@ -83,6 +83,8 @@ def test_types_and_enumerations_by_name(tmp_path: Path) -> None:
         ran(alone(small(tmp_path), parameters={"mode": "bakward"}))
     with pytest.raises(UsageError, match=r"components.it.parameters.mode = 3: expected one of forward, backward"):
         ran(alone(small(tmp_path), parameters={"mode": 3}))
+    with pytest.raises(UsageError, match=r"^components.it.record: label is a String; expected one of Real, Integer"):
+        ran(alone(small(tmp_path), record=("label",)))
 
 
 def test_a_number_that_a_type_does_not_hold_is_refused(tmp_path: Path) -> None:
