@@ -32,6 +32,11 @@ class SimulatorError(QuadcosimError):
         self.details = details
         """The FMU's own traceback, for `--debug`."""
 
+    def timed(self, t: float) -> None:
+        """Add the time [s] of the run at which it was raised, unless its text is that of a divergence."""
+        if not self.divergence:
+            self.args = (f"{self.args[0]}, at t = {t:g} s",)
+
 
 class StoppedStepError(SimulatorError):
     """An FMU did not complete a step normally: it ends the run (`ends`), or has discarded the step.

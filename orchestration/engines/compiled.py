@@ -168,7 +168,7 @@ class CompiledLoop:
         if code in (c.FAILED, c.REFUSED):
             function, transfer = self._structures.calls[part]
             if code == c.FAILED:
-                raise self._structures.instances[index].failure(function)
+                raise self._structures.instances[index].failure(function, self._loop.failed_status)
             transfer()
         elif code == c.NOT_FINITE:
             self._running.component(index).expect_finite(self._running.now / NANOSECONDS)

@@ -53,8 +53,8 @@ static double from(const Part *part, int64_t i) {
     case UINT8: return ((const uint8_t *)b)[i];
     case INT16: return ((const int16_t *)b)[i];
     case UINT16: return ((const uint16_t *)b)[i];
-    case INT32:
-    case BOOLEAN32: return ((const int32_t *)b)[i];
+    case INT32: return ((const int32_t *)b)[i];
+    case BOOLEAN32: return ((const int32_t *)b)[i] != 0;
     case UINT32: return ((const uint32_t *)b)[i];
     case INT64: return (double)((const int64_t *)b)[i];
     case UINT64: return (double)((const uint64_t *)b)[i];
@@ -83,6 +83,12 @@ static void into(const Part *part, int64_t i, double x) {
 
 static int whole(const Part *part) { return part->type >= INT8 && part->type <= UINT64; }
 
+/* Whether the type of a part holds a number. */
+static int holds(const Part *part, double x) {
+    if (whole(part)) x = rint(x);
+    return !(whole(part) || part->type == FLOAT32) || (x >= part->low && x <= part->high);
+}
+
 static int call(Loop *l, const Part *part) {
     l->calling = part->component;
     int status = part->counts_values
@@ -90,7 +96,7 @@ static int call(Loop *l, const Part *part) {
         : ((Access *)part->function)(part->fmu, part->references, part->count, part->buffer);
     called(l, part->component);
     if (status <= WARNING) return 0;
-    l->failed = part, l->component = part->component;
+    l->failed = part, l->component = part->component, l->failed_status = status;
     return FAILED;
 }
 
@@ -110,8 +116,7 @@ static int write_all(Loop *l, const Transfer *transfer) {
         const Part *part = &transfer->parts[i];
         if (part->asked) {
             for (int64_t j = 0; j < part->size; j++) {
-                double x = transfer->array[part->asked[j]];
-                if (whole(part) && !(rint(x) >= part->low && rint(x) <= part->high)) {
+                if (!holds(part, transfer->array[part->asked[j]])) {
                     l->failed = part, l->component = part->component;
                     return REFUSED;
                 }

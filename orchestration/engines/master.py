@@ -5,7 +5,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from orchestration.basics.errors import SimulatorError
+from orchestration.basics.errors import SimulatorError, StoppedStepError
 from orchestration.basics.simulator import Booleans, Floats, Simulator
 from orchestration.engines import initial
 from orchestration.engines.backlog import Backlog
@@ -135,6 +135,8 @@ class Master:
             if not self._loop.run(pause_at, progress):
                 return False
         except (Diverged, Terminated, SimulatorError) as error:
+            if isinstance(error, SimulatorError) and not isinstance(error, StoppedStepError):
+                error.timed(self.now / NANOSECONDS)
             self._ended(error)
         if self.interrupted_at is not None:
             self.backlog.drop_later_events()

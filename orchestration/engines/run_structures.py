@@ -92,7 +92,7 @@ class RunStructures:
     def _part(self, component: int, call: TransferCall) -> Any:
         instance, part = self.instances[component], call.part
         kind = "boolean32" if part.type == "Boolean" and part.buffer.dtype != bool else part.buffer.dtype.name
-        low, high = range_of(part.buffer.dtype) if part.buffer.dtype.kind in "iu" else (0.0, 0.0)
+        low, high = range_of(part.buffer.dtype) if part.buffer.dtype.kind in "iuf" else (0.0, 0.0)
         return c.Part(
             function=instance.address(call.function),
             fmu=instance.handle,

@@ -68,7 +68,7 @@ typedef struct { /* one call that moves values of one type between an FMU and a 
     const int64_t *asked, *places; /* NULL: the buffer is the array itself */
     int64_t size;
     int32_t type, counts_values;
-    double low, high; /* of a whole number */
+    double low, high; /* of the numbers that its type holds */
     int64_t component;
 } Part;
 
@@ -184,6 +184,7 @@ typedef struct {
     int64_t *events, *arrived; /* `arrived`: those of this instant, noted after the messages sent at it */
     int64_t event_count, event_limit, arrived_count;
     const Part *failed;
+    int64_t failed_status;
     int64_t component; /* whose FMU was called last */
     double end;        /* of its step [s] */
     int64_t is_over;   /* whether an FMU ends the run at this instant */

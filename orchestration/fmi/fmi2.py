@@ -41,7 +41,7 @@ class Fmi2Instance(NativeInstance):
     def step_error(self, status: int, end: float) -> SimulatorError:
         """As `NativeInstance`; after a discarded step the status of the FMU tells whether that ends the run."""
         if status != fmi2.fmi2Discard:
-            return self.failure("fmi2DoStep")
+            return self.failure("fmi2DoStep", status)
         ends, reached = fmi2.fmi2Boolean(), fmi2.fmi2Real(math.nan)
         dll, known = self._fmu.dll, (fmi2.fmi2Terminated, fmi2.fmi2LastSuccessfulTime)
         dll.fmi2GetBooleanStatus(self._component, known[0], ctypes.byref(ends))

@@ -53,12 +53,12 @@ class Fmi3Instance(NativeInstance):
     def step_error(self, status: int, end: float) -> SimulatorError:
         """As `NativeInstance`."""
         if status > fmi3.fmi3Discard:
-            return self.failure("fmi3DoStep")
+            return self.failure("fmi3DoStep", status)
         reached = self._reached.value
         if self._ends or status == fmi3.fmi3Discard:
             return self._stopped_step("fmi3DoStep", end, reached=reached, ends=self._ends.value)
         what = "asks for event mode" if self._event else "returns early"
-        return self.failure("fmi3DoStep", f"the FMU {what} at {reached:g} s, before {end:g} s")
+        return self.failure("fmi3DoStep", status, f"the FMU {what} at {reached:g} s, before {end:g} s")
 
     def _access(self, action: str, type: str) -> str:
         return f"fmi3{action}{'Int64' if type == 'Enumeration' else type}"

@@ -67,6 +67,12 @@ def collecting_callbacks(messages: list[Message], name: str, folder: Path) -> fm
     return callbacks
 
 
+def status_name(version: int, status: int) -> str:
+    """The name of the status of a call in a version of FMI."""
+    names = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")[: 6 if version == 2 else 5]
+    return f"fmi{version}{names[status]}" if 0 <= status < len(names) else f"{status}, which is no status of FMI"
+
+
 def failure_text(messages: Sequence[Message], otherwise: str) -> tuple[str, str]:
     """The first line of the first message of a failure, and the rest of it; `otherwise` if there is none."""
     bad = [message for message in messages if message[0] > WARNING]

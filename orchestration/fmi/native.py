@@ -22,7 +22,7 @@ from orchestration.basics.scratch import Scratch
 from orchestration.basics.simulator import Floats, Transfer
 from orchestration.fmi import pythonfmu
 from orchestration.fmi.instance import Instance
-from orchestration.fmi.messages import WARNING, Messages, failure_text
+from orchestration.fmi.messages import WARNING, Messages, failure_text, status_name
 from orchestration.fmi.model import Variable, read_model
 from orchestration.fmi.slaves import binary_folders, folder_here, instantiate, load_slave
 from orchestration.fmi.surroundings import FOLDER, ROUNDING, Surroundings, sentence
@@ -32,6 +32,9 @@ from orchestration.fmi.values import Value, convert_value, same
 DIVERGENCE_CATEGORY = b"divergence"
 _AT_END = 1e-9
 """Relative and in [s]: the rounding error at the end of a step of an FMU that sums its steps"""
+
+_MOST_WARNINGS = 100
+"""Of one instance; some FMUs log one in every step"""
 
 _NOT_USED = ("documentation/", "sources/")
 """Folders that an FMU of this project's kit never reads"""
@@ -189,7 +192,8 @@ class NativeInstance(Instance):
         def read() -> None:
             for call, part in calls:
                 call()
-                into[part.array_places] = part.buffer[part.places]
+                values = part.buffer[part.places]
+                into[part.array_places] = values != 0 if part.type == "Boolean" else values
 
         return self._registered(read, "Get", parts, into)
 
@@ -306,8 +310,8 @@ class NativeInstance(Instance):
         failure = self.failure
 
         def transfer() -> None:
-            if call(*arguments) > WARNING:
-                raise failure(function)
+            if (status := call(*arguments)) > WARNING:
+                raise failure(function, status)
 
         return transfer
 
@@ -336,7 +340,7 @@ class NativeInstance(Instance):
         try:
             return getattr(self._fmu, method)(*args, **kwargs)
         except FMICallException as error:
-            raise self.failure(error.function) from None
+            raise self.failure(error.function, error.status) from None
         finally:
             self.restore_globals()
 
@@ -355,14 +359,21 @@ class NativeInstance(Instance):
         """Process the messages of the FMU: keep the warnings."""
         for status, _, message in self._messages:
             if status == WARNING:
-                self.warnings.append(f"{self.name}: {message.decode('utf-8', 'replace')}")
+                self._keep_warning(message.decode("utf-8", "replace"))
         self._messages.clear()
 
-    def failure(self, function: str, otherwise: str = "no message") -> SimulatorError:
-        """The error for a call that failed, with the message that the FMU logged."""
+    def _keep_warning(self, text: str) -> None:
+        if len(self.warnings) < _MOST_WARNINGS:
+            self.warnings.append(f"{self.name}: {text}")
+        elif len(self.warnings) == _MOST_WARNINGS:
+            self.warnings.append(f"{self.name} ({self.model.name}): further warnings of this FMU are not kept")
+
+    def failure(self, function: str, status: int, otherwise: str | None = None) -> SimulatorError:
+        """The error for a call that failed, with the message that the FMU logged; `otherwise` if it logged none."""
         self.failed = True
         diverged = [m for m in self._messages if m[0] > WARNING and m[1] == DIVERGENCE_CATEGORY]
-        summary, details = failure_text(diverged or self._messages, otherwise)
+        silent = f"returned {status_name(self.model.version, status)}, without a message"
+        summary, details = failure_text(diverged or self._messages, otherwise or silent)
         if not diverged and self._names_initial_value(summary):
             return RefusedValueError(f"{self.name}.{summary}", details=details)
         return SimulatorError(

@@ -65,21 +65,21 @@ class TransferLayout:
 
     def converter(self, names: Sequence[str], dtype: np.dtype[Any]) -> Callable[[Floats], Numbers]:
         """The conversion of values of variables of one type to their type in memory."""
-        if dtype.kind == "f":
+        if dtype == np.float64:
             return lambda values: values
         if dtype.kind == "b" or self._variable(names[0]).kind == "Boolean":
             return lambda values: values != 0.0
         low, high = range_of(dtype)
 
-        def whole(values: Floats) -> Numbers:
-            rounded = np.rint(values)
+        def held(values: Floats) -> Numbers:
+            rounded = np.rint(values) if dtype.kind in "iu" else values
             outside = ~((rounded >= low) & (rounded <= high))
             if outside.any():
                 at = int(np.argmax(outside))
                 raise SimulatorError(f"{self._name}.{names[at]} = {values[at]:g}: expected a number that {dtype} holds")
             return rounded
 
-        return whole
+        return held
 
     def _part(
         self, array: Floats, group: list[tuple[int, Variable]], reference: int | None, shared: dict[int, Numbers] | None
@@ -118,7 +118,9 @@ class TransferLayout:
 
 
 def range_of(dtype: np.dtype[Any]) -> tuple[float, float]:
-    """The smallest and the largest float that an integer type holds: the largest of 64 bits is no float."""
+    """The smallest and the largest float that a type of numbers holds: the largest integer of 64 bits is no float."""
+    if dtype.kind == "f":
+        return float(np.finfo(dtype).min), float(np.finfo(dtype).max)
     of = np.iinfo(dtype)
     high = float(of.max)
     return float(of.min), high if int(high) <= of.max else math.nextafter(high, 0.0)

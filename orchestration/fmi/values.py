@@ -44,7 +44,8 @@ def _of_its_type(variable: Variable, value: object, place: str) -> Value:
     if variable.kind in ("Integer", "Enumeration"):
         bounds = np.iinfo(INTEGERS[variable.type])
         fits = isinstance(value, int) and not isinstance(value, bool) and bounds.min <= value <= bounds.max
-        return _if(fits, value, place, f"a whole number of {bounds.bits} bits")
+        whole = _if(fits, value, place, f"a whole number of {bounds.bits} bits")
+        return _if(int(float(whole)) == whole, whole, place, "a whole number that a float holds: all are up to 2**53")
     if variable.kind != "Real":
         raise UsageError(f"{place}: is a {variable.kind}, which cannot be set")
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool) and _is_float(value)
@@ -52,10 +53,18 @@ def _of_its_type(variable: Variable, value: object, place: str) -> Value:
 
 
 def number_of(variable: Variable, value: object) -> float:
-    """A value of the variable, or its start value as the description has it, as the number that is recorded."""
+    """A value of the variable, or its start value as the description has it, as the number that is recorded.
+
+    Raises `UsageError` for a start value that is none.
+    """
     if isinstance(value, str):
         value = {"true": 1, "false": 0, **variable.choices}.get(value, value)
-    return float(value)  # type: ignore[arg-type]
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except ValueError:
+        raise UsageError(
+            f"{variable.name} = {shown(value)}: expected a start value that is a {variable.type}"
+        ) from None
 
 
 def same(variable: Variable, value: Value, read: Value) -> bool:

@@ -259,7 +259,7 @@ def test_a_call_that_fails_is_told_in_the_same_words(fmu: Path) -> None:
         with pytest.raises(SimulatorError) as caught:
             ran(of(LOOP, fmu, controller={"fails_at": 0.3}), engine)
         messages.append(str(caught.value))
-    assert messages == ["controller (Moving): fmi2DoStep: there is no more"] * 2
+    assert messages == ["controller (Moving): fmi2DoStep: there is no more, at t = 0.308932 s"] * 2
 
 
 def test_a_number_that_an_input_does_not_hold_is_refused_in_the_same_words(tmp_path: Path) -> None:
@@ -272,7 +272,7 @@ def test_a_number_that_an_input_does_not_hold_is_refused_in_the_same_words(tmp_p
         with pytest.raises(QuadcosimError) as caught:
             ran(System(stop_time=0.1, components=parts, connections=(wire,)), engine)
         messages.append(str(caught.value))
-    assert messages == ["second.mode = 3e+09: expected a number that int32 holds"] * 2
+    assert messages == ["second.mode = 3e+09: expected a number that int32 holds, at t = 0.03 s"] * 2
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,10 @@ typedef void (*Log2)(void *, const char *, int, const char *, const char *, ...)
 typedef void (*Log3)(void *, int, const char *, const char *);
 typedef struct { Log2 log; void *allocate, *release, *finished, *environment; } Callbacks;
 
+#ifndef TRUTH
+#define TRUTH 1
+#endif
+
 typedef struct { double u[2], x[2], gain, next, reached; int on, mode, count, ended; char label[32]; } State;
 typedef struct { State s; double stop; char name[64]; Log2 log2; Log3 log3; void *environment; } Model;
 
@@ -220,7 +224,7 @@ API int fmi2SetInteger(void *c, const unsigned vr[], size_t n, const int v[]) {
 }
 API int fmi2GetBoolean(void *c, const unsigned vr[], size_t n, int v[]) {
     State *s = &((Model *)c)->s;
-    for (size_t i = 0; i < n; i++) v[i] = vr[i] == ON ? s->on : s->x[0] > 0.045;
+    for (size_t i = 0; i < n; i++) v[i] = TRUTH * (vr[i] == ON ? s->on : s->x[0] > 0.045);
     return OK;
 }
 API int fmi2SetBoolean(void *c, const unsigned vr[], size_t n, const int v[]) {

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestration.basics.errors import QuadcosimError, UsageError
+from orchestration.basics.errors import SimulatorError, UsageError
 from orchestration.processes import subprocesses
 from orchestration.runs.outcome import RunLost
 from orchestration.runs.pause import resume, run_until
@@ -141,12 +141,22 @@ def test_a_warning_of_the_fmu_comes_back(tmp_path: Path) -> None:
     assert run(alone(small(tmp_path, "WARNS"))).warnings == ("it: it: level 7 is 50% of it",)
 
 
-def test_an_error_of_the_fmu_comes_back_as_it_is(tmp_path: Path) -> None:
-    with pytest.raises(QuadcosimError) as apart:
-        run(alone(small(tmp_path, "REFUSES")))
-    with pytest.raises(QuadcosimError) as here:
-        run(alone(small(tmp_path, "REFUSES")), in_process=True)
-    assert (type(apart.value), str(apart.value)) == (type(here.value), str(here.value))
+@pytest.mark.parametrize(
+    ("does", "text"),
+    [
+        ("REFUSES", "level 7 is 50% of it"),
+        ("ENDS=return 3", "fmi2DoStep: returned fmi2Error, without a message, at t = 0.06 s"),
+        ("ENDS=return 5", "fmi2DoStep: returned fmi2Pending, without a message, at t = 0.06 s"),
+    ],
+)
+def test_an_error_of_the_fmu_comes_back_as_it_is(does: str, text: str, tmp_path: Path) -> None:
+    path, told = small(tmp_path, does), []
+    for how in ({}, {"in_process": True}, {"engine": "python"}):
+        with pytest.raises(SimulatorError) as raised:
+            run(alone(path), **how)
+        told.append(str(raised.value))
+    assert told == [told[0]] * 3
+    assert text in told[0]
 
 
 def test_a_process_that_ends_after_the_run_costs_no_result(tmp_path: Path) -> None:

@@ -64,7 +64,7 @@ def test_each_passes_its_own_tests_and_a_mistake_is_reported_with_its_line(here:
     line = 1 + next(i for i, text in enumerate(law.read_text().splitlines()) if "self.trust" in text)
     failed = main("run", "hover_pd/system.toml", code=1).stderr.splitlines()[-1]
     assert "self.trust: no such variable; expected thrust, torque" in failed
-    assert failed.endswith(f"in hover_pd.py, line {line}")
+    assert failed.endswith(f"in hover_pd.py, line {line}, at t = 0 s")
 
 
 @pytest.mark.parametrize("name", KINDS)
