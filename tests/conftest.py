@@ -12,7 +12,6 @@ from pathlib import Path
 
 import hypothesis
 import pytest
-from hypothesis.internal import entropy
 from hypothesis.internal.conjecture import providers
 
 import quadcosim  # noqa: F401 - errors are told in the words of Python, those of the command line in its own
@@ -31,10 +30,6 @@ hypothesis.settings.load_profile("ci" if os.environ.get("CI") else "local")
 # Else the constants of all modules that happen to be loaded are read from their sources, and drawn among others: three
 # seconds of each process, and examples that are others with another neighbour.
 providers._get_local_constants = lambda: providers._local_constants
-
-# Else NumPy's global generator is seeded and restored for each example, in a quarter of what Hypothesis takes for one.
-# Nothing draws from it: NPY002 of ruff.
-entropy.NP_RANDOM = entropy.NumpyRandomWrapper()
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell's background job, from which commands would inherit it
     signal.signal(signal.SIGINT, signal.default_int_handler)
