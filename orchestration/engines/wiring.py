@@ -35,6 +35,7 @@ from orchestration.system.check import check, recorded_variables
 from orchestration.system.component import Component
 from orchestration.system.model import System
 from orchestration.system.references import connect_references, describe_references
+from orchestration.system.sampling import has_scheduled_instants
 from orchestration.system.source import MOTION, Source
 from orchestration.system.times import Grid, exact_nanoseconds
 from orchestration.system.variable_names import variable_of
@@ -161,3 +162,15 @@ def fixed_steps(system: System, models: Mapping[str, Model]) -> dict[str, FixedS
             grid = Grid(Fraction(0), exact_nanoseconds(component.step))
             steps[name] = FixedStep(name=name, grid=grid, moves=component.align == "next")
     return steps
+
+
+def uneven_steps(system: System, models: Mapping[str, Model]) -> list[str]:
+    """A warning for each sampled component whose steps differ although its FMU takes those of one length only."""
+    return [
+        f"{name} ({models[name].name}): its steps differ in length, as its samples are not evenly spaced; it declares "
+        "that it takes steps of one length only"
+        for name, sampling in ((name, component.sampling) for name, component in system.components.items())
+        if sampling is not None
+        and (sampling.is_random or has_scheduled_instants(sampling))
+        and not models[name].varies_step
+    ]

@@ -8,6 +8,7 @@ from typing import Any
 from orchestration.basics.errors import QuadcosimError
 from orchestration.basics.interrupt import Interrupted
 from orchestration.engines.job_numbers import job_numbers
+from orchestration.engines.wiring import uneven_steps
 from orchestration.recording.recording import Recorder
 from orchestration.results import objectives
 from orchestration.results.column_info import column_infos
@@ -79,7 +80,11 @@ def result_of(
         termination=outcome.termination,
         interrupted_at=outcome.interrupted_at,
         provenance={**outcome.provenance, "follows": resolved.follows, "wall_time": wall_time},
-        warnings=(*resolved.request.warnings(resolved.parameters), *outcome.warnings),
+        warnings=(
+            *resolved.request.warnings(resolved.parameters),
+            *uneven_steps(resolved.system, resolved.models),
+            *outcome.warnings,
+        ),
     )
     engine = outcome.provenance["engine"]
     _NOTES.debug("%d steps to t = %g s by the %s loop in %.3f s", outcome.steps, outcome.end, engine, wall_time)

@@ -175,6 +175,10 @@ def test_a_fixed_step_is_kept_whatever_happens_between_its_points(tmp_path: Path
     varying = alone(small(tmp_path / "other", "FIXED_STEP"), stop=0.105)  # it declares that it takes any step
     with pytest.raises(SimulatorError, match=r"it \(Small\): fmi2DoStep"):
         ran(varying)
+    sampled = small(tmp_path / "sampled", fixed_step=True)
+    assert not ran(alone(sampled, step=None, sampling=Sampling(period=0.01))).warnings
+    (warning,) = ran(alone(sampled, step=None, sampling=Sampling(period=0.01, jitter=0.002))).warnings
+    assert warning.startswith("it (Small): its steps differ in length")
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
