@@ -4,6 +4,7 @@ import difflib
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import Any
 
 LONGEST = 4000
 """Largest number of characters in a message: names in it may come from a file and have any length"""
@@ -31,6 +32,8 @@ class SimulatorError(QuadcosimError):
         self.divergence = divergence
         self.details = details
         """The FMU's own traceback, for `--debug`."""
+        self.result: Any = None
+        """The `Result` so far of the run that it ended; None if nothing was recorded."""
 
     def timed(self, t: float) -> None:
         """Add the time [s] of the run at which it was raised, unless its text is that of a divergence."""

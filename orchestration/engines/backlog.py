@@ -105,9 +105,13 @@ class Backlog:
         """Drop the events of messages that would be sent after the end: in Jacobi order they are noted before."""
         self.tables.replace_events(self._past_and_later()[0])
 
+    def has_row(self) -> bool:
+        """Whether a row was recorded, be it handed over or not."""
+        return self.handed_over is not None or len(self.tables.rows()) > 0
+
     def ensure_row(self) -> None:
         """Add a row with the current values for a run that ended before its first row."""
-        if not len(self.tables.rows()) and self.handed_over is None:
+        if not self.has_row():
             self._running.board.row[0] = self._running.now / NANOSECONDS
             self.tables.replace_rows(self._running.board.row.tobytes())
 

@@ -75,6 +75,8 @@ class Master:
         self.board, self.columns, self.recorder = running.board, running.columns, recorder
         self.divergence: str | None = None
         self.divergence_time: int | None = None
+        self.failure: SimulatorError | None = None
+        """the error of an FMU that has ended the run after its first row; it has been raised"""
         self._first_exchange = (
             [(i,) for i in range(len(running.channels))] if first_exchange is None else first_exchange
         )
@@ -103,7 +105,7 @@ class Master:
 
     @property
     def interrupted_at(self) -> int | None:
-        """When Ctrl-C has ended the run [ns]; None if it has not."""
+        """When Ctrl-C or an error of an FMU has ended the run [ns]; None if neither has."""
         return self._running.interrupted_at
 
     @property
@@ -124,6 +126,7 @@ class Master:
         """Run to the end or to the first instant from `pause_at` [ns]; whether it is over.
 
         The end may be divergence, or caused by an FMU. A run is also over at the first instant after an interruption.
+        Raises `SimulatorError` if an FMU refuses a call; all up to the last row has then been handed over.
         """
         over = self.divergence is not None or self._run(pause_at, progress)
         if over:
@@ -182,6 +185,11 @@ class Master:
         if isinstance(error, Terminated):
             self._running.termination = str(error)
         elif isinstance(error, SimulatorError) and not error.divergence:
+            if self.backlog.has_row():
+                self.failure = error
+                self._running.now = self._running.interrupted_at = round(self.board.row[0] * NANOSECONDS)
+                self.backlog.drop_later_events()
+                self.backlog.hand_over_rest()
             raise error
         else:
             self.divergence, self.divergence_time, self._running.termination = str(error), self.now, None

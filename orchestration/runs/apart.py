@@ -67,11 +67,11 @@ def simulate(
                 ending = receiver.receive_all(child, order)
             outcome = receiver.run_outcome
             if outcome is None:
-                raise _lost(resolved, receiver, room.path, ending or "ended", started)
-            if ending is not None:
-                outcome = replace(outcome, warnings=(*outcome.warnings, f"after the run, its process {ending}"))
-            if not receiver.is_over:
+                outcome = _lost(resolved, receiver, room.path, ending or "ended")
+            elif not receiver.is_over:
                 return None
+            elif ending is not None:
+                outcome = replace(outcome, warnings=(*outcome.warnings, f"after the run, its process {ending}"))
             return result_of(resolved, outcome, recorder, time.perf_counter() - started, interrupt.requested)
     finally:
         room.remove()
@@ -139,8 +139,11 @@ class _Receiver:
         raise error
 
 
-def _lost(resolved: ResolvedRequest, receiver: _Receiver, room: Path, ending: str, started: float) -> RunLost:
-    """The error, with all that was recorded, for a run whose process ended before its last message."""
+def _lost(resolved: ResolvedRequest, receiver: _Receiver, room: Path, ending: str) -> RunOutcome:
+    """The outcome of a run whose process ended before its last message, once all that was recorded is received.
+
+    Raises `RunLost` if nothing was.
+    """
     activity, called = receiver.activity, [name for name in receiver.components if name in resolved.foreign]
     unrecorded = read_unrecorded(room, receiver.columns)
     if unrecorded is not None:
@@ -156,15 +159,13 @@ def _lost(resolved: ResolvedRequest, receiver: _Receiver, room: Path, ending: st
         "" if not fmus else f", {activity} {fmus[0]}" if len(fmus) == 1 else f", {activity} one of {', '.join(fmus)}"
     )
     if end < 0.0:
-        return RunLost(f"the process of the run {ending}{where}")
+        raise RunLost(f"the process of the run {ending}{where}")
     text = f"the process of the run {ending}{where}, after t = {end:g} s of {resolved.system.stop_time:g} s"
-    outcome = RunOutcome(
+    return RunOutcome(
         end=end, steps=0 if unrecorded is None else unrecorded.steps, divergence=None, divergence_time=None,
-        termination=None, interrupted_at=end,
-        provenance={"engine": "python" if unrecorded is None else "compiled"}, warnings=(text,),
+        termination=None, failure=RunLost(text), interrupted_at=end,
+        provenance={"engine": "python" if unrecorded is None else "compiled"}, warnings=(),
     )  # fmt: skip
-    wall_time = time.perf_counter() - started
-    return RunLost(text, result_of(resolved, outcome, receiver.recorder, wall_time, interrupted=False))
 
 
 def _chunk(resolved: ResolvedRequest, receiver: _Receiver, unrecorded: Unrecorded) -> Chunk:

@@ -14,7 +14,7 @@ from orchestration.fmi.instances import open_instance
 from orchestration.processes.channel import Parent, picklable
 from orchestration.recording.recording import About, Chunk, InMemory, Recording
 from orchestration.runs.apart import Order
-from orchestration.runs.prepared import prepared, progress_restoring_folder
+from orchestration.runs.prepared import prepared
 
 _MESSAGES = logging.getLogger("quadcosim")
 
@@ -81,8 +81,7 @@ def _simulate(order: Order, reporter: _Reporter, room: Path) -> None:
         order.request, recorder=reporter, engine=order.engine, load=reporter.load, room=Shared(room)
     ) as simulation:  # fmt: skip
         reporter.report("stage", "initialising", list(simulation.instances))
-        progress = progress_restoring_folder(simulation, lambda share: reporter.report("share", share))
-        is_over = order.course(simulation, progress)
+        is_over = simulation.follow(order.course, lambda share: reporter.report("share", share))
         reporter.report("outcome", is_over, simulation.outcome())
         reporter.is_over = True
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from orchestration.basics.errors import QuadcosimError
+from orchestration.basics.errors import SimulatorError
 from orchestration.basics.interrupt import Interrupted
 from orchestration.engines.job_numbers import job_numbers
 from orchestration.engines.wiring import uneven_steps
@@ -31,13 +31,8 @@ class RunInterrupted(Interrupted):
         self.result = result
 
 
-class RunLost(QuadcosimError):
+class RunLost(SimulatorError):
     """The process of a run ended before the run did; the text states how and when."""
-
-    def __init__(self, text: str, result: Result | None = None) -> None:
-        super().__init__(text)
-        self.result = result
-        """What was recorded; None if nothing was."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,6 +45,8 @@ class RunOutcome:
     divergence: str | None
     divergence_time: float | None
     termination: str | None
+    failure: SimulatorError | None
+    """what ended the run after its first row, beside Ctrl-C"""
     interrupted_at: float | None
     provenance: Provenance
     warnings: tuple[str, ...]
@@ -58,7 +55,10 @@ class RunOutcome:
 def result_of(
     resolved: ResolvedRequest, outcome: RunOutcome, recorder: Recorder, wall_time: float, interrupted: bool
 ) -> Result:
-    """The result of a run, with its metrics; raises `RunInterrupted` with it if it was `interrupted`."""
+    """The result of a run, with its metrics.
+
+    Raises `RunInterrupted` with it for a run that was `interrupted`, or the failure with it for one that has failed.
+    """
     recording = recorder.finish()
     numbers = {**resolved.parameters, **job_numbers(resolved.system)}
     result = Result(
@@ -84,10 +84,14 @@ def result_of(
             *resolved.request.warnings(resolved.parameters),
             *uneven_steps(resolved.system, resolved.models),
             *outcome.warnings,
+            *([] if outcome.failure is None else [str(outcome.failure)]),
         ),
     )
     engine = outcome.provenance["engine"]
     _NOTES.debug("%d steps to t = %g s by the %s loop in %.3f s", outcome.steps, outcome.end, engine, wall_time)
     if interrupted:
         raise RunInterrupted(f"at t = {outcome.end:g} s of {resolved.system.stop_time:g} s", result)
+    if outcome.failure is not None:
+        outcome.failure.result = result
+        raise outcome.failure
     return result

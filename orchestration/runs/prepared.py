@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from orchestration.basics.errors import SimulatorError
 from orchestration.basics.interrupt import Interrupt, deferred_interrupts
 from orchestration.basics.simulator import Floats
 from orchestration.engines import initial
@@ -28,7 +29,7 @@ from orchestration.fmi.model import Model
 from orchestration.fmi.native import NativeInstance
 from orchestration.fmi.surroundings import FOLDER, sentence
 from orchestration.recording.recording import InMemory, Recorder
-from orchestration.runs.outcome import Progress, RunOutcome, result_of
+from orchestration.runs.outcome import Course, Progress, RunOutcome, result_of
 from orchestration.runs.resolved import Announce, ResolvedRequest, resolve
 from orchestration.runs.result import Provenance, Result
 from orchestration.schedule.streams import Streams
@@ -73,6 +74,21 @@ class PreparedRun:
         """All numeric parameters of all components, as COMPONENT.NAME."""
         return self.resolved.parameters
 
+    def follow(self, course: Course, progress: Progress | None) -> bool:
+        """Run along a `course`; whether the run is over. An error of an FMU after the first row is its outcome."""
+
+        def report(share: float) -> None:
+            self.restore_folder()
+            if progress is not None:
+                progress(share)
+
+        try:
+            return course(self, report)
+        except SimulatorError:
+            if self.master.failure is None:
+                raise
+            return True
+
     def outcome(self) -> RunOutcome:
         """The outcome of the run so far."""
         master = self.master
@@ -82,13 +98,14 @@ class PreparedRun:
             divergence=master.divergence,
             divergence_time=_seconds(master.divergence_time),
             termination=master.termination,
+            failure=master.failure,
             interrupted_at=_seconds(master.interrupted_at),
             provenance={**provenance(self.instances), "engine": master.engine},
             warnings=tuple(warning for instance in self.instances.values() for warning in instance.warnings),
         )
 
     def result(self) -> Result:
-        """The result so far, with its metrics; raises `RunInterrupted` with it if Ctrl-C ended the run."""
+        """The result so far, with its metrics; raises `RunInterrupted` or a failure as `result_of`."""
         return result_of(
             self.resolved, self.outcome(), self.recorder, time.perf_counter() - self.started, self.interrupt.requested
         )
@@ -219,14 +236,3 @@ def _feeds(system: System, sources: Mapping[str, SourceValues], instances: Mappi
             write = instances[component].writer([variable_of(ends[i]) for i in places], into)
             feeds.append(Feed(component, values, places, into, write, count=len(ends)))
     return feeds
-
-
-def progress_restoring_folder(simulation: PreparedRun, progress: Progress | None) -> Progress:
-    """A callback that restores the current folder if an FMU has changed it, and passes `progress` on."""
-
-    def report(share: float) -> None:
-        simulation.restore_folder()
-        if progress is not None:
-            progress(share)
-
-    return report

@@ -83,7 +83,7 @@ class Result:
     termination: str | None
     """Which FMU ended the run, and how; None if none did."""
     interrupted_at: float | None
-    """The time [s] at which Ctrl-C ended the run; None if it did not."""
+    """The time [s] at which Ctrl-C, or an FMU that failed, ended the run; None if neither did."""
     provenance: Provenance
     """Where the numbers come from: versions of the software, the GUID of each FMU, the engine, the wall time [s]."""
     warnings: tuple[str, ...] = ()

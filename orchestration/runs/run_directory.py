@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from orchestration.basics.documents import read_json
-from orchestration.basics.errors import UsageError, shown
+from orchestration.basics.errors import SimulatorError, UsageError, one_line, shown
 from orchestration.engines.wiring import columns_of
 from orchestration.figures.views import files, view_of
 from orchestration.recording import tables
@@ -17,7 +17,7 @@ from orchestration.recording.tables import ToFolder
 from orchestration.requests.request import load_request
 from orchestration.results.column_info import ColumnInfo
 from orchestration.runs.folder import NewFolder, new_folder
-from orchestration.runs.outcome import RunInterrupted, RunLost
+from orchestration.runs.outcome import RunInterrupted
 from orchestration.runs.result import Provenance, Result
 from orchestration.system.request import system_of
 
@@ -147,15 +147,15 @@ def keep_run(
 
     `simulate` receives a recorder that writes into the new directory; if it returns None, it has written there what is
     to be kept. The directory replaces an earlier one that has a file of `replaces`. If it cannot, it is kept beside
-    `folder`, and `QuadcosimError` states where. After Ctrl-C, or if the process of the run has ended, what was recorded
-    is kept too, but replaces nothing: `RunInterrupted` or `RunLost` states where. Raises `UsageError` if `folder` holds
-    something else or cannot be written.
+    `folder`, and `QuadcosimError` states where. After Ctrl-C, or if an FMU or its process has failed, what was recorded
+    is kept too, but replaces nothing: `RunInterrupted` or `SimulatorError` states where. Raises `UsageError` if
+    `folder` holds something else or cannot be written.
     """
-    ended: RunInterrupted | RunLost | None = None
+    ended: RunInterrupted | SimulatorError | None = None
     with run_folder(Path(folder), replaces) as new:
         try:
             result = simulate(ToFolder(new.path))
-        except (RunInterrupted, RunLost) as stop:
+        except (RunInterrupted, SimulatorError) as stop:
             if stop.result is None:
                 raise
             ended, result = stop, stop.result
@@ -164,8 +164,9 @@ def keep_run(
         if result is not None:
             _write(result, new.path, figures=figures)
     if ended is not None and result is not None:
-        result = replace(result, recording=tables.InFolder(new.place))
-        raise type(ended)(f"{ended}; what was recorded is in {new.place}", result) from ended
+        ended.result = replace(result, recording=tables.InFolder(new.place))
+        ended.args = (f"{ended}; what was recorded is in {one_line(str(new.place))}",)
+        raise ended
     return result and replace(result, recording=tables.InFolder(new.place))
 
 

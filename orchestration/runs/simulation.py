@@ -9,7 +9,7 @@ from orchestration.processes.limits import Limits
 from orchestration.recording.recording import InMemory, Recorder
 from orchestration.runs import apart
 from orchestration.runs.outcome import Course, Progress
-from orchestration.runs.prepared import PreparedRun, prepared, progress_restoring_folder
+from orchestration.runs.prepared import PreparedRun, prepared
 from orchestration.runs.resolved import Announce, resolve
 from orchestration.runs.result import Result
 from orchestration.system.request import Request
@@ -59,8 +59,8 @@ def run(
     `time_limit` [s] of processor time; with a time limit any run has a separate process.
 
     Raises `UsageError` for an FMU, variable or value that does not exist, `SimulatorError` if an FMU
-    refuses a call for another reason than divergence, `RunLost` with what was recorded if an FMU or a limit ends
-    the process, `RunInterrupted` after Ctrl-C.
+    refuses a call for another reason than divergence, `RunLost` if an FMU or a limit ends the process,
+    `RunInterrupted` after Ctrl-C; what was recorded is their `result`.
     """
     from orchestration.requests.request import default_scenario, request_of  # not before: they load readers of files
 
@@ -106,5 +106,4 @@ def simulate(
             memory_limit=memory_limit, started=started,
         )  # fmt: skip
     with prepared(request, announce, recorder=recorder, engine=engine, resolved=resolved) as simulation:
-        is_over = course(simulation, progress_restoring_folder(simulation, progress))
-        return simulation.result() if is_over else None
+        return simulation.result() if simulation.follow(course, progress) else None

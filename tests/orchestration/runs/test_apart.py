@@ -1,5 +1,6 @@
 """A run with a third-party FMU has a separate process: however that ends, the run raises an error with its rows."""
 
+import itertools
 import os
 import signal
 import subprocess
@@ -110,12 +111,13 @@ def test_an_fmu_that_ends_the_process_before_the_first_row_is_named(tmp_path: Pa
 
 
 def test_the_command_says_it_in_one_line_and_keeps_the_rows_beside_what_is_there(tmp_path: Path, main: Main) -> None:
-    small(tmp_path, "ENDS=exit(0)")
     (tmp_path / "system.toml").write_text(SYSTEM)
-    for name in ("out", "out.1"):
+    crash = "the process of the run ended with exit code 0, in a call of it (Small), after t = 0.05 s of 0.1 s"
+    error = "it (Small): fmi2DoStep: returned fmi2Error, without a message, at t = 0.06 s"
+    for name, does, text in (("out", "exit(0)", crash), ("out.1", "return 3", error)):
+        small(tmp_path, f"ENDS={does}")
         done = main("run", tmp_path / "system.toml", "--out", tmp_path / "out", code=1)
-        text = "quadcosim: the process of the run ended with exit code 0, in a call of it (Small), after t = 0.05 s"
-        assert done.stderr == f"{text} of 0.1 s; what was recorded is in {tmp_path / name}\n"
+        assert done.stderr == f"quadcosim: {text}; what was recorded is in {tmp_path / name}\n"
         assert done.stdout == ""
         assert len(load_run(tmp_path / name).rows) == 6
 
@@ -142,21 +144,28 @@ def test_a_warning_of_the_fmu_comes_back(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("does", "text"),
+    ("does", "text", "rows"),
     [
-        ("REFUSES", "level 7 is 50% of it"),
-        ("ENDS=return 3", "fmi2DoStep: returned fmi2Error, without a message, at t = 0.06 s"),
-        ("ENDS=return 5", "fmi2DoStep: returned fmi2Pending, without a message, at t = 0.06 s"),
+        ("REFUSES", "b: level 7 is 50% of it, at t = 0.01 s", 1),
+        ("ENDS=return 3", "returned fmi2Error, without a message, at t = 0.06 s", 6),
+        ("ENDS=return 5", "returned fmi2Pending, without a message, at t = 0.06 s", 6),
     ],
 )
-def test_an_error_of_the_fmu_comes_back_as_it_is(does: str, text: str, tmp_path: Path) -> None:
-    path, told = small(tmp_path, does), []
-    for how in ({}, {"in_process": True}, {"engine": "python"}):
+def test_an_error_of_the_fmu_comes_back_as_it_is_with_every_row(
+    does: str, text: str, rows: int, tmp_path: Path
+) -> None:
+    sound = small(tmp_path / "sound")
+    whole = run(beside(sound, sound), in_process=True)
+    system = beside(sound, small(tmp_path, does))
+    engines: tuple[Any, Any] = ("compiled", "python")
+    for engine, in_process in itertools.product(engines, (False, True)):
         with pytest.raises(SimulatorError) as raised:
-            run(alone(path), **how)
-        told.append(str(raised.value))
-    assert told == [told[0]] * 3
-    assert text in told[0]
+            run(system, engine=engine, in_process=in_process)
+        assert str(raised.value) == f"b (Small): fmi2DoStep: {text}"
+        kept = raised.value.result
+        assert np.array_equal(kept.rows, whole.rows[:rows])
+        assert kept.events == tuple(event for event in whole.events if event.time <= kept.interrupted_at * 1e9)
+        assert (kept.interrupted_at, kept.warnings) == (kept.rows[-1, 0], (str(raised.value),))
 
 
 def test_a_process_that_ends_after_the_run_costs_no_result(tmp_path: Path) -> None:
