@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from orchestration.basics.simulator import Floats
 from orchestration.figures.palette import BLACK, GREY
-from orchestration.figures.run import Run
+from orchestration.figures.run import Run, Window
 from orchestration.figures.shades import CLIPPED, OUTSIDE
 from orchestration.figures.style import Style
 from orchestration.results import display_names as labels
@@ -36,7 +36,13 @@ def logarithmic(axes: Axes) -> None:
 
 def set_time_axis(axes: Axes, runs: Sequence[Run]) -> None:
     """Set the limits of the time axis to the span of the runs, or to the window."""
-    axes.set_xlim(min(run.span[0] for run in runs), max(run.span[1] for run in runs))
+    set_span(axes, (min(run.span[0] for run in runs), max(run.span[1] for run in runs)))
+
+
+def set_span(axes: Axes, span: Window) -> None:
+    """Set the limits of the time axis to a span, unless it is that of a run of one row."""
+    if span[0] < span[1]:
+        axes.set_xlim(span)
 
 
 def legend_of_runs(figure: Figure, runs: Sequence[Run], style: Style) -> None:

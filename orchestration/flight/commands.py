@@ -7,7 +7,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestration.figures.lines import TIME, clip_peaks, legend_of_runs, quantity
+from orchestration.figures.lines import TIME, clip_peaks, legend_of_runs, quantity, set_span
 from orchestration.figures.palette import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RED
 from orchestration.figures.run import Run, Window, title
 from orchestration.figures.style import Style
@@ -59,7 +59,7 @@ def _draw(panel: Axes, runs: Sequence[Run], name: str, span: Window, style: Styl
         panel.plot(t, values, drawstyle="steps-post", color=color, linestyle=run.dashes if len(runs) > 1 else "-")
         inside = (t >= span[0]) & (t <= span[1])
         lines.append((t[inside], values[inside]) if inside.any() else (t, values))
-    panel.set_xlim(span)
+    set_span(panel, span)
     low, high = min(float(y.min()) for _, y in lines), max(float(y.max()) for _, y in lines)
     room = (high - low) or 1.0  # below for samples and arrivals, above for losses
     panel.set_ylim(low - (0.1 if clips else 0.25) * room, high + 0.15 * room)

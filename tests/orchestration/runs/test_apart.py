@@ -113,13 +113,13 @@ def test_an_fmu_that_ends_the_process_before_the_first_row_is_named(tmp_path: Pa
 def test_the_command_says_it_in_one_line_and_keeps_the_rows_beside_what_is_there(tmp_path: Path, main: Main) -> None:
     (tmp_path / "system.toml").write_text(SYSTEM)
     crash = "the process of the run ended with exit code 0, in a call of it (Small), after t = 0.05 s of 0.1 s"
-    error = "it (Small): fmi2DoStep: returned fmi2Error, without a message, at t = 0.06 s"
-    for name, does, text in (("out", "exit(0)", crash), ("out.1", "return 3", error)):
-        small(tmp_path, f"ENDS={does}")
+    error = "it (Small): fmi2DoStep: it: level 7 is 50% of it, at t = 0.01 s"
+    for name, does, text, rows in (("out", "ENDS=exit(0)", crash, 6), ("out.1", "REFUSES", error, 1)):
+        small(tmp_path, does)
         done = main("run", tmp_path / "system.toml", "--out", tmp_path / "out", code=1)
         assert done.stderr == f"quadcosim: {text}; what was recorded is in {tmp_path / name}\n"
         assert done.stdout == ""
-        assert len(load_run(tmp_path / name).rows) == 6
+        assert len(load_run(tmp_path / name).rows) == rows
 
 
 def test_without_a_process_of_its_own_the_fmu_is_in_this_one(tmp_path: Path) -> None:
