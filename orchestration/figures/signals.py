@@ -1,15 +1,17 @@
 """The figure of the signals that are exchanged in a system of any FMUs."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from orchestration.figures.lines import TIME, abreast, legend_of_runs, quantity, set_time_axis, wrapped
-from orchestration.figures.palette import CYCLE, DASHES, MOST_LINES
+from orchestration.figures.palette import CYCLE, DASHES, MOST_LINES, MOST_PANELS
 from orchestration.figures.run import Run, title
 from orchestration.figures.style import Style
 from orchestration.results import display_names as labels
+from orchestration.results.column_info import ColumnInfo
+from orchestration.system.model import System
 from orchestration.system.variable_names import component_of
 
 Panel = tuple[str, str | None, list[str]]
@@ -19,9 +21,11 @@ Panel = tuple[str, str | None, list[str]]
 def signals(runs: Sequence[Run], style: Style) -> Figure:
     """A panel for each connection and unit, its signals as the receiver has them.
 
-    Without connections, the recorded outputs of each component.
+    Without connections, the recorded outputs of each component. Of more than `MOST_PANELS` the first are drawn,
+    and the number of signals of the others is stated.
     """
-    contents = [*_panels(runs[0])]
+    available = [*_panels(runs[0].system, runs[0].described)]
+    contents = available[:MOST_PANELS]
     figure = style.figure(3.0 + 10.5 * max(1, len(contents)))
     panels = figure.subplots(max(1, len(contents)), 1, sharex=True, squeeze=False)[:, 0]
     for panel, (name, unit, columns) in zip(panels, contents):
@@ -34,22 +38,31 @@ def signals(runs: Sequence[Run], style: Style) -> Figure:
     if style.has_titles and title(runs):
         figure.suptitle(title(runs))
     panels[-1].set_xlabel(TIME)
+    if left_out := sum(len(columns) for _, _, columns in available[MOST_PANELS:]):
+        figure.supxlabel(f"and {left_out} more signals")
     legend_of_runs(figure, runs, style)
     return figure
 
 
-def _panels(run: Run) -> Iterator[Panel]:
+def drawn(system: System, described: Mapping[str, ColumnInfo]) -> set[str]:
+    """The columns that the figure of a run reads, of all that are `described`."""
+    shown = [*_panels(system, described)][:MOST_PANELS]
+    return {"time", *(column for _, _, columns in shown for column in columns)}
+
+
+def _panels(system: System, described: Mapping[str, ColumnInfo]) -> Iterator[Panel]:
     of_connections = {
-        x.name: [end if end in run else start for start, end in zip(x.start, x.end)] for x in run.system.connections
+        x.name: [end if end in described else start for start, end in zip(x.start, x.end)] for x in system.connections
     }
     of_components = {
-        name: [column for column in run.recording.columns if column.startswith(f"{name}.")]
-        for name in run.system.components
+        name: [column for column in described if column.startswith(f"{name}.")] for name in system.components
     }
     for name, columns in (of_connections or of_components).items():
-        recorded = [column for column in columns if column in run]
-        for unit in dict.fromkeys(run.described[column].unit for column in recorded):
-            of_unit = [column for column in recorded if run.described[column].unit == unit]
+        by_unit: dict[str | None, list[str]] = {}
+        for column in columns:
+            if column in described:
+                by_unit.setdefault(described[column].unit, []).append(column)
+        for unit, of_unit in by_unit.items():
             for first in range(0, len(of_unit), MOST_LINES):
                 yield name, unit, of_unit[first : first + MOST_LINES]
 

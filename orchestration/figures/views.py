@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
     from orchestration.figures.run import Run
     from orchestration.figures.style import Style
+    from orchestration.results.column_info import ColumnInfo
+    from orchestration.system.model import System
 
     Maker = Callable[[Sequence[Run], Style], Figure | None]
 
@@ -23,8 +25,8 @@ class Drawing:
 
     makers: Mapping[str, Maker]
     """by the names of figures; they return None if a run has no such figure"""
-    columns: Collection[str] | None
-    """that they read; None: all"""
+    columns: Callable[[System, Mapping[str, ColumnInfo]], Collection[str]]
+    """that they read of a run of a system, all of whose columns are described"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,9 +45,9 @@ class View:
 
 def _of_any_system() -> Drawing:
     from orchestration.figures.gantt import chart
-    from orchestration.figures.signals import signals
+    from orchestration.figures.signals import drawn, signals
 
-    return Drawing(makers={"signals": signals, "schedule": chart}, columns=None)
+    return Drawing(makers={"signals": signals, "schedule": chart}, columns=drawn)
 
 
 ANY = "run"

@@ -10,6 +10,9 @@ from orchestration.flight.path import path
 from orchestration.flight.spectrum import spectrum
 from orchestration.quadrotor.wiring import POSITION, POSITION_REFERENCE
 
+_READ = {
+    "time", *POSITION_REFERENCE, *(f"plant.{name}" for name in POSITION), *COLUMNS, COLUMN, *DRAWN, *phase.DRAWN,
+}  # fmt: skip
 DRAWING = Drawing(
     makers=dict(
         zip(
@@ -18,7 +21,5 @@ DRAWING = Drawing(
             strict=True,
         )
     ),
-    columns={
-        "time", *POSITION_REFERENCE, *(f"plant.{name}" for name in POSITION), *COLUMNS, COLUMN, *DRAWN, *phase.DRAWN,
-    },
-)  # fmt: skip
+    columns=lambda system, described: _READ,
+)

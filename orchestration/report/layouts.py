@@ -1,8 +1,9 @@
 """The panels of runs by their columns: those of a known layout, or the connections of any system."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 
-from orchestration.figures.palette import MOST_LINES
+from orchestration.figures.palette import MOST_LINES, MOST_PANELS
 from orchestration.report.known_layouts import layout_for
 from orchestration.report.model import Line, Panel, ReportLayout
 from orchestration.results import display_names as labels
@@ -18,7 +19,9 @@ def layout_of(system: System | None, columns: Collection[str], about: About) -> 
     """The layout for some columns; `system` is that of the run, if it is known."""
     known = layout_for(columns)
     if known is None:
-        return ReportLayout(columns=tuple(columns), panels=(*_of_connections(system, columns, about),), scene=None)
+        every = enumerate(_of_connections(system, columns, about))
+        first = [replace(panel, shown=panel.shown and place < MOST_PANELS) for place, panel in every]
+        return ReportLayout(columns=tuple(columns), panels=(*first,), scene=None)
     panels, scene = known.panels(columns), known.scene(columns, system)
     if scene is None:  # then the page computes no columns from it
         panels = tuple(panel for panel in panels if all(line.column in columns for line in panel.lines))

@@ -43,7 +43,7 @@ def draw(
             raise UsageError(f"--figure {name}: expected one of {', '.join(view.names)}")
     drawing = view.load()
     labels = names or labels_of_runs(listed, [f"run {i + 1}" for i in range(len(listed))])
-    runs = runs_of(listed, labels, drawing.columns, window)
+    runs = runs_of(listed, labels, drawing.columns(listed[0].system, listed[0].described), window)
     with style.applied():
         figures = {name: drawing.makers[name](runs, style) for name in view.names if which is None or name in which}
     return {name: figure for name, figure in figures.items() if figure is not None}

@@ -12,6 +12,7 @@ from matplotlib.collections import FillBetweenPolyCollection
 from matplotlib.figure import Figure
 
 import quadcosim
+from orchestration.figures import signals
 from orchestration.figures.lines import clip_peaks
 from orchestration.figures.names import COLUMNS
 from orchestration.figures.style import SCREEN, STYLES, Style, save
@@ -118,7 +119,9 @@ def test_a_system_with_the_variables_of_a_quadrotor_is_drawn_as_a_flight_also_ov
     assert set(draw(system)) == set(draw([flight, system])) == set(FLIGHT)
 
 
-def test_signals_of_any_system_share_a_panel_by_unit_and_none_is_left_out(flight: Result) -> None:
+def test_signals_of_any_system_share_a_panel_by_unit_and_none_is_left_out_up_to_a_number_of_panels(
+    flight: Result, monkeypatch: pytest.MonkeyPatch
+) -> None:
     whole = flight.request.as_system()
     bare = replace(whole, sources={}, objectives={}, optional=(), criterion=Criterion(), operating_point={})
     result = quadcosim.run(replace(bare, stop_time=0.05))
@@ -134,6 +137,11 @@ def test_signals_of_any_system_share_a_panel_by_unit_and_none_is_left_out(flight
         assert legend is not None
         assert len(legend.get_texts()) == len(axes.get_lines())
         assert legend.get_window_extent().y0 >= axes.get_window_extent().y1 - 1.0
+    left_out = sum(len(axes.get_lines()) for axes in figure.axes[2:])
+    monkeypatch.setattr(signals, "MOST_PANELS", 2)
+    figure = draw(result)["signals"]
+    assert [axes.get_ylabel().replace("\u00a0", " ") for axes in figure.axes] == labels[:2]
+    assert figure.get_supxlabel() == f"and {left_out} more signals"
 
 
 def test_a_legend_tells_what_differs_between_runs(flight: Result, slow: Result) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from orchestration.basics.simulator import Floats
+from orchestration.figures.palette import MOST_LINES, MOST_PANELS
 from orchestration.flight.layout import POSITION_ERROR, FlightLayout
 from orchestration.quadrotor.translation import quadrotor
 from orchestration.quadrotor.wiring import POSITION_REFERENCE
@@ -81,6 +82,11 @@ def test_any_other_system_has_panels_by_unit_and_no_scene() -> None:
     (layout,) = tracks.layouts
     assert layout.scene is None
     assert [(panel.title, panel.unit) for panel in layout.panels] == [("tank", "m"), ("tank", None)]
+
+
+def test_a_page_of_many_signals_opens_with_the_first_of_their_panels() -> None:
+    panels = layout_of(None, [f"it.x{i}" for i in range(MOST_LINES * MOST_PANELS + 1)], {}).panels
+    assert [panel.shown for panel in panels] == [True] * MOST_PANELS + [False]
 
 
 def test_runs_that_are_alike_share_a_layout() -> None:
