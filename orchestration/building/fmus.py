@@ -44,7 +44,7 @@ def locate(fmu: str, announce: Callable[[str], None] | None = None) -> Path:
 
     The FMU of a path is built if a module beside it defines the slave of that name, or the one of which it is a
     variant, unless it carries the hash of these sources or was not built by this project; where consent is required,
-    `UsageError` states how to give it. Raises `UsageError` naming the valid names if there is no such FMU. `announce`
+    `UsageError` states how to give it. Raises `UsageError` for a missing file, and for an unknown name. `announce`
     receives a line for a build, and for a variant elsewhere that is older than the sources of this project.
     """
     for packing in PACKINGS:
@@ -67,10 +67,8 @@ def locate(fmu: str, announce: Callable[[str], None] | None = None) -> Path:
             build_slaves([target], path.parent, announce, packing=packing)
         if path.is_file():
             return path
-    raise UsageError(
-        f"fmu = {fmu}: expected {' or '.join(MODELS)}, or the path of an .fmu file, which may be missing if a module "
-        "beside it defines the slave"
-    )
+        raise UsageError(f"fmu = {fmu}: no such file, and no module beside it that defines the slave")
+    raise UsageError(f"fmu = {fmu}: expected {' or '.join(MODELS)}, or the path of an .fmu file")
 
 
 def look_up(fmu: str, announce: Callable[[str], None] | None = None) -> Path | None:

@@ -97,7 +97,7 @@ def validate(
     paths = fmu or [fmus.locate(name, inform) for name in MODELS]
     for path in paths:
         if not path.is_file():
-            raise UsageError(f"{path}: expected an .fmu file")
+            raise UsageError(f"{path}: no such file")
     document, lines, problems = [], [], 0
     with progress_bar("checking") as progress:
         for done, path in enumerate(paths):

@@ -67,7 +67,7 @@ def read_archive(path: Path, size_limit: float) -> Archive:
     description.
     """
     if not path.is_file():
-        raise UnreadableFmuError("expected an .fmu file")
+        raise UnreadableFmuError("no such file")
     try:
         archive = zipfile.ZipFile(path)
         size = sum(entry.file_size for entry in archive.infolist()) / 1e6

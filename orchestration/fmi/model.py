@@ -213,8 +213,8 @@ def read_model(path: str | Path) -> Model:
     path = Path(path)
     try:
         about = path.stat()
-    except OSError:
-        return _read_model(path, 0, 0)
+    except OSError as error:
+        raise UsageError(f"{path}: no such file") from error
     return _read_model(path, about.st_mtime_ns, about.st_size)
 
 
@@ -225,7 +225,11 @@ def _read_model(path: Path, changed: int, size: int) -> Model:
         if not 0 <= declared.valueReference < 2**32:
             what = f"{declared.name}: valueReference = {declared.valueReference}"
             raise UsageError(f"{path}: {what}: expected a whole number of 32 bits without a sign")
-    variables = {v.name: v for declared in description.modelVariables for v in _scalars(declared)}
+    scalars = [scalar for declared in description.modelVariables for scalar in _scalars(declared)]
+    variables = {v.name: v for v in scalars}
+    if len(variables) < len(scalars):
+        name = Counter(v.name for v in scalars).most_common(1)[0][0]
+        raise UsageError(f"{path}: its modelDescription.xml has more than one variable {name}")
     return Model(
         path=path,
         description=description,

@@ -67,7 +67,14 @@ def test_an_fmu_is_built_into_the_cache_and_loads_from_there(project: Path, tmp_
 # -- finding and building ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["Unified", "", "QuadrotorPlant.fmu", "nowhere/UnifiedController.fmu", "README.md"])
+@pytest.mark.parametrize("path", ["QuadrotorPlant.fmu", "nowhere/UnifiedController.fmu"])
+def test_a_path_of_no_file_is_refused_in_a_few_words(path: str) -> None:
+    with pytest.raises(UsageError) as refused:
+        fmus.locate(path)
+    assert str(refused.value) == f"fmu = {path}: no such file, and no module beside it that defines the slave"
+
+
+@pytest.mark.parametrize("name", ["Unified", "", "README.md"])
 def test_a_name_that_there_is_none_of_is_refused_with_the_names_there_are(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -501,7 +501,7 @@ def test_validate_ends_with_1_for_a_damaged_fmu(built: dict[str, Path], here: Pa
 
 
 def test_validate_of_what_is_not_there_is_wrong_usage(main: Main) -> None:
-    assert error_line(main("validate", "none.fmu", code=2)) == "none.fmu: expected an .fmu file"
+    assert error_line(main("validate", "none.fmu", code=2)) == "none.fmu: no such file"
 
 
 # -- a project of its own ---------------------------------------------------------------------------------

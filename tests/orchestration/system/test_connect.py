@@ -89,7 +89,7 @@ def test_a_boolean_becomes_a_real_and_a_real_becomes_no_boolean(tmp_path: Path) 
 
 
 def test_an_fmu_is_not_connected_to_itself(tmp_path: Path) -> None:
-    system, _, _ = proposed(tmp_path, described(tmp_path, "A", inputs={"x": "Real m"}, outputs={"x": "Real m"}))
+    system, _, _ = proposed(tmp_path, described(tmp_path, "A", inputs={"u_x": "Real m"}, outputs={"x": "Real m"}))
     assert system.connections == ()
 
 
@@ -224,6 +224,6 @@ def test_a_complete_proposal_runs(built: dict[str, Path], tmp_path: Path, main: 
 
 def test_a_file_that_is_no_fmu_is_rejected_in_one_line(tmp_path: Path, main: Main) -> None:
     (tmp_path / "text.fmu").write_text("no archive")
-    for path in ("text.fmu", "nowhere.fmu"):
+    for path, text in (("text.fmu", "expected"), ("nowhere.fmu", "no such file")):
         stderr = main("connect", tmp_path / path, code=2).stderr
-        assert re.fullmatch(rf"quadcosim: [^\n]*{path}: expected [^\n]*\n", stderr)
+        assert re.fullmatch(rf"quadcosim: [^\n]*{path}: {text}[^\n]*\n", stderr)
