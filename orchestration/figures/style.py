@@ -1,5 +1,6 @@
 """The style of figures: sizes, fonts and lines; and how files of them are written."""
 
+import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -67,8 +68,12 @@ class Style:
 
     @contextmanager
     def applied(self) -> Iterator[None]:
-        """A context in which figures have this style, regardless of the user's settings of matplotlib."""
-        with matplotlib.rc_context():
+        """A context in which figures have this style, regardless of the user's settings of matplotlib.
+
+        Of characters that its fonts lack, matplotlib draws boxes and warns once for each; here it does not warn.
+        """
+        with matplotlib.rc_context(), warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "Glyph .* missing from font")
             matplotlib.rcdefaults()
             matplotlib.rcParams.update(self._settings())
             yield

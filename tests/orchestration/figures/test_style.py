@@ -19,7 +19,7 @@ def drawn(style: Style) -> Figure:
     with style.applied():
         figure = style.figure(20.0)
         panel = figure.add_subplot()
-        panel.plot([0.0, 1.0, 2.0], [1.0, 3.0, 2.0], label="a")
+        panel.plot([0.0, 1.0, 2.0], [1.0, 3.0, 2.0], label="a, and what the fonts lack: 測")
         panel.set(xlabel="time [s]", ylabel=r"$\beta_t$ ε [1]")
         panel.legend()
     return figure
