@@ -118,6 +118,15 @@ def spans(system: System, recording: Recording, parameters: Mapping[str, float],
         before = rows[-1:]
 
 
+def not_finite(spans: Spans) -> str | None:
+    """The first value that is not finite of the signals that expressions use, as text; None if all are finite."""
+    for span in spans():
+        for name, values in span.signals.items():
+            for place in np.flatnonzero(~np.isfinite(values))[:1]:
+                return f"{name} = {values[place]} at t = {span.time[place]:g} s: what uses it may have no value"
+    return None
+
+
 def _arrivals(system: System, time: Floats, events: Events) -> dict[str, Booleans]:
     """By connection, the rows at which a message of it arrived, or was measured and not lost."""
     instants = np.round(time * NANOSECONDS).astype(np.int64)

@@ -1,7 +1,7 @@
 """The outcome of a run, in whichever process it ran, and the result made of it and the recording."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,6 +9,7 @@ from orchestration.basics.errors import SimulatorError
 from orchestration.basics.interrupt import Interrupted
 from orchestration.engines.job_numbers import job_numbers
 from orchestration.engines.wiring import uneven_steps
+from orchestration.expressions.recorded import Recorded
 from orchestration.recording.recording import Recorder
 from orchestration.results import objectives
 from orchestration.results.column_info import column_infos
@@ -61,18 +62,25 @@ def result_of(
     """
     recording = recorder.finish()
     numbers = {**resolved.parameters, **job_numbers(resolved.system)}
+
+    def spans() -> Iterator[Recorded]:
+        return objectives.spans(resolved.system, recording, numbers, outcome.end)
+
+    metrics = objectives.compute(
+        resolved.system,
+        spans,
+        end=outcome.end,
+        divergence_time=outcome.divergence_time,
+        steps=outcome.steps,
+        terminated=outcome.termination is not None,
+    )
+    is_short = metrics["good"] is False or None in map(metrics.get, resolved.system.objectives)
+    odd = objectives.not_finite(spans) if is_short and outcome.divergence_time is None else None
     result = Result(
         request=resolved.request,
         system=resolved.system,
         recording=recording,
-        metrics=objectives.compute(
-            resolved.system,
-            lambda: objectives.spans(resolved.system, recording, numbers, outcome.end),
-            end=outcome.end,
-            divergence_time=outcome.divergence_time,
-            steps=outcome.steps,
-            terminated=outcome.termination is not None,
-        ),
+        metrics=metrics,
         units=resolved.units,
         described=column_infos(resolved.system, resolved.models, recording.columns),
         parameters=resolved.parameters,
@@ -84,6 +92,7 @@ def result_of(
             *resolved.request.warnings(resolved.parameters),
             *uneven_steps(resolved.system, resolved.models),
             *outcome.warnings,
+            *([] if odd is None else [odd]),
             *([] if outcome.failure is None else [str(outcome.failure)]),
         ),
     )

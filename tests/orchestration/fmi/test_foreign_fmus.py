@@ -24,6 +24,7 @@ from orchestration.runs.prepared import prepared
 from orchestration.runs.result import Result
 from orchestration.system.component import Component
 from orchestration.system.connection import Connection
+from orchestration.system.criterion import Criterion
 from orchestration.system.model import System
 from orchestration.system.sampling import Sampling
 from orchestration.system.source import Source
@@ -247,6 +248,15 @@ def test_parameters_that_initialisation_loses_are_set_again(tmp_path: Path) -> N
 def test_a_parameter_that_an_fmu_does_not_take_is_a_warning(tmp_path: Path) -> None:
     result = ran(alone(small(tmp_path, "IGNORES"), parameters={"gain": 3.0}))
     assert result.warnings == ("it.gain: was set to 3.0, the FMU has 1.0",)
+
+
+def test_a_value_of_an_objective_that_is_not_finite_is_a_warning_that_names_it(tmp_path: Path) -> None:
+    path = small(tmp_path, "ENDS=m->s.x[0] = NAN")
+    result = ran(dataclasses.replace(alone(path), objectives={"peak": "max(it.y)"}))
+    judged = ran(dataclasses.replace(alone(path), criterion=Criterion(good="max(it.y) < 2")))
+    assert (result.metrics["peak"], judged.metrics["good"]) == (None, False)
+    assert result.warnings == judged.warnings == ("it.y = nan at t = 0.06 s: what uses it may have no value",)
+    assert ran(alone(path)).warnings == ()
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
