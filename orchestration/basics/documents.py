@@ -45,15 +45,15 @@ def readable(path: Path, what: str) -> Iterator[None]:
         raise UsageError(f"{path}: expected a readable {what}: its text is not in UTF-8 ({error.reason})") from error
 
 
-def read_text(path: Path, what: str) -> str:
-    """The text of a UTF-8 file of at most `LARGEST` characters; raises `UsageError`, naming `what` it should be."""
+def read_text(path: Path, what: str, largest: int = LARGEST) -> str:
+    """The text of a UTF-8 file of at most `largest` characters; raises `UsageError`, naming `what` it should be."""
     if "\0" in str(path):
         raise UsageError(f"{path}: expected a path without NUL characters")
     _NOTES.debug("reading %s %s", what, path)
     with readable(path, what), path.open(encoding="utf-8-sig") as file:
-        text = file.read(LARGEST + 1)
-    if len(text) > LARGEST:
-        raise UsageError(f"{path}: expected a readable {what}: it has more than {LARGEST} characters")
+        text = file.read(largest + 1)
+    if len(text) > largest:
+        raise UsageError(f"{path}: expected a readable {what}: it has more than {largest} characters")
     return text
 
 
@@ -91,9 +91,12 @@ def tables_in(text: str) -> dict[str, Any]:
     return tables
 
 
-def read_json(path: Path) -> Any:
-    """The value of a JSON file; raises `UsageError` if it is not JSON, which has no `NaN` and `Infinity`."""
-    text = read_text(path, "JSON file")
+def read_json(path: Path, largest: int = LARGEST) -> Any:
+    """The value of a JSON file of at most `largest` characters.
+
+    Raises `UsageError` if it is not JSON, which has no `NaN` and `Infinity`.
+    """
+    text = read_text(path, "JSON file", largest)
     try:
         value = json.loads(text, parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as error:

@@ -23,6 +23,7 @@ from orchestration.figures.style import SCREEN, save
 from orchestration.figures.views import VIEWS
 from orchestration.flight.names import FIGURES as FLIGHT
 from orchestration.recording.recording import Chunk, Events, InMemory, Recorder
+from orchestration.results.column_info import ColumnInfo
 from orchestration.runs import draw as drawing
 from orchestration.runs.run_directory import keep_run
 from quadcosim import (  # fmt: skip
@@ -87,7 +88,9 @@ def test_figures_can_be_left_out(result: Result, folder: Path) -> None:
 
 
 def test_a_run_read_back_is_the_run_written(result: Result, folder: Path) -> None:
-    again = load_run(save_run(result, folder, figures=False))
+    described = {**result.described, "time": ColumnInfo(unit="s", text="as long as of many columns " * 50_000)}
+    again = load_run(save_run(dataclasses.replace(result, described=described), folder, figures=False))
+    assert again.described == described
     assert again.columns == result.columns
     assert again.rows.tobytes() == result.rows.tobytes()
     assert again.events == result.events
