@@ -31,12 +31,14 @@ from docs.finding_texts import (
 )
 from docs.theory import PAPER
 from orchestration.basics.statistics import wilson
+from orchestration.comparison.run import rerun_cells
 from orchestration.comparison.survival import FATES, SETTLING, survived
 from orchestration.figures.style import DOCS, save
 from orchestration.flight.hover_loop import HoverLoop
 from orchestration.flight.local_limit import about_hover
 from orchestration.flight.margin import margin_of
 from orchestration.limits import figure, limit
+from orchestration.quadrotor.initial_conditions import Starts
 from orchestration.studies import drawing, figures
 from orchestration.studies.store import open_for_reading, store_path
 from orchestration.studies.study import Study
@@ -65,7 +67,7 @@ def main() -> None:
     """All sections, in the order of the page."""
     began = time.perf_counter()
     sections = (
-        compared, pictures, period, limits, continuous, delay, bounds, certificates, wind, gains, bandwidth,
+        compared, pictures, last_bits, period, limits, continuous, delay, bounds, certificates, wind, gains, bandwidth,
         finite_time, monte_carlo, sensitivity, agreement, processor, stalls,
     )  # fmt: skip
     for section in [one for one in sections if one.__name__ in sys.argv[1:] or not sys.argv[1:]]:
@@ -89,6 +91,28 @@ def pictures() -> list[str]:
     with DOCS.applied():
         drawn = dict(comparisons.figures())
     return [*map(str, save(drawn, FIGURES, DOCS)), comparisons.from_the_path()]
+
+
+def last_bits() -> list[str]:
+    """By how many flights the cells of two maps change if all initial errors grow by 1e-15."""
+    lines = []
+    for name in ("mismatches", "vehicles"):
+        known, kept = comparisons.load(name), comparisons.read_data(name)["cells"]
+        assert isinstance(known.starts, Starts)
+        sizes = {
+            size: getattr(known.starts, size) * (1.0 + 1e-15) for size in ("position", "velocity", "angle", "rate")
+        }
+        moved = dataclasses.replace(known, starts=dataclasses.replace(known.starts, **sizes))
+        again = rerun_cells(moved, range(len(kept)), workers=comparisons.WORKERS, engine="batch")
+        pairs = [*zip(again, kept, strict=True)]
+        survive = np.array([abs(new.survives.count - old["survives"]) for new, old in pairs])
+        settle = np.array([abs(new.settles.count - old["settles"]) for new, old in pairs])
+        lines.append(
+            f"{name}: of {len(kept)} cells {np.count_nonzero(survive)} have another number that survives, by up to "
+            f"{survive.max()} (by more than six: cells {np.flatnonzero(survive > 6).tolist()}), and "
+            f"{np.count_nonzero(settle)} another that settles, by up to {settle.max()}"
+        )
+    return lines
 
 
 def period() -> list[str]:
