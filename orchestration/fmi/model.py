@@ -18,6 +18,7 @@ import fmpy
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from fmu_kit.archive import read_source_hash
+from orchestration.basics.documents import readable
 from orchestration.basics.errors import UsageError, listed, no_utf8
 from orchestration.basics.units import BASE, BaseUnits, Unit, named
 from orchestration.fmi.archive import (
@@ -211,10 +212,8 @@ def read_model(path: str | Path) -> Model:
     co-simulation of FMI 2.0 or 3.0.
     """
     path = Path(path)
-    try:
+    with readable(path, "FMU"):
         about = path.stat()
-    except OSError as error:
-        raise UsageError(f"{path}: no such file") from error
     return _read_model(path, about.st_mtime_ns, about.st_size)
 
 
