@@ -34,9 +34,9 @@ demo: .venv/.base
 
 # Laws, plant, algebra, expressions, timetable, master with stubs, files of systems and scenarios; one FMU, built and run.
 QUICK := $(addprefix tests/,controller_fmu plant_fmu fmus/test_one_fmu.py fmu_kit/test_algebra.py fmu_kit/test_trajectory.py fmu_kit/test_units.py) \
-	$(addprefix tests/orchestration/,expressions schedule/test_timetable.py engines/test_master.py schedule/test_order.py \
-	quadrotor/test_loop.py quadrotor/test_scenario.py quadrotor/test_timing.py \
-	studies/test_axes.py studies/test_study_file.py system requests/ssp/test_reading.py basics/test_statistics.py)
+	$(addprefix tests/orchestration/,systems/expressions systems/schedule/test_timetable.py simulation/engines/test_master.py systems/schedule/test_order.py \
+	quadrotor/scenarios/test_loop.py quadrotor/scenarios/test_scenario.py quadrotor/scenarios/test_timing.py \
+	experiments/studies/test_axes.py experiments/studies/test_study_file.py systems/system simulation/requests/ssp/test_reading.py foundation/basics/test_statistics.py)
 
 check: lint
 	$(IN_FOLDER) $(BIN)/pytest --numprocesses 2 --dist load --hypothesis-profile quick --ignore-glob '*/test_flight.py' --ignore-glob '*/test_show.py' $(QUICK)

@@ -6,11 +6,11 @@ from setuptools import setup
 from setuptools.command.build_py import build_py
 
 FOLDERS, KEPT = ("examples", "studies", "gains"), (".csv", ".md", ".py", ".toml")
-"""As in orchestration/scaffold/examples.py"""
+"""As in orchestration/components/scaffold/examples.py"""
 
 
 class WithExamples(build_py):
-    """Puts them where `orchestration/scaffold/examples.py` looks for them."""
+    """Puts them where `orchestration/components/scaffold/examples.py` looks for them."""
 
     def run(self) -> None:
         super().run()
@@ -19,7 +19,7 @@ class WithExamples(build_py):
         for folder in FOLDERS:
             for file in sorted(Path(folder).rglob("*")):
                 if file.suffix in KEPT:
-                    to = Path(self.build_lib, "orchestration", "scaffold", "shipped", file)
+                    to = Path(self.build_lib, "orchestration", "components", "scaffold", "shipped", file)
                     self.mkpath(str(to.parent))
                     self.copy_file(str(file), str(to))
 

@@ -18,24 +18,24 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestration.building import fmus
-from orchestration.engines.batch.batch import Batch, Group
-from orchestration.engines.batch.batches import Batches
-from orchestration.engines.batch.kernels import preferred_lanes
-from orchestration.engines.batch.shape import Shape
-from orchestration.engines.structures import address
-from orchestration.engines.wiring import check_against_fmus
-from orchestration.fmi.model import read_model
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.timing import Timing
-from orchestration.runs.many_runs import located, run_many
-from orchestration.runs.prepared import prepared
-from orchestration.schedule.schedule_cache import ScheduleCache, schedule_key
-from orchestration.studies.axes import Axis
-from orchestration.studies.study import Study
-from orchestration.studies.sweep import sweep
-from orchestration.system.model import System
-from orchestration.system.paths import changed
+from orchestration.components.building import fmus
+from orchestration.components.fmi.model import read_model
+from orchestration.experiments.studies.axes import Axis
+from orchestration.experiments.studies.study import Study
+from orchestration.experiments.studies.sweep import sweep
+from orchestration.quadrotor.scenarios.scenario import Scenario
+from orchestration.quadrotor.scenarios.timing import Timing
+from orchestration.simulation.engines.batch.batch import Batch, Group
+from orchestration.simulation.engines.batch.batches import Batches
+from orchestration.simulation.engines.batch.kernels import preferred_lanes
+from orchestration.simulation.engines.batch.shape import Shape
+from orchestration.simulation.engines.structures import address
+from orchestration.simulation.engines.wiring import check_against_fmus
+from orchestration.simulation.runs.many_runs import located, run_many
+from orchestration.simulation.runs.prepared import prepared
+from orchestration.systems.schedule.schedule_cache import ScheduleCache, schedule_key
+from orchestration.systems.system.model import System
+from orchestration.systems.system.paths import changed
 
 REPETITIONS = 7
 CASES = {"1 kHz both": (0.001, 20.0), "10 ms / 1 ms": (0.01, 20.0), "20 ms / 1 ms": (0.02, 20.0)}

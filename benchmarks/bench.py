@@ -19,19 +19,19 @@ from fmu_kit.bundle import Target
 from fmu_kit.integrator import rk4_step
 from fmu_kit.rigid_body import Body, RigidState, Wrench, derivative
 from fmu_kit.trajectory import Trajectory
-from orchestration.basics.simulator import Floats
-from orchestration.engines.board import Board
-from orchestration.fmi.fmi2 import Fmi2Instance
-from orchestration.fmi.model import read_model
-from orchestration.quadrotor import wiring
-from orchestration.quadrotor.fmu_choice import FmuChoice
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.timing import Timing
-from orchestration.runs.prepared import prepared
-from orchestration.schedule.cursor import Cursor
-from orchestration.schedule.streams import Streams
-from orchestration.schedule.timetable import Timetable
-from orchestration.system.check import recorded_variables
+from orchestration.components.fmi.fmi2 import Fmi2Instance
+from orchestration.components.fmi.model import read_model
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.quadrotor.scenarios import wiring
+from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
+from orchestration.quadrotor.scenarios.scenario import Scenario
+from orchestration.quadrotor.scenarios.timing import Timing
+from orchestration.simulation.engines.board import Board
+from orchestration.simulation.runs.prepared import prepared
+from orchestration.systems.schedule.cursor import Cursor
+from orchestration.systems.schedule.streams import Streams
+from orchestration.systems.schedule.timetable import Timetable
+from orchestration.systems.system.check import recorded_variables
 from plant_fmu.wind import Wind
 
 STEPS = 5000

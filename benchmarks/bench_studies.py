@@ -6,12 +6,12 @@ import tempfile
 import time
 from pathlib import Path
 
-from orchestration.building.inputs import files_of, with_files
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.studies.axes import Axis
-from orchestration.studies.study import Study
-from orchestration.studies.sweep import sweep
-from orchestration.workers.task import Runner, RunTask
+from orchestration.experiments.studies.axes import Axis
+from orchestration.experiments.studies.study import Study
+from orchestration.experiments.studies.sweep import sweep
+from orchestration.quadrotor.scenarios.scenario import Scenario
+from orchestration.simulation.workers.task import Runner, RunTask
+from orchestration.systems.system.files import files_of, with_files
 
 RUNS, SECONDS = 200, 10.0
 """of the study with which two workers are compared"""

@@ -14,11 +14,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.studies.axes import Axis
-from orchestration.studies.study import Study
-from orchestration.studies.sweep import sweep
-from orchestration.workers.choice import EngineChoice
+from orchestration.experiments.studies.axes import Axis
+from orchestration.experiments.studies.study import Study
+from orchestration.experiments.studies.sweep import sweep
+from orchestration.quadrotor.scenarios.scenario import Scenario
+from orchestration.simulation.workers.choice import EngineChoice
 
 RUNS = 400
 WORKERS = 2

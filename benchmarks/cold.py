@@ -13,7 +13,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from orchestration.processes import subprocesses
+from orchestration.foundation.processes import subprocesses
 
 REPETITIONS = 3
 RUNS, FEWER_RUNS = 2048, 256

@@ -15,8 +15,8 @@ from pathlib import Path
 from benchmarks.flights import CASES, STEPS
 from fmu_kit import packaging
 from fmu_kit.bundle import Target
-from orchestration.building import builder
-from orchestration.building.models import MODELS
+from orchestration.components.building import builder
+from orchestration.components.building.models import MODELS
 
 HERE = Path(__file__).parent.parent
 PAIRS = 9

@@ -13,14 +13,14 @@ from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import replace
 
-from orchestration.engines.batch.batches import Batches
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.runs.many_runs import located
-from orchestration.runs.prepared import prepared
-from orchestration.system.computers import Computer, Task
-from orchestration.system.distribution import Distribution
-from orchestration.system.model import System
-from orchestration.system.paths import changed
+from orchestration.quadrotor.scenarios.scenario import Scenario
+from orchestration.simulation.engines.batch.batches import Batches
+from orchestration.simulation.runs.many_runs import located
+from orchestration.simulation.runs.prepared import prepared
+from orchestration.systems.system.computers import Computer, Task
+from orchestration.systems.system.distribution import Distribution
+from orchestration.systems.system.model import System
+from orchestration.systems.system.paths import changed
 
 REPETITIONS = 9
 DURATION = Distribution(uniform=(0.001, 0.002))

@@ -12,15 +12,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from benchmarks.batch import CASES, X, systems
-from orchestration.basics.errors import QuadcosimError
-from orchestration.engines.batch.batch import Batch, BatchResult, Group
-from orchestration.engines.cuda.compiler import image
-from orchestration.engines.cuda.driver import Gpu
-from orchestration.engines.cuda.fleet import Fleet, expect_gpu
-from orchestration.engines.cuda.program import Code, line, program
-from orchestration.schedule.schedule_cache import ScheduleCache, schedule_key
-from orchestration.system.model import System
-from orchestration.system.paths import changed
+from orchestration.foundation.basics.errors import QuadcosimError
+from orchestration.simulation.engines.batch.batch import Batch, BatchResult, Group
+from orchestration.simulation.engines.cuda.compiler import image
+from orchestration.simulation.engines.cuda.driver import Gpu
+from orchestration.simulation.engines.cuda.fleet import Fleet, expect_gpu
+from orchestration.simulation.engines.cuda.program import Code, line, program
+from orchestration.systems.schedule.schedule_cache import ScheduleCache, schedule_key
+from orchestration.systems.system.model import System
+from orchestration.systems.system.paths import changed
 
 REPETITIONS = 3
 COUNTS = (2**12, 2**15)

@@ -17,7 +17,7 @@ from docs.pages import fill
 from fmu_kit.bundle import Target
 from fmu_kit.compiler.pack.embedded import write
 from fmu_kit.variants import Value, Variant
-from orchestration.building.models import MODELS
+from orchestration.components.building.models import MODELS
 from tests.fmu_kit.compiler.compiled import HERE as BOARD_FILES
 from tests.fmu_kit.compiler.embedded import ARM, BOARDS, M4F, M7, QEMU, on_cortex_m, rows_of, to_note
 

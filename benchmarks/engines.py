@@ -9,11 +9,11 @@ import time
 from collections import defaultdict
 from typing import get_args
 
-from orchestration.building.fmus import native_twin
-from orchestration.engines.engine import Engine
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.timing import Timing
-from orchestration.runs.prepared import prepared
+from orchestration.components.building.fmus import native_twin
+from orchestration.quadrotor.scenarios.scenario import Scenario
+from orchestration.quadrotor.scenarios.timing import Timing
+from orchestration.simulation.engines.engine import Engine
+from orchestration.simulation.runs.prepared import prepared
 
 REPETITIONS = 9
 CASES = {

@@ -16,7 +16,7 @@ from benchmarks.embedded import count_instructions
 from benchmarks.mathematics import table
 from fmu_kit.bundle import Target
 from fmu_kit.compiler.pack.embedded import write
-from orchestration.building.models import MODELS
+from orchestration.components.building.models import MODELS
 from tests.fmu_kit.compiler.embedded import M4F, M7
 
 FOLDER = Path(__file__).parents[1] / "examples" / "autopilot" / "execution"

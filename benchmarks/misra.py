@@ -20,7 +20,7 @@ from docs.pages import fill
 from fmu_kit.bundle import Target
 from fmu_kit.compiler.pack.embedded import write
 from fmu_kit.variants import Variant
-from orchestration.building.models import MODELS
+from orchestration.components.building.models import MODELS
 
 CPPCHECK = "cppcheck"
 _FINDING = re.compile(r"\[misra-c2012-([\d.]+)\]")

@@ -16,8 +16,8 @@ import fmpy
 from fmu_kit.bundle import Target
 from fmu_kit.compiler.pack.lanes import compiled_lanes
 from fmu_kit.packaging import slave_class
-from orchestration.building.models import MODELS
-from orchestration.processes import subprocesses
+from orchestration.components.building.models import MODELS
+from orchestration.foundation.processes import subprocesses
 
 STEPS = 100_000
 LANES = (1, 4, 8, 16)

@@ -12,14 +12,14 @@ from collections import defaultdict
 from pathlib import Path
 
 from benchmarks.mathematics import table
-from orchestration.basics.errors import UsageError
-from orchestration.building.fmus import native_twins
-from orchestration.interop.catalogue import TOOLS, Tool
-from orchestration.interop.tool_runs import ToolRuns
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.timing import Timing
-from orchestration.runs.prepared import prepared
-from orchestration.system.model import System
+from orchestration.components.building.fmus import native_twins
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.quadrotor.scenarios.scenario import Scenario
+from orchestration.quadrotor.scenarios.timing import Timing
+from orchestration.simulation.interop.catalogue import TOOLS, Tool
+from orchestration.simulation.interop.tool_runs import ToolRuns
+from orchestration.simulation.runs.prepared import prepared
+from orchestration.systems.system.model import System
 
 STEP = 0.01
 """[s]"""

@@ -14,16 +14,16 @@ from typing import Any
 
 import numpy as np
 
-from orchestration.basics.errors import UsageError
-from orchestration.building import fmus
-from orchestration.exact.expect import Expected, expect
-from orchestration.runs.many_runs import run_many
-from orchestration.system.component import Component
-from orchestration.system.connection import Connection
-from orchestration.system.model import System
-from orchestration.system.sampling import Sampling
-from orchestration.system.source import Source
-from orchestration.system.system_file import load_system
+from orchestration.components.building import fmus
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.simulation.runs.many_runs import run_many
+from orchestration.systems.system.component import Component
+from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.model import System
+from orchestration.systems.system.sampling import Sampling
+from orchestration.systems.system.source import Source
+from orchestration.systems.system.system_file import load_system
+from orchestration.theory.exact.expect import Expected, expect
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 LARGEST_FOURTH = 0.95

@@ -11,9 +11,9 @@ import time
 from pathlib import Path
 from typing import Any
 
-from orchestration.report.writing import report
-from orchestration.studies.study_file import load_study
-from orchestration.studies.sweep import sweep
+from orchestration.experiments.report.writing import report
+from orchestration.experiments.studies.study_file import load_study
+from orchestration.experiments.studies.sweep import sweep
 
 STUDY = """
 name = "big"

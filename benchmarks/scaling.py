@@ -12,16 +12,16 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from orchestration.basics.simulator import Floats, Transfer
-from orchestration.engines.master import Master
-from orchestration.figures.palette import GREY
-from orchestration.recording.recording import InMemory
-from orchestration.schedule.streams import Streams
-from orchestration.schedule.timetable import Timetable
-from orchestration.system.component import Component
-from orchestration.system.connection import Connection
-from orchestration.system.model import System
-from orchestration.system.sampling import Sampling
+from orchestration.foundation.basics.simulator import Floats, Transfer
+from orchestration.foundation.recording.recording import InMemory
+from orchestration.simulation.engines.master import Master
+from orchestration.simulation.figures.palette import GREY
+from orchestration.systems.schedule.streams import Streams
+from orchestration.systems.schedule.timetable import Timetable
+from orchestration.systems.system.component import Component
+from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.model import System
+from orchestration.systems.system.sampling import Sampling
 
 SIZES = (2, 4, 10, 20, 50, 100, 200)
 INSTANTS = 200

@@ -15,13 +15,13 @@ from itertools import islice
 from pathlib import Path
 from typing import TypeVar
 
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.studies.axes import Axis
-from orchestration.studies.drawing import draw_study
-from orchestration.studies.store import Store, open_for_reading, open_for_writing
-from orchestration.studies.study import Study
-from orchestration.studies.table import export, frame
-from orchestration.workers.row import Row
+from orchestration.experiments.studies.axes import Axis
+from orchestration.experiments.studies.drawing import draw_study
+from orchestration.experiments.studies.store import Store, open_for_reading, open_for_writing
+from orchestration.experiments.studies.study import Study
+from orchestration.experiments.studies.table import export, frame
+from orchestration.quadrotor.scenarios.scenario import Scenario
+from orchestration.simulation.workers.row import Row
 
 ROWS = 1_000_000
 TOGETHER = 1000

@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
-from orchestration.basics.errors import QuadcosimError
-from orchestration.certificates.breaking import least_breaking
-from orchestration.certificates.certificate import Certificate, read_certificate
-from orchestration.certificates.certify import find_certificate
-from orchestration.certificates.checker import verified
-from orchestration.certificates.family import LoopFamily
-from tests.orchestration.certificates.loops import HOVER_A, HOVER_B, HOVER_F, late_command, switched
+from orchestration.foundation.basics.errors import QuadcosimError
+from orchestration.theory.certificates.breaking import least_breaking
+from orchestration.theory.certificates.certificate import Certificate, read_certificate
+from orchestration.theory.certificates.certify import find_certificate
+from orchestration.theory.certificates.checker import verified
+from orchestration.theory.certificates.family import LoopFamily
+from tests.orchestration.theory.certificates.loops import HOVER_A, HOVER_B, HOVER_F, late_command, switched
 
 EACH = 50
 """loops of either kind"""

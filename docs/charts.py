@@ -10,8 +10,8 @@ from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
 
 from docs import theory
-from orchestration.figures.palette import BLUE, GREY, ORANGE, RED, SHADES
-from orchestration.figures.style import DOCS
+from orchestration.simulation.figures.palette import BLUE, GREY, ORANGE, RED, SHADES
+from orchestration.simulation.figures.style import DOCS
 
 Array = Any
 

@@ -18,18 +18,21 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from orchestration.basics.statistics import first_end, wilson
-from orchestration.comparison import figures as plots
-from orchestration.comparison.cells import CellSummary, Median, Share, sizes
-from orchestration.comparison.design import Comparison
-from orchestration.comparison.figures import BINS, Reach
-from orchestration.comparison.file import load_comparison
-from orchestration.comparison.fronts import Point
-from orchestration.comparison.limits import GridLimit
-from orchestration.comparison.outcome import as_json
-from orchestration.comparison.run import compare
-from orchestration.comparison.survival import FATES, RESIDUAL, SETTLING, survived
-from orchestration.figures.palette import (
+from orchestration.experiments.comparison import figures as plots
+from orchestration.experiments.comparison.cells import CellSummary, Median, Share, sizes
+from orchestration.experiments.comparison.design import Comparison
+from orchestration.experiments.comparison.figures import BINS, Reach
+from orchestration.experiments.comparison.file import load_comparison
+from orchestration.experiments.comparison.fronts import Point
+from orchestration.experiments.comparison.limits import GridLimit
+from orchestration.experiments.comparison.outcome import as_json
+from orchestration.experiments.comparison.run import compare
+from orchestration.experiments.comparison.survival import FATES, RESIDUAL, SETTLING, survived
+from orchestration.experiments.studies.axis_labels import quantity_of
+from orchestration.experiments.studies.sweep import sweep
+from orchestration.foundation.basics.statistics import first_end, wilson
+from orchestration.quadrotor.scenarios.initial_conditions import Starts
+from orchestration.simulation.figures.palette import (
     BLUE,
     BROWN,
     CHARCOAL,
@@ -44,12 +47,9 @@ from orchestration.figures.palette import (
     UMBER,
     VIOLET,
 )
-from orchestration.figures.style import DOCS
-from orchestration.quadrotor.initial_conditions import Starts
-from orchestration.results import display_names as labels
-from orchestration.results.quantities import Quantity
-from orchestration.studies.axis_labels import quantity_of
-from orchestration.studies.sweep import sweep
+from orchestration.simulation.figures.style import DOCS
+from orchestration.simulation.results import display_names as labels
+from orchestration.simulation.results.quantities import Quantity
 
 ROOT = Path(__file__).parent.parent
 FILES = ROOT / "studies" / "comparisons"

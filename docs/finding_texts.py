@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 
 from docs import comparisons
-from orchestration.basics.statistics import first_end, quantile, wilson
-from orchestration.comparison.survival import FATES, survived
+from orchestration.experiments.comparison.survival import FATES, survived
+from orchestration.foundation.basics.statistics import first_end, quantile, wilson
 
 
 def fates(table: pd.DataFrame) -> str:

@@ -7,14 +7,14 @@ from matplotlib.figure import Figure
 
 from docs import paper_flight, reference_figures
 from docs.pages import fill
-from orchestration.figures.palette import BLUE, GREEN, GREY, RED
-from orchestration.figures.style import DOCS, save
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.timing import Timing
-from orchestration.runs.draw import draw
-from orchestration.schedule.cursor import Cursor
-from orchestration.schedule.streams import Streams
-from orchestration.schedule.timetable import Timetable
+from orchestration.quadrotor.scenarios.scenario import Scenario
+from orchestration.quadrotor.scenarios.timing import Timing
+from orchestration.simulation.figures.palette import BLUE, GREEN, GREY, RED
+from orchestration.simulation.figures.style import DOCS, save
+from orchestration.simulation.runs.draw import draw
+from orchestration.systems.schedule.cursor import Cursor
+from orchestration.systems.schedule.streams import Streams
+from orchestration.systems.schedule.timetable import Timetable
 from quadcosim import run
 
 FIGURES = Path(__file__).parent / "figures"

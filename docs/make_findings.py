@@ -30,21 +30,21 @@ from docs.finding_texts import (
     up_to,
 )
 from docs.theory import PAPER
-from orchestration.basics.statistics import wilson
-from orchestration.comparison.run import rerun_cells
-from orchestration.comparison.survival import FATES, SETTLING, survived
-from orchestration.figures.style import DOCS, save
-from orchestration.flight.hover_loop import HoverLoop
-from orchestration.flight.local_limit import about_hover
-from orchestration.flight.margin import margin_of
-from orchestration.limits import figure, limit
-from orchestration.quadrotor.initial_conditions import Starts
-from orchestration.studies import drawing, figures
-from orchestration.studies.store import open_for_reading, store_path
-from orchestration.studies.study import Study
-from orchestration.studies.study_file import load_study
-from orchestration.studies.sweep import AGREEMENT, sweep
-from orchestration.workers.batching import LaneAgreement
+from orchestration.experiments.comparison.run import rerun_cells
+from orchestration.experiments.comparison.survival import FATES, SETTLING, survived
+from orchestration.experiments.limits import figure, limit
+from orchestration.experiments.studies import drawing, figures
+from orchestration.experiments.studies.store import open_for_reading, store_path
+from orchestration.experiments.studies.study import Study
+from orchestration.experiments.studies.study_file import load_study
+from orchestration.experiments.studies.sweep import AGREEMENT, sweep
+from orchestration.foundation.basics.statistics import wilson
+from orchestration.quadrotor.flight.hover_loop import HoverLoop
+from orchestration.quadrotor.flight.local_limit import about_hover
+from orchestration.quadrotor.flight.margin import margin_of
+from orchestration.quadrotor.scenarios.initial_conditions import Starts
+from orchestration.simulation.figures.style import DOCS, save
+from orchestration.simulation.workers.batching import LaneAgreement
 
 ROOT = Path(__file__).parent.parent
 FIGURES = Path(__file__).parent / "figures"

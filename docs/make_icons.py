@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyBboxPatch, Polygon
 from PIL import Image
 
-from orchestration.figures.palette import BLUE, ORANGE
+from orchestration.simulation.figures.palette import BLUE, ORANGE
 
 ROOT = Path(__file__).parent.parent
 PIXELS = 256

@@ -8,15 +8,15 @@ import sys
 from pathlib import Path
 
 from docs.pages import fill
-from orchestration.checks.validation import rules
-from orchestration.checks.validation.finding import name_of
-from orchestration.figures import style
-from orchestration.interop import table
-from orchestration.interop.catalogue import chosen
-from orchestration.interop.compare import agreements
-from orchestration.interop.figure import agreement_chart
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.timing import Timing
+from orchestration.components.checks.validation import rules
+from orchestration.components.checks.validation.finding import name_of
+from orchestration.quadrotor.scenarios.scenario import Scenario
+from orchestration.quadrotor.scenarios.timing import Timing
+from orchestration.simulation.figures import style
+from orchestration.simulation.interop import table
+from orchestration.simulation.interop.catalogue import chosen
+from orchestration.simulation.interop.compare import agreements
+from orchestration.simulation.interop.figure import agreement_chart
 from tests.fmus import mutants
 from tests.fmus.verdicts import Verdict, as_markdown
 

@@ -6,15 +6,15 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from orchestration.basics.simulator import Floats
-from orchestration.figures.lines import TIME
-from orchestration.figures.run import Run
-from orchestration.figures.style import Style
-from orchestration.flight.errors import ERRORS, Error, draw_components
-from orchestration.flight.path import draw_in_space
-from orchestration.quadrotor.measures import position_error
-from orchestration.runs.draw import runs_of
-from orchestration.runs.result import Result
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.quadrotor.flight.errors import ERRORS, Error, draw_components
+from orchestration.quadrotor.flight.path import draw_in_space
+from orchestration.quadrotor.scenarios.measures import position_error
+from orchestration.simulation.figures.lines import TIME
+from orchestration.simulation.figures.run import Run
+from orchestration.simulation.figures.style import Style
+from orchestration.simulation.runs.draw import runs_of
+from orchestration.simulation.runs.result import Result
 
 BELOW = (0.05, 0.01)
 """[m]"""

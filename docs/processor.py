@@ -11,10 +11,10 @@ from typing import Any
 from matplotlib.figure import Figure
 
 import quadcosim
-from orchestration.basics.documents import tables_in
-from orchestration.basics.statistics import wilson
-from orchestration.figures.palette import GREY
-from orchestration.figures.style import DOCS
+from orchestration.foundation.basics.documents import tables_in
+from orchestration.foundation.basics.statistics import wilson
+from orchestration.simulation.figures.palette import GREY
+from orchestration.simulation.figures.style import DOCS
 
 ROOT = Path(__file__).parent.parent
 AUTOPILOT = ROOT / "examples" / "autopilot"

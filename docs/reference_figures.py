@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from orchestration.basics.simulator import Floats
-from orchestration.engines.sources import gusts, motion_values
-from orchestration.figures.palette import BLACK, BLUE, GREEN, GREY, ORANGE, RED
-from orchestration.figures.style import Style
-from orchestration.signals.dryden import DRAWS, Dryden
-from orchestration.signals.library import make_signal
-from orchestration.signals.waypoints import read_waypoints
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.simulation.engines.sources import gusts, motion_values
+from orchestration.simulation.figures.palette import BLACK, BLUE, GREEN, GREY, ORANGE, RED
+from orchestration.simulation.figures.style import Style
+from orchestration.systems.signals.dryden import DRAWS, Dryden
+from orchestration.systems.signals.library import make_signal
+from orchestration.systems.signals.waypoints import read_waypoints
 from quadcosim import load_scenario, run
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "references"

@@ -9,21 +9,21 @@ import numpy as np
 
 import quadcosim
 from fmu_kit.trajectory import Trajectory
-from orchestration.building.inputs import files_of
-from orchestration.exact.expect import expected_of
-from orchestration.exact.loops import Loops
-from orchestration.flight.hover import at_hover
-from orchestration.flight.hover_loop import HoverLoop
-from orchestration.flight.local_limit import local_limit
-from orchestration.quadrotor import wiring
-from orchestration.quadrotor.fmu_choice import FmuChoice
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.studies.axes import Axis
-from orchestration.studies.linked_settings import LinkedSettings
-from orchestration.studies.study import Study
-from orchestration.system.component import Parameter
-from orchestration.system.model import System
-from orchestration.system.source import Source
+from orchestration.experiments.studies.axes import Axis
+from orchestration.experiments.studies.linked_settings import LinkedSettings
+from orchestration.experiments.studies.study import Study
+from orchestration.quadrotor.flight.hover import at_hover
+from orchestration.quadrotor.flight.hover_loop import HoverLoop
+from orchestration.quadrotor.flight.local_limit import local_limit
+from orchestration.quadrotor.scenarios import wiring
+from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
+from orchestration.quadrotor.scenarios.scenario import Scenario
+from orchestration.systems.system.component import Parameter
+from orchestration.systems.system.files import files_of
+from orchestration.systems.system.model import System
+from orchestration.systems.system.source import Source
+from orchestration.theory.exact.expect import expected_of
+from orchestration.theory.exact.loops import Loops
 
 Array = Any
 

@@ -11,16 +11,16 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from orchestration.building.inputs import files_of
-from orchestration.exact.loops import Loops
-from orchestration.figures import gantt
-from orchestration.figures.palette import BLUE, GREEN, GREY, ORANGE, RED
-from orchestration.figures.style import DOCS, save
-from orchestration.runs.result import Result
-from orchestration.runs.scheduling import schedule
-from orchestration.runs.simulation import run
-from orchestration.system.paths import changed
-from orchestration.system.system_file import load_system
+from orchestration.simulation.figures import gantt
+from orchestration.simulation.figures.palette import BLUE, GREEN, GREY, ORANGE, RED
+from orchestration.simulation.figures.style import DOCS, save
+from orchestration.simulation.runs.result import Result
+from orchestration.simulation.runs.scheduling import schedule
+from orchestration.simulation.runs.simulation import run
+from orchestration.systems.system.files import files_of
+from orchestration.systems.system.paths import changed
+from orchestration.systems.system.system_file import load_system
+from orchestration.theory.exact.loops import Loops
 
 HERE = Path(__file__).resolve().parent
 SMALL = (7.0, 3.2)

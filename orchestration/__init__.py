@@ -3,7 +3,7 @@
 from importlib import import_module
 from typing import Any
 
-import orchestration.flight  # noqa: F401 - registers figures and analyses of flights in the tables of lower rooms
+import orchestration.quadrotor.flight  # noqa: F401 - registers figures and analyses of flights in the tables of lower rooms
 
 
 def __getattr__(name: str) -> Any:

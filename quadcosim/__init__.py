@@ -34,142 +34,142 @@ All times are in seconds, all values in the units that the FMUs declare. All err
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from orchestration.basics.errors import in_python, set_wording
+from orchestration.foundation.basics.errors import in_python, set_wording
 
 set_wording(in_python)
 
 if TYPE_CHECKING:
-    from orchestration.basics.errors import QuadcosimError, SimulatorError, UsageError
-    from orchestration.certificates.basin import Basin, basin
-    from orchestration.certificates.check import Checked
-    from orchestration.certificates.check import check as check_certificate
-    from orchestration.certificates.margin import Certified, margin
-    from orchestration.certificates.region import Region
-    from orchestration.certificates.region import region as margin_region
-    from orchestration.comparison.design import Comparison
-    from orchestration.comparison.file import load_comparison
-    from orchestration.comparison.run import Compared, compare
-    from orchestration.exact.expect import Expected, expect
-    from orchestration.fmi.model import Model, read_model
-    from orchestration.limits.limit import Limit
-    from orchestration.limits.limit import find as limit
-    from orchestration.quadrotor.fmu_choice import FmuChoice, Record
-    from orchestration.quadrotor.scenario import Scenario
-    from orchestration.quadrotor.scenario_file import load_scenario
-    from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice
-    from orchestration.quadrotor.timing import Timing
-    from orchestration.quadrotor.vehicle import Vehicle, load_vehicle
-    from orchestration.report.writing import report
-    from orchestration.runs.many_runs import Flights
-    from orchestration.runs.many_runs import run_many as fly
-    from orchestration.runs.outcome import RunInterrupted, RunLost
-    from orchestration.runs.pause import resume
-    from orchestration.runs.pause import run_until as fly_until
-    from orchestration.runs.result import Result
-    from orchestration.runs.run_directory import load_run, save_run
-    from orchestration.runs.scheduling import Scheduled, schedule
-    from orchestration.runs.simulation import run
-    from orchestration.runs.stepping import Simulation
-    from orchestration.stability.linearise import Linearised, linearise
-    from orchestration.stability.state_space import StateSpace
-    from orchestration.studies.axes import Axis
-    from orchestration.studies.study import Study
-    from orchestration.studies.study_file import load_study
-    from orchestration.studies.sweep import sweep
-    from orchestration.studies.swept import Swept
-    from orchestration.system.component import Component
-    from orchestration.system.computers import Arrivals, Computer, Message, Network, Task
-    from orchestration.system.connection import Connection
-    from orchestration.system.criterion import Criterion
-    from orchestration.system.distribution import Distribution
-    from orchestration.system.model import System
-    from orchestration.system.paths import changed
-    from orchestration.system.sampling import Sampling, SamplingOnArrival
-    from orchestration.system.source import Source
-    from orchestration.system.system_file import load_system
-    from orchestration.tuning.exact import ExactTuning
-    from orchestration.tuning.tune import Tuned, tune
-    from orchestration.tuning.tuning import Tuning
-    from orchestration.tuning.tuning_file import load_tuning
+    from orchestration.components.fmi.model import Model, read_model
+    from orchestration.experiments.comparison.design import Comparison
+    from orchestration.experiments.comparison.file import load_comparison
+    from orchestration.experiments.comparison.run import Compared, compare
+    from orchestration.experiments.limits.limit import Limit
+    from orchestration.experiments.limits.limit import find as limit
+    from orchestration.experiments.report.writing import report
+    from orchestration.experiments.studies.axes import Axis
+    from orchestration.experiments.studies.study import Study
+    from orchestration.experiments.studies.study_file import load_study
+    from orchestration.experiments.studies.sweep import sweep
+    from orchestration.experiments.studies.swept import Swept
+    from orchestration.experiments.tuning.exact import ExactTuning
+    from orchestration.experiments.tuning.tune import Tuned, tune
+    from orchestration.experiments.tuning.tuning import Tuning
+    from orchestration.experiments.tuning.tuning_file import load_tuning
+    from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError
+    from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice, Record
+    from orchestration.quadrotor.scenarios.scenario import Scenario
+    from orchestration.quadrotor.scenarios.scenario_file import load_scenario
+    from orchestration.quadrotor.scenarios.signals import DisturbanceChoice, ReferenceChoice
+    from orchestration.quadrotor.scenarios.timing import Timing
+    from orchestration.quadrotor.scenarios.vehicle import Vehicle, load_vehicle
+    from orchestration.simulation.runs.many_runs import Flights
+    from orchestration.simulation.runs.many_runs import run_many as fly
+    from orchestration.simulation.runs.outcome import RunInterrupted, RunLost
+    from orchestration.simulation.runs.pause import resume
+    from orchestration.simulation.runs.pause import run_until as fly_until
+    from orchestration.simulation.runs.result import Result
+    from orchestration.simulation.runs.run_directory import load_run, save_run
+    from orchestration.simulation.runs.scheduling import Scheduled, schedule
+    from orchestration.simulation.runs.simulation import run
+    from orchestration.simulation.runs.stepping import Simulation
+    from orchestration.systems.system.component import Component
+    from orchestration.systems.system.computers import Arrivals, Computer, Message, Network, Task
+    from orchestration.systems.system.connection import Connection
+    from orchestration.systems.system.criterion import Criterion
+    from orchestration.systems.system.distribution import Distribution
+    from orchestration.systems.system.model import System
+    from orchestration.systems.system.paths import changed
+    from orchestration.systems.system.sampling import Sampling, SamplingOnArrival
+    from orchestration.systems.system.source import Source
+    from orchestration.systems.system.system_file import load_system
+    from orchestration.theory.certificates.basin import Basin, basin
+    from orchestration.theory.certificates.check import Checked
+    from orchestration.theory.certificates.check import check as check_certificate
+    from orchestration.theory.certificates.margin import Certified, margin
+    from orchestration.theory.certificates.region import Region
+    from orchestration.theory.certificates.region import region as margin_region
+    from orchestration.theory.exact.expect import Expected, expect
+    from orchestration.theory.stability.linearise import Linearised, linearise
+    from orchestration.theory.stability.state_space import StateSpace
 
 _HOMES = {
     # run
-    "run": "orchestration.runs.simulation",
-    "Result": "orchestration.runs.result",
-    "save_run": "orchestration.runs.run_directory",
-    "load_run": "orchestration.runs.run_directory",
-    "Simulation": "orchestration.runs.stepping",
-    "fly_until": "orchestration.runs.pause",
-    "resume": "orchestration.runs.pause",
-    "report": "orchestration.report.writing",
+    "run": "orchestration.simulation.runs.simulation",
+    "Result": "orchestration.simulation.runs.result",
+    "save_run": "orchestration.simulation.runs.run_directory",
+    "load_run": "orchestration.simulation.runs.run_directory",
+    "Simulation": "orchestration.simulation.runs.stepping",
+    "fly_until": "orchestration.simulation.runs.pause",
+    "resume": "orchestration.simulation.runs.pause",
+    "report": "orchestration.experiments.report.writing",
     # a flight of the quadrotor
-    "Scenario": "orchestration.quadrotor.scenario",
-    "Timing": "orchestration.quadrotor.timing",
-    "FmuChoice": "orchestration.quadrotor.fmu_choice",
-    "ReferenceChoice": "orchestration.quadrotor.signals",
-    "DisturbanceChoice": "orchestration.quadrotor.signals",
-    "Record": "orchestration.quadrotor.fmu_choice",
-    "Vehicle": "orchestration.quadrotor.vehicle",
-    "load_vehicle": "orchestration.quadrotor.vehicle",
-    "load_scenario": "orchestration.quadrotor.scenario_file",
+    "Scenario": "orchestration.quadrotor.scenarios.scenario",
+    "Timing": "orchestration.quadrotor.scenarios.timing",
+    "FmuChoice": "orchestration.quadrotor.scenarios.fmu_choice",
+    "ReferenceChoice": "orchestration.quadrotor.scenarios.signals",
+    "DisturbanceChoice": "orchestration.quadrotor.scenarios.signals",
+    "Record": "orchestration.quadrotor.scenarios.fmu_choice",
+    "Vehicle": "orchestration.quadrotor.scenarios.vehicle",
+    "load_vehicle": "orchestration.quadrotor.scenarios.vehicle",
+    "load_scenario": "orchestration.quadrotor.scenarios.scenario_file",
     # any system
-    "System": "orchestration.system.model",
-    "Component": "orchestration.system.component",
-    "Sampling": "orchestration.system.sampling",
-    "SamplingOnArrival": "orchestration.system.sampling",
-    "Connection": "orchestration.system.connection",
-    "Source": "orchestration.system.source",
-    "Distribution": "orchestration.system.distribution",
-    "Criterion": "orchestration.system.criterion",
-    "Computer": "orchestration.system.computers",
-    "Task": "orchestration.system.computers",
-    "Network": "orchestration.system.computers",
-    "Message": "orchestration.system.computers",
-    "Arrivals": "orchestration.system.computers",
-    "load_system": "orchestration.system.system_file",
-    "changed": "orchestration.system.paths",
-    "schedule": "orchestration.runs.scheduling",
-    "Scheduled": "orchestration.runs.scheduling",
-    "read_model": "orchestration.fmi.model",
-    "Model": "orchestration.fmi.model",
+    "System": "orchestration.systems.system.model",
+    "Component": "orchestration.systems.system.component",
+    "Sampling": "orchestration.systems.system.sampling",
+    "SamplingOnArrival": "orchestration.systems.system.sampling",
+    "Connection": "orchestration.systems.system.connection",
+    "Source": "orchestration.systems.system.source",
+    "Distribution": "orchestration.systems.system.distribution",
+    "Criterion": "orchestration.systems.system.criterion",
+    "Computer": "orchestration.systems.system.computers",
+    "Task": "orchestration.systems.system.computers",
+    "Network": "orchestration.systems.system.computers",
+    "Message": "orchestration.systems.system.computers",
+    "Arrivals": "orchestration.systems.system.computers",
+    "load_system": "orchestration.systems.system.system_file",
+    "changed": "orchestration.systems.system.paths",
+    "schedule": "orchestration.simulation.runs.scheduling",
+    "Scheduled": "orchestration.simulation.runs.scheduling",
+    "read_model": "orchestration.components.fmi.model",
+    "Model": "orchestration.components.fmi.model",
     # many runs
-    "fly": "orchestration.runs.many_runs",
-    "Flights": "orchestration.runs.many_runs",
-    "limit": "orchestration.limits.limit",
-    "Limit": "orchestration.limits.limit",
-    "expect": "orchestration.exact.expect",
-    "Expected": "orchestration.exact.expect",
-    "linearise": "orchestration.stability.linearise",
-    "Linearised": "orchestration.stability.linearise",
-    "StateSpace": "orchestration.stability.state_space",
-    "basin": "orchestration.certificates.basin",
-    "Basin": "orchestration.certificates.basin",
-    "margin": "orchestration.certificates.margin",
-    "Certified": "orchestration.certificates.margin",
-    "margin_region": "orchestration.certificates.region",
-    "Region": "orchestration.certificates.region",
-    "check_certificate": "orchestration.certificates.check",
-    "Checked": "orchestration.certificates.check",
-    "sweep": "orchestration.studies.sweep",
-    "Study": "orchestration.studies.study",
-    "Axis": "orchestration.studies.axes",
-    "Swept": "orchestration.studies.swept",
-    "load_study": "orchestration.studies.study_file",
-    "compare": "orchestration.comparison.run",
-    "Comparison": "orchestration.comparison.design",
-    "Compared": "orchestration.comparison.run",
-    "load_comparison": "orchestration.comparison.file",
-    "tune": "orchestration.tuning.tune",
-    "Tuning": "orchestration.tuning.tuning",
-    "ExactTuning": "orchestration.tuning.exact",
-    "Tuned": "orchestration.tuning.tune",
-    "load_tuning": "orchestration.tuning.tuning_file",
+    "fly": "orchestration.simulation.runs.many_runs",
+    "Flights": "orchestration.simulation.runs.many_runs",
+    "limit": "orchestration.experiments.limits.limit",
+    "Limit": "orchestration.experiments.limits.limit",
+    "expect": "orchestration.theory.exact.expect",
+    "Expected": "orchestration.theory.exact.expect",
+    "linearise": "orchestration.theory.stability.linearise",
+    "Linearised": "orchestration.theory.stability.linearise",
+    "StateSpace": "orchestration.theory.stability.state_space",
+    "basin": "orchestration.theory.certificates.basin",
+    "Basin": "orchestration.theory.certificates.basin",
+    "margin": "orchestration.theory.certificates.margin",
+    "Certified": "orchestration.theory.certificates.margin",
+    "margin_region": "orchestration.theory.certificates.region",
+    "Region": "orchestration.theory.certificates.region",
+    "check_certificate": "orchestration.theory.certificates.check",
+    "Checked": "orchestration.theory.certificates.check",
+    "sweep": "orchestration.experiments.studies.sweep",
+    "Study": "orchestration.experiments.studies.study",
+    "Axis": "orchestration.experiments.studies.axes",
+    "Swept": "orchestration.experiments.studies.swept",
+    "load_study": "orchestration.experiments.studies.study_file",
+    "compare": "orchestration.experiments.comparison.run",
+    "Comparison": "orchestration.experiments.comparison.design",
+    "Compared": "orchestration.experiments.comparison.run",
+    "load_comparison": "orchestration.experiments.comparison.file",
+    "tune": "orchestration.experiments.tuning.tune",
+    "Tuning": "orchestration.experiments.tuning.tuning",
+    "ExactTuning": "orchestration.experiments.tuning.exact",
+    "Tuned": "orchestration.experiments.tuning.tune",
+    "load_tuning": "orchestration.experiments.tuning.tuning_file",
     # errors
-    "QuadcosimError": "orchestration.basics.errors",
-    "UsageError": "orchestration.basics.errors",
-    "SimulatorError": "orchestration.basics.errors",
-    "RunInterrupted": "orchestration.runs.outcome",
-    "RunLost": "orchestration.runs.outcome",
+    "QuadcosimError": "orchestration.foundation.basics.errors",
+    "UsageError": "orchestration.foundation.basics.errors",
+    "SimulatorError": "orchestration.foundation.basics.errors",
+    "RunInterrupted": "orchestration.simulation.runs.outcome",
+    "RunLost": "orchestration.simulation.runs.outcome",
 }
 _OTHERWISE = {
     "limit": "find",

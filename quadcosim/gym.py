@@ -16,11 +16,11 @@ For example one that rewards being near the paper's path::
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from orchestration.basics.extras import explains_missing
+from orchestration.foundation.basics.extras import explains_missing
 
 if TYPE_CHECKING:
-    from orchestration.runs.environment import Environment
+    from orchestration.simulation.runs.environment import Environment
 else:
-    Environment = explains_missing(import_module)("orchestration.runs.environment").Environment
+    Environment = explains_missing(import_module)("orchestration.simulation.runs.environment").Environment
 
 __all__ = ["Environment"]

@@ -15,10 +15,10 @@ import pytest
 from hypothesis.internal.conjecture import providers
 
 import quadcosim  # noqa: F401 - errors are told in the words of Python, those of the command line in its own
-from orchestration.basics import terminal
-from orchestration.building import builder, fmus
-from orchestration.building.models import MODELS
 from orchestration.command import cli
+from orchestration.components.building import builder, fmus
+from orchestration.components.building.models import MODELS
+from orchestration.foundation.basics import terminal
 from tests.commands import Done, Main
 from tests.fmus.making import MAKINGS, Making
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from fmu_kit.bundle import Target
 from fmu_kit.compiler.pack.c_compiler import Mathematics
-from orchestration.runs.result import Result
+from orchestration.simulation.runs.result import Result
 from quadcosim import Scenario
 from tests.fmus.process import run
 

@@ -1,6 +1,6 @@
 import fnmatch
 
-from orchestration.basics.documents import read_toml
+from orchestration.foundation.basics.documents import read_toml
 from tests.places import ROOT
 
 SETTINGS = read_toml(ROOT / "pyproject.toml", "settings")["tool"]["setuptools"]

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from orchestration.basics.documents import read_toml
+from orchestration.foundation.basics.documents import read_toml
 from tests.places import ROOT
 
 SETTINGS = read_toml(ROOT / "pyproject.toml", "project")
@@ -51,15 +51,20 @@ def test_every_path_that_is_named_exists(text: str) -> None:
 
 def test_the_floors_of_the_architecture_are_those_that_imports_are_held_to() -> None:
     contracts = SETTINGS["tool"]["importlinter"]["contracts"]
-    (layers,) = (each["layers"] for each in contracts if each.get("containers") == ["orchestration"])
-    drawn: list[list[str]] = []
-    for floor, room in re.findall(r"^\| (\d*) *\| `(\w+)` \|", ARCHITECTURE, re.M):
-        if floor:
-            drawn.append([])
-        drawn[-1].append(room)
-    assert drawn == [layer.split(" | ") for layer in layers]
-    rooms = {room for floor in drawn for room in floor}
-    assert rooms == {path.parent.name for path in (ROOT / "orchestration").glob("*/__init__.py")}
+    held = {each["containers"][0]: each["layers"] for each in contracts if each.get("exhaustive")}
+    parts = re.split(r"^### `(\w+)/`$", ARCHITECTURE.partition("## Around them")[0], flags=re.M)
+    assert parts[1::2] == held["orchestration"]
+    assert {*parts[1::2]} == {path.parent.name for path in (ROOT / "orchestration").glob("*/__init__.py")}
+    for district, text in zip(parts[1::2], parts[2::2], strict=True):
+        drawn: list[list[str]] = []
+        for floor, room in re.findall(r"^\| (\d*) *\| `(\w+)` \|", text, re.M):
+            if floor:
+                drawn.append([])
+            drawn[-1].append(room)
+        assert drawn == [layer.split(" | ") for layer in held.get(f"orchestration.{district}", ())]
+        if drawn:
+            rooms = {room for floor in drawn for room in floor}
+            assert rooms == {path.parent.name for path in (ROOT / "orchestration" / district).glob("*/__init__.py")}
 
 
 @pytest.mark.parametrize("broken", ["a folder that is not listed", "a late import upward"])
@@ -73,9 +78,9 @@ def test_a_tree_that_breaks_the_contract_does_not_pass(broken: str, tmp_path: Pa
         (tmp_path / "orchestration/attic").mkdir()
         (tmp_path / "orchestration/attic/__init__.py").touch()
     else:
-        said = "orchestration.figures.lines -> orchestration.quadrotor"
-        with (tmp_path / "orchestration/figures/lines.py").open("a") as file:
-            file.write("\n\ndef late() -> None:\n    import orchestration.quadrotor.wiring\n")
+        said = "orchestration.simulation is not allowed to import orchestration.quadrotor"
+        with (tmp_path / "orchestration/simulation/figures/lines.py").open("a") as file:
+            file.write("\n\ndef late() -> None:\n    import orchestration.quadrotor.scenarios.wiring\n")
     done = subprocess.run(
         [Path(sys.executable).with_name("lint-imports"), "--no-cache"], cwd=tmp_path, capture_output=True, text=True
     )

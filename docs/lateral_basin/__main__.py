@@ -17,7 +17,7 @@ from docs.lateral_basin.ellipsoids import read_ellipsoid, write_ellipsoid
 from docs.lateral_basin.period import STATES, UNITS, Loop
 from docs.lateral_basin.proof import NotProven, prove, refuted_factor
 from docs.lateral_basin.search import largest_ellipsoid
-from orchestration.basics.simulator import Floats
+from orchestration.foundation.basics.simulator import Floats
 
 SHARES = (0.75, 0.6, 0.45)
 """shares of the ellipsoid found that are tried"""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orchestration.basics.simulator import Floats
+from orchestration.foundation.basics.simulator import Floats
 
 ALL = 1.001
 """Bound of every coordinate of a y with |y| ≤ 1, rounding included."""

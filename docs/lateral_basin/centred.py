@@ -15,7 +15,7 @@ import numpy as np
 
 from docs.lateral_basin.intervals import Intervals
 from fmu_kit.scalar import FLOAT, ScalarOps
-from orchestration.basics.simulator import Floats
+from orchestration.foundation.basics.simulator import Floats
 
 
 class Condition(NamedTuple):

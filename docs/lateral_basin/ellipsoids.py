@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestration.basics.errors import UsageError
-from orchestration.basics.simulator import Floats
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.simulator import Floats
 
 FILE = Path(__file__).parent / "data" / "ellipsoids.json"
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestration.basics.simulator import Floats
+from orchestration.foundation.basics.simulator import Floats
 
 ROUNDING = 2.0**-52
 """relative: a unit in the last place or more"""

@@ -22,8 +22,8 @@ from fmu_kit.integrator import rk4_step
 from fmu_kit.rigid_body import RigidState, Wrench, derivative
 from fmu_kit.scalar import Scalar, ScalarOps
 from fmu_kit.trajectory import Reference
-from orchestration.basics.simulator import Floats
-from orchestration.engines.sources import NUMPY
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.simulation.engines.sources import NUMPY
 
 STATES = ("y", "vy", "φ", "p", "z", "vz")
 UNITS = ("m", "m/s", "rad", "rad/s", "m", "m/s")

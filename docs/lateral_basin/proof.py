@@ -22,9 +22,9 @@ from docs.lateral_basin.boxes import ALL, Boxes, outside
 from docs.lateral_basin.centred import Centred
 from docs.lateral_basin.intervals import Intervals, OutOfReachError
 from docs.lateral_basin.period import Loop
-from orchestration.basics.errors import QuadcosimError
-from orchestration.basics.simulator import Floats
-from orchestration.certificates.checker import is_positive
+from orchestration.foundation.basics.errors import QuadcosimError
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.theory.certificates.checker import is_positive
 
 HALVINGS = 9
 """of the box around the ellipsoid, before the inner box is given up"""

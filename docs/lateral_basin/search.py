@@ -14,7 +14,7 @@ from scipy.linalg import block_diag, solve_discrete_lyapunov
 from scipy.optimize import minimize
 
 from docs.lateral_basin.period import STATES, Loop
-from orchestration.basics.simulator import Floats
+from orchestration.foundation.basics.simulator import Floats
 
 POINTS = 3000
 """directions"""

@@ -5,19 +5,19 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from orchestration.basics.documents import read_toml
+from orchestration.foundation.basics.documents import read_toml
 
 Tables = dict[str, Any]
 
 
 def reader_of(tables: Tables) -> tuple[str, Callable[[Path], object]]:
     """The kind of a file with these tables, and its reader."""
-    from orchestration.comparison.file import load_comparison
-    from orchestration.expressions.syntax import parse
-    from orchestration.quadrotor.vehicle import load_vehicle
-    from orchestration.requests.request import load_request
-    from orchestration.studies.study_file import load_study
-    from orchestration.tuning.tuning_file import load_tuning
+    from orchestration.experiments.comparison.file import load_comparison
+    from orchestration.experiments.studies.study_file import load_study
+    from orchestration.experiments.tuning.tuning_file import load_tuning
+    from orchestration.quadrotor.scenarios.vehicle import load_vehicle
+    from orchestration.simulation.requests.request import load_request
+    from orchestration.systems.expressions.syntax import parse
 
     def load_expressions(path: Path) -> object:
         return [parse(text) for text in tables.values()]

@@ -7,14 +7,14 @@ from html import escape
 from typing import Any, NamedTuple
 
 from docs.website.tables import inline_html, table
-from orchestration.basics.records import Scalar
-from orchestration.basics.typed_tables import docs_of_keys, fields_of
-from orchestration.comparison.file import ComparisonFile
-from orchestration.quadrotor.initial_conditions import Starts
-from orchestration.quadrotor.scenario_file import ScenarioFile
-from orchestration.studies.study_file import StudyFile
-from orchestration.system.system_file import SystemTable
-from orchestration.tuning.tuning_file import TuningFile
+from orchestration.experiments.comparison.file import ComparisonFile
+from orchestration.experiments.studies.study_file import StudyFile
+from orchestration.experiments.tuning.tuning_file import TuningFile
+from orchestration.foundation.basics.records import Scalar
+from orchestration.foundation.basics.typed_tables import docs_of_keys, fields_of
+from orchestration.quadrotor.scenarios.initial_conditions import Starts
+from orchestration.quadrotor.scenarios.scenario_file import ScenarioFile
+from orchestration.systems.system.system_file import SystemTable
 
 FILES = {
     "System file": (SystemTable, "Any FMUs; [how to write one](systems.md)."),

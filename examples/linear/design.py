@@ -14,9 +14,9 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 
 import quadcosim
-from orchestration.figures.palette import BLUE, GREEN, GREY, ORANGE
-from orchestration.figures.style import DOCS, save
-from orchestration.system.component import Parameter
+from orchestration.simulation.figures.palette import BLUE, GREEN, GREY, ORANGE
+from orchestration.simulation.figures.style import DOCS, save
+from orchestration.systems.system.component import Parameter
 from quadcosim import FmuChoice, Linearised, Scenario, StateSpace, Timing
 
 HERE = Path(__file__).resolve().parent

@@ -15,12 +15,12 @@ from matplotlib.figure import Figure
 from scipy.linalg import expm, solve_discrete_are
 
 import quadcosim
-from orchestration.building.inputs import files_of
-from orchestration.exact.expect import expected_of
-from orchestration.exact.loops import Loops
-from orchestration.figures.palette import BLUE, ORANGE, RED
-from orchestration.figures.style import DOCS, save
-from orchestration.system.model import System
+from orchestration.simulation.figures.palette import BLUE, ORANGE, RED
+from orchestration.simulation.figures.style import DOCS, save
+from orchestration.systems.system.files import files_of
+from orchestration.systems.system.model import System
+from orchestration.theory.exact.expect import expected_of
+from orchestration.theory.exact.loops import Loops
 
 HERE = Path(__file__).resolve().parent
 OMEGA, PERIOD = 3.0, 0.1

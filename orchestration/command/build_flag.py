@@ -32,7 +32,7 @@ def build_option(command: Callable[..., Any]) -> Callable[..., Any]:
     @wraps(command)
     def call(flag: BuildFlag, **others: Any) -> Any:
         if flag.build:
-            from orchestration.building import consent
+            from orchestration.components.building import consent
 
             consent.allow()
         return command(**others)

@@ -10,10 +10,6 @@ from typing import Annotated, Any
 import typer
 import typer.core
 
-from orchestration.basics.errors import QuadcosimError, SimulatorError, UsageError, no_utf8, worded_by
-from orchestration.basics.extras import lack_of
-from orchestration.basics.terminal import inform, report_error
-from orchestration.building import consent
 from orchestration.command import (
     controllers,
     exact,
@@ -34,8 +30,12 @@ from orchestration.command import (
 from orchestration.command.build_flag import ask
 from orchestration.command.option_group import option_group
 from orchestration.command.output_options import OutputOptions
-from orchestration.fmi.banners import banners_to_stderr
-from orchestration.processes.subprocesses import misleading_variables
+from orchestration.components.building import consent
+from orchestration.components.fmi.banners import banners_to_stderr
+from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError, no_utf8, worded_by
+from orchestration.foundation.basics.extras import lack_of
+from orchestration.foundation.basics.terminal import inform, report_error
+from orchestration.foundation.processes.subprocesses import misleading_variables
 
 
 class _Interrupted(Exception):

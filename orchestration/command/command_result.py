@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
 
-from orchestration.basics.documents import plain
+from orchestration.foundation.basics.documents import plain
 
 
 @dataclass(frozen=True, kw_only=True)

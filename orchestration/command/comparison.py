@@ -3,15 +3,15 @@
 from pathlib import Path
 from typing import Any
 
-from orchestration.basics.errors import UsageError
-from orchestration.basics.terminal import inform
 from orchestration.command import comparison_text as terminal
 from orchestration.command.command_result import CommandResult
 from orchestration.command.figure_flags import FigureFlags
-from orchestration.comparison import run
-from orchestration.comparison.design import Comparison
-from orchestration.comparison.outcome import as_json as to_json
-from orchestration.workers.choice import EngineChoice
+from orchestration.experiments.comparison import run
+from orchestration.experiments.comparison.design import Comparison
+from orchestration.experiments.comparison.outcome import as_json as to_json
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.terminal import inform
+from orchestration.simulation.workers.choice import EngineChoice
 
 
 def all_cells(

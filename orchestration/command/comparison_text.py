@@ -3,10 +3,10 @@
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 
-from orchestration.comparison.cells import PEAK, VARIATION, CellSummary, Median, Share
-from orchestration.comparison.design import Comparison
-from orchestration.comparison.limits import GridLimit
-from orchestration.comparison.outcome import Outcome
+from orchestration.experiments.comparison.cells import PEAK, VARIATION, CellSummary, Median, Share
+from orchestration.experiments.comparison.design import Comparison
+from orchestration.experiments.comparison.limits import GridLimit
+from orchestration.experiments.comparison.outcome import Outcome
 
 
 def lines(comparison: Comparison, outcome: Outcome) -> Iterator[str]:

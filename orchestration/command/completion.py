@@ -14,29 +14,29 @@ def among(*names: str) -> Complete:
 
 def controllers(incomplete: str) -> list[str]:
     """This project's controllers, and FMUs by their paths."""
-    from orchestration.building.models import MODELS
-    from orchestration.quadrotor.wiring import DEFAULT_PLANT
+    from orchestration.components.building.models import MODELS
+    from orchestration.quadrotor.scenarios.wiring import DEFAULT_PLANT
 
     return starting(incomplete, [name for name in MODELS if name != DEFAULT_PLANT]) + _files(incomplete, ".fmu")
 
 
 def plants(incomplete: str) -> list[str]:
     """This project's plant, and FMUs by their paths."""
-    from orchestration.quadrotor.wiring import DEFAULT_PLANT
+    from orchestration.quadrotor.scenarios.wiring import DEFAULT_PLANT
 
     return starting(incomplete, [DEFAULT_PLANT]) + _files(incomplete, ".fmu")
 
 
 def vehicles(incomplete: str) -> list[str]:
     """The names of vehicles, and vehicle files."""
-    from orchestration.quadrotor.vehicle import ENDING, names
+    from orchestration.quadrotor.scenarios.vehicle import ENDING, names
 
     return starting(incomplete, names()) + _files(incomplete, ENDING)
 
 
 def presets(incomplete: str) -> list[str]:
     """The names of presets of timings."""
-    from orchestration.quadrotor.presets import PRESETS
+    from orchestration.quadrotor.scenarios.presets import PRESETS
 
     return starting(incomplete, PRESETS)
 

@@ -6,7 +6,6 @@ from typing import Annotated
 
 import typer
 
-from orchestration.basics.errors import UsageError
 from orchestration.command import registry
 from orchestration.command.build_flag import build_option
 from orchestration.command.command_result import CommandResult, result_of_files
@@ -14,6 +13,7 @@ from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.limit_flags import TimeLimit
 from orchestration.command.option_group import option_group
 from orchestration.command.study_flags import Out, StudyEngineFlag, Workers
+from orchestration.foundation.basics.errors import UsageError
 
 
 @build_option
@@ -41,8 +41,8 @@ def compare(
 ) -> CommandResult:
     """Compare controllers from the same initial conditions: survival, settling, limits, error and effort."""
     from orchestration.command import comparison as command
-    from orchestration.comparison.file import load_comparison
-    from orchestration.workers.choice import engine_choice
+    from orchestration.experiments.comparison.file import load_comparison
+    from orchestration.simulation.workers.choice import engine_choice
 
     how = engine_choice(engine)
     loaded = dataclasses.replace(load_comparison(comparison), native=native)
@@ -67,9 +67,9 @@ def tune(
     engine: StudyEngineFlag = "auto",
 ) -> CommandResult:
     """Tune a controller on some initial conditions and evaluate it on others; it resumes where it was stopped."""
-    from orchestration.tuning.tune import tune as search_all
-    from orchestration.tuning.tuning_file import load_tuning
-    from orchestration.workers.choice import engine_choice
+    from orchestration.experiments.tuning.tune import tune as search_all
+    from orchestration.experiments.tuning.tuning_file import load_tuning
+    from orchestration.simulation.workers.choice import engine_choice
 
     command = f"quadcosim tune {tuning} --out {out}" + (f" --engine {engine}" if engine != "auto" else "")
     tuned = search_all(load_tuning(tuning), out=out, workers=workers, engine=engine_choice(engine), command=command)

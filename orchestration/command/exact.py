@@ -5,18 +5,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from orchestration.basics.terminal import warn
 from orchestration.command import registry
 from orchestration.command.command_result import CommandResult
 from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
+from orchestration.foundation.basics.terminal import warn
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from orchestration.building.inputs import Files
-    from orchestration.exact.expect import Expected
-    from orchestration.system.model import System
-    from orchestration.system.request import Request
+    from orchestration.systems.system.files import Files
+    from orchestration.systems.system.model import System
+    from orchestration.systems.system.request import Request
+    from orchestration.theory.exact.expect import Expected
 
 
 @flight_options
@@ -37,7 +37,7 @@ def expect(
     flags: FlightFlags,
 ) -> CommandResult:
     """Compute exact expectations of mean-square objectives of the loop about its operating point, without a run."""
-    from orchestration.exact.expect import expect as expectations
+    from orchestration.theory.exact.expect import expect as expectations
 
     expected = expectations(request_from(scenario, flags, timing), as_simulated=as_simulated, horizon=horizon)
     return CommandResult(document=expected, lines=_lines(expected))
@@ -47,9 +47,9 @@ def warn_if_means_are_infinite(
     request: "Request", systems: "Sequence[System] | None" = None, files: "Files | None" = None
 ) -> None:
     """Warn if averages over runs of these systems have no finite expectation."""
-    from orchestration.building.inputs import files_of
-    from orchestration.exact.infinite_means import infinite_means_warning
-    from orchestration.system.request import system_of
+    from orchestration.systems.system.files import files_of
+    from orchestration.systems.system.request import system_of
+    from orchestration.theory.exact.infinite_means import infinite_means_warning
 
     systems = [system_of(request)] if systems is None else systems
     text = infinite_means_warning(request, systems, files_of(systems[0]) if files is None else files)

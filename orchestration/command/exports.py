@@ -5,12 +5,12 @@ from typing import Annotated
 
 import typer
 
-from orchestration.basics.terminal import inform, warn
 from orchestration.command import registry
 from orchestration.command.command_result import CommandResult, result_of_files
 from orchestration.command.flags import FlightFlags, flight_options, request_from
 from orchestration.command.option_group import option_group
 from orchestration.command.variant_flags import VariantFlags
+from orchestration.foundation.basics.terminal import inform, warn
 
 
 @option_group("variant", VariantFlags)
@@ -29,7 +29,7 @@ def export_c(
     variant: VariantFlags,
 ) -> CommandResult:
     """Write a controller, or any slave, as two files in C for a microcontroller: no allocation, C99."""
-    from orchestration.building import builder
+    from orchestration.components.building import builder
 
     written = builder.export_c(variant.applied_to(builder.slaves_named(slave)), out, single=single)
     return result_of_files(each for path in written for each in (path.with_suffix(".h"), path))
@@ -56,10 +56,10 @@ def ssp(
     flags: FlightFlags,
 ) -> CommandResult:
     """Write FMUs, connections and parameters as one SSP 1.0 file for other tools, and its timing beside it."""
-    from orchestration.building import fmus
-    from orchestration.interop.reading_back import readings
-    from orchestration.requests.ssp import writing
-    from orchestration.requests.ssp.export import export_of
+    from orchestration.components.building import fmus
+    from orchestration.simulation.interop.reading_back import readings
+    from orchestration.simulation.requests.ssp import writing
+    from orchestration.simulation.requests.ssp.export import export_of
 
     request = request_from(scenario, flags)
     if request.title is not None or scenario is None:

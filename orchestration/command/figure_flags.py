@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from orchestration.basics.errors import UsageError
-from orchestration.figures.names import COLUMNS, FORMATS, STYLES, WRITTEN
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.simulation.figures.names import COLUMNS, FORMATS, STYLES, WRITTEN
 
 if TYPE_CHECKING:
-    from orchestration.figures.style import Style
+    from orchestration.simulation.figures.style import Style
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +59,7 @@ class FigureFlags:
         """The style with the sizes and formats of these flags."""
         from dataclasses import replace
 
-        from orchestration.figures.style import STYLES as KNOWN
+        from orchestration.simulation.figures.style import STYLES as KNOWN
 
         style = replace(KNOWN[self.style], formats=tuple(dict.fromkeys(self.format or WRITTEN)), **self._extent)
         return style if self.font_size is None else replace(style, font=self.font_size)

@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
-from orchestration.basics.attribute_docs import FieldDoc, attribute_docs
-from orchestration.basics.documents import toml_of
-from orchestration.basics.errors import UsageError
 from orchestration.command import completion
 from orchestration.command.build_flag import build_option
 from orchestration.command.option_group import Command, option_group
-from orchestration.system.choices import Clock, Hold, Order, Spread
+from orchestration.foundation.basics.attribute_docs import FieldDoc, attribute_docs
+from orchestration.foundation.basics.documents import toml_of
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.systems.system.choices import Clock, Hold, Order, Spread
 
 if TYPE_CHECKING:
-    from orchestration.quadrotor.scenario import Scenario
-    from orchestration.system.model import System
-    from orchestration.system.request import Request
+    from orchestration.quadrotor.scenarios.scenario import Scenario
+    from orchestration.systems.system.model import System
+    from orchestration.systems.system.request import Request
 
 TIMING, EFFECTS, MODEL = "Timing", "Disturbances of the loop", "Model"
 
@@ -38,7 +38,7 @@ def _of_record(
     module: str, name: str, key: str, *, words: Any = None, tells_default: bool = False, repeated: bool = False,
     **options: Any,
 ) -> Any:  # fmt: skip
-    doc = attribute_docs(f"orchestration.quadrotor.{module}", name).get(key, FieldDoc("", ""))
+    doc = attribute_docs(f"orchestration.quadrotor.scenarios.{module}", name).get(key, FieldDoc("", ""))
     text = doc.text.replace(" [s]", "")  # the metavar is SECONDS
     text = f"{text[:-1]}; default: {doc.default}." if tells_default else text
     if words is not None:
@@ -154,11 +154,11 @@ class FlightFlags:
 
     def applied_to(self, scenario: "Scenario") -> "Scenario":
         """`scenario` with these flags; raises `UsageError` for invalid values."""
-        from orchestration.building.fmus import native_twins
-        from orchestration.quadrotor.presets import preset_timing
-        from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice, choice_of
-        from orchestration.quadrotor.timing import TIMING_KEYS
-        from orchestration.quadrotor.vehicle import load_vehicle
+        from orchestration.components.building.fmus import native_twins
+        from orchestration.quadrotor.scenarios.presets import preset_timing
+        from orchestration.quadrotor.scenarios.signals import DisturbanceChoice, ReferenceChoice, choice_of
+        from orchestration.quadrotor.scenarios.timing import TIMING_KEYS
+        from orchestration.quadrotor.scenarios.vehicle import load_vehicle
 
         timing: dict[str, Any] = {} if self.preset is None else preset_timing(self.preset)
         single = (key for key in TIMING_KEYS if key not in _BY_MEASUREMENT)
@@ -190,9 +190,9 @@ class FlightFlags:
 
     def _timed(self, key: str) -> Any:
         """The value of a flag; of one that may be random a number, or the text of the table of its distribution."""
-        from orchestration.quadrotor.timing import Timing
-        from orchestration.system.distribution import AS_TABLE
-        from orchestration.system.distribution_table import is_table, may_vary
+        from orchestration.quadrotor.scenarios.timing import Timing
+        from orchestration.systems.system.distribution import AS_TABLE
+        from orchestration.systems.system.distribution_table import is_table, may_vary
 
         text = getattr(self, key)
         if text is None or is_table(text) or not (key == "loss" or key in may_vary(Timing)):
@@ -202,8 +202,8 @@ class FlightFlags:
 
     def applied_to_system(self, system: "System") -> "System":
         """`system` with these flags; raises `UsageError` for flags that apply to the quadrotor only."""
-        from orchestration.building.fmus import native_twins
-        from orchestration.system.paths import changed
+        from orchestration.components.building.fmus import native_twins
+        from orchestration.systems.system.paths import changed
 
         of_systems = ("seed", "stop_time", "set", "native")
         top: dict[str, Any] = {
@@ -245,11 +245,14 @@ def flight_options(command: Command) -> Command:
 
 def request_from(path: Path | None, flags: FlightFlags, timing: Path | None = None) -> "Request":
     """The system or scenario of a file, an SSP with its timing, or the paper's scenario, with the flags applied."""
-    from orchestration.quadrotor.scenario import Scenario
-    from orchestration.requests.request import load_request
+    from orchestration.quadrotor.scenarios.scenario import Scenario
+    from orchestration.simulation.requests.request import load_request
+    from orchestration.systems.system.request import system_of
 
     request = Scenario() if path is None else load_request(path, timing)
-    return flags.applied_to(request) if isinstance(request, Scenario) else flags.applied_to_system(request)
+    if isinstance(request, Scenario):
+        return flags.applied_to(request)
+    return flags.applied_to_system(system_of(request))
 
 
 def assigned(flag: str, texts: list[str] | None) -> dict[str, Any]:

@@ -5,14 +5,14 @@ from typing import Annotated, Any
 
 import typer
 
-from orchestration.basics.errors import UsageError
-from orchestration.basics.terminal import inform, progress_bar
-from orchestration.building import consent
 from orchestration.command import completion, registry
 from orchestration.command.command_result import CommandResult, result_of_files
 from orchestration.command.limit_flags import LimitFlags
 from orchestration.command.option_group import option_group
 from orchestration.command.variant_flags import VariantFlags
+from orchestration.components.building import consent
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.terminal import inform, progress_bar
 
 
 @option_group("variant", VariantFlags)
@@ -54,9 +54,9 @@ def build(
 
     With --name one slave is built as another FMU, in which parameters fixed by --set and --vehicle are constants.
     """
-    from orchestration.building import builder, fmus
-    from orchestration.building.models import MODELS
-    from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER
+    from orchestration.components.building import builder, fmus
+    from orchestration.components.building.models import MODELS
+    from orchestration.quadrotor.scenarios.wiring import DEFAULT_CONTROLLER
 
     if target is not None and not native:
         raise UsageError("--target: expected --native with it; FMUs with Python inside are the same for all systems")
@@ -90,9 +90,9 @@ def validate(
     Accepts any co-simulation FMU of FMI 2.0 or 3.0; those built by quadcosim are checked for the rules of this project
     too. All checks run in a separate process with limits.
     """
-    from orchestration.building import fmus
-    from orchestration.building.models import MODELS
-    from orchestration.checks.validation.validator import validate as findings_of
+    from orchestration.components.building import fmus
+    from orchestration.components.building.models import MODELS
+    from orchestration.components.checks.validation.validator import validate as findings_of
 
     paths = fmu or [fmus.locate(name, inform) for name in MODELS]
     for path in paths:
@@ -118,10 +118,10 @@ def doctor(
     limits: LimitFlags,
 ) -> CommandResult:
     """List what FMUs require and what this machine lacks, and load them; exit code 1 if anything is missing."""
-    from orchestration.building import fmus
-    from orchestration.building.models import MODELS
-    from orchestration.checks.doctor.as_lines import as_text
-    from orchestration.checks.doctor.report import as_tables, examine
+    from orchestration.components.building import fmus
+    from orchestration.components.building.models import MODELS
+    from orchestration.components.checks.doctor.as_lines import as_text
+    from orchestration.components.checks.doctor.report import as_tables, examine
 
     report = examine(fmu or [fmus.locate(name, inform) for name in MODELS], limits.limits)
     return CommandResult(document=as_tables(report), lines=as_text(report).splitlines(), good=report.good)

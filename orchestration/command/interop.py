@@ -5,14 +5,14 @@ from typing import Annotated
 
 import typer
 
-from orchestration.basics.terminal import inform, progress_bar
 from orchestration.command import completion, registry
 from orchestration.command.command_result import CommandResult
 from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
+from orchestration.foundation.basics.terminal import inform, progress_bar
 
 
 def _tools(incomplete: str) -> list[str]:
-    from orchestration.interop.catalogue import TOOLS
+    from orchestration.simulation.interop.catalogue import TOOLS
 
     return completion.starting(incomplete, [name for name in TOOLS if " " not in name])
 
@@ -38,17 +38,17 @@ def interop(
 
     Exit code 1 if a state of a tool differs by more than 1e-9 from this master's with the same first inputs.
     """
-    from orchestration.interop import table
-    from orchestration.interop.catalogue import chosen
-    from orchestration.interop.compare import agreements
-    from orchestration.system.request import system_of
+    from orchestration.simulation.interop import table
+    from orchestration.simulation.interop.catalogue import chosen
+    from orchestration.simulation.interop.compare import agreements
+    from orchestration.systems.system.request import system_of
 
     request = request_from(scenario, flags, timing)
     tools = chosen(tool, system_of(request).components)
     with progress_bar("running other masters") as progress:
         found = agreements(request, tools, announce=inform, progress=progress)
     if out is not None:
-        from orchestration.interop.figure import draw
+        from orchestration.simulation.interop.figure import draw
 
         for path in draw(found, out):
             inform(str(path))

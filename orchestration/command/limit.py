@@ -5,10 +5,10 @@ from typing import Annotated
 
 import typer
 
-from orchestration.basics.terminal import inform
 from orchestration.command import completion, registry
 from orchestration.command.command_result import CommandResult
 from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
+from orchestration.foundation.basics.terminal import inform
 
 
 @flight_options
@@ -80,8 +80,8 @@ def limit(
     flags: FlightFlags,
 ) -> CommandResult:
     """Find the largest good value of a period, delay, jitter, loss or any path by runs, and the local limit."""
-    from orchestration.engines.engine import engine_named
-    from orchestration.limits import limit as limits
+    from orchestration.experiments.limits import limit as limits
+    from orchestration.simulation.engines.engine import engine_named
 
     how = "auto" if engine == "auto" else engine_named(engine, "auto")
     request = request_from(scenario, flags, timing)
@@ -91,7 +91,7 @@ def limit(
     )  # fmt: skip
     where = out or (None if scenario is None else scenario.parent)
     if figures and where is not None:
-        from orchestration.limits.figure import draw_limit
+        from orchestration.experiments.limits.figure import draw_limit
 
         for written in draw_limit(request, found, where):
             inform(str(written))

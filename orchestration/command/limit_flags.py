@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from orchestration.basics.errors import UsageError
-from orchestration.processes.limits import Limits
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.processes.limits import Limits
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,7 @@ from orchestration.command.command_result import CommandResult
 from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
 
 if TYPE_CHECKING:
-    from orchestration.stability.state_space import StateSpace
+    from orchestration.theory.stability.state_space import StateSpace
 
 
 @flight_options
@@ -37,7 +37,7 @@ def linearise(
 
     With --json A, B, C and D of both, and the names of their inputs and outputs.
     """
-    from orchestration.stability.linearise import linearise as linearised_loop
+    from orchestration.theory.stability.linearise import linearise as linearised_loop
 
     loop = linearised_loop(request_from(scenario, flags, timing), component)
     halves = {loop.name: loop.component, "rest": loop.rest}

@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from orchestration.basics.errors import UsageError
-from orchestration.basics.terminal import inform
 from orchestration.command import registry
 from orchestration.command.command_result import CommandResult
 from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
 from orchestration.command.linearise import linearise
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.terminal import inform
 
 if TYPE_CHECKING:
-    from orchestration.system.request import Request
+    from orchestration.systems.system.request import Request
 
 
 @flight_options
@@ -70,7 +70,7 @@ def margin(
 
 
 def _certified(request: "Request", of: str, out: Path | None) -> CommandResult:
-    from orchestration.certificates.margin import margin as certify
+    from orchestration.theory.certificates.margin import margin as certify
 
     found = certify(request, of, progress="bar")
     written = None if out is None or found.certificate is None else found.save(out)
@@ -91,7 +91,7 @@ def _certified(request: "Request", of: str, out: Path | None) -> CommandResult:
 
 
 def _region(request: "Request", of: str, and_of: str, out: Path | None) -> CommandResult:
-    from orchestration.certificates.region import region
+    from orchestration.theory.certificates.region import region
 
     found = region(request, of, and_of, progress="bar")
     written = [] if out is None else found.save(out)
@@ -105,7 +105,7 @@ def _region(request: "Request", of: str, and_of: str, out: Path | None) -> Comma
 
 
 def _checked(path: Path, request: "Request | None") -> CommandResult:
-    from orchestration.certificates.check import check
+    from orchestration.theory.certificates.check import check
 
     found = check(path, request)
     lines = []
@@ -125,11 +125,11 @@ def _checked(path: Path, request: "Request | None") -> CommandResult:
 
 def _of_hover(request: "Request") -> CommandResult:
     """The delays of the quadrotor about hover: constant ones exactly, varying ones by bounds."""
-    from orchestration.building.inputs import files_of
-    from orchestration.flight.margin import margin_of
-    from orchestration.fmi.foreign import isolated_call
-    from orchestration.quadrotor.scenario import Scenario
-    from orchestration.system.request import system_of
+    from orchestration.components.fmi.foreign import isolated_call
+    from orchestration.quadrotor.flight.margin import margin_of
+    from orchestration.quadrotor.scenarios.scenario import Scenario
+    from orchestration.systems.system.files import files_of
+    from orchestration.systems.system.request import system_of
 
     if not isinstance(request, Scenario):
         raise UsageError("margin: expected a scenario of the quadrotor, or --of PATH")

@@ -5,13 +5,13 @@ from typing import Annotated, get_args
 
 import typer
 
-from orchestration.basics.errors import UsageError
-from orchestration.basics.terminal import inform
 from orchestration.command import registry
 from orchestration.command.command_result import CommandResult, result_of_files
 from orchestration.command.registry import RUN
-from orchestration.scaffold import examples as shipped
-from orchestration.scaffold.folder import Kind, git_author, write
+from orchestration.components.scaffold import examples as shipped
+from orchestration.components.scaffold.folder import Kind, git_author, write
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.terminal import inform
 
 
 def new(

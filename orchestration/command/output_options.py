@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from orchestration.basics import terminal
-from orchestration.basics.errors import UsageError
+from orchestration.foundation.basics import terminal
+from orchestration.foundation.basics.errors import UsageError
 
 
 def _option(*names: str, text: str, metavar: str = "") -> Any:

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from orchestration.basics.errors import UsageError, shown
-from orchestration.basics.terminal import Share, progress_bar
 from orchestration.command import registry
 from orchestration.command.command_result import CommandResult, result_of_files
 from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.option_group import option_group
-from orchestration.flight.names import FIGURES
+from orchestration.foundation.basics.errors import UsageError, shown
+from orchestration.foundation.basics.terminal import Share, progress_bar
+from orchestration.quadrotor.flight.names import FIGURES
 
 if TYPE_CHECKING:
-    from orchestration.figures.style import Style
-    from orchestration.runs.result import Result
+    from orchestration.simulation.figures.style import Style
+    from orchestration.simulation.runs.result import Result
 
 OVERLAY = "overlay"
 """Folder beside the runs for figures of several of them"""
@@ -56,10 +56,10 @@ def plot(
 ) -> CommandResult:  # fmt: skip
     """Draw the figures of a run again, or of several runs overlaid, for a screen, a paper or slides."""
     with progress_bar("drawing") as progress:  # first, as importing matplotlib takes time
-        from orchestration.figures.style import save
-        from orchestration.runs.draw import draw
-        from orchestration.runs.run_directory import load_run
-        from orchestration.runs.run_labels import labels_of_runs
+        from orchestration.simulation.figures.style import save
+        from orchestration.simulation.runs.draw import draw
+        from orchestration.simulation.runs.run_directory import load_run
+        from orchestration.simulation.runs.run_labels import labels_of_runs
 
         results = [load_run(one) for one in directory]
         names = labels_of_runs(results, [str(one) for one in directory])
@@ -79,8 +79,8 @@ def _write_film(
     style: "Style",
     progress: Share,
 ) -> Path:
-    from orchestration.flight import film as filming
-    from orchestration.runs.draw import runs_of
+    from orchestration.quadrotor.flight import film as filming
+    from orchestration.simulation.runs.draw import runs_of
 
     if not all({*result.recording.columns} >= filming.COLUMNS for result in results):
         raise UsageError("--film: expected runs of a quadrotor; other systems have figures only")

@@ -7,10 +7,10 @@ from typing import Any
 
 import typer
 
-from orchestration.basics import terminal
 from orchestration.command.command_result import CommandResult
 from orchestration.command.option_group import option_group
 from orchestration.command.output_options import OutputOptions
+from orchestration.foundation.basics import terminal
 
 RUN, STUDY, FMUS, TOOLS = "Run", "Study", "FMUs", "Other tools"
 """Groups of commands in the help"""

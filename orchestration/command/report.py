@@ -5,10 +5,10 @@ from typing import Annotated
 
 import typer
 
-from orchestration.basics.terminal import progress_bar
 from orchestration.command import registry
 from orchestration.command.build_flag import build_option
 from orchestration.command.command_result import CommandResult, result_of_files
+from orchestration.foundation.basics.terminal import progress_bar
 
 
 @build_option
@@ -46,7 +46,7 @@ def report(
     ] = None,
 ) -> CommandResult:
     """Write runs, a study or a comparison as one HTML file: replay, plots, maps; it needs no network."""
-    from orchestration.report.writing import report as write
+    from orchestration.experiments.report.writing import report as write
 
     with progress_bar("running") as progress:
         return result_of_files([write(*what, out=out, flights=flights, runs=run or [], progress=progress)])

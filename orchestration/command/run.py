@@ -5,17 +5,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from orchestration.basics.errors import UsageError
-from orchestration.basics.terminal import inform, progress_bar, warn
-from orchestration.basics.units import after
 from orchestration.command import exact, registry
 from orchestration.command.command_result import CommandResult
 from orchestration.command.flags import EngineFlag, FlightFlags, Timing, flight_options, request_from
 from orchestration.command.limit_flags import ProcessFlags
 from orchestration.command.option_group import option_group
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.terminal import inform, progress_bar, warn
+from orchestration.foundation.basics.units import after
 
 if TYPE_CHECKING:
-    from orchestration.runs.result import Result
+    from orchestration.simulation.runs.result import Result
 
 
 @option_group("process", ProcessFlags)
@@ -45,8 +45,8 @@ def run(
     process: ProcessFlags,
 ) -> CommandResult:
     """Run a scenario or a system and print its metrics. FMUs that are missing or out of date are built first."""
-    from orchestration.engines.engine import engine_named
-    from orchestration.runs.simulation import run as simulate  # modules for files are loaded only if needed
+    from orchestration.simulation.engines.engine import engine_named
+    from orchestration.simulation.runs.simulation import run as simulate  # modules for files are loaded only if needed
 
     if resume is not None and (scenario is not None or pause_at is not None or flags != FlightFlags()):
         raise UsageError("--resume: expected no scenario and no flags of the run; the paused run has its own")
@@ -55,16 +55,16 @@ def run(
     with progress_bar("running") as progress:
         how: Any = {"progress": progress, "announce": inform, "engine": engine_named(engine), **vars(process)}
         if resume is not None:
-            from orchestration.runs import pause
+            from orchestration.simulation.runs import pause
 
             result: Result | None = pause.resume(resume, out, figures=figures, **how)
         elif pause_at is not None and out is not None:
-            from orchestration.runs import pause
+            from orchestration.simulation.runs import pause
 
             chosen = request_from(scenario, flags, timing)
             result = pause.run_until(chosen, pause_at, out, figures=figures, **how)
         elif out is not None:
-            from orchestration.runs.run_directory import keep_run
+            from orchestration.simulation.runs.run_directory import keep_run
 
             chosen = request_from(scenario, flags, timing)
             result = keep_run(out, lambda to: simulate(chosen, recorder=to, **how), figures=figures)
@@ -86,7 +86,7 @@ def run(
 
 
 def _metrics(result: "Result") -> CommandResult:
-    from orchestration.results.criterion import unmet
+    from orchestration.simulation.results.criterion import unmet
 
     found = {**result.metrics, "wall_time": result.provenance["wall_time"], "engine": result.provenance["engine"]}
     width, units = max(map(len, found)), {**result.units, "wall_time": "s"}

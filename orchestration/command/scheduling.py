@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from orchestration.basics.errors import UsageError
-from orchestration.basics.terminal import inform
 from orchestration.command import registry
 from orchestration.command.command_result import CommandResult
 from orchestration.command.flags import assigned
-from orchestration.figures.names import expect_figure
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.terminal import inform
+from orchestration.simulation.figures.names import expect_figure
 
 if TYPE_CHECKING:
-    from orchestration.runs.scheduling import Scheduled
-    from orchestration.schedule.responses import Responses
+    from orchestration.simulation.runs.scheduling import Scheduled
+    from orchestration.systems.schedule.responses import Responses
 
 HEAD = (
     "", "jobs", "share", "least", "mean", "99 %", "most", "bound", "start ±", "end ±", "latency", "deadline", "missed",
@@ -50,9 +50,9 @@ def schedule(
         raise UsageError(f"--until {until:g}: expected a positive number of seconds")
     if out is not None:
         expect_figure(out)
-    from orchestration.runs import scheduling
-    from orchestration.system.paths import changed
-    from orchestration.system.request import system_of
+    from orchestration.simulation.runs import scheduling
+    from orchestration.systems.system.paths import changed
+    from orchestration.systems.system.request import system_of
 
     request = scheduling.request_until(system, until)
     found = scheduling.schedule(changed(system_of(request), assigned("set", changes)))
@@ -70,8 +70,8 @@ def schedule(
 def _draw(found: "Scheduled", out: Path, start: float | None, end: float | None) -> Path:
     from dataclasses import replace
 
-    from orchestration.figures import gantt
-    from orchestration.figures.style import SCREEN, save
+    from orchestration.simulation.figures import gantt
+    from orchestration.simulation.figures.style import SCREEN, save
 
     whole = gantt.default_window(found.timeline)
     window = (start or 0.0, found.until if end is None and start is not None else end or whole[1])
@@ -110,7 +110,7 @@ def _table(kind: str, each: "Mapping[str, Responses]") -> Iterator[str]:
 
 
 def _row(of: "Responses") -> Sequence[str]:
-    from orchestration.system.description import seconds
+    from orchestration.systems.system.description import seconds
 
     def text_of(time: float | None) -> str:
         return "-" if time is None else seconds(float(f"{time:.4g}"))

@@ -5,7 +5,7 @@ import gc
 import os
 import sys
 
-from orchestration.processes.subprocesses import ROOT, misleading_variables, one_thread
+from orchestration.foundation.processes.subprocesses import ROOT, misleading_variables, one_thread
 
 _AGAIN = "import sys; sys.path.insert(0, sys.argv.pop(1)); from orchestration.command.start import main; main()"
 

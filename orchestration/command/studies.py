@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from orchestration.basics.terminal import inform, progress_bar
 from orchestration.command import completion, exact, registry
 from orchestration.command.build_flag import build_option
 from orchestration.command.command_result import CommandResult, result_of_files
@@ -13,9 +12,10 @@ from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.limit_flags import TimeLimit
 from orchestration.command.option_group import option_group
 from orchestration.command.study_flags import Out, StudyEngineFlag, Workers
+from orchestration.foundation.basics.terminal import inform, progress_bar
 
 if TYPE_CHECKING:
-    from orchestration.studies.study import Study
+    from orchestration.experiments.studies.study import Study
 
 StudyFile = Annotated[Path, typer.Argument(help="Study file.", metavar="STUDY.toml", show_default=False)]
 
@@ -36,9 +36,9 @@ def sweep(
     time_limit: TimeLimit = None,
 ) -> CommandResult:
     """Run the missing runs of a study; it can be stopped and resumed at any time."""
-    from orchestration.studies.study_file import load_study
-    from orchestration.studies.sweep import sweep as run_missing
-    from orchestration.workers.choice import engine_choice
+    from orchestration.experiments.studies.study_file import load_study
+    from orchestration.experiments.studies.sweep import sweep as run_missing
+    from orchestration.simulation.workers.choice import engine_choice
 
     loaded = load_study(study)
     _warn_if_means_are_infinite(loaded)
@@ -59,7 +59,7 @@ def sweep(
 
 def _warn_if_means_are_infinite(study: "Study") -> None:
     """Warn before the sweep, so that later changes of its files have no influence."""
-    from orchestration.stability.known_loops import LOOPS
+    from orchestration.theory.stability.known_loops import LOOPS
 
     if study.base.kind not in LOOPS:
         files = study.files()
@@ -71,10 +71,10 @@ def _warn_if_means_are_infinite(study: "Study") -> None:
 
 def status(study: StudyFile, out: Out = None) -> CommandResult:
     """Show the progress of a study, also while it runs in another process."""
-    from orchestration.studies.store import open_for_reading, store_path
-    from orchestration.studies.study_file import load_study
-    from orchestration.studies.sweep import AGREEMENT, ENGINE, TOTAL, expect_current
-    from orchestration.workers.batching import LaneAgreement
+    from orchestration.experiments.studies.store import open_for_reading, store_path
+    from orchestration.experiments.studies.study_file import load_study
+    from orchestration.experiments.studies.sweep import AGREEMENT, ENGINE, TOTAL, expect_current
+    from orchestration.simulation.workers.batching import LaneAgreement
 
     loaded = load_study(study)
     path = store_path(loaded.name, out)
@@ -113,8 +113,8 @@ def export(
     ] = None,
 ) -> CommandResult:  # fmt: skip
     """Write the rows of a study, or the signals and events of a run, as CSV, MAT or Parquet, with their units."""
-    from orchestration.studies import exporting
-    from orchestration.studies.store import store_path
+    from orchestration.experiments.studies import exporting
+    from orchestration.experiments.studies.store import store_path
 
     if what.is_dir() and not store_path("", what).is_file():
         return result_of_files(exporting.of_run(what, out or what, formats or ()))
@@ -134,8 +134,8 @@ def draw(
 ) -> CommandResult:
     """Draw a study: a metric over one or two axes with the good region, or sensitivity bars."""
     with progress_bar("drawing") as progress:  # first, as importing matplotlib takes time
-        from orchestration.studies.drawing import draw_study, expect_metric
-        from orchestration.studies.study_file import load_study
+        from orchestration.experiments.studies.drawing import draw_study, expect_metric
+        from orchestration.experiments.studies.study_file import load_study
 
         loaded = load_study(study)
         expect_metric(loaded, metric)
@@ -145,9 +145,9 @@ def draw(
 
 def _current_store(study: Path, out: Path | None) -> Path:
     """The store of a study file that has not changed since its runs."""
-    from orchestration.studies.store import open_for_reading, store_path
-    from orchestration.studies.study_file import load_study
-    from orchestration.studies.sweep import expect_current
+    from orchestration.experiments.studies.store import open_for_reading, store_path
+    from orchestration.experiments.studies.study_file import load_study
+    from orchestration.experiments.studies.sweep import expect_current
 
     loaded = load_study(study)
     path = store_path(loaded.name, out)

@@ -6,20 +6,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from orchestration.basics.terminal import inform
 from orchestration.command import registry
 from orchestration.command.build_flag import build_option
 from orchestration.command.command_result import CommandResult
 from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
 from orchestration.command.registry import RUN
+from orchestration.foundation.basics.terminal import inform
 
 if TYPE_CHECKING:
-    from orchestration.system.model import System
+    from orchestration.systems.system.model import System
 
 
 def schema() -> CommandResult:
     """Print the JSON schema of system files, with which editors complete and check them."""
-    from orchestration.system import system_file
+    from orchestration.systems.system import system_file
 
     result = CommandResult(document=system_file.schema(), lines=[])
     return replace(result, lines=result.as_json.splitlines())
@@ -39,11 +39,11 @@ def connect(
     ] = None,
 ) -> CommandResult:
     """Propose a system file for FMUs: outputs to inputs by name, type and unit; open points are marked in it."""
-    from orchestration.basics.errors import UsageError
-    from orchestration.building import fmus
-    from orchestration.fmi.model import read_model
-    from orchestration.requests.resource_files import resources_of
-    from orchestration.system.proposal import propose
+    from orchestration.components.building import fmus
+    from orchestration.components.fmi.model import read_model
+    from orchestration.foundation.basics.errors import UsageError
+    from orchestration.simulation.requests.resource_files import resources_of
+    from orchestration.systems.system.proposal import propose
 
     if out is not None and out.exists():
         raise UsageError(f"--out {out}: exists already; expected a file that does not exist")
@@ -79,13 +79,13 @@ def show(
     flags: FlightFlags,
 ) -> CommandResult:
     """Show a system: components with their rates, connections with their delay, jitter, loss and hold, units."""
-    from orchestration.system.description import as_text
-    from orchestration.system.file_tables import tables_of
-    from orchestration.system.request import system_of
+    from orchestration.systems.system.description import as_text
+    from orchestration.systems.system.file_tables import tables_of
+    from orchestration.systems.system.request import system_of
 
     shown = system_of(request_from(system, flags, timing))
     if out is not None:
-        from orchestration.figures import diagram
+        from orchestration.simulation.figures import diagram
 
         inform(str(diagram.write(shown, out)))
     return CommandResult(document=tables_of(shown), lines=as_text(shown, *_from_fmus(shown)).splitlines())
@@ -96,10 +96,10 @@ def _from_fmus(system: "System") -> tuple[dict[str, str], str]:
 
     Empty if FMUs are missing or do not fit: nothing is built, so that no foreign module runs.
     """
-    from orchestration.basics.errors import QuadcosimError
-    from orchestration.building import fmus
-    from orchestration.engines.wiring import check_against_fmus
-    from orchestration.fmi.model import read_model
+    from orchestration.components.building import fmus
+    from orchestration.components.fmi.model import read_model
+    from orchestration.foundation.basics.errors import QuadcosimError
+    from orchestration.simulation.engines.wiring import check_against_fmus
 
     try:
         paths = {name: fmus.look_up(fmu, inform) for name, fmu in system.fmus.items()}

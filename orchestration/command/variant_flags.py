@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from orchestration.basics.errors import UsageError
 from orchestration.command import completion
 from orchestration.command.flags import assigned
+from orchestration.foundation.basics.errors import UsageError
 
 if TYPE_CHECKING:
     from fmu_kit.bundle import Target
@@ -58,7 +58,7 @@ class VariantFlags:
         if len(slaves) != 1:
             listed = ", ".join(slave.model for slave in slaves)
             raise UsageError(f"--set, --vehicle and --name: expected one slave, FOLDER/NAME for one of {listed}")
-        from orchestration.building.builder import with_fixed
+        from orchestration.components.building.builder import with_fixed
 
         (slave,) = slaves
         values = {**self._vehicle_parameters(slave), **assigned("set", self.set)}
@@ -67,9 +67,9 @@ class VariantFlags:
     def _vehicle_parameters(self, slave: "Target") -> "dict[str, float | int | bool | str]":
         if self.vehicle is None:
             return {}
-        from orchestration.building.models import MODELS
-        from orchestration.quadrotor.vehicle import load_vehicle
-        from orchestration.quadrotor.wiring import DEFAULT_PLANT
+        from orchestration.components.building.models import MODELS
+        from orchestration.quadrotor.scenarios.vehicle import load_vehicle
+        from orchestration.quadrotor.scenarios.wiring import DEFAULT_PLANT
 
         if slave.model not in MODELS:
             raise UsageError(f"--vehicle: expected one of {', '.join(MODELS)}; {slave.model} is none of them")

@@ -1,1 +1,1 @@
-"""The quadrotor: the first system, its scenario files, flags and presets."""
+"""The quadrotor, which no other district knows: its scenarios and the analysis of its flights."""

@@ -18,7 +18,7 @@ from fmu_kit.compiler.trace.tracing import trace
 from fmu_kit.frames import Frame
 from fmu_kit.slave import Slave
 from fmu_kit.trajectory import Trajectory
-from orchestration.building.models import MODELS
+from orchestration.components.building.models import MODELS
 from plant_fmu.slave import QuadrotorPlant
 from tests.controller_fmu.wired import Rows, flight
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from docs import comparisons
-from orchestration.comparison.run import rerun_cells
+from orchestration.experiments.comparison.run import rerun_cells
 
 PAGES = sorted((Path(comparisons.__file__).parent / "findings").glob("*.md"))
 FLOWN = sorted(path.stem for path in comparisons.DATA.glob("*.json"))

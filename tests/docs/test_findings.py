@@ -8,7 +8,7 @@ import pandas as pd
 import quadcosim
 from docs.finding_texts import fates, up_to
 from docs.theory import ATTITUDE, PAPER, scaled
-from orchestration.quadrotor.scenario import Scenario
+from orchestration.quadrotor.scenarios.scenario import Scenario
 from tests.places import ROOT
 
 PAGES = "\n".join(page.read_text(encoding="utf-8") for page in sorted((ROOT / "docs" / "findings").glob("*.md")))

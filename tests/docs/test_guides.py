@@ -19,12 +19,12 @@ import fmpy
 import numpy as np
 import pytest
 
-from orchestration.building import fmus
-from orchestration.checks.doctor.machine import this_machine
-from orchestration.checks.doctor.verdict import INSTALL_LIBPYTHON, satisfies
-from orchestration.quadrotor.timing import Timing
-from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT
-from orchestration.requests.ssp import writing
+from orchestration.components.building import fmus
+from orchestration.components.checks.doctor.machine import this_machine
+from orchestration.components.checks.doctor.verdict import INSTALL_LIBPYTHON, satisfies
+from orchestration.quadrotor.scenarios.timing import Timing
+from orchestration.quadrotor.scenarios.wiring import COMMAND, MEASUREMENT
+from orchestration.simulation.requests.ssp import writing
 from quadcosim import run
 from tests.fmus.expected import law_command
 from tests.fmus.making import PAIR

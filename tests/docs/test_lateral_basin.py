@@ -18,9 +18,9 @@ from docs.lateral_basin.period import STATES, Loop
 from docs.lateral_basin.proof import Decrease, NotProven, prove, prove_boxes, refuted_factor
 from docs.lateral_basin.search import largest_ellipsoid
 from fmu_kit.scalar import FLOAT
-from orchestration.basics.errors import UsageError
-from orchestration.basics.simulator import Floats
-from orchestration.certificates.checker import is_positive
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.theory.certificates.checker import is_positive
 from tests.places import ROOT
 
 PERIODS = (0.01, 0.04)

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.basics.documents import read_toml
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.system.request import system_of
+from orchestration.foundation.basics.documents import read_toml
+from orchestration.quadrotor.scenarios.scenario import Scenario
+from orchestration.systems.system.request import system_of
 from quadcosim import Result, run
 from tests.places import ROOT
 

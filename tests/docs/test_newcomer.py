@@ -15,8 +15,8 @@ from docs.newcomer.blocks import Block, blocks_of
 from docs.newcomer.following import BlockFailed, Newcomer
 from docs.newcomer.pages import pages
 from docs.newcomer.readers import reader_of
-from orchestration.basics.documents import read_toml
 from orchestration.command.cli import app
+from orchestration.foundation.basics.documents import read_toml
 from tests.commands import Main
 from tests.places import ROOT
 

@@ -9,10 +9,10 @@ import pytest
 
 import quadcosim
 from docs import theory
-from orchestration.building.inputs import files_of
-from orchestration.exact.expect import expected_of
-from orchestration.exact.loops import Loops
-from orchestration.flight.hover_loop import HoverLoop
+from orchestration.quadrotor.flight.hover_loop import HoverLoop
+from orchestration.systems.system.files import files_of
+from orchestration.theory.exact.expect import expected_of
+from orchestration.theory.exact.loops import Loops
 
 
 @pytest.mark.parametrize("exponent", [1.0, 0.9, 0.5])

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from orchestration.command.cli import main
-from orchestration.quadrotor.vehicle import load_vehicle, names
+from orchestration.quadrotor.scenarios.vehicle import load_vehicle, names
 from tests.places import ROOT
 
 PAGE = (ROOT / "docs" / "vehicles.md").read_text(encoding="utf-8")

@@ -10,7 +10,7 @@ from benchmarks.execution import LAWS
 from docs import processor
 from quadcosim import System
 from tests.native import NATIVE
-from tests.orchestration.fmi.small import needs_compiler
+from tests.orchestration.components.fmi.small import needs_compiler
 from tests.places import EXAMPLES
 
 FOLDER = EXAMPLES / "autopilot"

@@ -2,9 +2,9 @@
 
 import pytest
 
-from orchestration.runs.simulation import run
-from orchestration.system.paths import changed
-from orchestration.system.system_file import load_system
+from orchestration.simulation.runs.simulation import run
+from orchestration.systems.system.paths import changed
+from orchestration.systems.system.system_file import load_system
 from tests.places import EXAMPLES
 
 SYSTEM = load_system(EXAMPLES / "three_servos" / "can.toml")

@@ -12,7 +12,7 @@ import quadcosim
 from fmu_kit.algebra import Quaternion, Vec3
 from quadcosim import System
 from tests.native import assert_the_same
-from tests.orchestration.fmi.small import needs_compiler
+from tests.orchestration.components.fmi.small import needs_compiler
 from tests.places import EXAMPLES
 
 FOLDER = EXAMPLES / "estimator"

@@ -2,8 +2,8 @@
 
 import pytest
 
-from orchestration.building import fmus
-from orchestration.checks.validation.validator import validate
+from orchestration.components.building import fmus
+from orchestration.components.checks.validation.validator import validate
 from tests.places import EXAMPLES
 
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from orchestration.runs.simulation import run
+from orchestration.simulation.runs.simulation import run
 from tests.examples.common import example
 
 QUIET = {

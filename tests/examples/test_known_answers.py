@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from examples.lqg import design as lqg
-from orchestration.building.inputs import files_of
-from orchestration.exact.expect import expect, expected_of
-from orchestration.exact.loops import Loops
-from orchestration.limits import limit
-from orchestration.runs.simulation import run
-from orchestration.system.distribution import Distribution
-from orchestration.system.model import System
-from orchestration.system.paths import changed
+from orchestration.experiments.limits import limit
+from orchestration.simulation.runs.simulation import run
+from orchestration.systems.system.distribution import Distribution
+from orchestration.systems.system.files import files_of
+from orchestration.systems.system.model import System
+from orchestration.systems.system.paths import changed
+from orchestration.theory.exact.expect import expect, expected_of
+from orchestration.theory.exact.loops import Loops
 from tests.examples.common import native_example as example
 
 PERIOD = "components.controller.sampling.period"

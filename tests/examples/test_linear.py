@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 
 import quadcosim
-from orchestration.basics.documents import read_toml
-from orchestration.flight.hover import at_hover
-from orchestration.fmi.reuse import Instances
-from orchestration.quadrotor.fmu_choice import FmuChoice
-from orchestration.stability.monodromy import growth_of_loop
-from orchestration.system.component import Parameter
+from orchestration.components.fmi.reuse import Instances
+from orchestration.foundation.basics.documents import read_toml
+from orchestration.quadrotor.flight.hover import at_hover
+from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
+from orchestration.systems.system.component import Parameter
+from orchestration.theory.stability.monodromy import growth_of_loop
 from quadcosim import Scenario, Timing
 from tests.native import native
-from tests.orchestration.fmi.small import needs_compiler
-from tests.orchestration.stability.test_linearise import closed
+from tests.orchestration.components.fmi.small import needs_compiler
+from tests.orchestration.theory.stability.test_linearise import closed
 from tests.places import EXAMPLES
 
 pytestmark = needs_compiler

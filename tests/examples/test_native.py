@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from fmu_kit.compiler.pack.c_compiler import Mathematics
-from orchestration.building import builder
-from orchestration.runs.result import Result
-from orchestration.runs.simulation import run
-from orchestration.system.model import System
+from orchestration.components.building import builder
+from orchestration.simulation.runs.result import Result
+from orchestration.simulation.runs.simulation import run
+from orchestration.systems.system.model import System
 from tests.examples.common import NAMES, example
 from tests.native import assert_near, assert_the_same, natives
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.system.paths import value_at
+from orchestration.systems.system.paths import value_at
 from tests.commands import Main
 from tests.examples.common import NAMES, example
 from tests.places import EXAMPLES

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestration.runs.result import Result
-from orchestration.signals.waypoints import read_waypoints
+from orchestration.simulation.runs.result import Result
+from orchestration.systems.signals.waypoints import read_waypoints
 from quadcosim import DisturbanceChoice, ReferenceChoice, Scenario, load_scenario, run
-from tests.orchestration.engines.batch.lanes import located
-from tests.orchestration.fmi.small import needs_compiler
+from tests.orchestration.components.fmi.small import needs_compiler
+from tests.orchestration.simulation.engines.batch.lanes import located
 from tests.places import EXAMPLES
 
 pytestmark = needs_compiler

@@ -11,7 +11,7 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from fmu_kit.algebra import Inertia, Quaternion, Vec3, is_positive_definite
-from orchestration.engines.sources import NUMPY
+from orchestration.simulation.engines.sources import NUMPY
 
 ROUNDING = 1e-14
 """A few dozen units in the last place."""

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from fmu_kit.algebra import ZERO, Inertia, Quaternion, Vec3
 from fmu_kit.integrator import rk4_step
 from fmu_kit.rigid_body import Body, RigidState, Wrench, acceleration, derivative, tilt
-from orchestration.engines.sources import NUMPY
+from orchestration.simulation.engines.sources import NUMPY
 
 IDENTITY = Quaternion.from_xyzw(0.0, 0.0, 0.0, 1.0)
 J = np.array([[0.8, 0.05, -0.02], [0.05, 0.9, 0.03], [-0.02, 0.03, 1.4]])

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from fmu_kit.algebra import ZERO, Vec3
 from fmu_kit.trajectory import Reference, Trajectory
-from orchestration.engines.sources import NUMPY
+from orchestration.simulation.engines.sources import NUMPY
 
 lengths = st.floats(-10.0, 10.0)
 trajectories = st.builds(

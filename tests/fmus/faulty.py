@@ -9,7 +9,7 @@ from xml.etree.ElementTree import fromstring
 import fmpy
 
 from fmu_kit.archive import NATIVE_TABLES
-from orchestration.building import fmus
+from orchestration.components.building import fmus
 from tests.fmus.archive import files_of
 from tests.fmus.damage import DESCRIPTION, Damage, Files, file, with_its_guid, write_fmu
 from tests.fmus.foreign import COMPILER

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from orchestration.building.models import MODELS
-from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT
+from orchestration.components.building.models import MODELS
+from orchestration.quadrotor.scenarios.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT
 
 PAIR = {name: MODELS[name] for name in (DEFAULT_CONTROLLER, DEFAULT_PLANT)}
 """One controller and one plant: what every slave does by its base, and what a packing does to any, is shown with them.

@@ -13,8 +13,8 @@ from xml.etree.ElementTree import Element, SubElement
 import fmpy
 
 from fmu_kit.archive import ICONS
-from orchestration.building import builder
-from orchestration.building.models import MODELS
+from orchestration.components.building import builder
+from orchestration.components.building.models import MODELS
 from tests.fmus.damage import (
     DESCRIPTION,
     Damage,

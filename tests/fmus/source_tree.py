@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from subprocess import CompletedProcess
 
-from orchestration.building.models import MODELS
+from orchestration.components.building.models import MODELS
 from tests.fmus.process import run
 from tests.places import ROOT
 

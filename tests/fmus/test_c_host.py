@@ -9,11 +9,11 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from orchestration.checks.doctor.dependencies import needed
-from orchestration.checks.doctor.fmu import inspected
-from orchestration.checks.doctor.machine import this_machine
-from orchestration.checks.doctor.pythons import BY_LOADER, THIS_PYTHON, PythonLibrary
-from orchestration.checks.doctor.verdict import INSTALL_LIBPYTHON, other_host, satisfies
+from orchestration.components.checks.doctor.dependencies import needed
+from orchestration.components.checks.doctor.fmu import inspected
+from orchestration.components.checks.doctor.machine import this_machine
+from orchestration.components.checks.doctor.pythons import BY_LOADER, THIS_PYTHON, PythonLibrary
+from orchestration.components.checks.doctor.verdict import INSTALL_LIBPYTHON, other_host, satisfies
 from tests.fmus.archive import without_loader
 from tests.fmus.expected import COMMAND, MEASUREMENT, law_command
 from tests.fmus.instance import Instance

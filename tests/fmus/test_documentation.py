@@ -19,8 +19,8 @@ from fmpy.model_description import ModelVariable
 from fmpy.validation import validate_fmu
 
 from fmu_kit.trajectory import Trajectory
-from orchestration.building.models import MODELS
-from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT
+from orchestration.components.building.models import MODELS
+from orchestration.quadrotor.scenarios.wiring import COMMAND, MEASUREMENT
 from tests.fmus.archive import files_of
 from tests.fmus.instance import Instance
 from tests.fmus.making import PAIR

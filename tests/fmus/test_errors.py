@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from orchestration.basics.errors import SimulatorError, UsageError
-from orchestration.building.models import MODELS
-from orchestration.fmi.fmi2 import Fmi2Instance
+from orchestration.components.building.models import MODELS
+from orchestration.components.fmi.fmi2 import Fmi2Instance
+from orchestration.foundation.basics.errors import SimulatorError, UsageError
 from tests.fmus.archive import without_loader
 from tests.fmus.instance import Instance
 from tests.fmus.making import PAIR, Making
@@ -348,8 +348,8 @@ def test_a_plant_state_that_overflows_is_divergence(start: Values, inputs: Value
 LOAD = """
 import sys
 from pathlib import Path
-from orchestration.basics.errors import QuadcosimError
-from orchestration.fmi.fmi2 import Fmi2Instance
+from orchestration.foundation.basics.errors import QuadcosimError
+from orchestration.components.fmi.fmi2 import Fmi2Instance
 try:
     Fmi2Instance(Path(sys.argv[1]), "it").close()
 except QuadcosimError as error:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestration.basics.simulator import Floats
+from orchestration.foundation.basics.simulator import Floats
 from tests.fmus.expected import COMMAND, MEASUREMENT, law_command
 from tests.fmus.making import PAIR
 from tests.fmus.process import run

@@ -11,8 +11,8 @@ import pytest
 from fmpy.model_description import ModelDescription, ScalarVariable
 
 from fmu_kit.model_description import PYTHON_REQUIRED
-from orchestration.basics.documents import read_toml
-from orchestration.building.models import MODELS
+from orchestration.components.building.models import MODELS
+from orchestration.foundation.basics.documents import read_toml
 from tests.fmus.archive import files_of
 from tests.fmus.expected import MEASUREMENT
 from tests.fmus.instance import Instance

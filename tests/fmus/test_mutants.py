@@ -8,15 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.building import fmus
-from orchestration.building.models import MODELS
-from orchestration.checks.validation import rules
-from orchestration.checks.validation.confined_process import PLATFORM, READABLE, check_description
-from orchestration.checks.validation.finding import Finding, name_of
-from orchestration.checks.validation.progress import ReceivedReport, Reporter
-from orchestration.checks.validation.validator import PROCESS, validate
 from orchestration.command import cli
-from orchestration.processes.limits import Limits
+from orchestration.components.building import fmus
+from orchestration.components.building.models import MODELS
+from orchestration.components.checks.validation import rules
+from orchestration.components.checks.validation.confined_process import PLATFORM, READABLE, check_description
+from orchestration.components.checks.validation.finding import Finding, name_of
+from orchestration.components.checks.validation.progress import ReceivedReport, Reporter
+from orchestration.components.checks.validation.validator import PROCESS, validate
+from orchestration.foundation.processes.limits import Limits
 from tests.fmus.damage import Mutant, every
 from tests.fmus.faulty import faulty
 from tests.fmus.making import PAIR

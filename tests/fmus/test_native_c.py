@@ -8,9 +8,9 @@ import pytest
 from elftools.elf.elffile import ELFFile
 
 from fmu_kit.bundle import Target
-from orchestration.building import fmus
-from orchestration.building.models import MODELS
-from orchestration.checks.validation.validator import validate
+from orchestration.components.building import fmus
+from orchestration.components.building.models import MODELS
+from orchestration.components.checks.validation.validator import validate
 from tests.fmus.expected import COMMAND, MEASUREMENT, law_command
 from tests.fmus.making import PAIR
 from tests.fmus.process import run

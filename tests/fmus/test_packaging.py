@@ -14,10 +14,10 @@ import pytest
 from fmu_kit import bundle
 from fmu_kit.archive import content_guid
 from fmu_kit.loader import BESIDE, GUID_FILE
-from orchestration.basics.errors import QuadcosimError
-from orchestration.building import builder
-from orchestration.building.models import MODELS
-from orchestration.checks.doctor import binaries
+from orchestration.components.building import builder
+from orchestration.components.building.models import MODELS
+from orchestration.components.checks.doctor import binaries
+from orchestration.foundation.basics.errors import QuadcosimError
 from tests.fmus.archive import files_of
 from tests.fmus.instance import Instance
 from tests.fmus.process import run
@@ -251,7 +251,7 @@ def test_a_python_that_is_too_old_is_refused_in_a_sentence(model: str, built: di
         ("import math, numpy.linalg as la", "numpy.linalg"),
         ("from numpy import array", "numpy"),
         ("def late():\n    import numpy", "numpy"),
-        ("from orchestration.building.models import MODELS", "orchestration.building.models"),
+        ("from orchestration.components.building.models import MODELS", "orchestration.components.building.models"),
     ],
 )
 def test_a_slave_that_needs_more_than_the_standard_library_is_refused(

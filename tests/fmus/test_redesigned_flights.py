@@ -6,14 +6,14 @@ from typing import Any
 import pytest
 
 import quadcosim
-from orchestration.basics.errors import UsageError
-from orchestration.building import fmus
-from orchestration.flight.hover import at_hover
-from orchestration.flight.hover_loop import HoverLoop
-from orchestration.fmi.reuse import Instances
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.scenario_file import scenario_from_tables
-from orchestration.stability.monodromy import growth_of_loop
+from orchestration.components.building import fmus
+from orchestration.components.fmi.reuse import Instances
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.quadrotor.flight.hover import at_hover
+from orchestration.quadrotor.flight.hover_loop import HoverLoop
+from orchestration.quadrotor.scenarios.scenario import Scenario
+from orchestration.quadrotor.scenarios.scenario_file import scenario_from_tables
+from orchestration.theory.stability.monodromy import growth_of_loop
 
 MEAN = {"discretisation": "mean", "stages": 3}
 

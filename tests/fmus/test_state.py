@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from orchestration.basics.errors import SimulatorError
-from orchestration.fmi.fmi2 import Fmi2Instance
+from orchestration.components.fmi.fmi2 import Fmi2Instance
+from orchestration.foundation.basics.errors import SimulatorError
 from tests.fmus.flights import FLIGHTS, Flight
 from tests.fmus.instance import Instance
 from tests.fmus.making import PAIR, Making

@@ -11,23 +11,23 @@ import pytest
 from fmpy import read_model_description
 from fmpy.model_description import ValidationError
 
-from orchestration.basics.errors import QuadcosimError
-from orchestration.building.models import MODELS
-from orchestration.checks.validation import confined_process, run_rules
-from orchestration.checks.validation.finding import Finding, check
-from orchestration.checks.validation.fmu import Fmu
-from orchestration.checks.validation.own_description import differences, elements
-from orchestration.checks.validation.probe import Probe
-from orchestration.checks.validation.progress import Frame, ReceivedReport, Reporter
-from orchestration.checks.validation.reading import read_co_simulation, read_fmu
-from orchestration.checks.validation.structure import initial_unknowns, known_dependencies, outputs
-from orchestration.checks.validation.units import dimensions, unit_meaning
-from orchestration.checks.validation.validator import validate
-from orchestration.checks.validation.variables import aliases, names
 from orchestration.command import cli
-from orchestration.fmi.archive import Archive
-from orchestration.processes.child import Child, Ending
-from orchestration.processes.limits import Limits
+from orchestration.components.building.models import MODELS
+from orchestration.components.checks.validation import confined_process, run_rules
+from orchestration.components.checks.validation.finding import Finding, check
+from orchestration.components.checks.validation.fmu import Fmu
+from orchestration.components.checks.validation.own_description import differences, elements
+from orchestration.components.checks.validation.probe import Probe
+from orchestration.components.checks.validation.progress import Frame, ReceivedReport, Reporter
+from orchestration.components.checks.validation.reading import read_co_simulation, read_fmu
+from orchestration.components.checks.validation.structure import initial_unknowns, known_dependencies, outputs
+from orchestration.components.checks.validation.units import dimensions, unit_meaning
+from orchestration.components.checks.validation.validator import validate
+from orchestration.components.checks.validation.variables import aliases, names
+from orchestration.components.fmi.archive import Archive
+from orchestration.foundation.basics.errors import QuadcosimError
+from orchestration.foundation.processes.child import Child, Ending
+from orchestration.foundation.processes.limits import Limits
 from tests.fmus.archive import files_of
 from tests.fmus.damage import DESCRIPTION, Damage, description, root, source, without, write_fmu
 from tests.fmus.foreign import lag, needs_compiler

@@ -4,19 +4,19 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.building import fmus
-from orchestration.checks.validation.description import capabilities
-from orchestration.checks.validation.finding import Finding, Rule, check
-from orchestration.checks.validation.fmu import Fmu
-from orchestration.checks.validation.reading import read_co_simulation, read_fmu
-from orchestration.checks.validation.structure import RULES, known_dependencies
-from orchestration.checks.validation.validator import validate
-from orchestration.checks.validation.variables import aliases, arrays, bounds, names
-from orchestration.fmi.archive import Archive, UnreadableFmuError
+from orchestration.components.building import fmus
+from orchestration.components.checks.validation.description import capabilities
+from orchestration.components.checks.validation.finding import Finding, Rule, check
+from orchestration.components.checks.validation.fmu import Fmu
+from orchestration.components.checks.validation.reading import read_co_simulation, read_fmu
+from orchestration.components.checks.validation.structure import RULES, known_dependencies
+from orchestration.components.checks.validation.validator import validate
+from orchestration.components.checks.validation.variables import aliases, arrays, bounds, names
+from orchestration.components.fmi.archive import Archive, UnreadableFmuError
 from tests.fmus.archive import files_of
 from tests.fmus.damage import DESCRIPTION, write_fmu
 from tests.fmus.making import PAIR
-from tests.orchestration.fmi.small import CLOCK, needs_compiler, small
+from tests.orchestration.components.fmi.small import CLOCK, needs_compiler, small
 
 # -- FMUs that run --------------------------------------------------------------------------------------
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from fmpy.validation import validate_fmu
 
-from orchestration.checks.validation.finding import Finding
-from orchestration.checks.validation.validator import validate
-from orchestration.processes.limits import Limits
+from orchestration.components.checks.validation.finding import Finding
+from orchestration.components.checks.validation.validator import validate
+from orchestration.foundation.processes.limits import Limits
 from tests.fmus.damage import Mutant
 
 

@@ -12,18 +12,18 @@ from fmpy.validation import validate_fmu
 from fmu_kit.errors import FmuError
 from fmu_kit.interface import Declaration, FixedParameter, Input
 from fmu_kit.slave import Slave
-from orchestration.building import fmus
-from orchestration.checks.validation.validator import validate
-from orchestration.fmi import instances
-from orchestration.requests.request import load_request
-from orchestration.requests.ssp import package, writing
-from orchestration.studies.store import open_for_reading, store_path
-from orchestration.studies.study_file import load_study
-from orchestration.system.model import System
+from orchestration.components.building import fmus
+from orchestration.components.checks.validation.validator import validate
+from orchestration.components.fmi import instances
+from orchestration.experiments.studies.store import open_for_reading, store_path
+from orchestration.experiments.studies.study_file import load_study
+from orchestration.simulation.requests.request import load_request
+from orchestration.simulation.requests.ssp import package, writing
+from orchestration.systems.system.model import System
 from quadcosim import SimulatorError, UsageError, changed, load_run, load_system, run
 from tests.commands import Main
 from tests.fmu_kit.compiler.probes import Mode
-from tests.orchestration.studies.common import sweep
+from tests.orchestration.experiments.studies.common import sweep
 
 SLAVE = """
 import dataclasses

@@ -12,13 +12,13 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 import quadcosim
-from orchestration.quadrotor.presets import preset_timing
-from orchestration.quadrotor.wiring import REFERENCE
-from orchestration.requests.request import load_request
-from orchestration.requests.ssp import writing
-from orchestration.runs.pause import read_state
-from orchestration.signals.table_file import read_table
-from orchestration.studies.study_file import load_study
+from orchestration.experiments.studies.study_file import load_study
+from orchestration.quadrotor.scenarios.presets import preset_timing
+from orchestration.quadrotor.scenarios.wiring import REFERENCE
+from orchestration.simulation.requests.request import load_request
+from orchestration.simulation.requests.ssp import writing
+from orchestration.simulation.runs.pause import read_state
+from orchestration.systems.signals.table_file import read_table
 from quadcosim import Scenario, UsageError, fly_until, load_run, load_scenario, save_run
 
 resource = pytest.importorskip("resource")  # and signals with a time, neither of which Windows has

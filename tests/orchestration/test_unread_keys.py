@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from orchestration.comparison.file import load_comparison
-from orchestration.requests.request import load_request
-from orchestration.studies.study_file import load_study
-from orchestration.tuning.tuning_file import load_tuning
+from orchestration.experiments.comparison.file import load_comparison
+from orchestration.experiments.studies.study_file import load_study
+from orchestration.experiments.tuning.tuning_file import load_tuning
+from orchestration.simulation.requests.request import load_request
 from quadcosim import UsageError
 
 SCENARIO = """

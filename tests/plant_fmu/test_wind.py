@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fmu_kit.algebra import Vec3
-from orchestration.engines.sources import NUMPY
+from orchestration.simulation.engines.sources import NUMPY
 from plant_fmu.wind import Wind
 
 component = st.floats(-5.0, 5.0)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import quadcosim
-from orchestration.studies.axes import Axis
-from orchestration.studies.study import Study
-from orchestration.studies.study_file import load_study
+from orchestration.experiments.studies.axes import Axis
+from orchestration.experiments.studies.study import Study
+from orchestration.experiments.studies.study_file import load_study
 from quadcosim import (
     Component,
     Connection,

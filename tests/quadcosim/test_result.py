@@ -10,7 +10,7 @@ import pytest
 from scipy.io import loadmat
 
 import quadcosim
-from orchestration.building import fmus
+from orchestration.components.building import fmus
 from quadcosim import QuadcosimError, Result, Scenario, System, UsageError
 from tests.commands import Main
 

@@ -11,10 +11,10 @@ import pyarrow.parquet as pq
 import pytest
 
 import quadcosim
-from orchestration.figures.style import STYLES
-from orchestration.tuning.tuning_file import load_tuning
+from orchestration.experiments.tuning.tuning_file import load_tuning
+from orchestration.simulation.figures.style import STYLES
 from quadcosim import Axis, QuadcosimError, Result, Scenario, Study, Swept, Timing, UsageError
-from tests.orchestration.tuning.test_tuning import FILE
+from tests.orchestration.experiments.tuning.test_tuning import FILE
 from tests.patience import PATIENCE
 from tests.places import EXAMPLES
 from tests.quadcosim.conftest import native
@@ -138,7 +138,7 @@ def test_a_sweep_draws_what_its_criterion_is_about_or_what_is_asked_for(swept: S
 def test_the_rows_of_a_study_say_the_unit_of_an_axis_in_parquet_and_mat(swept: Swept) -> None:
     from scipy.io import loadmat
 
-    from orchestration.studies.exporting import of_study
+    from orchestration.experiments.studies.exporting import of_study
 
     parquet, mat = of_study(swept.path, ("parquet", "mat"))
     assert pq.read_schema(parquet).field("timing.period").metadata[b"unit"] == b"s"

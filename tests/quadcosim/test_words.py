@@ -3,7 +3,7 @@
 import pytest
 
 import quadcosim
-from orchestration.basics.errors import in_python
+from orchestration.foundation.basics.errors import in_python
 from quadcosim import Scenario, UsageError
 from tests.commands import Main
 

@@ -6,12 +6,12 @@ import pytest
 
 import quadcosim
 from fmu_kit.bundle import Target
-from orchestration.building.models import MODELS
-from orchestration.flight.hover import at_hover
-from orchestration.flight.hover_loop import HoverLoop
-from orchestration.fmi.reuse import Instances
-from orchestration.stability.monodromy import growth_of_loop
-from orchestration.system.model import System
+from orchestration.components.building.models import MODELS
+from orchestration.components.fmi.reuse import Instances
+from orchestration.quadrotor.flight.hover import at_hover
+from orchestration.quadrotor.flight.hover_loop import HoverLoop
+from orchestration.systems.system.model import System
+from orchestration.theory.stability.monodromy import growth_of_loop
 from quadcosim import Result, Scenario, Timing, UsageError
 from tests.native import assert_the_same, natives
 

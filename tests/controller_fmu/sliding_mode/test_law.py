@@ -29,7 +29,7 @@ from fmu_kit.integrator import rk4_step
 from fmu_kit.rigid_body import Body, RigidState, Wrench, derivative
 from fmu_kit.scalar import FLOAT, ScalarOps
 from fmu_kit.trajectory import Reference, Trajectory
-from orchestration.engines.sources import NUMPY
+from orchestration.simulation.engines.sources import NUMPY
 from tests.controller_fmu.closed_loop import (
     assert_is_the_rate,
     assert_rates,

@@ -15,8 +15,8 @@ import pytest
 from fmu_kit.bundle import PackagingError
 from fmu_kit.compiler.pack.c_compiler import compiled_for, targets_of, universal
 from fmu_kit.compiler.pack.c_compiler import compiler as compiler_here
-from orchestration.building import builder, fmus
-from orchestration.checks.doctor.binaries import newest, read
+from orchestration.components.building import builder, fmus
+from orchestration.components.checks.doctor.binaries import newest, read
 
 needs_zig = pytest.mark.skipif(
     importlib.util.find_spec("ziglang") is None, reason="no zig: pip install 'quadcosim[cross]'"

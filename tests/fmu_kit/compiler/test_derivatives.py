@@ -11,7 +11,7 @@ from controller_fmu.sliding_mode.law import Gains, evaluate
 from controller_fmu.vehicle import Measurement, Model
 from fmu_kit.algebra import Quaternion, Vec3
 from fmu_kit.trajectory import Trajectory
-from orchestration.building import fmus
+from orchestration.components.building import fmus
 from tests.fmus.expected import COMMAND, MEASUREMENT
 from tests.fmus.instance import Instance
 from tests.scalars import PRECISE

@@ -11,8 +11,8 @@ import pytest
 from fmu_kit.bundle import Target
 from fmu_kit.compiler.emit.embedded_code import single_number
 from fmu_kit.compiler.pack.embedded import write
-from orchestration.building import builder, fmus
-from orchestration.building.models import MODELS
+from orchestration.components.building import builder, fmus
+from orchestration.components.building.models import MODELS
 from tests.commands import Main
 from tests.fmu_kit.compiler.embedded import (
     ARM,

@@ -18,9 +18,9 @@ from fmu_kit.bundle import Target
 from fmu_kit.compiler.emit.standards import STANDARDS
 from fmu_kit.compiler.emit.terminals import TERMINALS
 from fmu_kit.packaging import slave_class
-from orchestration.building import fmus
-from orchestration.building.models import MODELS
-from orchestration.quadrotor.scenario import Scenario
+from orchestration.components.building import fmus
+from orchestration.components.building.models import MODELS
+from orchestration.quadrotor.scenarios.scenario import Scenario
 from tests.commands import Main
 from tests.fmu_kit.compiler.compiled import compiled
 from tests.fmus.archive import files_of

@@ -21,8 +21,8 @@ from fmu_kit.compiler.passes.precomputing import precompute
 from fmu_kit.compiler.trace.tracing import trace
 from fmu_kit.packaging import slave_class
 from fmu_kit.variables import Variable
-from orchestration.building import fmus
-from orchestration.building.models import MODELS
+from orchestration.components.building import fmus
+from orchestration.components.building.models import MODELS
 from tests.fmu_kit.compiler.compiled import compiler
 from tests.fmu_kit.compiler.in_lanes import Alone, Together, Values, bits
 from tests.fmu_kit.compiler.twins import GUID, compiled

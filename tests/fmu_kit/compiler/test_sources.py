@@ -9,7 +9,7 @@ import fmpy
 import pytest
 from elftools.elf.elffile import ELFFile
 
-from orchestration.building import builder, fmus
+from orchestration.components.building import builder, fmus
 from tests.fmus.process import run
 
 MODEL = "QuadrotorPlant"

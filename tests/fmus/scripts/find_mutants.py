@@ -11,11 +11,11 @@ import tempfile
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from orchestration.basics.errors import QuadcosimError
-from orchestration.checks.validation import confined_process, description, rules, run_rules
-from orchestration.checks.validation.finding import Rule, Subject, name_of
-from orchestration.checks.validation.progress import Frame, ReceivedReport, Reporter
-from orchestration.processes.limits import Limits
+from orchestration.components.checks.validation import confined_process, description, rules, run_rules
+from orchestration.components.checks.validation.finding import Rule, Subject, name_of
+from orchestration.components.checks.validation.progress import Frame, ReceivedReport, Reporter
+from orchestration.foundation.basics.errors import QuadcosimError
+from orchestration.foundation.processes.limits import Limits
 from tests.fmus.damage import Mutant
 from tests.fmus.mutants import MUTANTS
 from tests.fmus.process import in_a_copy

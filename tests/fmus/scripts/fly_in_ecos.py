@@ -3,12 +3,12 @@
 import json
 import sys
 
-import orchestration.interop.tools.ecos  # noqa: F401  # oneTBB, which ecospy does not find by itself
+import orchestration.simulation.interop.tools.ecos  # noqa: F401  # oneTBB, which ecospy does not find by itself
 
 # isort: split
 from ecospy import EcosSimulation, EcosSimulationStructure
 
-from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT
+from orchestration.quadrotor.scenarios.wiring import COMMAND, MEASUREMENT
 
 if __name__ == "__main__":
     structure = EcosSimulationStructure()

@@ -13,11 +13,11 @@ from typing import Any
 
 import pytest
 
-from orchestration.building import fmus
-from orchestration.building.models import MODELS
 from orchestration.command import plotting
-from orchestration.flight.names import FIGURES as FLIGHT
-from orchestration.processes import subprocesses
+from orchestration.components.building import fmus
+from orchestration.components.building.models import MODELS
+from orchestration.foundation.processes import subprocesses
+from orchestration.quadrotor.flight.names import FIGURES as FLIGHT
 from quadcosim import Scenario, Timing, load_run, run, save_run
 from tests.commands import Done, Main
 from tests.native import native
@@ -121,8 +121,8 @@ HEAVY = (
     "pandas",
     "pyarrow",
     "fmpy",
-    "orchestration.basics.records",
-    "orchestration.system.model",
+    "orchestration.foundation.basics.records",
+    "orchestration.systems.system.model",
 )
 
 
@@ -282,7 +282,7 @@ def test_plot_zooms_on_a_window(main: Main, here: Path) -> None:
 @pytest.mark.parametrize("out", [[], ["--out", "stopped", "--no-figures"]], ids=["nothing kept", "kept"])
 def test_ctrl_c_ends_a_flight_with_one_line_and_130(here: Path, out: list[str]) -> None:
     code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n" + (
-        "from orchestration.basics import terminal; terminal.SPARSE = 0.0\n"  # reports when it runs
+        "from orchestration.foundation.basics import terminal; terminal.SPARSE = 0.0\n"  # reports when it runs
         "from orchestration.command.cli import main; main()"
     )
     with subprocess.Popen(

@@ -14,9 +14,9 @@ from typing import Any
 import pytest
 import typer.main
 
-from orchestration.basics.terminal import configure
 from orchestration.command.cli import app
 from orchestration.command.command_result import CommandResult
+from orchestration.foundation.basics.terminal import configure
 from tests.commands import Main
 from tests.places import ROOT
 

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.basics.errors import UsageError
-from orchestration.computers.results import Timeline
-from orchestration.figures import gantt
-from orchestration.figures.run import Run, Window
-from orchestration.figures.style import SCREEN
-from orchestration.recording.recording import InMemory
-from orchestration.requests.ranges import default_quantity
-from orchestration.system.model import System
-from orchestration.system.system_file import load_system
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.recording.recording import InMemory
+from orchestration.simulation.figures import gantt
+from orchestration.simulation.figures.run import Run, Window
+from orchestration.simulation.figures.style import SCREEN
+from orchestration.simulation.requests.ranges import default_quantity
+from orchestration.systems.computers.results import Timeline
+from orchestration.systems.system.model import System
+from orchestration.systems.system.system_file import load_system
 from quadcosim import schedule
 from tests.commands import Main
 from tests.places import EXAMPLES

@@ -37,10 +37,12 @@ def test_a_system_is_shown_as_text_without_any_large_package() -> None:
 
 
 def test_processes_that_run_load_only_what_runs_need() -> None:
-    imports = "import json, sys, orchestration.workers.worker_process, orchestration.runs.apart_process"
+    imports = (
+        "import json, sys, orchestration.simulation.workers.worker_process, orchestration.simulation.runs.apart_process"
+    )
     code = f"{imports}; print(json.dumps(list(sys.modules)))"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    unused = {"pydantic", "orchestration.requests.request", "orchestration.engines.batch.batch"}
+    unused = {"pydantic", "orchestration.simulation.requests.request", "orchestration.simulation.engines.batch.batch"}
     assert not (LARGE | unused) & set(json.loads(found))
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from orchestration.studies.store import store_path
+from orchestration.experiments.studies.store import store_path
 from tests.commands import Done, Main
-from tests.orchestration.studies.common import (
+from tests.orchestration.experiments.studies.common import (
     GRID,
     NOISY,
     RUNS,

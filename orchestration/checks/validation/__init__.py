@@ -1,7 +1,0 @@
-"""Validation of FMUs: the archive, the description, and what the FMU does.
-
-from orchestration.checks.validation.validator import validate
-
-for finding in validate("fmus/QuadrotorPlant.fmu"):
-    print(finding.rule, finding.text)
-"""

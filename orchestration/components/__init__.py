@@ -1,0 +1,1 @@
+"""FMUs one by one: read, run, built, checked."""

@@ -1,0 +1,79 @@
+"""Consent to building FMUs of modules that are not of this project, which runs these modules.
+
+A program that calls this package consents by the call. The command line asks once for each folder, whose modules may
+then be built whenever they have changed.
+"""
+
+import hashlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.processes.subprocesses import ROOT
+
+Ask = Callable[[str], bool]
+"""Asks the user a question; returns whether the answer is yes"""
+
+
+@dataclass(kw_only=True)
+class _Policy:
+    ask: Ask
+    allowed: bool = False
+
+
+_policy: _Policy | None = None
+
+
+@contextmanager
+def asking(ask: Ask) -> Iterator[None]:
+    """While the block runs, building asks for consent to each folder that has none."""
+    global _policy
+    before, _policy = _policy, _Policy(ask=ask)
+    try:
+        yield
+    finally:
+        _policy = before
+
+
+def allow() -> None:
+    """Consent to all folders until the end of the block of `asking`."""
+    if _policy is not None:
+        _policy.allowed = True
+
+
+def is_allowed() -> bool:
+    """Whether building needs no consent."""
+    return _policy is None or _policy.allowed
+
+
+def agree(folder: Path) -> None:
+    """Record the consent to `folder`; where nothing can be written, it is asked for again."""
+    place = _place(folder)
+    with suppress(OSError):
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_text(f"{folder.resolve()}\n", encoding="utf-8")
+
+
+def expect(fmu: Path, folder: Path) -> None:
+    """Raise `UsageError` if an FMU may not be built of the modules in `folder`; consent is recorded."""
+    if _policy is None or _is_of_this_project(folder) or _place(folder).is_file():
+        return
+    what = f"building it runs the modules in {folder.resolve()}, which are not of this project"
+    if not (_policy.allowed or _policy.ask(f"{fmu} is missing or out of date; {what}. Build it?")):
+        raise UsageError(f"fmu = {fmu}: is missing or out of date; {what}: expected --build, once for this folder")
+    agree(folder)
+
+
+def _is_of_this_project(folder: Path) -> bool:
+    """Whether it is in the examples of the checkout that this package runs from."""
+    root = Path(ROOT)
+    return (root / "pyproject.toml").is_file() and folder.resolve().is_relative_to(root / "examples")
+
+
+def _place(folder: Path) -> Path:
+    import platformdirs
+
+    key = hashlib.sha256(str(folder.resolve()).encode("utf-8", "surrogateescape")).hexdigest()
+    return Path(platformdirs.user_cache_dir("quadcosim")) / "agreed" / key

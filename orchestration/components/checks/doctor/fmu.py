@@ -1,0 +1,183 @@
+"""The requirements of an .fmu file: from its description, its binaries, and the Python sources in it."""
+
+import io
+import math
+import posixpath
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+from fmu_kit import loader
+from orchestration.components.checks.doctor import sources
+from orchestration.components.checks.doctor.binaries import (
+    LINUX,
+    MACOS,
+    WINDOWS,
+    Binary,
+    UnreadableError,
+    combined,
+    origin_in,
+    read,
+)
+from orchestration.components.fmi.archive import DESCRIPTION, UnreadableFmuError, read_archive, read_root, version_of
+
+CO_SIMULATION = "CoSimulation"
+KINDS = {CO_SIMULATION: "co-simulation", "ModelExchange": "model exchange", "ScheduledExecution": "scheduled execution"}
+"""by the elements that declare them"""
+
+ARCHITECTURES = {
+    "x86": "x86",
+    "x86-64": "x86_64",
+    "arm": "aarch32",
+    "aarch64": "aarch64",
+    "riscv32": "riscv32",
+    "riscv64": "riscv64",
+    "ppc32": "ppc32",
+    "ppc64": "ppc64",
+}
+"""names in FMI 3.0 by the names of the doctor"""
+SYSTEMS = {LINUX: "linux", WINDOWS: "windows", MACOS: "darwin"}
+"""names in FMI 3.0 by the names of the doctor"""
+_TUPLES = {
+    f"{architecture}-{folder}": (system, (name,))
+    for name, architecture in ARCHITECTURES.items()
+    for system, folder in SYSTEMS.items()
+}
+PLATFORMS: Mapping[int, Mapping[str, tuple[str, tuple[str, ...]]]] = {
+    2: {
+        **{folder: machine for folder, machine in _TUPLES.items() if not folder.startswith("x86")},
+        "linux32": (LINUX, ("x86",)),
+        "linux64": (LINUX, ("x86-64",)),
+        "win32": (WINDOWS, ("x86",)),
+        "win64": (WINDOWS, ("x86-64",)),
+        "darwin32": (MACOS, ("x86",)),
+        "darwin64": (MACOS, ("x86-64", "aarch64")),
+    },
+    3: _TUPLES,
+}
+"""The folders that a version of FMI defines, and their machines.
+
+For processors other than x86, FMI 2.0 uses the names of FMI 3.0 (FMI 2.0.4, section 2.3).
+"""
+
+_SUFFIXES = {"linux": ".so", "win": ".dll", "darwin": ".dylib"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlatformBinary:
+    """The FMU's library for one platform."""
+
+    platform: str
+    """The folder in `binaries/`."""
+    binary: Binary | None = None
+    """None: it cannot be read, for the reason in `problem`."""
+    finds_python: bool = False
+    """Whether it is a loader of this project, which opens a libpython and then pythonfmu's library."""
+    bundled: frozenset[str] = frozenset()
+    """Dependencies inside the FMU, in folders that the loader searches."""
+    problem: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class InspectedFmu:
+    """The requirements of an FMU."""
+
+    path: Path
+    version: int
+    """2 or 3, of FMI"""
+    kinds: tuple[str, ...]
+    model_identifier: str
+    guid: str
+    """In FMI 3.0 the instantiation token."""
+    start_time: float
+    """[s]; of the default experiment, 0 if it has none"""
+    needs_tool: str | None
+    """The tool that must be installed, as the FMU declares (needsExecutionTool)."""
+    platforms: tuple[PlatformBinary, ...]
+    requires_python: str | None
+    """The version specifier that the description declares, if any."""
+    python: sources.PythonSources | None
+    """None if it is not made by pythonfmu."""
+
+
+def inspected(path: Path, size_limit: float = math.inf) -> InspectedFmu:
+    """The requirements of a file; raises `UnreadableFmuError` if it is no FMU, or unpacks to over `size_limit` MB."""
+    archive = read_archive(path, size_limit)
+    description = read_root(archive)
+    version = version_of(description)
+    kinds = tuple(kind for kind in KINDS if description.find(kind) is not None)
+    chosen = description.find(kinds[0]) if kinds else None
+    if chosen is None:
+        raise UnreadableFmuError(f"expected {' or '.join(list(KINDS)[:version])} in {DESCRIPTION}")
+    declared = description.find("VendorAnnotations/Tool[@name='quadcosim']/Python")
+    tool = description.get("generationTool", "the tool that made it")
+    return InspectedFmu(
+        path=path,
+        version=version,
+        kinds=kinds,
+        model_identifier=chosen.get("modelIdentifier", ""),
+        guid=description.get("guid" if version == 2 else "instantiationToken", ""),
+        start_time=_start_time(description),
+        needs_tool=tool if chosen.get("needsExecutionTool") in ("true", "1") else None,
+        platforms=_platforms(archive.files, version, chosen.get("modelIdentifier", "")),
+        requires_python=None if declared is None else declared.get("requires"),
+        python=sources.read(archive.files),
+    )
+
+
+def _start_time(description: Element) -> float:
+    experiment = description.find("DefaultExperiment")
+    try:
+        return float("0" if experiment is None else experiment.get("startTime", "0"))
+    except ValueError:  # reported by `validate`
+        return 0.0
+
+
+def _platforms(files: Mapping[str, bytes], version: int, identifier: str) -> tuple[PlatformBinary, ...]:
+    parts = [name.split("/") for name in files]
+    folders = sorted({part[1] for part in parts if part[0] == "binaries" and len(part) > 2 and part[2]})
+    return tuple(_platform(files, version, folder, identifier) for folder in folders if not _is_static(version, folder))
+
+
+def _is_static(version: int, folder: str) -> bool:
+    """Whether a folder of FMI 3.0 has static libraries: a compiler's name follows that of the system."""
+    return version == 3 and folder.count("-") > 1
+
+
+def _platform(files: Mapping[str, bytes], version: int, folder: str, identifier: str) -> PlatformBinary:
+    system_name = folder if version == 2 else folder.rpartition("-")[2]
+    suffixes = [suffix for system, suffix in _SUFFIXES.items() if system_name.startswith(system)] or _SUFFIXES.values()
+    expected = [f"binaries/{folder}/{identifier}{suffix}" for suffix in suffixes]
+    found = next((name for name in expected if name in files), None)
+    if found is None:
+        return PlatformBinary(platform=folder, problem=f"expected {' or '.join(expected)}")
+    try:
+        binary = read(io.BytesIO(files[found]))
+        finds_python = folder == posixpath.basename(loader.PLATFORM) and loader.BESIDE in files
+        if finds_python:
+            binary = combined(binary, read(io.BytesIO(files[loader.BESIDE])))
+    except UnreadableError as error:
+        return PlatformBinary(platform=folder, problem=f"{found}: {error}")
+    searched = {f"binaries/{folder}"} if binary.system == WINDOWS else set(_inside(binary, folder))
+    bundled = {name for name in binary.dependency_names for place in searched if f"{place}/{name}" in files}
+    problem = _mismatch(version, folder, binary)
+    return PlatformBinary(
+        platform=folder, binary=binary, finds_python=finds_python, bundled=frozenset(bundled), problem=problem
+    )
+
+
+def _inside(binary: Binary, folder: str) -> list[str]:
+    """Folders of the archive in which the loader searches for an ELF library."""
+    own = f"binaries/{folder}"
+    return [posixpath.normpath(origin_in(entry, own)) for entry in binary.run_path]
+
+
+def _mismatch(version: int, folder: str, binary: Binary) -> str | None:
+    """The problem of a binary whose header is for another machine than its folder; None: there is none."""
+    if folder not in PLATFORMS[version]:
+        return None
+    system, architectures = PLATFORMS[version][folder]
+    if binary.system == system and set(binary.architectures) <= set(architectures):
+        return None
+    return f"a binary for {binary.target}, expected {system}, {' or '.join(architectures)} in this folder"

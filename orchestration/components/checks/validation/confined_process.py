@@ -1,0 +1,89 @@
+"""The confined process, which alone touches the FMU.
+
+`python -m orchestration.components.checks.validation.confined_process FMU FOLDER SECONDS MB` unpacks the FMU in
+the folder, an empty one, and reports its findings (see `progress`).
+"""
+
+import sys
+from pathlib import Path
+
+import fmpy
+
+from orchestration.components.checks.validation import rules, run_rules
+from orchestration.components.checks.validation.archive_rules import can_be_unpacked
+from orchestration.components.checks.validation.description import standard
+from orchestration.components.checks.validation.fmu import Fmu
+from orchestration.components.checks.validation.instance import RefusedError
+from orchestration.components.checks.validation.own_description import own_description
+from orchestration.components.checks.validation.probe import Probe
+from orchestration.components.checks.validation.progress import Reporter
+from orchestration.components.checks.validation.reading import read_co_simulation, read_fmu
+from orchestration.components.fmi.archive import UnreadableFmuError, read_archive
+from orchestration.components.fmi.pythonfmu import expect_readable_place
+from orchestration.components.fmi.slaves import FOLDERS
+from orchestration.foundation.processes.channel import Parent
+from orchestration.foundation.processes.limits import Limits, restrict
+
+READABLE, PLATFORM = "readable", "platform"
+"""Rules of this module: the FMU is readable, and this machine can run it"""
+
+
+def main(path: str, folder: str, time: str, size: str) -> None:
+    """Try every rule that applies to the FMU; limits in [s] and [MB]."""
+    check(Path(path), Path(folder), Limits(time=float(time), size=float(size)), Reporter(Parent().send))
+
+
+def check(path: Path, folder: Path, limits: Limits, report: Reporter) -> None:
+    """Try every rule that applies to the FMU; raises an error of a rule itself."""
+    restrict(limits.size)
+    try:
+        fmu = check_description(path, limits.size, report)
+        if fmu is not None and can_be_unpacked(fmu.archive):
+            fmpy.extract(str(path), str(folder))
+            expect_readable_place(folder)
+            _run(Probe(fmu, folder, limits.time, report.beat), report)
+        report.end()
+    except Exception as error:
+        report.failed(error)
+        raise
+
+
+def check_description(path: Path, size_limit: float, report: Reporter) -> Fmu | None:
+    """Try the rules that need no instance; None if the FMU is unreadable."""
+    report.begin(READABLE)
+    try:
+        archive = read_archive(path, size_limit)
+        report.try_rules(rules.OF_ARCHIVES, archive, RefusedError)
+        root = read_co_simulation(archive)
+        report.try_rules((standard,), archive, RefusedError)
+        fmu = read_fmu(archive, root)
+    except UnreadableFmuError as error:
+        report.begin(READABLE)
+        report.finding(str(error))
+        return None
+    report.try_rules((*rules.OF_DESCRIPTIONS, *(rules.OUR_DESCRIPTIONS if fmu.is_ours else ())), fmu, RefusedError)
+    return fmu
+
+
+def _run(probe: Probe, report: Reporter) -> None:
+    fmu = probe.fmu
+    if fmu.is_ours:
+        report.try_rules((own_description,), probe, RefusedError)
+    here, platforms = FOLDERS[fmu.version], fmu.platforms
+    if not set(here) & set(platforms):
+        report.begin(PLATFORM)
+        missing = f"expected a binary for {' or '.join(here)}, found {', '.join(platforms) or 'none'}"
+        report.finding(f"the behaviour of the FMU was not checked: {missing}")
+        return
+    if any(report.try_rules([rule], probe, RefusedError) for rule in run_rules.FIRST):
+        return
+    report.try_rules(rules.OF_RUNS, probe, RefusedError)
+    if probe.repeats is None:
+        report.try_rules(rules.OF_EQUAL_RUNS, probe, RefusedError)
+    report.try_rules(rules.LAST_OF_RUNS, probe, RefusedError)
+    if fmu.is_ours:
+        report.try_rules(rules.OUR_RUNS, probe, RefusedError)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

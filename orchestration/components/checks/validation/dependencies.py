@@ -1,0 +1,171 @@
+"""Rules on declared dependencies: each input is moved, and the outputs that move with it are compared."""
+
+import contextlib
+import math
+from collections import defaultdict, deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+from orchestration.components.checks.validation.declared import Unknown, Variable
+from orchestration.components.checks.validation.excitation import ExcitationPlan
+from orchestration.components.checks.validation.fmu import Fmu
+from orchestration.components.checks.validation.instance import CheckedInstance, RefusedError, Row, Value, Values, same
+from orchestration.components.checks.validation.probe import Probe
+
+MOST_SWITCHES = 16
+"""Boolean parameters that are inverted, each with all inputs moved"""
+MOST_PARAMETERS = 200
+"""parameters that are moved, of an FMU with more"""
+MOST_REFUSED = 10
+"""moves that may be refused before the others are left out: each costs an instance"""
+_POINTS = (0, 3)
+"""communication points, in steps, at which the inputs are moved"""
+
+_FAR = tuple(sign * 10.0**k for k in range(5) for sign in (1.0, -1.0))
+"""moves of an input without effect when it is moved a little"""
+
+Moved = dict[str, set[str]]
+"""outputs that move, by the input that they move with; arrays count as one"""
+
+
+@dataclass(frozen=True)
+class Mode:
+    """Declared and observed dependencies of the outputs in a mode."""
+
+    where: str
+    declared: dict[str, set[str] | None]
+    """inputs by output; None: all"""
+    moved: Moved = field(default_factory=lambda: defaultdict(set))
+
+
+def undeclared_dependency(probe: Probe) -> Iterator[str]:
+    """No output moves with an input, nor at initialisation with a parameter, without a declared dependency."""
+    for mode in _modes(probe):
+        for name, outputs in mode.moved.items():
+            for output in sorted(outputs):
+                declared = mode.declared.get(output)
+                if declared is not None and name not in declared:
+                    yield f"{output} moves with {name} {mode.where}: expected {name} among its dependencies"
+
+
+def idle_dependency(probe: Probe) -> Iterator[str]:
+    """Rule of this project: an input with declared dependencies moves one of these outputs."""
+    if not probe.fmu.is_ours:
+        return
+    for mode in _modes(probe):
+        for v in probe.inputs:
+            declaring = {output for output, inputs in mode.declared.items() if inputs is not None and v.whole in inputs}
+            if declaring and not declaring & (mode.moved[v.whole] or _moving_far(probe, v)):
+                names = ", ".join(sorted(declaring))
+                yield f"{v.name} moves none of {names} {mode.where}: expected it not to be among their dependencies"
+
+
+def _modes(probe: Probe) -> Iterator[Mode]:
+    """The observations in initialisation mode and, of our FMUs, at communication points, in every configuration.
+
+    At a communication point FMI allows no reading between setting an input and the next step; FMUs of this project
+    support it nevertheless, as they declare.
+    """
+    initial = Mode("in initialisation mode", _declared(probe.fmu, probe.fmu.initial_unknowns))
+    later = Mode("at a communication point", _declared(probe.fmu, probe.fmu.outputs))
+    for values in _configurations(probe):
+        with contextlib.suppress(RefusedError):  # a refused configuration shows nothing
+            _move(probe, probe.inputs, values, None, initial.moved)
+            parameters = [v for v in _parameters(probe) if v.name not in values]
+            _move(probe, parameters, values, None, initial.moved, most_refused=MOST_REFUSED)
+            for steps in _POINTS if probe.fmu.is_ours else ():
+                _move(probe, probe.inputs, values, steps, later.moved)
+    yield initial
+    if probe.fmu.is_ours:
+        yield later
+
+
+def _configurations(probe: Probe) -> Iterator[dict[str, Value]]:
+    """Inputs a little away from their starts; and with these each Boolean parameter inverted."""
+    inputs = probe.inputs_at(0)
+    yield inputs
+    switches = [v for v in probe.elements_of("parameter") if v.kind == "Boolean"]
+    for v in switches[:MOST_SWITCHES]:
+        yield {**inputs, v.name: not v.start_value}
+
+
+def _parameters(probe: Probe) -> list[Variable]:
+    """Parameters that may be set in initialisation mode and moved a little; a text may be a path, which cannot."""
+    found = [v for v in probe.elements_of("parameter") if v.initial == "exact" and v.kind not in ("String", "Binary")]
+    return found[:MOST_PARAMETERS]
+
+
+def _move(
+    probe: Probe,
+    variables: Iterable[Variable],
+    values: Values,
+    steps: int | None,
+    moved: Moved,
+    most_refused: float = math.inf,
+) -> None:
+    """Move each variable a little, one after another, and note what moves with it.
+
+    After `steps` steps; None: in initialisation mode. A value that is refused shows nothing, and ends its instance.
+    """
+    waiting, refused = deque(variables), -1
+    while waiting and refused < most_refused:
+        refused += 1
+        with probe.instance() as instance:
+            _prepare(probe, instance, values, steps)
+            before = instance.get(probe.outputs)
+            with contextlib.suppress(RefusedError):
+                while waiting:
+                    v = waiting.popleft()
+                    moved[v.whole] |= _moving(probe, instance, v, before)
+
+
+def _moving(probe: Probe, instance: CheckedInstance, v: Variable, before: Row) -> set[str]:
+    """The outputs that move with a variable, which is then reset."""
+    value, *near = probe.around(v)
+    outputs = set()
+    for other in near:
+        instance.set({v.name: other})
+        outputs |= _changed(probe, before, instance.get(probe.outputs))
+    instance.set({v.name: value})
+    return outputs
+
+
+def _moving_far(probe: Probe, v: Variable) -> set[str]:
+    """The outputs that move in initialisation mode with a Real input that is moved far: a switch has a threshold."""
+    outputs: set[str] = set()
+    for move in _FAR if v.kind == "Real" else ():
+        with probe.instance() as instance, contextlib.suppress(RefusedError):
+            values = probe.inputs_at(0)
+            instance.begin(values, probe.start)
+            before = instance.get(probe.outputs)
+            instance.set({v.name: float(values[v.name]) + move})
+            outputs |= _changed(probe, before, instance.get(probe.outputs))
+    return outputs
+
+
+def _changed(probe: Probe, before: Row, after: Row) -> set[str]:
+    """The outputs that have changed; an array has if any of its elements has."""
+    return {v.whole for v in probe.outputs if not same(before[v.name], after[v.name])}
+
+
+def _prepare(probe: Probe, instance: CheckedInstance, values: Values, steps: int | None) -> None:
+    if steps is None:
+        instance.begin(values, probe.start)
+        return
+    instance.initialise(values, probe.start)
+    for t, h in probe.points(ExcitationPlan(steps=steps))[:steps]:
+        instance.step(t, h)
+
+
+def _declared(fmu: Fmu, unknowns: Iterable[Unknown]) -> dict[str, set[str] | None]:
+    declared: dict[str, set[str] | None] = {}
+    for unknown in unknowns:
+        output = fmu.variable(unknown.handle)
+        if output is not None and output.causality == "output":
+            listed = unknown.dependencies
+            known = None if listed is None else {v.name for v in map(fmu.variable, listed) if v is not None}
+            declared[output.name] = known
+    return declared
+
+
+RULES = (undeclared_dependency, idle_dependency)

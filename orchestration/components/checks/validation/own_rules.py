@@ -1,0 +1,113 @@
+"""Rules of this project, beyond the standard, for FMUs that quadcosim built."""
+
+import datetime
+from collections.abc import Iterator
+
+from fmu_kit.archive import ICONS, NATIVE_TABLES, content_guid
+from fmu_kit.loader import GUID_FILE
+from orchestration.components.building.models import MODELS
+from orchestration.components.checks.validation.declared import Variable
+from orchestration.components.checks.validation.fmu import Fmu
+from orchestration.components.checks.validation.roles import ROLES
+from orchestration.components.checks.validation.units import base_units, dimensions
+
+PAGE = "documentation/index.html"
+_PNG = b"\x89PNG\r\n\x1a\n"
+_DATE = "%Y-%m-%dT%H:%M:%SZ"
+
+
+def guid_of_content(fmu: Fmu) -> Iterator[str]:
+    """The GUID is a hash of the content of all files."""
+    expected = content_guid(dict(fmu.archive.files))
+    if fmu.guid != expected:
+        yield f"{fmu.standard.token} = {fmu.guid}: expected {expected}, that of the content"
+    if NATIVE_TABLES in fmu.archive.files:
+        return
+    known = fmu.archive.files.get(GUID_FILE, b"").decode(errors="replace")
+    if known != fmu.guid:
+        yield f"{GUID_FILE} = {known}: expected {fmu.guid}, the guid"
+
+
+def date(fmu: Fmu) -> Iterator[str]:
+    """The date is in UTC, as the text of FMI requires; the schema allows any time."""
+    text = fmu.root.get("generationDateAndTime", "none")
+    try:
+        sound = datetime.datetime.strptime(text, _DATE).strftime(_DATE) == text
+    except ValueError:
+        sound = False
+    if not sound:
+        yield f"generationDateAndTime = {text}: expected the form 2009-12-08T14:33:22Z"
+
+
+def execution_tool(fmu: Fmu) -> Iterator[str]:
+    """No tool is required: some masters refuse such an FMU."""
+    if fmu.can("needsExecutionTool"):
+        yield "needsExecutionTool = true: expected false"
+
+
+def value_references(fmu: Fmu) -> Iterator[str]:
+    """A value reference is the place in the list: unique, and the same for every build of the same sources."""
+    for v in fmu.variables:
+        if v.reference != v.place - 1:
+            yield f"{v.name}: valueReference = {v.reference}, expected {v.place - 1}, its place in the list"
+
+
+def start_text(fmu: Fmu) -> Iterator[str]:
+    """A start is the shortest text for its bits, so that two builds cannot differ in it."""
+    for v in fmu.variables:
+        for start in v.starts if v.kind == "Real" else ():
+            if start != repr(float(start)):
+                yield f"{v.name}: start = {start}, expected {float(start)!r}, the shortest text for the same bits"
+
+
+def units(fmu: Fmu) -> Iterator[str]:
+    """Every Real has a unit, and every unit a definition by SI base units and a corresponding name."""
+    used = {v.unit for v in fmu.variables if v.unit is not None}
+    for v in fmu.variables:
+        if v.kind == "Real" and v.unit is None and v.causality != "independent":  # which is in seconds without one
+            yield f"{v.name}: expected a unit, found none"
+    for name, base in base_units(fmu).items():
+        if base is None:
+            yield f"unit {name}: expected its base units, found none"
+        if dimensions(name) is None:
+            yield f"unit {name}: expected a name made of SI symbols, as N.m.s or m/s3"
+        if name not in used:
+            yield f"unit {name}: expected a variable that has it, found none"
+
+
+def documentation(fmu: Fmu) -> Iterator[str]:
+    """The FMU has a documentation page, and a model of this project its icon."""
+    files = fmu.archive.files
+    if not files.get(PAGE, b"").strip():
+        yield f"{PAGE}: expected a page, found {'an empty file' if PAGE in files else 'none'}"
+    icon = ICONS[fmu.version]
+    if fmu.root.get("modelName") in MODELS and not files.get(icon, b"").startswith(_PNG):
+        yield f"{icon}: expected an icon in PNG, found {'another file' if icon in files else 'none'}"
+
+
+def ports(fmu: Fmu) -> Iterator[str]:
+    """A controller or plant has all variables to be connected, with the names and units of the wiring."""
+    outputs, by_name = {v.name for v in fmu.of_causality("output")}, {v.name: v for v in fmu.variables}
+    role = next((role for role in ROLES if outputs.intersection(role.identified_by)), None)
+    if role is None:
+        return
+    is_complete = not by_name.keys().isdisjoint(role.complete_by)
+    for port in (*role.ports, *role.optional):
+        expected = _described(port.kind, port.causality, port.unit)
+        if port.name not in by_name:
+            if port in role.optional and not is_complete:
+                continue
+            yield f"{port.name}: expected {expected}, found none"
+        elif (found := _as_port(by_name[port.name])) != expected:
+            yield f"{port.name}: expected {expected}, found {found}"
+
+
+def _as_port(v: Variable) -> str:
+    return _described(v.kind, v.causality, v.unit)
+
+
+def _described(kind: str, causality: str, unit: str | None) -> str:
+    return f"{kind} {causality}" + (f" in {unit}" if unit is not None else "")
+
+
+RULES = (guid_of_content, date, execution_tool, value_references, start_text, units, documentation, ports)

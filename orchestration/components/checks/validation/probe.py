@@ -1,0 +1,221 @@
+"""Instances and runs of an FMU under validation."""
+
+import functools
+import itertools
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from orchestration.components.checks.validation.declared import Variable
+from orchestration.components.checks.validation.excitation import (
+    PLAIN,
+    STEPS,
+    UNEVEN,
+    ExcitationPlan,
+    around,
+    inputs_at,
+    moved,
+)
+from orchestration.components.checks.validation.fmu import Fmu
+from orchestration.components.checks.validation.instance import CheckedInstance, RefusedError, Row, Value, instance_of
+from orchestration.components.checks.validation.run_comparison import deviations, difference
+from orchestration.components.fmi.messages import Message
+from orchestration.foundation.processes.waiting import own_clock
+
+FEWEST = 3
+"""steps of a run of an FMU, however slow it is"""
+SHARE = 0.02
+"""of the time for an FMU that one run may take; a slow FMU gets fewer steps"""
+MOST_WATCHED = 1000
+"""variables that are compared between runs, of an FMU with more"""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class FirstRun:
+    """The first run at start values."""
+
+    steps: int
+    is_complete: bool
+    """whether it did all intended steps"""
+    seconds: float
+    messages: tuple[Message, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Probe:
+    """An FMU and the folder that it is unpacked in."""
+
+    fmu: Fmu
+    folder: Path
+    budget: float
+    """[s] for the whole validation"""
+    beat: Callable[[], None] = lambda: None
+    """called when a call of the FMU begins or returns"""
+    _numbers: Iterator[int] = field(default_factory=itertools.count)
+
+    def instance(self) -> CheckedInstance:
+        """A fresh instance with a unique name."""
+        return instance_of(self.fmu, self.folder, f"{self.fmu.model_identifier} {next(self._numbers)}", self.beat)
+
+    # -- time -----------------------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def start(self) -> float:
+        """Start time of the default experiment, in seconds."""
+        return self.fmu.experiment.get("startTime", 0.0)
+
+    @functools.cached_property
+    def step(self) -> float:
+        """Communication step of the default experiment, in seconds; if it has none, the internal step of the FMU.
+
+        Without either a hundredth of the experiment, or 10 ms.
+        """
+        experiment = self.fmu.experiment
+        share = (experiment.get("stopTime", self.start + 1.0) - self.start) / STEPS
+        step = experiment.get("stepSize", self.fmu.fixed_step or share)
+        return step if math.isfinite(step) and step > 0.0 else 0.01
+
+    def points(self, plan: ExcitationPlan) -> list[tuple[float, float]]:
+        """Communication point and step size of each step, up to the end of the default experiment.
+
+        Times are not accumulated. No more steps than there is time for.
+        """
+        return self._points(plan)[: self.first.steps]
+
+    def _points(self, plan: ExcitationPlan) -> list[tuple[float, float]]:
+        shares = UNEVEN if plan.uneven else (1.0,)
+        stop = self.fmu.experiment.get("stopTime", math.inf) + 1e-6 * self.step
+        points: list[tuple[float, float]] = []
+        for k in range(plan.steps):
+            done = k // len(shares) * math.fsum(shares) + math.fsum(shares[: k % len(shares)])
+            t, h = self.start + done * self.step, shares[k % len(shares)] * self.step
+            if t + h <= stop or not points:
+                points.append((t, h))
+        return points
+
+    # -- values ---------------------------------------------------------------------------------------------
+
+    def elements_of(self, causality: str) -> tuple[Variable, ...]:
+        """Scalars and elements of arrays of this causality."""
+        return tuple(v for v in self.fmu.elements if v.causality == causality)
+
+    @functools.cached_property
+    def inputs(self) -> tuple[Variable, ...]:
+        """All inputs."""
+        return self.elements_of("input")
+
+    @functools.cached_property
+    def outputs(self) -> tuple[Variable, ...]:
+        """All outputs."""
+        return self.elements_of("output")
+
+    @functools.cached_property
+    def general_parameters(self) -> dict[str, Value]:
+        """Real parameters a little away from their starts.
+
+        At its defaults a model may leave out parts: a lag of time constant zero has no state to lose.
+        """
+        return {v.name: moved(v) for v in self.elements_of("parameter") if v.kind == "Real" and v.start}
+
+    def inputs_at(self, k: int) -> dict[str, Value]:
+        """As `excitation.inputs_at`."""
+        return inputs_at(self.inputs, k)
+
+    def around(self, v: Variable) -> list[Value]:
+        """As `excitation.around`, for an input about its value at step 0."""
+        return around(v, self.inputs_at(0))
+
+    @functools.cached_property
+    def watched(self) -> tuple[Variable, ...]:
+        """Variables that are compared between runs: all, or of very many the outputs and some of the others."""
+        every = self.fmu.elements
+        if len(every) <= MOST_WATCHED or self.fmu.is_ours:
+            return every
+        some = every[:: math.ceil(len(every) / MOST_WATCHED)]
+        return tuple({v.name: v for v in (*self.outputs[:MOST_WATCHED], *some)}.values())
+
+    # -- runs -----------------------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def first(self) -> FirstRun:
+        """The first run, which determines the number of steps for the others; raises `RefusedError`."""
+        started = own_clock()
+        points = self._points(PLAIN)
+        with self.instance() as instance:
+            self.begin(instance, PLAIN)
+            done, goes_on = 0, True
+            for t, h in points:
+                if done >= FEWEST and own_clock() - started > SHARE * self.budget:
+                    break
+                goes_on = instance.step(t, h)
+                done += 1
+                if not goes_on:
+                    break
+            instance.terminate()
+            return FirstRun(
+                steps=max(done, 1) if done < len(points) and goes_on else STEPS,
+                is_complete=done == len(points) or not goes_on,
+                seconds=own_clock() - started,
+                messages=tuple(instance.messages),
+            )
+
+    def begin(self, instance: CheckedInstance, plan: ExcitationPlan) -> None:
+        """Initialise an instance."""
+        instance.initialise({**plan.parameters, **(self.inputs_at(0) if plan.moving else {})}, self.start)
+
+    def run_steps(
+        self, instance: CheckedInstance, plan: ExcitationPlan, first: int = 0, last: int | None = None
+    ) -> list[Row]:
+        """Do the steps `first` to before `last`; the watched variables after each of them."""
+        rows = []
+        for k, (t, h) in list(enumerate(self.points(plan)))[first:last]:
+            for _ in range(plan.times_set if plan.moving else 0):
+                instance.set(self.inputs_at(k))
+            if not instance.step(t, h):
+                break
+            rows.append(instance.get(self.watched))
+        return rows
+
+    def run(self, plan: ExcitationPlan) -> list[Row]:
+        """A complete run of a fresh instance."""
+        with self.instance() as instance:
+            self.begin(instance, plan)
+            return self.run_steps(instance, plan)
+
+    @functools.cached_property
+    def full_plan(self) -> ExcitationPlan:
+        """Parameters near their starts, moving inputs, and uneven steps if the FMU declares that it takes them."""
+        uneven = self.fmu.can("canHandleVariableCommunicationStepSize")
+        return ExcitationPlan(parameters=self.general_parameters, moving=True, uneven=uneven, steps=40)
+
+    @functools.cached_property
+    def _general_run(self) -> tuple[ExcitationPlan, list[Row]]:
+        plan = self.full_plan
+        at_starts = replace(plan, parameters={})
+        for candidate in (plan, at_starts, replace(at_starts, uneven=False), replace(at_starts, moving=False)):
+            try:
+                return candidate, self.run(candidate)
+            except RefusedError:
+                continue
+        plain = ExcitationPlan(steps=plan.steps)
+        return plain, self.run(plain)
+
+    @property
+    def general_plan(self) -> ExcitationPlan:
+        """As much of `full_plan` as the FMU accepts; it need not accept all."""
+        return self._general_run[0]
+
+    @property
+    def expected_rows(self) -> list[Row]:
+        """The rows of a run of one instance by `general_plan`."""
+        return self._general_run[1]
+
+    @functools.cached_property
+    def repeats(self) -> str | None:
+        """The difference of an equal run of another fresh instance to the first; None if there is none."""
+        return difference(self.run(self.general_plan), self.expected_rows)
+
+    def deviations(self, found: list[Row], expected: list[Row], text: str) -> Iterator[str]:
+        """As `run_comparison.deviations`."""
+        return deviations(found, expected, text, is_ours=self.fmu.is_ours)

@@ -1,0 +1,107 @@
+"""The report of the confined process to the one that waits for it: findings as they come, and returning calls."""
+
+import time
+from collections.abc import Callable, Iterable
+from itertools import islice
+from typing import Any
+
+from orchestration.components.checks.validation.finding import Finding, Note, Rule, Subject, name_of
+from orchestration.foundation.basics.errors import QuadcosimError
+
+MOST = 100
+"""Findings of one rule that are listed"""
+LONGEST = 1000
+"""Characters of the text of a finding"""
+_BEAT = 0.02
+"""[s] between two beats, at least"""
+Frame = tuple[Any, ...]
+"""The name of a method of `ReceivedReport` without its underscore, and its arguments"""
+
+
+class Reporter:
+    """Sends the beginning of each rule, findings and the end as they occur: of use however far the process gets."""
+
+    def __init__(self, send: Callable[[Frame], None]) -> None:
+        self._send = send
+        self._next = 0.0
+
+    def begin(self, rule: str) -> None:
+        """A rule begins."""
+        self._send(("begin", rule))
+
+    def beat(self) -> None:
+        """A call of the FMU begins or has returned."""
+        now = time.monotonic()
+        if now >= self._next:
+            self._next = now + _BEAT
+            self._send(("beat",))
+
+    def finding(self, text: str) -> None:
+        """The rule has a finding."""
+        whole = text if len(text) <= LONGEST else f"{text[:LONGEST]} ..."
+        self._send(("finding", whole, isinstance(text, Note)))
+
+    def failed(self, error: Exception) -> None:
+        """The validation itself fails."""
+        self._send(("failed", f"{type(error).__name__}: {error}"))
+
+    def end(self) -> None:
+        """All rules have been tried."""
+        self._send(("end",))
+
+    def try_rules(self, chosen: Iterable[Rule[Subject]], subject: Subject, refusal: type[QuadcosimError]) -> int:
+        """Try rules; the number of problems that they find. A `refusal` raised by one counts, too."""
+        count = 0
+        for rule in chosen:
+            self.begin(name_of(rule))
+            count += self._try(rule, subject, refusal)
+        return count
+
+    def _try(self, rule: Callable[[Subject], Iterable[str]], subject: Subject, refusal: type[QuadcosimError]) -> int:
+        count = 0
+        try:
+            texts = iter(rule(subject))
+            for text in islice(texts, MOST):
+                self.finding(text)
+                count += not isinstance(text, Note)
+            if next(texts, None) is not None:
+                self.finding(Note(f"there are more; {MOST} are listed"))
+        except refusal as error:
+            self.finding(str(error))
+            count += 1
+        return count
+
+
+class ReceivedReport:
+    """The content of a report, as received."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        """`clock`: seconds of the process's own time."""
+        self.findings: list[Finding] = []
+        self.rule: str | None = None
+        """the one begun last"""
+        self.ended = False
+        self.error: str | None = None
+        self.last_beat: float | None = None
+        """when a call of the FMU last began or returned, by the clock; None if there was none"""
+        self._clock = clock
+
+    def receive(self, frame: Frame) -> None:
+        """The next frame."""
+        name, *content = frame
+        getattr(self, f"_{name}")(*content)
+
+    def _begin(self, rule: str) -> None:
+        self.rule = rule
+
+    def _beat(self) -> None:
+        self.last_beat = self._clock()
+
+    def _finding(self, text: str, note: bool) -> None:
+        self.findings.append(Finding(str(self.rule), text, note=note))
+
+    def _failed(self, error: str) -> None:
+        self.error = error
+
+    def _end(self) -> None:
+        self.ended = True

@@ -1,0 +1,39 @@
+"""All rules, by their subject and the FMUs that they apply to."""
+
+from orchestration.components.checks.validation import (
+    archive_rules,
+    dependencies,
+    description,
+    own_rules,
+    refusals,
+    run_rules,
+    structure,
+    units,
+    variables,
+)
+from orchestration.components.checks.validation.own_description import own_description
+
+OF_ARCHIVES = archive_rules.RULES
+OF_DESCRIPTIONS = (*description.RULES, *variables.RULES, *units.RULES, *structure.RULES)
+OF_RUNS = run_rules.RULES
+"""After `run_rules.FIRST`, on which they rely."""
+OF_EQUAL_RUNS = (*run_rules.COMPARED, *dependencies.RULES)
+"""For FMUs whose runs can be repeated."""
+LAST_OF_RUNS = run_rules.LAST
+"""Only rules of this project come after."""
+
+OUR_DESCRIPTIONS = own_rules.RULES
+OUR_RUNS = refusals.RULES
+
+STANDARD = (
+    *OF_ARCHIVES,
+    description.standard,
+    *OF_DESCRIPTIONS,
+    *run_rules.FIRST,
+    *OF_RUNS,
+    *OF_EQUAL_RUNS,
+    *LAST_OF_RUNS,
+)
+"""For every FMU."""
+OURS = (*OUR_DESCRIPTIONS, own_description, *OUR_RUNS)
+"""For those that quadcosim built."""

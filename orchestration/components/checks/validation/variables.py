@@ -1,0 +1,102 @@
+"""Rules on variables: their names, their bounds, and those that share a value reference."""
+
+import math
+import re
+from collections import defaultdict
+from collections.abc import Iterator
+
+from orchestration.components.checks.validation.declared import NUMBERS, Variable
+from orchestration.components.checks.validation.fmu import Fmu
+
+_QUOTED = r"""'(?:[0-9A-Za-z_!#$%&()*+,\-./:;<>=?@\[\]^{}|~ ]|\\['"?\\abfnrtv])+'"""
+_PART = rf"(?:[A-Za-z_][0-9A-Za-z_]*|{_QUOTED})(?:\[[0-9]+(?:,[0-9]+)*\])?"
+_IDENTIFIER = rf"{_PART}(?:\.{_PART})*"
+_NAMES = {
+    "structured": re.compile(rf"{_IDENTIFIER}|der\({_IDENTIFIER}(?:,[0-9]+)?\)"),
+    "flat": re.compile(r"[^\r\n\t]+"),
+}
+"""valid names by convention"""
+
+
+def names(fmu: Fmu) -> Iterator[str]:
+    """Names follow the convention that the FMU declares (FMI 2.0.4, section 2.2.9; FMI 3.0, section 2.4.7)."""
+    convention = fmu.root.get("variableNamingConvention", "flat")
+    legal = _NAMES.get(convention, _NAMES["flat"])  # any other one violates the schema
+    for v in fmu.variables:
+        for name in (v.name, *v.further_names):
+            if not legal.fullmatch(name):
+                yield f"{name!r}: expected a name by the convention {convention}"
+
+
+def bounds(fmu: Fmu) -> Iterator[str]:
+    """min, start and max are in this order."""
+    for v in fmu.variables:
+        if v.kind not in NUMBERS:
+            continue
+        low, high = limits(v)
+        if not low <= high:
+            yield f"{v.name}: min = {v.minimum} is above max = {v.maximum}"
+        for start in v.starts:
+            if v.kind == "Real" and not math.isfinite(float(start)):
+                yield f"{v.name}: start = {start}, expected a finite value"
+            if float(start) < low:
+                yield f"{v.name}: start = {start}, expected at least min = {v.minimum}"
+            if float(start) > high:
+                yield f"{v.name}: start = {start}, expected at most max = {v.maximum}"
+
+
+def limits(variable: Variable) -> tuple[float, float]:
+    """The smallest and the largest declared value of a variable."""
+    low = -math.inf if variable.minimum is None else float(variable.minimum)
+    return low, math.inf if variable.maximum is None else float(variable.maximum)
+
+
+def arrays(fmu: Fmu) -> Iterator[str]:
+    """An array has dimensions above 0 and a start for all of it, or one for each element (FMI 3.0, section 2.4.7)."""
+    for v in fmu.variables:
+        count = 1 if v.shape is None else math.prod(v.shape)
+        if len(v.starts) not in (0, 1, count):
+            yield f"{v.name}: it starts with {len(v.starts)} values, expected {'1' if count == 1 else f'1 or {count}'}"
+        if v.shape is not None and v.causality == "structuralParameter":
+            yield f"{v.name}: a structural parameter with dimensions, expected a scalar"
+        if not all(n > 0 for n in v.shape or ()):
+            yield f"{v.name}: dimensions {', '.join(map(str, v.shape or ()))}, expected each above 0"
+        for size in filter(None, map(fmu.variable, v.others.get("dimension", ()))):
+            if size.type != "UInt64" or not (size.causality == "structuralParameter" or size.variability == "constant"):
+                found = f"a {size.variability} {size.causality} of {size.type}"
+                yield f"{v.name}: its dimension is {size.name}, {found}: expected a structural or constant UInt64"
+
+
+def aliases(fmu: Fmu) -> Iterator[str]:
+    """Variables with one value reference are one value under several names (FMI 2.0.4, section 2.2.7).
+
+    FMI 3.0 counts references over all types, and has its aliases inside of their variable (section 2.4.7).
+    """
+    sets: dict[tuple[str, int], list[Variable]] = defaultdict(list)
+    for v in fmu.variables:
+        sets["" if fmu.version > 2 else fmu.standard.access[v.type], v.reference].append(v)
+    for (_, reference), members in sets.items():
+        if len(members) > 1:
+            names = ", ".join(v.name for v in members)
+            wrong = ["FMI 3.0 has one for each variable"] if fmu.version > 2 else _alias_problems(members)
+            for problem in wrong:
+                yield f"{names}: value reference {reference} for all of them, but {problem}"
+
+
+def _alias_problems(members: list[Variable]) -> Iterator[str]:
+    constants = [v for v in members if v.variability == "constant"]
+    if constants:
+        if len(constants) < len(members):
+            yield "only some are constants"
+        elif len({v.start for v in members}) > 1:
+            yield "the constants have different starts"
+        return
+    if sum(v.causality in ("input", "parameter", "independent") for v in members) > 1:
+        yield "more than one of them is set from outside"
+    elif sum(v.start is not None for v in members) > 1:
+        yield "more than one of them has a start"
+    if len({v.unit for v in members}) > 1:
+        yield f"their units are {', '.join(str(v.unit) for v in members)}"
+
+
+RULES = (names, bounds, arrays, aliases)

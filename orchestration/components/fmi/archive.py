@@ -1,0 +1,115 @@
+"""The archive of an FMU, opened once for all checks, and its model description."""
+
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+from orchestration.foundation.basics.errors import QuadcosimError, UsageError
+
+DESCRIPTION = "modelDescription.xml"
+LARGEST, DENSEST = 1000.0, 20.0
+"""An FMU that unpacks to more MB than this, and to more than this many times its size, is not run"""
+
+
+class UnreadableFmuError(QuadcosimError):
+    """The file is too damaged to be checked; the text, without its path, states what was expected."""
+
+
+class OtherVersionError(UnreadableFmuError):
+    """It is an FMU of a version of FMI that is not supported."""
+
+
+VERSIONS = {"2.0": 2, "3.0": 3}
+"""Supported versions of FMI, as model descriptions write them"""
+
+
+@dataclass(frozen=True, slots=True)
+class Archive:
+    """The content of an .fmu file."""
+
+    path: Path
+    entries: tuple[zipfile.ZipInfo, ...]
+    """As listed in the archive; a name may occur more than once"""
+    files: Mapping[str, bytes]
+    """Content by name"""
+
+
+class _Files(Mapping[str, bytes]):
+    """The files of an archive, each read on access: together they may be larger than the memory."""
+
+    def __init__(self, archive: zipfile.ZipFile) -> None:
+        self._archive = archive
+        self._names = dict.fromkeys(archive.namelist())
+
+    def __getitem__(self, name: str) -> bytes:
+        if name not in self._names:
+            raise KeyError(name)
+        return self._archive.read(name)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._names
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+
+def read_archive(path: Path, size_limit: float) -> Archive:
+    """Open an archive after checking that it is intact; it stays open.
+
+    Raises `UnreadableFmuError` if it is no archive, is damaged, unpacks to more than `size_limit` MB, or has no model
+    description.
+    """
+    if not path.is_file():
+        raise UnreadableFmuError("no such file")
+    try:
+        archive = zipfile.ZipFile(path)
+        size = sum(entry.file_size for entry in archive.infolist()) / 1e6
+        if size > size_limit:
+            raise UnreadableFmuError(f"unpacks to {size:.0f} MB: expected at most {size_limit:g} MB (--size-limit)")
+        damaged = archive.testzip()
+    except (zipfile.BadZipFile, zlib.error, OSError, EOFError, RuntimeError, ValueError) as error:
+        raise UnreadableFmuError(f"expected a zip archive that is whole: {error}") from error
+    if damaged is not None:
+        raise UnreadableFmuError(f"expected a zip archive that is whole: wrong CRC or header of {damaged}")
+    files = _Files(archive)
+    if DESCRIPTION not in files:
+        raise UnreadableFmuError(f"expected an FMU, with {DESCRIPTION} at the top of the archive")
+    return Archive(path, tuple(archive.infolist()), files)
+
+
+def expect_honest_size(path: Path) -> None:
+    """Raise `UsageError` for an archive that would fill the disk (a zip bomb), by the sizes that it declares."""
+    with zipfile.ZipFile(path) as archive:
+        unpacked = sum(entry.file_size for entry in archive.infolist())  # zipfile unpacks no more than that
+    times = unpacked / path.stat().st_size
+    if unpacked > LARGEST * 1e6 and times > DENSEST:
+        raise UsageError(
+            f"{path}: unpacks to {unpacked / 1e6:.0f} MB, {times:.0f} times its size: expected at most {LARGEST:g} MB, "
+            f"or {DENSEST:g} times its size"
+        )
+
+
+def read_root(archive: Archive) -> Element:
+    """The model description; raises `UnreadableFmuError` for no XML, `OtherVersionError` for an unsupported version."""
+    try:
+        root = ElementTree.fromstring(archive.files[DESCRIPTION])
+    except ElementTree.ParseError as error:
+        raise UnreadableFmuError(f"{DESCRIPTION}: expected well-formed XML: {error}") from error
+    version = root.get("fmiVersion")
+    if version not in VERSIONS:
+        raise OtherVersionError(
+            f"fmiVersion = {version}: expected {' or '.join(VERSIONS)}; an FMU of FMI {version} is not checked here"
+        )
+    return root
+
+
+def version_of(root: Element) -> int:
+    """The version of FMI of a model description: 2 or 3."""
+    return VERSIONS[root.get("fmiVersion", "")]

@@ -1,0 +1,64 @@
+"""An instance of an FMI 3.0 FMU for co-simulation: scalars and arrays of numbers; no clocks, no event mode."""
+
+import ctypes
+from typing import Any, ClassVar
+
+import numpy as np
+from fmpy import fmi3
+
+from orchestration.components.fmi.messages import WARNING
+from orchestration.components.fmi.native import NativeInstance
+from orchestration.components.fmi.values import INTEGERS
+from orchestration.foundation.basics.errors import SimulatorError, UsageError
+
+
+class Fmi3Instance(NativeInstance):
+    """See `NativeInstance`."""
+
+    stored: ClassVar = {
+        **INTEGERS,
+        "Float64": np.float64,
+        "Float32": np.float32,
+        "Boolean": np.bool_,
+        "Enumeration": np.int64,
+    }
+    counts_values = True
+    state_calls = ("getFMUState", "serializeFMUState", "freeFMUState", "deserializeFMUState", "setFMUState")
+
+    def _expect_supported(self) -> None:
+        if self.model.version != 3:
+            raise UsageError(f"{self.path}: FMI {self.description.fmiVersion}; expected FMI 3.0 for co-simulation")
+        clocks = [v.name for v in self.variables.values() if v.kind == "Clock"]
+        if clocks:
+            raise UsageError(f"{self.path}: has clocks, which are not supported: {', '.join(clocks)}; expected none")
+
+    def _load_step(self, library: Any) -> None:
+        self._do_step = self.guarded(library.fmi3DoStep)
+        self._event, self._ends, self._early = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool()
+        self._reached = ctypes.c_double()
+        self.step_outputs = (self._event, self._ends, self._early, self._reached)
+        self._step_arguments = [ctypes.byref(x) for x in self.step_outputs]
+
+    def _enter(self, start: float, stop: float | None) -> None:
+        self._call("enterInitializationMode", tolerance=self._tolerance, startTime=start, stopTime=stop)
+
+    def step(self, t: float, h: float) -> None:
+        """Advance from `t` to `t + h` seconds."""
+        status = self._do_step(self._component, t, h, True, *self._step_arguments)
+        if status > WARNING or self._event or self._ends or self._early:
+            raise self.step_error(status, t + h)
+        if self._messages:
+            self.collect_warnings()
+
+    def step_error(self, status: int, end: float) -> SimulatorError:
+        """As `NativeInstance`."""
+        if status > fmi3.fmi3Discard:
+            return self.failure("fmi3DoStep", status)
+        reached = self._reached.value
+        if self._ends or status == fmi3.fmi3Discard:
+            return self._stopped_step("fmi3DoStep", end, reached=reached, ends=self._ends.value)
+        what = "asks for event mode" if self._event else "returns early"
+        return self.failure("fmi3DoStep", status, f"the FMU {what} at {reached:g} s, before {end:g} s")
+
+    def _access(self, action: str, type: str) -> str:
+        return f"fmi3{action}{'Int64' if type == 'Enumeration' else type}"

@@ -1,0 +1,73 @@
+"""The process of an isolated instance: `python -m orchestration.components.fmi.isolated_process FMU NAME` obeys."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orchestration.components.fmi.instances import open_here
+from orchestration.components.fmi.isolated import Command
+from orchestration.components.fmi.native import NativeInstance
+from orchestration.foundation.basics.simulator import Floats, Transfer
+from orchestration.foundation.processes.channel import Parent, picklable
+
+
+class _Server:
+    """The instance and the arrays of its transfers."""
+
+    def __init__(self, path: Path, name: str) -> None:
+        self.instance: NativeInstance | None = None
+        self._path, self._name = path, name
+        self._readers: list[tuple[Transfer, Floats]] = []
+        self._writers: list[tuple[Transfer, Floats]] = []
+
+    def execute(self, commands: list[Command]) -> Any:
+        """The result of the last command."""
+        if self.instance is None:
+            self.instance = open_here(self._path, self._name)
+        result = None
+        for name, *arguments in commands:
+            local: Callable[..., Any] | None = getattr(self, f"_{name}", None)
+            result = (local or getattr(self.instance, name))(*arguments)
+        return result
+
+    def _reader(self, names: tuple[str, ...]) -> None:
+        assert self.instance is not None
+        values: Floats = np.zeros(len(names))
+        self._readers.append((self.instance.reader(names, values), values))
+
+    def _writer(self, names: tuple[str, ...]) -> None:
+        assert self.instance is not None
+        values: Floats = np.zeros(len(names))
+        self._writers.append((self.instance.writer(names, values), values))
+
+    def _write(self, index: int, content: bytes) -> None:
+        write, values = self._writers[index]
+        values[:] = np.frombuffer(content)
+        write()
+
+    def _read(self) -> bytes:
+        for read, _ in self._readers:
+            read()
+        return b"".join(values.tobytes() for _, values in self._readers)
+
+
+def main(path: str, name: str) -> None:
+    """Serve one instance."""
+    parent, server = Parent(), _Server(Path(path), name)
+    for commands in parent:
+        result = error = None
+        try:
+            result = server.execute(commands)
+        except Exception as raised:
+            error = picklable(raised)
+        instance = server.instance
+        parent.send((result, error, instance is None or instance.failed, [] if instance is None else instance.warnings))
+    if server.instance is not None:
+        server.instance.close()
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,301 @@
+"""The model of an FMU: its description, in one form for FMI 2.0 and FMI 3.0."""
+
+import difflib
+import functools
+import itertools
+import math
+import zipfile
+from collections import Counter
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from pathlib import Path
+from typing import Literal
+
+import fmpy
+from fmpy.model_description import ModelDescription, ModelVariable
+
+from fmu_kit.archive import read_source_hash
+from orchestration.components.fmi.archive import (
+    OtherVersionError,
+    UnreadableFmuError,
+    expect_honest_size,
+    read_archive,
+    read_root,
+)
+from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
+from orchestration.foundation.basics.documents import readable
+from orchestration.foundation.basics.errors import UsageError, listed, no_utf8
+from orchestration.foundation.basics.units import BASE, BaseUnits, Unit, named
+
+Kind = Literal["Real", "Integer", "Boolean", "Enumeration", "String", "Binary", "Clock"]
+"""Types by their FMI 2.0 names; FMI 3.0's Float64 is a Real, its Int32 an Integer"""
+NUMERIC: tuple[Kind, ...] = ("Real", "Integer", "Boolean", "Enumeration")
+"""Types that can be connected and recorded: as numbers, a Boolean as 0 or 1"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Variable:
+    """A scalar of an FMU; an element of an array has its indices in its name, as in `u[1]`."""
+
+    name: str
+    kind: Kind
+    type: str
+    """as in the description: Real, Float64, Int32 …"""
+    causality: str
+    variability: str
+    unit: str | None
+    description: str | None
+    start: str | None
+    reference: int
+    element: int
+    """place within the array, 0 for a scalar"""
+    length: int
+    """of that array; 0 for a scalar"""
+    minimum: float | None
+    maximum: float | None
+    choices: Mapping[str, int]
+    """items of an Enumeration, by name"""
+
+    @property
+    def is_settable(self) -> bool:
+        """Whether it is a parameter or an input."""
+        return self.causality in ("parameter", "input", "structuralParameter")
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether it is a parameter that was fixed when the FMU was built: it can be set to its own value only."""
+        return self.variability == "constant" and self.causality == "local" and self.start is not None
+
+
+@dataclass(frozen=True, kw_only=True, repr=False, eq=False)
+class Model:
+    """An FMU file and its description; it is read once and compared by identity."""
+
+    path: Path
+    """Of the FMU."""
+    description: ModelDescription
+    """Its model description, as fmpy reads it."""
+    variables: Mapping[str, Variable]
+    """Its variables by name, arrays by their elements: causality, unit, start value, description."""
+    initial_dependencies: Mapping[str, frozenset[str] | None]
+    """By output, the inputs that it depends on at initialisation; None: all of them."""
+
+    def __repr__(self) -> str:
+        counts = Counter(v.causality for v in self.variables.values())
+        return f"<Model {self.name}, FMI {self.version}: {', '.join(f'{n} {what}' for what, n in counts.items())}>"
+
+    @cached_property
+    def is_of_this_kit(self) -> bool:
+        """Whether it is built on `fmu_kit`, and follows the conventions of its slaves."""
+        return read_source_hash(self.path) is not None
+
+    @property
+    def waits(self) -> bool:
+        """Whether the time of its first sample is set by a parameter, and it does not sample in steps before."""
+        return self.is_of_this_kit and self.has_clock and SAMPLE_OFFSET in self.variables
+
+    @property
+    def has_clock(self) -> bool:
+        """Whether it has its own clock, which its parameters set."""
+        parameters = [self.variables[name] for name in (SAMPLE_PERIOD, SAMPLE_OFFSET) if name in self.variables]
+        return SAMPLE_PERIOD in self.variables and all(each.is_settable for each in parameters)
+
+    @property
+    def name(self) -> str:
+        """The model's name."""
+        return str(self.description.modelName)
+
+    @property
+    def version(self) -> int:
+        """Of FMI: 2 or 3."""
+        return int(self.description.fmiMajorVersion)
+
+    @property
+    def varies_step(self) -> bool:
+        """Whether it supports communication steps of any length."""
+        return bool(self.description.coSimulation.canHandleVariableCommunicationStepSize)
+
+    @property
+    def saves_state(self) -> bool:
+        """Whether its state can be saved as bytes and restored."""
+        interface = self.description.coSimulation
+        return bool(interface.canGetAndSetFMUstate and interface.canSerializeFMUstate)
+
+    @property
+    def once_per_process(self) -> bool:
+        """Whether a process can have one instance only."""
+        return bool(self.description.coSimulation.canBeInstantiatedOnlyOncePerProcess)
+
+    @property
+    def tolerance(self) -> float | None:
+        """The relative tolerance of the experiment that it declares; None if it declares none."""
+        tolerance = _number(getattr(self.description.defaultExperiment, "tolerance", None))
+        return tolerance if tolerance is not None and tolerance > 0.0 else None
+
+    def variable(self, name: str, place: str) -> Variable:
+        """A variable by name; raises `UsageError` naming the place and similar variables."""
+        if name in self.variables:
+            return self.variables[name]
+        near = difflib.get_close_matches(name, list(self.variables), n=3)
+        hint = f"did you mean {' or '.join(near)}? " if near else ""
+        settable = [v.name for v in self.variables.values() if v.causality == "parameter"]
+        raise UsageError(
+            f"{place}: {self.name} has no such variable; {hint}its parameters are {listed(settable, most=20)}"
+        )
+
+    def base_units(self, unit: str | None) -> BaseUnits | None:
+        """A unit in base units, by the FMU's definitions; None if they do not define it."""
+        definition = next((u for u in self.description.unitDefinitions if u.name == unit), None)
+        base = getattr(definition, "baseUnit", None)
+        if base is None:
+            return None
+        exponents = tuple(Fraction(getattr(base, key)) for key in BASE)
+        return BaseUnits(exponents=exponents, factor=float(base.factor), offset=float(base.offset))
+
+    @cached_property
+    def units(self) -> dict[str, Unit]:
+        """The units of the variables that have one, by name."""
+        declared = {name: v.unit for name, v in self.variables.items() if v.unit}
+        parsed = {unit: named(unit, self.base_units(unit)) for unit in dict.fromkeys(declared.values())}
+        return {name: parsed[unit] for name, unit in declared.items()}
+
+    def names(self, *causalities: str, kinds: tuple[Kind, ...] = NUMERIC) -> tuple[str, ...]:
+        """Variables of these causalities and types, in the order of the description."""
+        return tuple(v.name for v in self.variables.values() if v.causality in causalities and v.kind in kinds)
+
+    def depends_on(self, output: str) -> frozenset[str] | None:
+        """The inputs that an output depends on at initialisation; None: on all of them, or unknown."""
+        return self.initial_dependencies.get(output)
+
+
+def read_description(path: Path) -> ModelDescription:
+    """The description of an FMU; raises `UsageError` for a file that is no FMU for co-simulation."""
+    if not zipfile.is_zipfile(path):
+        raise UsageError(f"{path}: expected an FMU, which is a zip file")
+    try:
+        expect_honest_size(path)
+        description: ModelDescription = fmpy.read_model_description(str(path), validate=False)
+    except UsageError:
+        raise
+    except UnicodeEncodeError as error:
+        raise no_utf8(error) from error
+    except Exception as error:  # fmpy passes on any exception of the readers of zip and XML
+        _expect_version(path)
+        raise UsageError(f"{path}: expected an FMU with a valid modelDescription.xml: {error}") from error
+    kinds = {"model exchange": description.modelExchange, "scheduled execution": description.scheduledExecution}
+    if description.fmiMajorVersion not in (2, 3) or description.coSimulation is None:
+        kind = "co-simulation" if description.coSimulation is not None else " and ".join(k for k in kinds if kinds[k])
+        raise UsageError(f"{path}: FMI {description.fmiVersion}, {kind}; expected FMI 2.0 or 3.0 for co-simulation")
+    token = "guid" if description.fmiMajorVersion == 2 else "instantiationToken"
+    for name, value in ((token, description.guid), ("modelIdentifier", description.coSimulation.modelIdentifier)):
+        if value is None:
+            raise UsageError(f"{path}: its modelDescription.xml has no {name}")
+    return description
+
+
+def _expect_version(path: Path) -> None:
+    """Raise `UsageError` for an FMU that says to be of a version of FMI that is not supported."""
+    with suppress(UnreadableFmuError):
+        try:
+            read_root(read_archive(path, math.inf))
+        except OtherVersionError as error:
+            raise UsageError(f"{path}: {str(error).partition(';')[0]}") from None
+
+
+def read_model(path: str | Path) -> Model:
+    """Read the model of a co-simulation FMU.
+
+    It is read once in a process while the file stays the same. Raises `UsageError` for a file that is no FMU for
+    co-simulation of FMI 2.0 or 3.0.
+    """
+    path = Path(path)
+    with readable(path, "FMU"):
+        about = path.stat()
+    return _read_model(path, about.st_mtime_ns, about.st_size)
+
+
+@functools.lru_cache(maxsize=64)
+def _read_model(path: Path, changed: int, size: int) -> Model:
+    description = read_description(path)
+    for declared in description.modelVariables:
+        if not 0 <= declared.valueReference < 2**32:
+            what = f"{declared.name}: valueReference = {declared.valueReference}"
+            raise UsageError(f"{path}: {what}: expected a whole number of 32 bits without a sign")
+    scalars = [scalar for declared in description.modelVariables for scalar in _scalars(declared)]
+    variables = {v.name: v for v in scalars}
+    if len(variables) < len(scalars):
+        name = Counter(v.name for v in scalars).most_common(1)[0][0]
+        raise UsageError(f"{path}: its modelDescription.xml has more than one variable {name}")
+    return Model(
+        path=path,
+        description=description,
+        variables=variables,
+        initial_dependencies=_dependencies(description, variables),
+    )
+
+
+_KINDS: dict[str, Kind] = {
+    "Real": "Real", "Float64": "Real", "Float32": "Real", "Boolean": "Boolean", "Enumeration": "Enumeration",
+    "String": "String", "Binary": "Binary", "Clock": "Clock", "Integer": "Integer",
+}  # fmt: skip
+
+
+def _scalars(declared: ModelVariable) -> list[Variable]:
+    """The elements of a variable: itself, or every `name[i,j]`, counted from 1, the last index varying fastest."""
+    kind: Kind = _KINDS.get(declared.type, "Integer")
+    shape = tuple(declared.shape or ())
+    starts = (declared.start or "").split() if shape else [declared.start]
+    variables = []
+    for element, index in enumerate(itertools.product(*(range(1, n + 1) for n in shape))):
+        start = starts[element] if element < len(starts) else (starts[-1] if starts else None)
+        variables.append(
+            Variable(
+                name=declared.name + (f"[{','.join(map(str, index))}]" if shape else ""),
+                kind=kind,
+                type=declared.type,
+                causality=declared.causality or "local",
+                variability=declared.variability or "continuous",
+                unit=declared.unit or getattr(declared.declaredType, "unit", None),
+                description=declared.description,
+                start=start,
+                reference=declared.valueReference,
+                element=element,
+                length=math.prod(shape) if shape else 0,
+                minimum=_number(declared.min),
+                maximum=_number(declared.max),
+                choices={i.name: int(i.value) for i in getattr(declared.declaredType, "items", ())},
+            )
+        )
+    return variables
+
+
+def _number(text: str | None) -> float | None:
+    try:
+        value = float(text) if text is not None else math.nan
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def _dependencies(description: ModelDescription, variables: Mapping[str, Variable]) -> dict[str, frozenset[str] | None]:
+    """Declared dependencies of outputs on inputs at initialisation; an output that is not listed depends on none."""
+    names: dict[tuple[str, int], list[str]] = {}  # FMI 2.0 counts references by type
+    for variable in variables.values():
+        names.setdefault((variable.type, variable.reference), []).append(variable.name)
+    inputs = {v.name for v in variables.values() if v.causality == "input"}
+    unknowns = description.initialUnknowns
+    nothing: frozenset[str] | None = frozenset() if unknowns else None
+    dependencies: dict[str, frozenset[str] | None] = {
+        v.name: nothing for v in variables.values() if v.causality == "output"
+    }
+    for unknown in unknowns:
+        needed = unknown.dependencies
+        which = (
+            None if needed is None else frozenset(n for v in needed for n in names[v.type, v.valueReference]) & inputs
+        )
+        for name in names.get((unknown.variable.type, unknown.variable.valueReference), ()):
+            dependencies[name] = which
+    return dependencies

@@ -1,0 +1,98 @@
+"""`quadcosim new`: writes a folder with a slave, its test, a system that uses it and a page of commands."""
+
+import importlib.util
+import keyword
+import re
+import subprocess
+import sys
+from pathlib import Path
+from string import Template
+from typing import Literal
+
+from orchestration.components.building import consent
+from orchestration.components.building.models import MODELS
+from orchestration.foundation.basics.errors import UsageError
+
+Kind = Literal["controller", "plant", "filter"]
+_HERE = Path(__file__).parent
+
+
+def write(kind: Kind, name: str, where: Path, *, author: str, license: str) -> list[Path]:
+    """Write the folder `where`/`name`; the paths of its files.
+
+    The class has the name in CamelCase, its module in snake_case. Raises `UsageError` for an invalid name, or if the
+    folder exists.
+    """
+    model = class_name(name)
+    module = module_name(model)
+    _expect_usable(name, model, module)
+    folder = where / name
+    expect_new(folder)
+    names = {"Name": model, "module": module, "folder": name, "author": _quoted(author), "license": _quoted(license)}
+    files = {
+        f"{module}.py": "law.py",
+        f"test_{module}.py": "test.py",
+        "system.toml": "system.toml",
+        "README.md": "README.md",
+    }
+    folder.mkdir(parents=True)
+    for file, template in files.items():
+        text = (_HERE / f"{kind}_{template}.tmpl").read_text(encoding="utf-8")
+        (folder / file).write_text(Template(text).substitute(names), encoding="utf-8")
+    consent.agree(folder)
+    return [folder / file for file in files]
+
+
+def expect_new(folder: Path) -> None:
+    """Raise `UsageError` for a folder that exists."""
+    if folder.exists():
+        raise UsageError(f"{folder}: exists already; expected a folder that does not exist")
+
+
+def class_name(name: str) -> str:
+    """`hover_pd`, `hover-pd` and `HoverPd` are HoverPd."""
+    return "".join(part[:1].upper() + part[1:] for part in re.split(r"[_-]+", name))
+
+
+def module_name(model: str) -> str:
+    """HoverPd is hover_pd."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", model).lower()
+
+
+def git_author() -> str:
+    """The user name in git's configuration; empty without git or without a name."""
+    try:
+        done = subprocess.run(
+            ["git", "config", "user.name"], capture_output=True, text=True, encoding="utf-8", errors="replace",
+            check=False,
+        )  # fmt: skip
+    except OSError:
+        return ""
+    return done.stdout.strip()
+
+
+def _expect_usable(name: str, model: str, module: str) -> None:
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name) or not model.isidentifier():
+        raise UsageError(f"{name!a}: expected a name of letters, digits and _ that begins with a letter, as hover_pd")
+    if model in MODELS:
+        raise UsageError(f"{name}: an FMU of this project has this name; expected another one")
+    taken = keyword.iskeyword(module) or module in sys.stdlib_module_names or _is_installed(module)
+    if taken or model in _OF_THE_KIT:
+        raise UsageError(f"{name}: {module} is a module or a keyword of Python; expected another name, as my_{module}")
+
+
+_OF_THE_KIT = ("Slave", "Input", "Output", "Parameter", "State", "Local", "Vec3", "Quaternion")
+
+
+def _is_installed(module: str) -> bool:
+    """Whether a module of this name is installed; one in the working directory does not count."""
+    spec = importlib.util.find_spec(module)
+    if spec is None or spec.origin is None:  # a folder that is not a package
+        return False
+    here = Path.cwd()
+    return Path(spec.origin) not in (here / f"{module}.py", here / module / "__init__.py")
+
+
+def _quoted(text: str) -> str:
+    """`text` escaped for a string literal of Python."""
+    return text.replace("\\", "\\\\").replace('"', '\\"')

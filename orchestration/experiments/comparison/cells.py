@@ -1,0 +1,150 @@
+"""Summaries of the cells of a comparison: survival, settling, error and effort, with confidence intervals."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from orchestration.experiments.comparison.design import START, Comparison
+from orchestration.experiments.comparison.survival import RESIDUAL, SETTLING, diverged_late, settled, survived
+from orchestration.experiments.studies.axes import Value
+from orchestration.foundation.basics.statistics import quantile, wilson
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+PEAK, VARIATION = "torque_max", "total_variation.torque"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Share:
+    """A count of runs, its share of all, and the Wilson interval of that share at 95 %."""
+
+    count: int
+    value: float
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, count: int, runs: int) -> "Share":
+        """The share of `count` in `runs`."""
+        low, high = wilson(count, runs)
+        return cls(count=count, value=count / runs, low=low, high=high)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Median:
+    """The median of some values, with the interval of two order statistics at 95 %."""
+
+    value: float | None
+    low: float | None
+    high: float | None
+    """None: no values, or too few to bound it"""
+
+    @classmethod
+    def of(cls, values: Sequence[float], confidence: float = 0.95) -> "Median":
+        """The median of values, with its interval at this confidence."""
+        known = [value for value in values if not math.isnan(value)]
+        if not known:
+            return cls(value=None, low=None, high=None)
+        estimate = quantile(known, confidence=confidence)
+        return cls(value=estimate.value, low=_finite(estimate.low), high=_finite(estimate.high))
+
+    def is_near(self, other: "Median", tolerance: float) -> bool:
+        """Whether it equals another median within a relative tolerance."""
+        pairs = ((getattr(self, key), getattr(other, key)) for key in ("value", "low", "high"))
+        return all(a == b or (None not in (a, b) and math.isclose(a, b, rel_tol=tolerance)) for a, b in pairs)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CellSummary:
+    """The outcomes of the runs of one cell."""
+
+    cell: int
+    vehicle: str
+    condition: str
+    controller: str
+    value: Value
+    count: int
+    """of runs"""
+    survives: Share
+    """have not diverged by the horizon"""
+    settles: Share
+    """stay within 5 cm throughout the last third"""
+    diverged: int
+    diverged_late: int
+    """of these, in the second half of the horizon: if there are any, the share still depends on the horizon"""
+    medians: dict[str, Median]
+    """over the runs that survive, by objective; `settling_time` over those that settle, `residual` the final error"""
+
+    def row(self, axis: str) -> dict[str, Any]:
+        """The row of the table, also used in JSON."""
+        values: dict[str, Any] = {
+            "cell": self.cell, "vehicle": self.vehicle, "condition": self.condition, "controller": self.controller,
+            axis: self.value, "count": self.count,
+        }  # fmt: skip
+        for name, share in (("survives", self.survives), ("settles", self.settles)):
+            values |= {name: share.count, f"{name}.share": share.value, f"{name}.low": share.low}
+            values |= {f"{name}.high": share.high}
+        values |= {"diverged": self.diverged, "diverged_late": self.diverged_late}
+        for name, median in self.medians.items():
+            values |= {name: median.value, f"{name}.low": median.low, f"{name}.high": median.high}
+        return values
+
+
+def reported_objectives(comparison: Comparison) -> tuple[str, ...]:
+    """The objectives in the summary of a cell, beside settling time and residual."""
+    front = comparison.front
+    return tuple(dict.fromkeys((front.error, PEAK, VARIATION, front.effort)))
+
+
+def cell_summaries(comparison: Comparison, table: "pd.DataFrame") -> list[CellSummary]:
+    """The summaries of all cells that have runs in a table of the study."""
+    cells = [*comparison.cells()]
+    done = table[table["status"] == "done"]
+    numbers = done["design_index"].to_numpy(int) // len(comparison.initial_conditions)
+    summaries = []
+    for index, rows in done.groupby(numbers, sort=True):
+        cell = cells[int(index)]
+        alive, settling = rows[survived(rows)], rows[settled(rows)]
+        summaries.append(
+            CellSummary(
+                cell=cell.index,
+                vehicle=cell.vehicle,
+                condition=cell.condition,
+                controller=cell.controller,
+                value=cell.value,
+                count=len(rows),
+                survives=Share.of(len(alive), len(rows)),
+                settles=Share.of(len(settling), len(rows)),
+                diverged=len(rows) - len(alive),
+                diverged_late=int(diverged_late(rows, comparison.study.origin.stop_time).sum()),
+                medians={
+                    "settling_time": Median.of(settling[SETTLING].to_numpy(float)),
+                    "residual": Median.of(alive[RESIDUAL].to_numpy(float)),
+                    **{name: Median.of(alive[name].to_numpy(float)) for name in reported_objectives(comparison)},
+                },
+            )
+        )
+    return summaries
+
+
+def table_of_runs(comparison: Comparison, rows: Iterable[tuple[int, dict[str, Any]]]) -> "pd.DataFrame":
+    """A table of runs that are not in a store, from their indices and metrics."""
+    import pandas as pd
+
+    listed = [
+        {"design_index": index, "status": "done", **comparison.study.points[index], **metrics}
+        for index, metrics in rows
+    ]
+    return pd.DataFrame(listed)
+
+
+def sizes(comparison: Comparison, table: "pd.DataFrame") -> "pd.Series":
+    """The size of the initial error of each run."""
+    known = [start.size for start in comparison.initial_conditions]
+    return table[START].map(lambda index: known[int(index)])
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

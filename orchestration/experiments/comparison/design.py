@@ -1,0 +1,213 @@
+"""The design of a comparison, and its study: every controller on every vehicle from the same initial conditions."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from orchestration.components.building import fmus
+from orchestration.experiments.studies.axes import Axis, Value
+from orchestration.experiments.studies.linked_settings import Key, LinkedSettings
+from orchestration.experiments.studies.study import Study
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.records import record
+from orchestration.systems.system.paths import value_at
+from orchestration.systems.system.request import ControlLoop, Ensemble, InitialConditions, Values
+from orchestration.systems.system.request import Craft as Vehicle
+
+VEHICLE, CONDITION, CONTROLLER, START = "vehicle", "condition", "controller", "start"
+FMU = "controller.fmu"
+
+
+@record()
+class Controller:
+    """A controller that is compared: an FMU with parameters."""
+
+    name: str
+    sets: Values = field(default_factory=dict)
+    tuned: Mapping[Key, Values] = field(default_factory=dict)
+    """further values by vehicle and value of the axis"""
+    bandwidth: float | None = None
+    """of its attitude loop [rad/s]; None: that of the FMU about hover"""
+
+
+@record()
+class VehicleEntry:
+    """A vehicle on which controllers are compared."""
+
+    name: str
+    vehicle: Vehicle | None = None
+    """its parameters; None: the plant of the base"""
+
+
+@record()
+class Condition:
+    """A deviation from the controllers' model, or a fault: mass, lag, wind, losses."""
+
+    name: str
+    """Its name in tables and pictures."""
+    sets: Values = field(default_factory=dict)
+    """Values by path."""
+    multiplies: Mapping[str, float] = field(default_factory=dict)
+    """Factors by path, applied to the value after all other settings."""
+
+
+@record("front.")
+class Front:
+    """Two objectives with a trade-off, both to be minimised."""
+
+    error: str = "position_rmse"
+    """The objective that measures the error of a run."""
+    effort: str = "total_variation.torque"
+    """The objective that measures its effort."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cell:
+    """One controller on one vehicle under one condition at one value of the axis: a run from each initial condition."""
+
+    index: int
+    vehicle: str
+    condition: str
+    controller: str
+    value: Value
+
+
+@record()
+class Comparison:
+    """Controllers on vehicles under conditions over an axis, from the same initial conditions; raises `UsageError`."""
+
+    name: str
+    """The name of the comparison, and of the folder of its store in `results`."""
+    base: ControlLoop
+    """The scenario that all runs modify."""
+    controllers: tuple[Controller, ...]
+    """The controllers that are compared."""
+    vehicles: tuple[VehicleEntry, ...]
+    """The vehicles on which they are compared."""
+    conditions: tuple[Condition, ...]
+    """Deviations from the controllers' model, and faults."""
+    axis: Axis
+    """The quantity that is varied, with increasing values."""
+    starts: Ensemble
+    """The initial conditions, the same for every controller."""
+    front: Front = field(default_factory=Front)
+    """The two objectives of the trade-off."""
+    native: bool = False
+    """Whether it is run with the native twins of its FMUs."""
+
+    def __post_init__(self) -> None:
+        for kind in ("controllers", "vehicles", "conditions"):
+            names = [one.name for one in getattr(self, kind)]
+            if not names or len(set(names)) != len(names):
+                raise UsageError(f"{kind} = {', '.join(names)}: expected at least one, each with its own name")
+        if self.axis.values is None or any(isinstance(v, str) for v in self.axis.values):
+            raise UsageError(f"axis {self.axis.name}: expected values, or start, stop and number")
+        if sorted(self.axis.values) != [*self.axis.values]:
+            raise UsageError(
+                f"axis {self.axis.name}: expected increasing values; limits are values up to which runs survive"
+            )
+        if self.axis.name in (VEHICLE, CONDITION, CONTROLLER, START):
+            raise UsageError(f"axis {self.axis.name}: expected another name")
+        objectives = self.study.origin.objectives
+        for key in ("error", "effort"):
+            if getattr(self.front, key) not in objectives:
+                raise UsageError(f"front.{key} = {getattr(self.front, key)}: expected one of {', '.join(objectives)}")
+
+    @property
+    def values(self) -> tuple[Value, ...]:
+        """The values of the axis."""
+        return self.axis.values or ()
+
+    @cached_property
+    def initial_conditions(self) -> tuple[InitialConditions, ...]:
+        """The initial conditions, about the start of the base's reference."""
+        return tuple(self.starts.initial_conditions(self.base))
+
+    @cached_property
+    def study(self) -> Study:
+        """The study of all runs, cell by cell. Each initial condition has its own seed, the same in every cell."""
+        return Study(
+            name=self.name,
+            base=self.base,
+            native=self.native,
+            axes=(
+                _named(VEHICLE, self.vehicles),
+                _named(CONDITION, self.conditions),
+                _named(CONTROLLER, self.controllers),
+                self.axis,
+                Axis(name=START, targets=(), values=tuple(range(len(self.initial_conditions)))),
+            ),
+            together=(
+                LinkedSettings(axes=(VEHICLE, CONTROLLER), sets=self._vehicle_settings()),
+                LinkedSettings(axes=(CONTROLLER,), sets={(one.name,): one.sets for one in self.controllers}),
+                LinkedSettings(axes=(CONTROLLER, VEHICLE, self.axis.name), sets=self._tuned_settings()),
+                LinkedSettings(
+                    axes=(CONDITION,),
+                    sets={(one.name,): one.sets for one in self.conditions},
+                    multiplies={(one.name,): one.multiplies for one in self.conditions},
+                ),
+                LinkedSettings(
+                    axes=(START,),
+                    sets={(i,): self._start_settings(i, start) for i, start in enumerate(self.initial_conditions)},
+                ),
+            ),
+        )
+
+    def fmu_of(self, controller: Controller) -> str:
+        """The FMU of a controller, by name or path."""
+        fmu = str(controller.sets.get(FMU, self.base.as_system().fmus["controller"]))
+        return fmus.native_twin(fmu) if self.native else fmu
+
+    def parameters_for(self, entry: VehicleEntry, controller: Controller) -> dict[str, Value]:
+        """The parameters of the plant of a vehicle and of a controller on it, by target."""
+        return {} if entry.vehicle is None else dict(entry.vehicle.parameters_for(self.fmu_of(controller)))
+
+    def _vehicle_settings(self) -> dict[Key, Values]:
+        return {(v.name, one.name): self.parameters_for(v, one) for v in self.vehicles for one in self.controllers}
+
+    def _tuned_settings(self) -> dict[Key, Values]:
+        return {(one.name, *key): changes for one in self.controllers for key, changes in one.tuned.items()}
+
+    def _start_settings(self, index: int, start: InitialConditions) -> dict[str, Value]:
+        return {**start.values, "seed": self.base.seed + self.starts.first + index}
+
+    def cells(self) -> Iterator[Cell]:
+        """All cells in the order of their indices."""
+        grid = (
+            (vehicle, condition, controller, value)
+            for vehicle in self.vehicles
+            for condition in self.conditions
+            for controller in self.controllers
+            for value in self.values
+        )
+        for index, (vehicle, condition, controller, value) in enumerate(grid):
+            yield Cell(
+                index=index,
+                vehicle=vehicle.name,
+                condition=condition.name,
+                controller=controller.name,
+                value=value,
+            )
+
+    def cell(self, index: int) -> Cell:
+        """The cell of an index; raises `UsageError` if there is none."""
+        cells = [*self.cells()]
+        if not 0 <= index < len(cells):
+            raise UsageError(f"--cell {index}: expected a number from 0 to {len(cells) - 1}")
+        return cells[index]
+
+    def runs_of(self, cell: Cell) -> range:
+        """The indices in the study of the runs of a cell."""
+        return range(cell.index * len(self.initial_conditions), (cell.index + 1) * len(self.initial_conditions))
+
+    def request(self, index: int, starts: Mapping[str, float]) -> ControlLoop:
+        """A single run of the study as a request of the kind of the base; `starts` are the FMUs' default parameters."""
+        system = self.study.system(index, starts)
+        targets = [*self.axis.targets, *(target for each in self.study.together for target in each.targets)]
+        values = {target: value_at(system, path) for target in targets for path in self.base.paths_of(target)[:1]}
+        fmus = {f"{name}.fmu": fmu for name, fmu in system.fmus.items()}
+        return self.base.with_values({**{target: v for target, v in values.items() if v is not None}, **fmus})
+
+
+def _named(name: str, ones: Sequence[Controller] | Sequence[VehicleEntry] | Sequence[Condition]) -> Axis:
+    return Axis(name=name, targets=(), values=tuple(one.name for one in ones))

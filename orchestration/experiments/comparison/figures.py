@@ -1,0 +1,238 @@
+"""Figures of a comparison: basins, shares that survive and settle, limits, fronts."""
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
+
+from orchestration.experiments.comparison.cells import CellSummary, Median
+from orchestration.experiments.comparison.fronts import Point
+from orchestration.experiments.comparison.limits import GridLimit
+from orchestration.experiments.studies.axes import Value
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.simulation.figures import cells
+from orchestration.simulation.figures.palette import BLUE, CYCLE, DASHES, GREY, MARKS, ORANGE
+from orchestration.simulation.figures.style import SCREEN, Style
+from orchestration.simulation.figures.ticks import plain
+from orchestration.simulation.results.quantities import Quantity
+
+BINS = 8
+"""of the size of the initial error"""
+
+BySize: TypeAlias = tuple[Sequence[Any], Floats]
+"""Values of an axis, and the share of the initial conditions, shape (`BINS` of the size of the error, values)"""
+
+
+def basins(by_size: Mapping[str, BySize], axis: Quantity, fate: str, title: str, style: Style = SCREEN) -> Figure:
+    """The share that survives, or settles, over size of the initial error and axis, a panel for each controller.
+
+    The white line is where half of them do. Panels have one axis if all controllers have the same values.
+    """
+    is_one = len({tuple(values) for values, _ in by_size.values()}) == 1
+    figure, panels = _panels(len(by_size), 22.0, style, sharex=is_one)
+    bins = np.linspace(0.0, 1.0, BINS + 1)
+    for panel, (name, (values, share)) in zip(panels, by_size.items()):
+        x = cells.edges(axis.of(values))
+        mesh = cells.fill(panel, x, bins, share, vmin=0.0, vmax=1.0)
+        cells.hatch(panel, x, bins, np.isnan(share))
+        cells.limit(panel, x, bins, np.where(np.isnan(share), np.nan, share >= 0.5), colors="white")
+        panel.set_title(name)
+    figure.colorbar(mesh, ax=panels.tolist(), label=f"share that {fate}s [1]")
+    figure.supxlabel(axis.title)
+    figure.supylabel("size of the initial error [1]")
+    figure.suptitle(f"{title}; above the white line less than half of the starts {fate}")
+    return figure
+
+
+def shares(
+    by_title: Mapping[str, Sequence[CellSummary]], axis: Quantity, colors: Mapping[str, str], style: Style = SCREEN
+) -> Figure:
+    """The shares that survive and settle, with Wilson intervals, two lines for each controller.
+
+    Controllers differ by colour and dashes; in a single panel their names stand on the lines.
+
+    `by_title` has the cells of each panel; `colors` are those of the controllers.
+    """
+    several = len(by_title) > 1
+    figure, panels = _panels(len(by_title), 20.0 if several else 30.0, style)
+    dashes = dict(zip(colors, itertools.cycle(DASHES)))
+    for panel, (title, group) in zip(panels, by_title.items()):
+        curves = {name: [cell for cell in group if cell.controller == name] for name in colors}
+        for name, those in curves.items():
+            _shares_of(panel, axis, those, color=colors[name], dashes=dashes[name])
+        runs = max((cell.count for cell in group), default=0)
+        panel.set_title(title if several else f"{title}; {runs} starts, 95 % intervals")
+        panel.set_ylim(-0.02, 1.02)
+        if not several:
+            _name_curves(panel, axis, curves, colors, style)
+    shown = {cell.controller for group in by_title.values() for cell in group}
+    names = [name for name in colors if name in shown and several]
+    handles = [Line2D([], [], color=colors[name], linestyle=dashes[name], label=name) for name in names]
+    handles += [Line2D([], [], color=GREY, label=fate, **how) for fate, how in _LINES.items()]
+    if several:
+        figure.legend(handles=handles, loc="outside right center")
+        figure.supxlabel(axis.title)
+        figure.supylabel("share of the starts [1]")
+    else:
+        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+        panels[0].set(xlabel=axis.title, ylabel="share of the starts [1]")
+    return figure
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reach:
+    """The limits of one controller, and the last value of its axis."""
+
+    name: str
+    limits: Sequence[GridLimit]
+    last: float
+
+
+def limits_of(reaches: Sequence[Reach], axis: Quantity, in_seconds: bool, style: Style = SCREEN) -> Figure:
+    """The limits up to which half and nine in ten survive, and settle, with intervals; arrows reach beyond the axis.
+
+    If the axis is `in_seconds`, a third panel has the limits of settling times the bandwidth.
+    """
+    figure = style.figure(2.5 * len(reaches) + 12.0)
+    panels = figure.subplots(1, 3 if in_seconds else 2, sharey=True, squeeze=False).ravel()
+    for row, reach in enumerate(reaches):
+        for limit in reach.limits:
+            color, shift = (BLUE, -0.15) if limit.share == "half" else (ORANGE, 0.15)
+            survives = limit.fate == "survive"
+            label = f"{limit.share} of the starts" if row == 0 and survives else None
+            _bar(panels[0 if survives else 1], limit, reach.last, axis.factor, row + shift, color, label)
+            if in_seconds and limit.bandwidth is not None and not survives:
+                _bar(panels[2], limit, reach.last, limit.bandwidth, row + shift, color, None)
+    names = [reach.name for reach in reaches]
+    panels[0].set(yticks=range(len(names)), yticklabels=names, xlabel=f"survive up to {axis.title}")
+    panels[1].set(xlabel=f"settle up to {axis.title}")
+    panels[0].invert_yaxis()
+    if in_seconds:
+        panels[2].set(xlabel=f"settle: {axis.name} ·\nbandwidth of the attitude loop [rad]")
+    figure.legend(loc="outside upper center", ncols=2)
+    return figure
+
+
+def fronts_of(
+    points: Sequence[Point],
+    values: Sequence[Value],
+    axis: Quantity,
+    metrics: Sequence[str],
+    colors: Mapping[str, str],
+    title: str,
+    style: Style = SCREEN,
+) -> Figure:
+    """Error against effort at values of the axis; the line joins the Pareto front.
+
+    `metrics` are the labels of effort and error, `colors` those of the controllers.
+    """
+    figure, panels = _panels(len(values), 20.0, style)
+    marks = dict(zip(colors, itertools.cycle(MARKS)))
+    for panel, value in zip(panels, values):
+        here = [point for point in points if point.value == value]
+        for point in here:
+            effort, error = _sides(point.effort), _sides(point.error)
+            panel.errorbar(
+                *effort[0], *error[0], xerr=effort[1], yerr=error[1], fmt=marks[point.controller],
+                mfc=colors[point.controller] if point.on_front else "none", color=colors[point.controller],
+                markersize=5, elinewidth=0.8,
+            )  # fmt: skip
+        line = sorted((p.effort.value or 0.0, p.error.value or 0.0) for p in here if p.on_front)
+        panel.plot(*np.transpose(line), color=GREY, linewidth=0.8, zorder=0)
+        panel.set_title(f"{axis.text_of(float(value))}, {here[0].starts} starts")
+        panel.set(xscale="log", yscale="log")
+    for panel in panels:  # after all are drawn: they share their axes
+        plain(panel.xaxis)
+        plain(panel.yaxis)
+    for name, color in colors.items():
+        if any(point.controller == name for point in points):
+            panels[0].plot([], [], marks[name], color=color, label=name)
+    figure.legend(loc="outside right center")
+    figure.supxlabel(metrics[0])
+    figure.supylabel(metrics[1])
+    figure.suptitle(f"{title}: medians over the starts that all survive; filled: on the front")
+    return figure
+
+
+def colors_of(names: Sequence[str]) -> dict[str, str]:
+    """A colour for each controller."""
+    if len(names) <= len(CYCLE):
+        return dict(zip(names, CYCLE))
+    shades = matplotlib.colormaps["turbo"](np.linspace(0.05, 0.95, len(names)))
+    return {name: matplotlib.colors.to_hex(shade) for name, shade in zip(names, shades)}
+
+
+_LINES: Mapping[str, Mapping[str, Any]] = {
+    "survive": {"marker": "."},
+    "settle": {"marker": "o", "markerfacecolor": "white", "markersize": 3.5, "linewidth": 0.7},
+}
+"""Styles of the two lines of a controller"""
+
+
+def _shares_of(panel: Axes, axis: Quantity, group: Sequence[CellSummary], *, color: str, dashes: str) -> None:
+    """The two lines of one controller."""
+    at = axis.of([cell.value for cell in group])
+    for fate, line in (("settle", [cell.settles for cell in group]), ("survive", [cell.survives for cell in group])):
+        panel.plot(at, [share.value for share in line], color=color, linestyle=dashes, **_LINES[fate])
+        panel.fill_between(
+            at, [share.low for share in line], [share.high for share in line], color=color, alpha=0.08, linewidth=0.0
+        )
+
+
+def _name_curves(
+    panel: Axes, axis: Quantity, curves: Mapping[str, Sequence[CellSummary]], colors: Mapping[str, str], style: Style
+) -> None:
+    """Names on the lines of survival at different heights: the earlier a line falls, the lower its name."""
+    known = {name: group for name, group in curves.items() if group}
+    order = sorted(known, key=lambda name: sum(cell.survives.value for cell in known[name]))
+    for name, height in zip(order, np.linspace(0.1, 0.9, 2 * len(order) + 1)[1::2]):
+        at, share = axis.of([cell.value for cell in known[name]]), [cell.survives.value for cell in known[name]]
+        below = next((k for k in range(1, len(share)) if share[k] < height <= share[k - 1]), None)
+        place = (
+            (at[-1], share[-1])
+            if below is None
+            else (float(np.interp(height, (share[below], share[below - 1]), (at[below], at[below - 1]))), height)
+        )
+        panel.annotate(
+            name, place, color=colors[name], fontsize=0.85 * style.font, ha="center" if below else "right", va="center",
+            path_effects=[withStroke(linewidth=0.35 * style.font, foreground="white")],
+        )  # fmt: skip
+
+
+def _bar(panel: Axes, limit: GridLimit, last: float, factor: float, at: float, color: str, label: str | None) -> None:
+    high = last if limit.high is None else limit.high
+    ends = [[factor * (limit.value - limit.low)], [factor * (high - limit.value)]]
+    panel.errorbar(factor * limit.value, at, xerr=ends, fmt="o", color=color, markersize=5, capsize=2, label=label)
+    if limit.high is None:
+        panel.plot(factor * high, at, ">", color=color, markersize=6)
+
+
+def _sides(median: Median) -> tuple[list[float], list[list[float]]]:
+    """A median and the lengths of its error bars; zero where the interval is not known."""
+    value = median.value or 0.0
+    low = value if median.low is None else median.low
+    high = value if median.high is None else median.high
+    return [value], [[value - low], [high - value]]
+
+
+def _panels(
+    count: int, height: float, style: Style, *, sharex: bool = True
+) -> tuple[Figure, "np.ndarray[tuple[int], np.dtype[np.object_]]"]:
+    """A figure with `count` panels, each `height` lines high, at most three in a row, with shared axes."""
+    columns = min(3 if style.is_wide else 1, count)
+    rows = math.ceil(count / columns)
+    figure = style.figure(height * rows + 6.0)
+    panels = figure.subplots(rows, columns, sharex=sharex, sharey=True, squeeze=False).ravel()
+    for panel in panels[count:]:
+        panel.set_visible(False)
+    for panel in panels[max(count - columns, 0) : count]:
+        panel.xaxis.set_tick_params(labelbottom=True)  # also without a panel below it
+    return figure, panels[:count]

@@ -1,0 +1,114 @@
+"""Writes the pictures of a comparison: basins, shares and limits with intervals, fronts."""
+
+import itertools
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from orchestration.experiments.comparison.cells import sizes
+from orchestration.experiments.comparison.design import CONDITION, CONTROLLER, VEHICLE, Comparison
+from orchestration.experiments.comparison.figures import BINS, Reach, basins, colors_of, fronts_of, limits_of, shares
+from orchestration.experiments.comparison.fronts import Point
+from orchestration.experiments.comparison.limits import GridLimit
+from orchestration.experiments.comparison.outcome import Outcome
+from orchestration.experiments.comparison.survival import FATES
+from orchestration.experiments.studies.axis_labels import quantity_of
+from orchestration.experiments.studies.figures import save
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.simulation.figures.style import SCREEN, Style
+from orchestration.simulation.results import display_names as labels
+from orchestration.simulation.results.quantities import is_in_seconds
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+MOST_PANELS = 6
+
+
+def draw(
+    comparison: Comparison,
+    outcome: Outcome,
+    table: "pd.DataFrame",
+    folder: Path,
+    style: Style = SCREEN,
+    *,
+    units: Mapping[str, str],
+) -> list[Path]:
+    """Draw all pictures into a folder; their paths. `units` are those of the store, by name of axis and metric."""
+    axis = quantity_of(comparison.axis, units)
+    done = table[table["status"] == "done"]
+    written = [
+        path
+        for (vehicle, condition), rows in done.groupby([VEHICLE, CONDITION], sort=False)
+        for path in _of_one(comparison, units, outcome, rows, (vehicle, condition), folder, style)
+    ]
+    if outcome.limits:
+        reaches, in_seconds = reaches_of(comparison, outcome.limits), _in_seconds(comparison)
+        written += save(partial(limits_of, reaches, axis, in_seconds), folder / "limits", style)
+    return written
+
+
+def _of_one(
+    comparison: Comparison,
+    units: Mapping[str, str],
+    outcome: Outcome,
+    rows: "pd.DataFrame",
+    of: tuple[str, str],
+    folder: Path,
+    style: Style,
+) -> Iterator[Path]:
+    """The pictures of one vehicle under one condition."""
+    axis, colors = quantity_of(comparison.axis, units), colors_of([one.name for one in comparison.controllers])
+    summaries = [cell for cell in outcome.cells if (cell.vehicle, cell.condition) == of]
+    points = [point for point in outcome.fronts if (point.vehicle, point.condition) == of and _is_known(point)]
+    title, end = ", ".join(of), "_".join(re.sub(r"[^\w.-]+", "_", name) for name in of)
+    for fate in FATES:
+        by_size = {
+            name: (comparison.values, _by_size(comparison, group, fate))
+            for name in colors
+            if len(group := rows[rows[CONTROLLER] == name])
+        }
+        yield from save(partial(basins, by_size, axis, fate, title), folder / f"basin_{fate}_{end}", style)
+    yield from save(partial(shares, {title: summaries}, axis, colors), folder / f"shares_{end}", style)
+    if points:
+        values = [*dict.fromkeys(point.value for point in points)]
+        shown = [values[round(i)] for i in np.linspace(0, len(values) - 1, min(len(values), MOST_PANELS))]
+        front = comparison.front
+        names = tuple(labels.metric_with_unit(metric, units.get(metric)) for metric in (front.effort, front.error))
+        yield from save(partial(fronts_of, points, shown, axis, names, colors, title), folder / f"front_{end}", style)
+
+
+def reaches_of(comparison: Comparison, limits: Sequence[GridLimit]) -> list[Reach]:
+    """The limits of each controller, on each vehicle and under each condition if there are several."""
+    several = len(comparison.vehicles) * len(comparison.conditions) > 1
+    groups = itertools.groupby(limits, lambda one: (one.vehicle, one.condition, one.controller))
+    return [
+        Reach(
+            name=", ".join((key[2], *key[:2])) if several else key[2],
+            limits=[*group],
+            last=float(comparison.values[-1]),
+        )
+        for key, group in groups
+    ]
+
+
+def _by_size(comparison: Comparison, rows: "pd.DataFrame", fate: str) -> Floats:
+    """The share that survives, or settles, by bin of the size of the initial error and value of the axis."""
+    bins = (BINS * sizes(comparison, rows).to_numpy(float)).astype(int).clip(max=BINS - 1)
+    counted = rows.assign(bin=bins, has=FATES[fate](rows).astype(float))
+    shares_known = counted.pivot_table(index="bin", columns=comparison.axis.name, values="has")
+    share: Floats = shares_known.reindex(index=range(BINS), columns=[*comparison.values]).to_numpy(float)
+    return share
+
+
+def _is_known(point: Point) -> bool:
+    return point.error.value is not None and point.effort.value is not None
+
+
+def _in_seconds(comparison: Comparison) -> bool:
+    axis = comparison.axis
+    return not axis.multiplies and bool(axis.targets) and all(map(is_in_seconds, axis.targets))

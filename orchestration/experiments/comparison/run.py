@@ -1,0 +1,187 @@
+"""Runs a comparison and draws its conclusions; reruns single cells."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from orchestration.experiments.comparison.bandwidth import Bandwidths, bandwidths
+from orchestration.experiments.comparison.cells import CellSummary, cell_summaries, table_of_runs
+from orchestration.experiments.comparison.design import Comparison
+from orchestration.experiments.comparison.outcome import Outcome, outcome_of, write
+from orchestration.experiments.studies.store import store_path
+from orchestration.experiments.studies.sweep import sweep
+from orchestration.experiments.studies.swept import Swept
+from orchestration.experiments.studies.table import export, frame, units_in
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.extras import explains_missing, needs
+from orchestration.foundation.basics.progress import CountProgress
+from orchestration.foundation.basics.terminal import inform
+from orchestration.simulation.engines.wiring import check_against_fmus
+from orchestration.simulation.results import html
+from orchestration.simulation.runs.run_directory import keep_run
+from orchestration.simulation.runs.simulation import run as fly
+from orchestration.simulation.workers.batching import TOLERATED
+from orchestration.simulation.workers.choice import EngineChoice, Execution, choose_execution
+from orchestration.simulation.workers.executors import RunEvaluator
+from orchestration.systems.system.files import Files
+from orchestration.systems.system.model import System
+from orchestration.systems.system.request import errors_in_own_terms
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from orchestration.simulation.figures.style import Style
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Compared:
+    """The result of a comparison."""
+
+    axis: str
+    """The name of its axis."""
+    summary: Swept
+    """The summary of the sweep of its runs, with the path of the store."""
+    table: "pd.DataFrame"
+    """A row for each run."""
+    bandwidths: Bandwidths
+    """Of the attitude loop [rad/s], by controller, vehicle and value of the axis."""
+    outcome: Outcome
+    """Cells, limits, pairs and fronts, with their intervals."""
+    written: list[Path]
+    """The tables and pictures beside the store."""
+
+    def __repr__(self) -> str:
+        return (
+            f"<Compared: {len(self.outcome.cells)} cells of {self.summary.total} runs, in {self.summary.path.parent}>"
+        )
+
+    def _repr_html_(self) -> str:
+        """The limits of each controller, as notebooks show them."""
+        rows = [
+            (
+                f"{one.controller} on {one.vehicle}, {one.condition}: {one.share} of the starts {one.fate} up to",
+                f"{one.value:g}",
+                "",
+            )
+            for one in self.outcome.limits
+        ]
+        return html.card(
+            "A comparison", None, None, f"{len(self.outcome.cells)} cells, {self.summary.total} runs", rows
+        )
+
+    @explains_missing
+    def to_pandas(self, what: Literal["cells", "limits", "runs"] = "cells") -> "pd.DataFrame":
+        """A row for each cell: counts of runs that survive and settle, medians; or the limits, or the runs."""
+        import pandas as pd
+
+        if what == "runs":
+            return self.table
+        listed = self.outcome.limits if what == "limits" else self.outcome.cells
+        return pd.DataFrame([one.row(self.axis) if isinstance(one, CellSummary) else vars(one) for one in listed])
+
+
+@needs("filelock", "pandas")
+def compare(
+    comparison: Comparison,
+    *,
+    folder: str | Path | None = None,
+    workers: int = 1,
+    engine: EngineChoice = "auto",
+    time_limit: float | None = None,
+    figures: bool = True,
+    style: "Style | None" = None,
+    progress: CountProgress = "bar",
+    announce: Callable[[str], None] | None = inform,
+) -> Compared:
+    """Run what is missing of a comparison, and write its tables and pictures beside its store.
+
+    `folder`, `workers`, `engine`, `time_limit`, `progress` and `announce` are those of `sweep`, which raises what this
+    does. Pictures are drawn unless `figures` is false, in a `style`, by default for a screen.
+    """
+    summary = sweep(
+        comparison.study, folder=folder, workers=workers, engine=engine, time_limit=time_limit, progress=progress,
+        announce=announce,
+    )  # fmt: skip
+    comparison = replace(comparison, native=summary.study.native)
+    known = bandwidths(comparison)  # after the check of the design, which names an invalid run
+    place = summary.path.parent
+    table = frame(summary.path)
+    outcome = outcome_of(comparison, table, known)
+    written = [*export(summary.path, place), *write(comparison, outcome, known, place)]
+    if figures:
+        from orchestration.experiments.comparison import pictures
+        from orchestration.simulation.figures.style import SCREEN  # with it comes matplotlib
+
+        written += pictures.draw(comparison, outcome, table, place, style or SCREEN, units=units_in(summary.path))
+    return Compared(
+        axis=comparison.axis.name, summary=summary, table=table, bandwidths=known, outcome=outcome, written=written
+    )
+
+
+def rerun_cells(
+    comparison: Comparison, indices: Sequence[int], *, workers: int = 1, engine: EngineChoice = "auto"
+) -> list[CellSummary]:
+    """Run all runs of some cells, whether or not a store has them; in the order of the cells.
+
+    Raises `UsageError` for a cell that does not exist.
+    """
+    runs = [comparison.runs_of(comparison.cell(index)) for index in indices]
+    comparison, files, how = _prepared(comparison, [of_cell[0] for of_cell in runs], engine)
+    study = comparison.study
+    starts = files.start_values_of(study.origin)
+    systems = [study.system(i, starts) for i in chain(*runs)]
+    with RunEvaluator(files, workers, how.engine) as pool:
+        flights = pool.run_all(systems, in_lanes=how.in_lanes, on_gpu=how.on_gpu)
+    return cell_summaries(comparison, table_of_runs(comparison, zip(chain(*runs), flights)))
+
+
+def agree(one: CellSummary, other: CellSummary) -> bool:
+    """Whether two summaries of a cell are equal, up to the tolerance of metrics of a SIMD batch."""
+    same = ("cell", "count", "survives", "settles", "diverged")
+    counts = all(getattr(one, key) == getattr(other, key) for key in same)
+    pairs = ((one.medians[name], other.medians.get(name)) for name in one.medians)
+    return counts and all(known is not None and median.is_near(known, TOLERATED) for median, known in pairs)
+
+
+def stored_cell(comparison: Comparison, index: int, folder: Path | None) -> CellSummary | None:
+    """The summary of a cell from the store; None if it has no runs there."""
+    path = store_path(comparison.name, folder)
+    if not path.is_file():
+        return None
+    summaries = cell_summaries(comparison, frame(path))
+    return next((cell for cell in summaries if cell.cell == index), None)
+
+
+def flight(
+    comparison: Comparison, index: int, start: int, out: Path, *, engine: EngineChoice = "auto", figures: bool = True
+) -> None:
+    """Run one initial condition of a cell by itself, and keep it in a run directory."""
+    runs = comparison.runs_of(comparison.cell(index))
+    if not 0 <= start < len(runs):
+        raise UsageError(f"--start {start}: expected a number from 0 to {len(runs) - 1}")
+    comparison, files, how = _prepared(comparison, [runs[start]], engine)
+    request = comparison.request(runs[start], files.start_values_of(comparison.study.origin))
+    keep_run(out, lambda to: fly(request, recorder=to, engine=how.engine), figures=figures)
+
+
+def _prepared(
+    comparison: Comparison, indices: Sequence[int], engine: EngineChoice
+) -> tuple[Comparison, Files, Execution]:
+    """A comparison as an engine runs some of its runs, its files and the choice of the engine.
+
+    Raises `UsageError` for an invalid run.
+    """
+
+    def first(native: bool) -> tuple[System, Files]:
+        study = replace(comparison, native=native).study
+        files = study.files()
+        with errors_in_own_terms(comparison.base):
+            systems = [study.system(index, files.start_values_of(study.origin)) for index in indices]
+            for system in systems:
+                check_against_fmus(system, files.models_of(system))
+        return systems[0], files
+
+    how = choose_execution(engine, comparison.native, first)
+    return replace(comparison, native=how.native), first(how.native)[1], how

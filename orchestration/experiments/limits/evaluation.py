@@ -1,0 +1,114 @@
+"""Evaluation of whether a value of a quantity is good, with one seed or many."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from orchestration.foundation.basics.bisection import Range
+from orchestration.foundation.basics.statistics import refutes, wilson
+from orchestration.simulation.requests.ranges import Varied
+from orchestration.simulation.results.criterion import judged_objective, unmet
+from orchestration.simulation.workers.executors import RunEvaluator
+
+RELIABILITY = 0.9
+"""For random quantities: the share of good seeds to which the stated confidence refers"""
+
+
+def is_good(metrics: dict[str, Any]) -> bool:
+    """Whether a run meets the criterion of its system."""
+    return bool(metrics["good"])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evaluation:
+    """The outcome of the runs at one value, with one seed or many."""
+
+    value: float
+    outcome: str
+    """of a good run if all were good, else of the first seed that was not"""
+    divergence_time: float | None
+    """of that seed [s]"""
+    flew: int
+    """number of good runs"""
+    runs: int
+    """number of runs: all seeds, or up to the first that was not good"""
+    share: tuple[float, float] | None
+    """Wilson interval of the share of good seeds, at the confidence; None: nothing is random, or not all were run"""
+    measured: float | None = None
+    """the judged objective, of the seed that `outcome` is of or else the first; None: it has no value"""
+    unmet: str | None = None
+    """the part of the criterion that this seed did not meet, in words; None: it was met, or the run diverged"""
+
+
+class Evaluator:
+    """Evaluates values of a quantity, each with all seeds, and keeps the evaluations."""
+
+    def __init__(
+        self,
+        varied: Varied,
+        span: Range,
+        seeds: int,
+        confidence: float | None,
+        units: Mapping[str, str],
+        pool: RunEvaluator,
+        announce: Callable[[str], None],
+        progress: Callable[[float], None],
+    ) -> None:
+        self._varied, self._span, self._seeds = varied, span, seeds
+        self._confidence, self._pool, self._announce, self._progress = confidence, pool, announce, progress
+        self._units = units
+        self._done = self._remaining = 0
+        self.tolerance = span.tolerance
+        self.tried: dict[float, Evaluation] = {}
+
+    def expect_remaining(self, count: int) -> None:
+        """Set how many values may follow the next one, for the progress as a share of all of them."""
+        self._remaining = count
+
+    def fails(self, value: float) -> bool:
+        """Whether some seed is not good; the remaining seeds are not run then."""
+        evaluation = self._run(value, stop=lambda metrics: not is_good(metrics))
+        return evaluation.flew < evaluation.runs
+
+    def is_refuted(self, value: float) -> bool:
+        """Whether so many of all seeds are not good that `RELIABILITY` is refuted at the confidence."""
+        done = self._run(value, stop=lambda metrics: False)
+        return self._confidence is not None and refutes(done.flew, done.runs, RELIABILITY, self._confidence)
+
+    def _run(self, value: float, stop: Callable[[Any], bool]) -> Evaluation:
+        system = self._varied.at(value)
+        runs = [replace(system, seed=system.seed + i) for i in range(self._seeds)]
+        all_values = self._done + 1 + self._remaining
+        metrics = self._pool.run_until(
+            runs, stop=stop, report=lambda seeds: self._progress((self._done + seeds / len(runs)) / all_values)
+        )
+        self._done += 1
+        failed = next((one for one in metrics if not is_good(one)), None)
+        good = sum(map(is_good, metrics))
+        measured = metrics[0 if failed is None else metrics.index(failed)].get(judged_objective(system) or "")
+        known = self._confidence is not None and len(metrics) == self._seeds
+        evaluation = self.tried[value] = Evaluation(
+            value=value,
+            outcome=system.criterion.outcomes[0] if failed is None else failed["outcome"],
+            divergence_time=None if failed is None else failed["divergence_time"],
+            flew=good,
+            runs=len(metrics),
+            share=wilson(good, len(metrics), self._confidence) if known and self._confidence is not None else None,
+            measured=measured if isinstance(measured, float) and math.isfinite(measured) else None,
+            unmet=None if failed is None else unmet(system, failed, self._units),
+        )
+        self._announce(f"{self._varied.of} {value:.6g}{self._span.unit}: {describe(evaluation)}")
+        return evaluation
+
+
+def describe(evaluation: Evaluation) -> str:
+    """The outcome at a value, in words."""
+    if evaluation.share is not None:
+        low, high = evaluation.share
+        return f"{evaluation.flew} of {evaluation.runs} seeds are good, a share of {low:.2f} to {high:.2f}"
+    if evaluation.flew == evaluation.runs:
+        return evaluation.outcome
+    if evaluation.divergence_time is not None:
+        return f"fails, {evaluation.outcome} at {evaluation.divergence_time:.3g} s"
+    return f"fails, {evaluation.outcome}" + (f": {evaluation.unmet}" if evaluation.unmet else "")

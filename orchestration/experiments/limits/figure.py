@@ -1,0 +1,183 @@
+"""The figure of a limit: the measurement at each value, the measured limit, and the limit by theory."""
+
+import contextlib
+import re
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from orchestration.components.fmi.foreign import LostError, isolated_call
+from orchestration.experiments.limits.evaluation import RELIABILITY, Evaluation
+from orchestration.experiments.limits.limit_result import LimitResult
+from orchestration.experiments.studies import figures
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.simulation.figures.palette import BLUE, GREY, ORANGE, RED
+from orchestration.simulation.figures.style import SCREEN, Style
+from orchestration.simulation.results import display_names as labels
+from orchestration.simulation.results import quantities
+from orchestration.simulation.results.quantities import Quantity
+from orchestration.systems.system.files import files_of
+from orchestration.systems.system.request import Request, system_of
+from orchestration.theory.stability.known_loops import LOOPS, KnownLoop
+
+DIGITS = 4
+"""of values in text"""
+
+
+def limit_figure(result: LimitResult, style: Style = SCREEN) -> Figure:
+    """The judged objective over the quantity, or the share of good seeds, with the limits."""
+    across = _quantity(result)
+    figure = style.figure(38.0)
+    axes = figure.add_subplot()
+    if result.confidence is None:
+        _draw_values(axes, result, across)
+    else:
+        _draw_shares(axes, result, across)
+    axes.set_xlim(_with_margin([one.value * across.factor for one in result.tried]))
+    _draw_limits(axes, result, across)
+    axes.set_xlabel(across.title)
+    axes.set_title(_title(result, across), loc="left")
+    figure.legend(loc="outside lower center", ncols=3)
+    return figure
+
+
+def _draw_values(axes: Axes, result: LimitResult, across: Quantity) -> None:
+    """One run per value: the judged objective, or good and not good where it has no value."""
+    known = [one for one in result.tried if one.measured is not None]
+    if not known:
+        _draw_marks(axes, result.tried, [float(is_good(one)) for one in result.tried], across)
+        axes.set(yticks=(0.0, 1.0), yticklabels=("not good", "good"), ylim=(-0.3, 1.3))
+        return
+    _draw_marks(axes, known, [one.measured or 0.0 for one in known], across)
+    down = [one.value * across.factor for one in result.tried if one.measured is None]
+    axes.plot(
+        down, np.full(len(down), 0.97), "^", color=RED, transform=axes.get_xaxis_transform(),
+        label="diverged" if down else None,
+    )  # fmt: skip
+    bound = result.judged_bound
+    if bound is not None:
+        axes.axhline(
+            bound,
+            color=GREY,
+            linewidth=1.0,
+            linestyle=":",
+            label=f"the criterion's bound, {Quantity(name='', unit=result.judged_unit).text_of(bound, DIGITS)}",
+        )
+    values = [one.measured or 0.0 for one in known]
+    if min(values) > 0.0 and max(values) > 20.0 * min(values):
+        axes.set_yscale("log")
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.yaxis.set_minor_formatter("" if max(values) > 100.0 * min(values) else "{x:g}")
+    axes.set_ylabel(labels.with_unit(labels.metric(result.judged or ""), result.judged_unit))
+
+
+def _draw_shares(axes: Axes, result: LimitResult, across: Quantity) -> None:
+    """Many runs per value: the share of good seeds, with its interval where all were run."""
+    shares = [one.flew / one.runs for one in result.tried]
+    _draw_marks(axes, result.tried, shares, across)
+    known = [one for one in result.tried if one.share is not None]
+    low, high = (np.array([one.share[side] for one in known if one.share is not None]) for side in (0, 1))
+    middle = np.array([one.flew / one.runs for one in known])
+    apart = np.maximum(np.array([middle - low, high - middle]), 0.0)
+    axes.errorbar(
+        [one.value * across.factor for one in known], middle, apart, fmt="none", ecolor=GREY, capsize=2,
+        label=f"{result.confidence:.0%} interval",
+    )  # fmt: skip
+    axes.axhline(RELIABILITY, color=GREY, linewidth=1.0, linestyle=":", label=f"{RELIABILITY:.0%} of the seeds")
+    axes.set(ylabel=f"share of {result.seeds} seeds that are good", ylim=(-0.05, 1.08))
+
+
+def _draw_marks(
+    axes: Axes, tried: "list[Evaluation] | tuple[Evaluation, ...]", heights: list[float], across: Quantity
+) -> None:
+    """One mark per value: dots where all runs were good, crosses elsewhere."""
+    for good, mark, color, label in ((True, "o", BLUE, "good"), (False, "X", RED, "not good")):
+        chosen = [i for i, one in enumerate(tried) if is_good(one) is good]
+        x, y = [tried[i].value * across.factor for i in chosen], [heights[i] for i in chosen]
+        axes.plot(x, y, mark, color=color, markersize=6, label=label if chosen else None)
+
+
+def is_good(tried: Evaluation) -> bool:
+    """Whether all runs at a value were good."""
+    return tried.flew == tried.runs
+
+
+def _draw_limits(axes: Axes, result: LimitResult, across: Quantity) -> None:
+    """The limits as lines, with the region beyond the measured one shaded."""
+    named = (
+        (result.large_signal_limit, RED, "-", "measured limit"),
+        (result.local_limit, ORANGE, "--", "local limit, by theory"),
+        (result.refuted_limit, GREY, "-.", f"{RELIABILITY:.0%} refuted"),
+    )
+    left, right = axes.get_xlim()
+    for limit, color, style, name in named:
+        at = None if limit is None else limit * across.factor
+        if limit is not None and at is not None and left <= at <= right:
+            axes.axvline(at, color=color, linestyle=style, label=f"{name}  {across.text_of(limit, DIGITS)}")
+    if result.large_signal_limit is not None:
+        axes.axvspan(result.large_signal_limit * across.factor, right, color=RED, alpha=0.06, linewidth=0.0)
+
+
+def _title(result: LimitResult, across: Quantity) -> str:
+    what, until = across.name, f", in runs of {result.horizon:g} s"
+    if result.large_signal_limit is not None:
+        return f"Good up to {across.text_of(result.large_signal_limit, DIGITS)}: {what}{until}"
+    first = result.tried[0]
+    return f"{what}: {'good throughout' if is_good(first) else 'never good'}{until}"
+
+
+def _quantity(result: LimitResult) -> Quantity:
+    return quantities.setting(result.of, [one.value for one in result.tried], result.unit)
+
+
+def _with_margin(values: list[float]) -> tuple[float, float]:
+    room = 0.03 * (max(values) - min(values)) or 1.0
+    return min(values) - room, max(values) + room
+
+
+def draw_limit(request: Request, result: LimitResult, folder: Path, style: Style = SCREEN) -> list[Path]:
+    """Draw the measurements with both limits, and the spectral radius where a linear loop is known; the paths."""
+    name = "limit_" + re.sub(r"[^A-Za-z0-9]+", "_", result.of).strip("_")
+    written = figures.save(lambda chosen: limit_figure(result, chosen), folder / name, style)
+    with contextlib.suppress(UsageError, LostError):  # linear theory does not apply, or its process is lost
+        written += draw_spectral_radius(request, result, folder, style)
+    return written
+
+
+def draw_spectral_radius(request: Request, result: LimitResult, folder: Path, style: Style) -> list[Path]:
+    """Draw the spectral radius of the loop over the quantity; the paths, empty if no linear loop is known.
+
+    Raises `UsageError` where linear theory does not apply, and `LostError` as `isolated_call` does.
+    """
+    known = LOOPS.of(request.kind)
+    if known is None:
+        return []
+    ends = [limit for limit in (result.local_limit, result.large_signal_limit) if limit is not None]
+    last = 1.3 * max(ends, default=0.1)
+    values = np.array([0.001 + i / 199.0 * (last - 0.001) for i in range(200)])
+    radii = isolated_call(files_of(system_of(request)).fmus.values(), _radii, known, request, result.of, values)
+    return (
+        []
+        if radii is None
+        else figures.save(
+            lambda chosen: figures.spectral_radius(
+                result.of,
+                values,
+                radii,
+                local_limit=result.local_limit,
+                large_signal_limit=result.large_signal_limit,
+                style=chosen,
+            ),
+            folder / f"spectral_radius_{result.of}",
+            style,
+        )
+    )
+
+
+def _radii(known: KnownLoop, request: Request, of: str, values: Floats) -> Floats | None:
+    """The spectral radius at each value; None if the loop is not known as a function of the quantity."""
+    radius = known.radius_over(request, of)
+    return None if radius is None else np.array([radius(value) for value in values])

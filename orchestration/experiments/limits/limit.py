@@ -1,0 +1,264 @@
+"""The largest good value of a quantity, measured by runs, and its local limit by linear theory."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from orchestration.components.fmi.foreign import LostError, isolated_call
+from orchestration.experiments.limits.evaluation import RELIABILITY, Evaluator, describe
+from orchestration.experiments.limits.limit_result import ContinuousRun, LimitResult
+from orchestration.foundation.basics.bisection import Bracket, Range, bisected, first_failure
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.extras import explains_missing
+from orchestration.foundation.basics.progress import ShareProgress, share_reporter
+from orchestration.foundation.basics.terminal import inform
+from orchestration.simulation.engines.engine import Engine
+from orchestration.simulation.engines.wiring import check_against_fmus
+from orchestration.simulation.requests.ranges import Varied, default_quantity, search_range
+from orchestration.simulation.requests.request import RequestLike, request_of
+from orchestration.simulation.results import html
+from orchestration.simulation.results.criterion import bound_of, judged_objective
+from orchestration.simulation.workers.choice import single_run_execution
+from orchestration.simulation.workers.executors import RunEvaluator
+from orchestration.systems.system.files import Files, files_of
+from orchestration.systems.system.randomness import depends_on_seed, has_random_timing
+from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
+from orchestration.theory.exact.mean_square import MeanSquareLimit, mean_square_limit
+from orchestration.theory.stability.known_loops import LocalLimit
+from orchestration.theory.stability.local_limit import local_limits
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from orchestration.simulation.figures.gallery import Figures
+
+GAP = 0.1
+"""of the local limit: a larger difference to the large-signal limit is noted"""
+FINER = 5
+"""parts of the step of the scan within the bracket"""
+BEYOND = 4
+"""values of the scan that are evaluated beyond the first that fails"""
+CONTINUOUS = 1e-4
+"""[s], the period of the flight that approximates continuous time"""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Limit(LimitResult):
+    """The last good value of a quantity and the evidence for it, in the quantity's unit."""
+
+    def __repr__(self) -> str:
+        return f"<Limit of {self.of}: {self.note}>"
+
+    def _repr_html_(self) -> str:
+        """The form that notebooks show."""
+        limits = {
+            "last value that is good": self.large_signal_limit,
+            "local limit, of small errors at rest": self.local_limit,
+            "mean-square limit": self.mean_square_limit,
+            "refuted from": self.refuted_limit,
+        }
+        rows = [(name, html.number(value), "" if value is None else self.unit or "") for name, value in limits.items()]
+        return html.card(
+            f"The limit of {self.of}", None, None, self.note, [*rows, ("values tried", str(len(self.tried)), "")]
+        )
+
+    @explains_missing
+    def plot(self, *, style: Literal["screen", "paper", "slides"] = "screen") -> "Figures":
+        """The figure of the measurements over the quantity, with both limits; a notebook shows it.
+
+        `style` sets its size and fonts. Raises `UsageError` for an unknown style.
+        """
+        from orchestration.experiments.limits.figure import limit_figure
+        from orchestration.simulation.figures.gallery import Figures
+        from orchestration.simulation.figures.style import style_named
+
+        chosen = style_named(style)
+        with chosen.applied():
+            return Figures({"limit": limit_figure(self, chosen)}, chosen)
+
+    @explains_missing
+    def to_pandas(self) -> "pd.DataFrame":
+        """A row for each evaluated value, in rising order: outcome, and numbers of seeds run and good."""
+        import pandas as pd
+
+        return pd.DataFrame([vars(one) for one in self.tried])
+
+
+@explains_missing
+def find(
+    request: RequestLike,
+    of: str | None = None,
+    *,
+    first: float | None = None,
+    last: float | None = None,
+    tolerance: float | None = None,
+    scan: float | None = None,
+    confidence: float = 0.95,
+    continuous: bool = False,
+    workers: int = 1,
+    engine: Engine | Literal["auto"] = "auto",
+    progress: ShareProgress = "bar",
+    announce: Callable[[str], None] | None = inform,
+) -> Limit:
+    """Find the largest value of a quantity of a system or a scenario at which it is still good.
+
+    `of` is a path, or for the quadrotor `period`, `delay`, `jitter` or `loss`; default: the period of the only sampled
+    component. The search runs from `first` to `last` in steps of `scan`; `continuous` adds a run near continuous time
+    (quadrotor only). The seeds of a random quantity are run by `workers` processes. The engine `auto` uses native twins
+    of the FMUs if available. `progress` is called with the share done of a search in which nothing fails before the end
+    of the scan, `announce` with the choice of the engine and a line for each evaluated value; None for silence.
+
+    Raises `UsageError` for an invalid quantity, range, tolerance, step or confidence.
+    """
+    loop, execution = single_run_execution(request_of(request), engine)
+    of = of or default_quantity(loop)
+    varied, files = _checked(loop, of, confidence)
+    near = loop.near_continuous(CONTINUOUS) if continuous else None
+    if continuous and near is None:
+        raise UsageError("--continuous: for the quadrotor only")
+    models = files.models_of(varied.system)
+    span = search_range(varied, models, first=first, last=last, tolerance=tolerance, scan=scan)
+    with errors_in_own_terms(loop):
+        checks = [check_against_fmus(varied.at(value), models) for value in span.values()]
+    units, metric = checks[0].units, judged_objective(varied.system)
+    random = depends_on_seed(varied.at(span.last))
+    seeds = math.ceil(math.log(1.0 - confidence) / math.log(RELIABILITY)) if random else 1
+    local = _local(varied, span, files)
+    mean_square = _mean_square(varied, span, files, local) if random else MeanSquareLimit()
+    with share_reporter(progress, "longest search") as report, RunEvaluator(files, workers, execution.engine) as pool:
+        announce = announce or (lambda line: None)
+        if engine == "auto":
+            announce(str(execution))
+        trials = Evaluator(varied, span, seeds, confidence if random else None, units, pool, announce, report)
+        values = span.values()
+        bracket = first_failure(
+            trials.fails,
+            values,
+            span.tolerance,
+            parts=FINER,
+            remaining=lambda most: trials.expect_remaining(most + BEYOND),
+        )
+        above = [value for value in values if bracket is not None and value >= bracket.bad]
+        refuted = _refuted(trials, bracket, above) if random else None
+        if not random:
+            beyond = [value for value in above if value not in trials.tried][:BEYOND]
+            for i, value in enumerate(beyond, start=1):
+                trials.expect_remaining(len(beyond) - i)
+                trials.fails(value)
+        ideal = _continuous_run(near, pool) if near is not None else None
+        report(1.0)
+    note = [*_note(span, bracket, trials, refuted, local), *_mean_square_note(mean_square, span)]
+    tried = tuple(trials.tried[value] for value in sorted(trials.tried))
+    return Limit(
+        of=of, unit=span.unit.strip() or None, judged=metric, judged_unit=units.get(metric or ""),
+        judged_bound=None if metric is None else bound_of(varied.system, metric),
+        local_limit=local.limit, local_limit_outside=local.outside, local_method=local.method,
+        local_accuracy=local.accuracy, mean_square_limit=mean_square.limit,
+        large_signal_limit=None if bracket is None else bracket.good,
+        refuted_limit=refuted, follows=checks[0].follows, horizon=varied.system.stop_time, tolerance=span.tolerance,
+        scan=span.step, confidence=confidence if random else None, seeds=seeds,
+        flies_above=tuple(
+            one.value for one in tried if bracket is not None and one.value > bracket.bad and one.flew == seeds
+        ),
+        continuous=ideal, tried=tried, note="; ".join(note),
+    )  # fmt: skip
+
+
+def _checked(request: Request, of: str, confidence: float) -> tuple[Varied, Files]:
+    if not 0.0 < confidence < 1.0:
+        raise UsageError(f"--confidence {confidence}: expected a number between 0 and 1")
+    varied = Varied(request=request, of=of)
+    if varied.system.criterion.good is None:
+        raise UsageError("criterion.good: expected in the system file, since it defines the limit")
+    return varied, files_of(varied.system)
+
+
+def _local(varied: Varied, span: Range, files: Files) -> LocalLimit:
+    try:
+        return isolated_call(files.fmus.values(), local_limits, varied, span)
+    except LostError as error:
+        return LocalLimit(reason=f"no local limit: {error}")
+
+
+def _mean_square(varied: Varied, span: Range, files: Files, local: LocalLimit) -> MeanSquareLimit:
+    """The mean-square limit; with additive noise alone, which does not change the loop, it is the local limit."""
+    if local.limit is not None and not has_random_timing(varied.at(span.last)):
+        return MeanSquareLimit(limit=local.limit)
+    try:
+        return isolated_call(files.fmus.values(), mean_square_limit, varied, span, files.models_of(varied.system))
+    except LostError as error:
+        return MeanSquareLimit(reason=f"no mean-square limit: {error}")
+
+
+_ALWAYS = ("local_limit", "large_signal_limit")
+"""Fields that are shown also where they have no value"""
+
+
+def as_text(limit: Limit) -> dict[str, str]:
+    """The applicable fields of a limit as text; of the evaluated values, those whose share of seeds is known."""
+    known = {name: value for name, value in vars(limit).items() if value not in (None, "", ())}
+    texts = {name: str(known[name]) if name in known else "-" for name in vars(limit) if name in (*known, *_ALWAYS)}
+    if limit.flies_above:
+        texts["flies_above"] = ", ".join(f"{value:.6g}" for value in limit.flies_above)
+    if (ideal := limit.continuous) is not None:
+        settles = "" if ideal.settling_time is None else f", within 5 cm from {ideal.settling_time:.6g} s on"
+        texts["continuous"] = f"{ideal.outcome} at a period of {ideal.period:g} s{settles}"
+    shares = [f"{one.value:.6g}: {describe(one)}" for one in limit.tried if one.share is not None]
+    texts["tried"] = "; ".join(shares) or f"{len(limit.tried)} values"
+    return texts
+
+
+def _mean_square_note(found: MeanSquareLimit, span: Range) -> list[str]:
+    """The note on the mean-square limit."""
+    if found.limit is not None:
+        return [f"from {found.limit:.6g}{span.unit} on means of squares have no finite expectation"]
+    return [found.reason] if found.reason else []
+
+
+def _refuted(trials: Evaluator, bracket: Bracket | None, above: list[float]) -> float | None:
+    """The lowest evaluated value at which it is refuted that `RELIABILITY` of the seeds are good."""
+    if bracket is None:
+        return None
+    below = bracket.good
+    for i, value in enumerate(above, start=1):
+        trials.expect_remaining(len(above) - i)
+        if trials.is_refuted(value):
+            if below is None:
+                return value
+            return bisected(trials.is_refuted, below, value, trials.tolerance, remaining=trials.expect_remaining).bad
+        below = value
+    return None
+
+
+def _continuous_run(near: Request, pool: RunEvaluator) -> ContinuousRun:
+    """The result of a run near continuous time."""
+    (metrics,) = pool.run_until([system_of(near)], stop=lambda metrics: False)
+    return ContinuousRun(period=CONTINUOUS, outcome=metrics["outcome"], settling_time=metrics["settling_time"])
+
+
+def _note(
+    span: Range, bracket: Bracket | None, trials: Evaluator, refuted: float | None, found: LocalLimit
+) -> list[str]:
+    local = found.limit
+    if bracket is None:
+        parts = [f"good throughout the range, to {span.last:g}{span.unit}"]
+    elif bracket.good is None:
+        failure = describe(trials.tried[bracket.bad])
+        parts = [f"not good at {bracket.bad:g}{span.unit}, the first value of the range ({failure})"]
+    else:
+        failure = describe(trials.tried[bracket.bad])
+        parts = [f"good at {bracket.good:.6g}{span.unit} and not at {bracket.bad:.6g}{span.unit} ({failure})"]
+    if refuted is not None:
+        parts.append(
+            f"that nine seeds in ten are good is refuted at {refuted:.6g}{span.unit}: {describe(trials.tried[refuted])}"
+        )
+    parts.append(f"what is narrower than the scan, {span.step:g}{span.unit}, is not seen")
+    if local is None:
+        return [*parts, found.reason]
+    measured = None if bracket is None else bracket.good
+    if measured is None:
+        return [*parts, f"the local limit is {local:.6g}{span.unit}"]
+    if abs(measured - local) > GAP * local:
+        return [*parts, f"more than a tenth from the local limit of {local:.6g}{span.unit}: large signals decide"]
+    return [*parts, f"within a tenth of the local limit of {local:.6g}{span.unit}"]

@@ -1,0 +1,60 @@
+"""A report as one HTML file that contains its data, the code of the page and the plotting library."""
+
+import html
+import json
+import re
+from importlib import resources
+from pathlib import Path
+
+from orchestration.experiments.report.model import Report, as_json
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.simulation.figures import palette, shades
+
+SCRIPTS = (
+    "data.js", "words.js", "theme.js", "scene.js", "peaks.js", "timeplots.js", "map.js", "shares.js", "run.js",
+    "tables.js", "page.js",
+)  # fmt: skip
+"""In the order of loading; each depends only on those before it"""
+FIGURES = {
+    "CYCLE": palette.CYCLE,
+    "NOT_GOOD": {"bad": palette.NOT_GOOD, "diverged": palette.DIVERGED},
+    "SHADES": {name: getattr(shades, name) for name in ("OUTER", "MOST", "LEAST", "WIDE")},
+    "PEAKS": {name: getattr(shades, name) for name in ("OUTSIDE", "CLIPPED")},
+}
+"""What the page shows as figures do: colours, and what ranges leave out"""
+_PAGE = resources.files("orchestration.experiments.report") / "page"
+_PLACE = re.compile(r"\{\{(\w+)\}\}")
+
+
+def write(report: Report, out: Path) -> Path:
+    """Write the file of a report; raises `UsageError` if it cannot be written."""
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        out.write_text(as_html(report), encoding="utf-8")
+    except OSError as error:
+        raise UsageError(f"--out {out}: expected a file that can be written: {error.strerror}") from error
+    return out
+
+
+def as_html(report: Report) -> str:
+    """The text of the file."""
+    from plotly.offline import get_plotlyjs  # comes with an extra
+
+    parts = {
+        "title": html.escape(report.title),
+        "style": _text("style.css"),
+        "data": _in_script(as_json(report)),
+        "plotly": get_plotlyjs(),
+        "figures": json.dumps(FIGURES),
+        "script": "\n".join(_text(name) for name in SCRIPTS),
+    }
+    return _PLACE.sub(lambda place: parts[place[1]], _text("page.html"))
+
+
+def _in_script(document: str) -> str:
+    """JSON escaped for a script element: names in it cannot open or close a tag."""
+    return document.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
+
+
+def _text(name: str) -> str:
+    return (_PAGE / name).read_text(encoding="utf-8")

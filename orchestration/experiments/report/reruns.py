@@ -1,0 +1,130 @@
+"""Reruns runs of a study for their signals, which a store does not keep: in SIMD batches where possible."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from orchestration.components.fmi.model import Model
+from orchestration.experiments.report.known_layouts import layout_for
+from orchestration.experiments.report.tracks import Signals
+from orchestration.experiments.studies.study import Study
+from orchestration.foundation.basics.errors import QuadcosimError
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.simulation.engines.batch.batches import Batches
+from orchestration.simulation.engines.wiring import columns_of, source_signals
+from orchestration.simulation.results.objectives import Metrics
+from orchestration.simulation.runs.simulation import run
+from orchestration.simulation.workers.choice import choose_execution
+from orchestration.systems.system.check import recorded_variables
+from orchestration.systems.system.files import Files, all_with_files
+from orchestration.systems.system.model import System
+from orchestration.systems.system.references import connect_references
+
+BATCH = 64
+"""Runs at once, which limits the memory for their signals"""
+MOST_COLUMNS = 24
+"""of a system other than a quadrotor"""
+Progress = Callable[[float], None]
+"""Receives the share of the reruns that is done"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rerun:
+    """A run of a study that was simulated again."""
+
+    index: int
+    system: System
+    signals: Signals
+    metrics: Metrics
+    message: str | None
+
+
+def fastest(study: Study) -> tuple[Study, Files, bool]:
+    """The study with the fastest engine of this machine, its files, and whether it runs in SIMD batches."""
+
+    def first(native: bool) -> tuple[System, Files]:
+        variant = replace(study, native=native)
+        files = variant.files()
+        return variant.system(0, files.start_values_of(variant.origin)), files
+
+    how = choose_execution("auto", study.native, first)
+    variant = replace(study, native=how.native)
+    return variant, variant.files(), how.in_lanes
+
+
+def rerun(
+    study: Study, files: Files, indices: Sequence[int], *, lanes: bool, progress: Progress | None = None
+) -> Iterator[Rerun]:
+    """Simulate runs of a study again by their indices; a run that fails is omitted."""
+    starts, paths = files.start_values_of(study.origin), {**files.fmus, **files.tables}
+    batches = Batches() if lanes else None
+    for first in range(0, len(indices), BATCH if lanes else 1):
+        some = indices[first : first + (BATCH if lanes else 1)]
+        listed = [study.system(i, starts) for i in some]
+        known = [connect_references(system, files.models_of(system)) for system in listed]
+        systems = all_with_files(known, paths)
+        for index, system, data in zip(some, systems, _simulated(systems, starts, batches, _columns(known, files))):
+            if data is not None:
+                signals, metrics, message = data
+                yield Rerun(index=index, system=system, signals=signals, metrics=metrics, message=message)
+        if progress is not None:
+            progress(min(1.0, (first + len(some)) / len(indices)))
+
+
+RunData = tuple[Signals, Metrics, str | None]
+"""Signals, metrics, and the reason of a divergence or termination"""
+
+
+def _simulated(
+    systems: Sequence[System], starts: Mapping[str, float], batches: Batches | None, names: Sequence[str]
+) -> Iterator[RunData | None]:
+    """The runs of systems in their order, with the columns of these names; None for one that fails."""
+    if batches is None:
+        yield from (_single_run(system, names) for system in systems)
+        return
+    columns = [name for name in names if name.partition(".")[0] in systems[0].components]
+    by_place: dict[int, RunData | None] = {}
+    for place, summary, rows in batches.each(systems, columns):
+        if summary is None:
+            by_place[place] = _single_run(systems[place], names)
+            continue
+        signals = dict(zip(("time", *columns), rows.T.copy()))
+        sources = _of_sources(systems[place], starts, signals["time"])
+        by_place[place] = signals | sources, summary.metrics, summary.message
+    yield from (by_place[place] for place in range(len(systems)))
+
+
+def _single_run(system: System, names: Sequence[str]) -> RunData | None:
+    try:
+        result = run(system)
+    except QuadcosimError:
+        return None
+    message = result.divergence or result.termination
+    return {name: result.signals[name] for name in ("time", *names)}, result.metrics, message
+
+
+def _columns(systems: Sequence[System], files: Files) -> list[str]:
+    """The columns to keep, common to all runs: those of their known layout and sources, else those exchanged."""
+    distinct = {tuple(system.fmus.items()): system for system in systems}.values()
+    recorded = [_recorded(system, files.models_of(system)) for system in distinct]
+    common = [name for name in recorded[0] if all(name in others for others in recorded[1:])]
+    known = layout_for(common)
+    if known is not None:
+        sources = [name for name in common if name.partition(".")[0] in systems[0].sources]
+        return [name for name in (*known.compact, *sources) if name in common]
+    return common[:MOST_COLUMNS]
+
+
+def _recorded(system: System, models: Mapping[str, Model]) -> list[str]:
+    """The columns of its run: exchanged variables first."""
+    variables = recorded_variables(system, models)
+    own = [f"{name}.{variable}" for name, of_component in variables.items() for variable in of_component]
+    return [*dict.fromkeys((*columns_of(system)[1:], *own))]
+
+
+def _of_sources(system: System, starts: Mapping[str, float], t: Floats) -> dict[str, Floats]:
+    """The signals of the sources, which SIMD batches do not record."""
+    values = {
+        f"{name}.{key}": value for name, one in system.components.items() for key, value in one.parameters.items()
+    }
+    numbers = {name: float(value) for name, value in values.items() if not isinstance(value, str)}
+    return source_signals(system, {**starts, **numbers}, t)

@@ -1,0 +1,92 @@
+"""The sources of a report: directories of runs, one study or its store, one comparison."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from orchestration.experiments.report import of_runs
+from orchestration.experiments.report.model import Report
+from orchestration.experiments.report.reruns import Progress
+from orchestration.foundation.basics.documents import read_toml
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.simulation.runs.result import Result
+from orchestration.simulation.runs.run_directory import METRICS, load_run
+
+EXPECTED = "the directory of a run, a study file or its store, or a comparison file"
+STORE = "study.sqlite"
+
+
+def report_of(
+    what: Sequence[Path],
+    command: str,
+    *,
+    store: Path | None = None,
+    required: Sequence[int] = (),
+    most: int | None = None,
+    progress: Progress | None = None,
+) -> Report:
+    """The report of the runs, study or comparison at these paths; raises `UsageError` for anything else.
+
+    `store` is the folder of the store of a study or a comparison, default `results/NAME`. `required` and `most` are
+    for studies: runs whose signals are included, and the number of such runs.
+    """
+    if not what:
+        raise UsageError(f"expected {EXPECTED}")
+    kinds = [_kind(path) for path in what]
+    if len(what) > 1 and set(kinds) != {"run"}:
+        raise UsageError(f"{', '.join(map(str, what))}: expected directories of runs, or one study or comparison alone")
+    if kinds[0] == "run":
+        if required or most is not None:
+            raise UsageError("--run and --flights: expected a study or a comparison with them")
+        return of_runs.runs_report(dict(_runs(what)), command)
+    return _of_many(what[0], kinds[0], command, store=store, required=required, most=most, progress=progress)
+
+
+def _kind(path: Path) -> str:
+    if path.is_dir():
+        if (path / METRICS).is_file():
+            return "run"
+        if (path / STORE).is_file():
+            return "store"
+    elif path.suffix == ".sqlite" and path.is_file():
+        return "store"
+    elif path.suffix == ".toml" and path.is_file():
+        return "comparison" if "controllers" in read_toml(path, "study or comparison file") else "study"
+    raise UsageError(f"{path}: expected {EXPECTED}")
+
+
+def _runs(paths: Sequence[Path]) -> Iterator[tuple[str, Result]]:
+    """Runs by the name of their directory; by their path if that is not unique."""
+    names = [path.resolve().name for path in paths]
+    for path, name in zip(paths, names):
+        yield (name if names.count(name) == 1 else str(path)), load_run(path)
+
+
+def _of_many(
+    path: Path,
+    kind: str,
+    command: str,
+    *,
+    store: Path | None,
+    required: Sequence[int],
+    most: int | None,
+    progress: Progress | None,
+) -> Report:
+    # reading stores needs an extra
+    from orchestration.experiments.comparison.file import load_comparison
+    from orchestration.experiments.report import of_comparison, of_study
+    from orchestration.experiments.studies.store import store_path
+    from orchestration.experiments.studies.study_file import load_study
+
+    if kind == "store":
+        file = path / STORE if path.is_dir() else path
+        name = file.resolve().parent.name
+        return of_study.study_report(name, of_study.read(file), None, command, required=required, most=most)
+    if kind == "study":
+        study = load_study(path)
+        stored = of_study.read(store_path(study.name, store), study)
+        return of_study.study_report(
+            study.name, stored, study, command, required=required, most=most, progress=progress
+        )
+    comparison = load_comparison(path)
+    file = store_path(comparison.name, store)
+    return of_comparison.comparison_report(comparison, file, command, required=required, most=most, progress=progress)

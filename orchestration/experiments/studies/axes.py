@@ -1,0 +1,151 @@
+"""The axes of a study and the points that they span."""
+
+import math
+from collections.abc import Sequence
+from typing import Literal, overload
+
+import numpy as np
+
+from orchestration.experiments.studies import sensitivity
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.records import Scalar, record
+from orchestration.foundation.basics.simulator import Floats
+
+Value = Scalar
+Scale = Literal["linear", "logarithmic"]
+Method = Literal["random", "latin-hypercube", "sobol", "morris", "saltelli"]
+"""Sampling methods: the last two are for sensitivity (Morris screening, Sobol indices)"""
+MOST_POINTS = 1_000_000
+"""Largest number of runs of a study"""
+
+
+_BY_NAME = ("axis.name",)
+
+
+@record()
+class Axis:
+    """One quantity that a study varies.
+
+    It takes `values` in turn, or is sampled between `low` and `high` together with all other sampled axes. Raises
+    `UsageError` for invalid values.
+    """
+
+    name: str
+    """The name of its column in the table of runs; default target."""
+    targets: tuple[str, ...] = _BY_NAME
+    """What it sets: paths of the system, for the quadrotor also `timing.KEY`, `controller.NAME`, `plant.NAME`; `seed`,
+    `stop_time`."""
+    multiplies: bool = False
+    """Whether its values are factors on the targets' values in the base, instead of setting them."""
+    values: tuple[Value, ...] | None = None
+    """The values, in turn; None: it is sampled."""
+    low: float = 0.0
+    """The lower end of its range if sampled, in the unit of its targets."""
+    high: float = 1.0
+    """The upper end of that range."""
+    scale: Scale = "linear"
+    """Whether it is sampled uniformly, or uniformly in its logarithm."""
+
+    def __post_init__(self) -> None:
+        if self.targets == _BY_NAME:
+            object.__setattr__(self, "targets", (self.name,))
+        if self.values is not None and not self.values:
+            raise UsageError(f"axis {self.name}: expected at least one value")
+        if len({_kind(value) for value in self.values or ()}) > 1:
+            raise UsageError(f"axis {self.name}: expected values of one kind: numbers, texts, or true and false")
+        if self.values is None:
+            _check_range(self.name, self.low, self.high, self.scale)
+
+    def at(self, share: float) -> float:
+        """The value at `share` in [0, 1] of the range."""
+        if self.scale == "logarithmic":
+            return math.exp(math.log(self.low) + share * math.log(self.high / self.low))
+        return self.low + share * (self.high - self.low)
+
+
+def span(name: str, low: float, high: float, number: int, scale: Scale) -> tuple[float, ...]:
+    """`number` values from `low` to `high`, in equal steps or equal ratios; the ends are exact."""
+    _check_range(name, low, high, scale)
+    if number < 2:
+        raise UsageError(f"axis {name}: number = {number}, expected at least 2")
+    if number > MOST_POINTS:
+        raise UsageError(f"axis {name}: number = {number}, expected at most {MOST_POINTS}")
+    axis = Axis(name=name, targets=(), low=low, high=high, scale=scale)
+    # Twelve digits keep the steps of a decimal range decimal: 0.003 instead of 0.0030000000000000005.
+    inner = [float(f"{axis.at(i / (number - 1)):.12g}") for i in range(1, number - 1)]
+    return (low, *inner, high)
+
+
+class Points(Sequence[dict[str, Value]]):
+    """The design: every combination of the listed values, each with every sampled point, in that order.
+
+    Each point is a dictionary of values by axis name, computed on access; the last listed axis varies fastest, but for
+    the samples. Raises `UsageError` for a design of more than `MOST_POINTS`, before it is expanded.
+    """
+
+    def __init__(self, axes: Sequence[Axis], method: Method, samples: int, seed: int) -> None:
+        self._axes = tuple(axes)
+        self._sampled = [axis for axis in axes if axis.values is None]
+        sizes = [len(axis.values) for axis in axes if axis.values is not None]
+        self._draws = 1
+        if self._sampled:
+            if samples < 1:
+                raise UsageError(f"design.samples = {samples}: expected at least 1 for sampled axes")
+            self._draws = samples * sensitivity.runs_a_sample(method, len(self._sampled))
+        self._number = math.prod(sizes) * self._draws
+        if self._number > MOST_POINTS:
+            factors = " x ".join(map(str, [*sizes, *([self._draws] if self._sampled else [])]))
+            raise UsageError(f"{factors} = {self._number} runs: expected at most {MOST_POINTS}")
+        if self._sampled:
+            self._shares = unit_points(method, len(self._sampled), samples, seed)
+
+    def __len__(self) -> int:
+        return self._number
+
+    @overload
+    def __getitem__(self, index: int) -> dict[str, Value]: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[dict[str, Value]]: ...
+    def __getitem__(self, index: int | slice) -> dict[str, Value] | list[dict[str, Value]]:
+        if isinstance(index, slice):
+            return [self._point(i) for i in range(*index.indices(self._number))]
+        return self._point(range(self._number)[index])
+
+    def _point(self, index: int) -> dict[str, Value]:
+        rest, draw = divmod(index, self._draws)
+        point: dict[str, Value] = {}
+        for axis in reversed(self._axes):
+            if axis.values is not None:
+                rest, place = divmod(rest, len(axis.values))
+                point[axis.name] = axis.values[place]
+        for axis, share in zip(self._sampled, self._shares[draw] if self._sampled else ()):
+            point[axis.name] = axis.at(float(share))
+        return {axis.name: point[axis.name] for axis in self._axes}
+
+
+def unit_points(method: Method, dimension: int, samples: int, seed: int) -> Floats:
+    """Points of the unit cube, shape (n, dimension); n is `samples` except for the sensitivity designs."""
+    if method in ("morris", "saltelli"):
+        return sensitivity.shares(method, dimension, samples, seed)
+    generator = np.random.default_rng(seed)
+    if method == "random":
+        return generator.random((samples, dimension))
+    from scipy.stats import qmc
+
+    if method == "latin-hypercube":
+        return np.asarray(qmc.LatinHypercube(dimension, rng=generator).random(samples))
+    exponent = round(math.log2(samples))
+    if 2**exponent != samples:
+        raise UsageError(f"design.samples = {samples}: expected a power of two for a Sobol sequence")
+    return np.asarray(qmc.Sobol(dimension, rng=generator).random_base2(exponent))
+
+
+def _kind(value: Value) -> str:
+    return "truth" if isinstance(value, bool) else "text" if isinstance(value, str) else "number"
+
+
+def _check_range(name: str, low: float, high: float, scale: Scale) -> None:
+    if not (math.isfinite(low) and math.isfinite(high) and low < high):
+        raise UsageError(f"axis {name}: start = {low}, stop = {high}, expected finite numbers with start < stop")
+    if scale == "logarithmic" and low <= 0.0:
+        raise UsageError(f"axis {name}: start = {low}, expected a positive number on a logarithmic scale")

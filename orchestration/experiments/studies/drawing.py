@@ -1,0 +1,121 @@
+"""The figures of a study: chosen by its axes, drawn from its store, written beside it."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from orchestration.experiments.studies import figures, sensitivity
+from orchestration.experiments.studies.axes import Axis, unit_points
+from orchestration.experiments.studies.default_metric import default_metric
+from orchestration.experiments.studies.maps import heat_map
+from orchestration.experiments.studies.store import store_path
+from orchestration.experiments.studies.store_columns import TEXTS, metrics_with
+from orchestration.experiments.studies.study import Study
+from orchestration.experiments.studies.table import frame, units_in
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.terminal import Share
+from orchestration.simulation.figures.style import SCREEN, Style, save
+from orchestration.simulation.results.criterion import bound_of, judged_objective
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def expect_metric(study: Study, metric: str | None) -> None:
+    """Raise `UsageError` for an unknown metric."""
+    known = [name for name in metrics_with(study.metric_names) if name not in TEXTS or _is_screened(study)]
+    if metric is not None and metric not in known:
+        raise UsageError(f"metric {metric}: expected one of {', '.join(known)}; every figure shows the outcome")
+
+
+def draw_study(
+    study: Study,
+    folder: Path | None,
+    metric: str | None = None,
+    style: Style = SCREEN,
+    progress: Share = lambda share: None,
+) -> list[Path]:
+    """Draw a metric from the store of `study`, default: the first objective that varies; the paths.
+
+    Raises `UsageError` for an unknown metric, or axes for which there is no figure.
+    """
+    path = store_path(study.name, folder)
+    drawn, indices = study_figures(study, path, metric, style)
+    tables = [sensitivity.write(indices, (path.parent / next(iter(drawn))).with_suffix(".csv"))] if indices else []
+    return tables + save(drawn, path.parent, style, progress)
+
+
+def study_figures(
+    study: Study, store: Path, metric: str | None, style: Style = SCREEN
+) -> tuple[dict[str, Figure], list[sensitivity.Index]]:
+    """The figures of a metric over the axes of `study` by name, and the sensitivity indices that they show, if any.
+
+    Raises `UsageError` as `draw_study` does.
+    """
+    expect_metric(study, metric)
+    table, units = frame(store), units_in(store)
+    if metric is None:
+        metric = _default_metric_of(study, table)
+    indices = indices_of(study, numbers(table, metric), metric) if _is_screened(study) else []
+    with style.applied():
+        if indices:
+            return {f"sensitivity_{metric}": figures.sensitivity_bars(indices, metric, style)}, indices
+        return _over_axes(study, table, metric, units, style), []
+
+
+def _over_axes(
+    study: Study, table: "pd.DataFrame", metric: str, units: Mapping[str, str], style: Style
+) -> dict[str, Figure]:
+    axes = tuple(axis for axis in study.axes if _is_numeric(axis))
+    if len(axes) != len(study.axes):
+        raise UsageError(f"{study.name}: expected axes of numbers to draw")
+    system = study.origin
+    words = system.criterion.outcomes
+    if len(axes) > 2:
+        return {metric: figures.scatter(table, axes, metric, words, units=units, style=style)}
+    drawn = {metric: figures.lines(table, axes, metric, words, bound_of(system, metric), units=units, style=style)}
+    if len(axes) == 2 and all(axis.values is not None for axis in axes):
+        drawn[f"{metric}_map"] = heat_map(table, axes, metric, words, units=units, style=style)
+    return drawn
+
+
+def indices_of(study: Study, values: Floats, metric: str) -> list[sensitivity.Index]:
+    """The sensitivity indices of a metric, with a value for each run of `study`, shape (n,)."""
+    sampled = [axis for axis in study.axes if axis.values is None]
+    if len(sampled) != len(study.axes):
+        raise UsageError(f"{study.name}: expected every axis to be a range, for sensitivity")
+    if study.method not in sensitivity.METHODS:
+        raise UsageError(f"{study.name}: design.method = {study.method}, expected morris or saltelli")
+    design = unit_points(study.method, len(sampled), study.samples, study.design_seed)
+    if len(values) != len(design):
+        raise UsageError(f"{study.name}: {len(values)} of {len(design)} runs are there, expected all")
+    return sensitivity.analyse(study.method, [axis.name for axis in sampled], design, values, metric)
+
+
+def numbers(table: "pd.DataFrame", metric: str) -> Floats:
+    """A metric by run, shape (n,); for the outcome, 1 for a good run and 0 for another."""
+    values = (
+        figures.good_runs(table).astype(float).where(table["outcome"].notna()) if metric == "outcome" else table[metric]
+    )
+    return np.asarray(values.to_numpy(float, na_value=np.nan))
+
+
+def _default_metric_of(study: Study, table: "pd.DataFrame") -> str:
+    good = figures.good_runs(table)
+    return default_metric(
+        study.metric_names,
+        lambda name: table[name].where(good).to_numpy(float, na_value=np.nan),
+        judged_objective(study.origin),
+    )
+
+
+def _is_screened(study: Study) -> bool:
+    return study.method in sensitivity.METHODS and any(axis.values is None for axis in study.axes)
+
+
+def _is_numeric(axis: Axis) -> bool:
+    return axis.values is None or all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in axis.values)

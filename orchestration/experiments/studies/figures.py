@@ -1,0 +1,213 @@
+"""Figures of a study: a metric over one or two axes, the spectral radius, sensitivity bars."""
+
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from orchestration.experiments.studies.axes import Axis
+from orchestration.experiments.studies.axis_labels import SCALES, quantity_of
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.statistics import wilson
+from orchestration.foundation.basics.units import after
+from orchestration.simulation.figures.palette import BLUE, GREY, ORANGE, RED, SHADES
+from orchestration.simulation.figures.shades import is_wide
+from orchestration.simulation.figures.style import SCREEN, Style
+from orchestration.simulation.figures.style import save as write
+from orchestration.simulation.figures.ticks import plain
+from orchestration.simulation.results import display_names as labels
+from orchestration.simulation.results.quantities import setting
+from orchestration.systems.system.criterion import DIVERGED, TERMINATED
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from orchestration.experiments.studies.sensitivity import Index
+
+
+def lines(
+    table: "pd.DataFrame",
+    axes: tuple[Axis, ...],
+    metric: str,
+    words: tuple[str, str],
+    edge: float | None = None,
+    *,
+    units: Mapping[str, str],
+    style: Style = SCREEN,
+) -> Figure:
+    """A metric against the first axis, one line for each value of the second; runs that are not good are crosses.
+
+    Diverged runs have no metric and are marked along the lower edge, in a row for each line. `units` are those of
+    metrics and axes.
+    """
+    figure = style.figure(35.0)
+    panel = figure.add_subplot()
+    x = axes[0]
+    across, second = quantity_of(x, units), quantity_of(axes[-1], units)
+    groups = [(None, table)] if len(axes) == 1 else list(table.groupby(axes[1].name, sort=True))
+    colors = matplotlib.colormaps[SHADES](np.linspace(0.0, 0.9, len(groups)))
+    diverged: dict[str | tuple[float, ...], Floats] = {}
+    for (value, group), color in zip(groups, [BLUE] if len(groups) == 1 else colors, strict=True):
+        ordered = group.sort_values(x.name)
+        not_good = ~good_runs(ordered)
+        at, y = across.of(ordered[x.name]), ordered[metric].to_numpy(float)
+        named = None if value is None else f"{float(second.of(value)):g}"
+        panel.plot(at, np.where(not_good, np.nan, y), ".-", color=color, label=named)
+        panel.plot(at[not_good], y[not_good], "x", color=color, markersize=5)
+        diverged[color if len(groups) == 1 else tuple(color)] = at[(ordered["outcome"] == DIVERGED).to_numpy()]
+    outcomes = {*table["outcome"].dropna()}
+    for word, mark in ((words[0], ".-"), (words[1], "x"), (TERMINATED, "x"), (DIVERGED, "v")):
+        if word in outcomes:
+            color = BLUE if len(groups) == 1 and word == words[0] else GREY
+            panel.plot([], [], mark, color=color, markersize=4 if mark == "v" else None, label=word)
+    panel.set(
+        xlabel=across.title, ylabel=labels.metric_with_unit(metric, units.get(metric)), yscale=_scale(table[metric])
+    )
+    panel.set_xscale(SCALES[x.scale])
+    if edge is not None:
+        panel.axhline(
+            edge, color=RED, linewidth=0.8, linestyle="--", label=f"{words[0]} up to {edge:g}{after(units.get(metric))}"
+        )
+    _mark_diverged(panel, {color: at for color, at in diverged.items() if len(at)})
+    plain(panel.yaxis)
+    handles, names = panel.get_legend_handles_labels()
+    figure.legend(handles, names, title=None if len(axes) == 1 else second.title, loc="outside right upper")
+    return figure
+
+
+def _mark_diverged(panel: Axes, places: Mapping[str | tuple[float, ...], Floats]) -> None:
+    """Triangles along the lower edge, in a row for each colour, below all other marks."""
+    if not places:
+        return
+    step = min(0.022, 0.25 / len(places))
+    share = step * (len(places) + 1)
+    scale = panel.yaxis.get_transform()
+    low, high = (scale.transform(end) for end in panel.get_ylim())
+    bottom = scale.inverted().transform(low - (high - low) * share / (1.0 - share))
+    panel.set_ylim(bottom=float(np.asarray(bottom)))
+    for row, (color, at) in enumerate(places.items(), start=1):
+        across = panel.get_xaxis_transform()
+        panel.plot(at, np.full(len(at), row * step), "v", color=color, markersize=4, transform=across)
+
+
+def scatter(
+    table: "pd.DataFrame",
+    axes: tuple[Axis, ...],
+    metric: str,
+    words: tuple[str, str],
+    *,
+    units: Mapping[str, str],
+    style: Style = SCREEN,
+) -> Figure:
+    """A metric against each of many axes; crosses for runs that are not good, marks at the lower edge for diverged."""
+    figure = style.figure(17.0 * math.ceil(len(axes) / 2))
+    panels = figure.subplots(math.ceil(len(axes) / 2), 2, squeeze=False, sharey=True).ravel()
+    not_good = ~good_runs(table)
+    for panel, axis in zip(panels, axes, strict=False):
+        across = quantity_of(axis, units)
+        for chosen, marker, color in ((table[~not_good], ".", BLUE), (table[not_good], "x", RED)):
+            panel.plot(across.of(chosen[axis.name]), chosen[metric], marker, color=color, markersize=4, alpha=0.7)
+        down = across.of(table.loc[table["outcome"] == "diverged", axis.name])
+        panel.plot(down, np.full(len(down), 0.02), "v", color=RED, markersize=3, transform=panel.get_xaxis_transform())
+        panel.set(xlabel=across.title, yscale=_scale(table[metric]))
+        panel.set_xscale(SCALES[axis.scale])
+        plain(panel.yaxis)
+    for panel in panels[len(axes) :]:
+        panel.set_visible(False)
+    figure.supylabel(labels.metric_with_unit(metric, units.get(metric)))
+    kinds = zip((*words, TERMINATED, DIVERGED), ("dots", "crosses", "crosses", "below"), strict=True)
+    counted = [(int((table["outcome"] == kind).sum()), kind, mark) for kind, mark in kinds]
+    counts = [f"{count} {kind} ({mark})" for count, kind, mark in counted if count]
+    low, high = wilson(int((~not_good).sum()), len(table))
+    figure.suptitle(
+        f"{len(table)} runs: {', '.join(counts)}{by_horizon(table)}\n"
+        f"share that is {words[0]} {(~not_good).mean():.0%}, 95 % interval {low:.0%} to {high:.0%}",
+    )
+    return figure
+
+
+def spectral_radius(
+    of: str,
+    values: Floats,
+    radii: Floats,
+    *,
+    local_limit: float | None,
+    large_signal_limit: float | None,
+    style: Style = SCREEN,
+) -> Figure:
+    """The spectral radius of the sampled loop about hover against the period or delay [s], with both limits."""
+    figure = style.figure(30.0)
+    panel = figure.add_subplot()
+    across = setting(of, values)
+    panel.plot(across.of(values), radii, color=BLUE)
+    panel.axhline(1.0, color=GREY, linewidth=0.8)
+    for limit, color, name in ((local_limit, BLUE, "local"), (large_signal_limit, ORANGE, "large-signal")):
+        if limit is not None:
+            at = across.factor * limit
+            panel.axvline(at, color=color, linestyle="--", label=f"{name} limit, {across.text_of(limit, 4)}")
+    panel.set(xlabel=across.title, ylabel="spectral radius about hover [1]")
+    panel.margins(x=0)
+    if panel.get_legend_handles_labels()[0]:
+        panel.legend()
+    return figure
+
+
+def sensitivity_bars(indices: "list[Index]", metric: str, style: Style = SCREEN) -> Figure:
+    """Bars with confidence intervals, one group for each kind of index."""
+    kinds = list(dict.fromkeys(index.kind for index in indices))
+    axes = list(dict.fromkeys(index.axis for index in indices))
+    figure = style.figure(4.3 * len(axes) + 13.0)
+    panel = figure.add_subplot()
+    height = 0.8 / len(kinds)
+    for i, (kind, color) in enumerate(zip(kinds, (BLUE, ORANGE), strict=False)):
+        chosen = {index.axis: index for index in indices if index.kind == kind}
+        panel.barh(
+            np.arange(len(axes)) + i * height,
+            [chosen[axis].value for axis in axes],
+            height,
+            xerr=[chosen[axis].confidence for axis in axes],
+            color=color,
+            label=_KINDS.get(kind, kind),
+            capsize=2,
+        )
+    panel.set(
+        yticks=np.arange(len(axes)) + height * (len(kinds) - 1) / 2,
+        yticklabels=[labels.setting(axis) for axis in axes],
+        xlabel=f"index of sensitivity [1]: {_OF.get(metric, labels.metric(metric))}",
+    )
+    panel.invert_yaxis()
+    figure.legend(loc="outside right upper")
+    return figure
+
+
+def good_runs(table: "pd.DataFrame") -> "pd.Series":
+    """Whether each run meets the criterion."""
+    return table["good"].eq(1).fillna(False).astype(bool)
+
+
+def save(make: Callable[[Style], Figure], path: Path, style: Style = SCREEN) -> list[Path]:
+    """Make a figure in a style and write it as `path` with the suffix of each format; the paths."""
+    with style.applied():
+        figure = make(style)
+    return write({path.name: figure}, path.parent, style)
+
+
+def by_horizon(table: "pd.DataFrame") -> str:
+    """The stop time as text, if all runs have the same."""
+    horizons = set(table["horizon"].dropna()) if "horizon" in table else set()
+    return f", by {horizons.pop():g} s" if len(horizons) == 1 else ""
+
+
+def _scale(values: "pd.Series") -> str:
+    return "log" if is_wide(values.to_numpy(float, na_value=np.nan)) else "linear"
+
+
+_KINDS = {
+    "mu_star": "mean size of the effect μ*", "sigma": "its spread σ", "first": "first order", "total": "total",
+}  # fmt: skip
+_OF = {"outcome": "whether a run is good"}

@@ -1,0 +1,105 @@
+"""Agreement of runs in SIMD lanes with FMUs: a sample of the runs by their FMUs, and their beginning by FMUs in Python.
+
+Lanes and native FMUs are compiled from the same text, so an error in it would affect both, but not FMUs in Python. In
+chaotic runs, differences in the last bits of mathematical functions suffice for other metrics. Such runs are detected
+by a twin: the same run in lanes with each Real parameter of its FMUs changed in its last bit. Parameters of 0.0 are not
+changed, since 0.0 may switch off an effect. A run whose metrics do not change is compared.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from typing import Any
+
+from orchestration.components.building.fmus import look_up, python_twin, python_twins
+from orchestration.components.fmi.model import Model, Variable
+from orchestration.simulation.workers.batching import TOLERATED, LaneAgreement, Pair, sample
+from orchestration.simulation.workers.executors import TaskRunner
+from orchestration.simulation.workers.row import Row
+from orchestration.simulation.workers.task import RunTask, TaskBatch
+from orchestration.systems.system.component import Component
+from orchestration.systems.system.files import Files
+from orchestration.systems.system.model import System
+
+BEGINNING, SHARE = 1.0, 0.05
+"""[s] simulated by FMUs in Python, and least share of a run: a whole run costs as much as hundreds in lanes"""
+_BEGINNING, _NUDGED, _PYTHON = "begun ", "nudged ", "in Python "
+"""Prefixes of the keys of variants of a run"""
+
+
+def with_python_twins(files: Files) -> Files:
+    """The files of a study and the Python twins of its native FMUs, where there are any; missing ones are built."""
+    twins = {python_twin(fmu) for fmu in files.fmus} - files.fmus.keys()
+    paths = {twin: path for twin in twins if (path := look_up(twin)) is not None}
+    return replace(files, fmus={**files.fmus, **paths})
+
+
+def lane_agreement(
+    lanes: Mapping[str, Row], files: Files, task_of: Callable[[int, str], RunTask], run: TaskRunner
+) -> LaneAgreement | None:
+    """The agreement of a sample of runs in lanes with the same runs by FMUs; None if there were no runs in lanes.
+
+    `lanes` are their rows by key; `task_of` makes the task of a run from its index and key. `run` works with `files`,
+    as returned by `with_python_twins`.
+    """
+    chosen = [task_of(lanes[key].index, key) for key in sorted(sample(lanes))]
+    if not chosen:
+        return None
+    beginnings = [_beginning(task) for task in chosen if _has_twins(task.system, files)]
+    tasks: list[RunTask | TaskBatch] = [*chosen, *map(_in_python, beginnings)]
+    if beginnings:
+        nudged = (_nudged(one, files.models_of(one.system)) for one in beginnings)
+        tasks.append(TaskBatch(tasks=(*beginnings, *nudged)))
+    # A run that exceeds the time limit outside of lanes is not compared: lanes are faster.
+    rows = {one.row.key: one.row for outcomes in run(tasks) for one in outcomes if not one.ended}
+
+    def pairs(tasks: Iterable[RunTask], one: Mapping[str, Row], prefix: str) -> list[Pair]:
+        both = ((task, one.get(task.key), rows.get(prefix + task.key)) for task in tasks)
+        return [(task.index, _metrics(here), _metrics(there)) for task, here, there in both if here and there]
+
+    steady = [one for one in beginnings if LaneAgreement.of(pairs([one], rows, _NUDGED)).difference <= TOLERATED]
+    python = LaneAgreement.of(pairs(steady, rows, _PYTHON)) if steady else None
+    return replace(LaneAgreement.of(pairs(chosen, lanes, "")), python=python)
+
+
+def _metrics(row: Row) -> Mapping[str, Any]:
+    return row.metrics or {"status": row.message}
+
+
+def _has_twins(system: System, files: Files) -> bool:
+    """Whether some of its FMUs have a Python twin, and all these twins are available."""
+    own, twins = {*system.fmus.values()}, {*python_twins(system).fmus.values()}
+    return bool(twins - own) and twins <= files.fmus.keys()
+
+
+def _beginning(task: RunTask) -> RunTask:
+    """The beginning of a run."""
+    horizon = task.system.stop_time
+    system = replace(task.system, stop_time=min(horizon, max(BEGINNING, SHARE * horizon)))
+    return replace(task, key=_BEGINNING + task.key, system=system, keep_signals=False)
+
+
+def _in_python(task: RunTask) -> RunTask:
+    """The same run with FMUs in Python."""
+    return replace(task, key=_PYTHON + task.key, system=python_twins(task.system))
+
+
+def _nudged(task: RunTask, models: Mapping[str, Model]) -> RunTask:
+    """The same run with each parameter changed in its last bit."""
+    components = {
+        name: _nudged_component(component, models[name]) for name, component in task.system.components.items()
+    }
+    return replace(task, key=_NUDGED + task.key, system=replace(task.system, components=components))
+
+
+def _nudged_component(component: Component, model: Model) -> Component:
+    parameters = [v for v in model.variables.values() if v.kind == "Real" and v.causality == "parameter"]
+    values = {v.name: component.parameters.get(v.name, v.start) for v in parameters}
+    moved = {v.name: _next_number(float(value), v) for v in parameters if float(value := values[v.name] or 0.0) != 0.0}
+    return replace(component, parameters={**component.parameters, **moved})
+
+
+def _next_number(value: float, variable: Variable) -> float:
+    """The next number above, or below if that exceeds the parameter's maximum."""
+    above = math.nextafter(value, math.inf)
+    return above if variable.maximum is None or above <= variable.maximum else math.nextafter(value, -math.inf)

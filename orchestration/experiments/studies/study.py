@@ -1,0 +1,194 @@
+"""Studies: a base system, axes, and the runs that they define."""
+
+import hashlib
+import json
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+from orchestration.components.building.fmus import native_twin, native_twins
+from orchestration.experiments.studies.axes import Axis, Method, Points, Value
+from orchestration.experiments.studies.linked_settings import LinkedSettings
+from orchestration.experiments.studies.store_columns import is_column
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.records import record
+from orchestration.simulation.requests.ranges import paths_in
+from orchestration.simulation.results.own_metrics import OwnMetric
+from orchestration.systems.system.distribution_table import is_table, trace_path
+from orchestration.systems.system.files import Files, files_of
+from orchestration.systems.system.model import System
+from orchestration.systems.system.paths import changed, is_source_file, value_at
+from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
+
+
+@record()
+class Study:
+    """Runs of a base system, or a scenario of the quadrotor, over axes."""
+
+    name: str
+    """The name of the study, and of the folder of its store in `results`."""
+    base: Request
+    """The scenario or the system to vary."""
+    axes: tuple[Axis, ...]
+    """The axes: every combination of the listed values, each with every sampled point, is a run."""
+    together: tuple[LinkedSettings, ...] = ()
+    """Settings linked to the values of the axes besides their own targets, each applied on top of the previous."""
+    method: Method = "sobol"
+    """How axes without values are sampled; morris and saltelli are for sensitivity."""
+    samples: int = 0
+    """How many points are sampled; a power of two for sobol."""
+    design_seed: int = 0
+    """The seed of the sampling."""
+    vary_seed: bool = False
+    """Whether each run has its own seed, derived from that of the base and the values of the axes."""
+    keep_signals: tuple[int, ...] | bool = False
+    """The indices of the runs whose signals are kept, or whether all are."""
+    metrics: tuple[OwnMetric, ...] = ()
+    """Functions of a result, passed to `sweep`, besides the objectives of the base."""
+    native: bool = False
+    """Whether it is run with the native twins of its FMUs."""
+
+    def __post_init__(self) -> None:
+        names = [axis.name for axis in self.axes]
+        if len(set(names)) != len(names) or not names:
+            raise UsageError(f"axes = {', '.join(names)}: expected at least one axis, each with its own name")
+        if not _NAME.fullmatch(self.name):
+            raise UsageError(
+                f"name = {self.name!r}: expected the name of a folder: at most 100 letters, digits, spaces and - _ . +"
+            )
+        for axis in self.axes:
+            is_of_seeds = (axis.name, axis.targets, axis.multiplies) == ("seed", ("seed",), False)
+            if is_column(axis.name, self.metric_names) and not is_of_seeds:
+                raise UsageError(f"axis {axis.name}: the table of runs has a column of that name, expected another")
+        for each in self.together:
+            if not set(each.axes) <= set(names):
+                raise UsageError(f"axes = {', '.join(names)}: expected {', '.join(each.axes)} among them")
+        assert self._paths is not None  # raises UsageError for an unknown target
+
+    @cached_property
+    def origin(self) -> System:
+        """The system that the base describes."""
+        system = system_of(self.base)
+        return native_twins(system) if self.native else system
+
+    @property
+    def metric_names(self) -> tuple[str, ...]:
+        """The names of the objectives and of the study's own metrics."""
+        return (*self.origin.objectives, *(metric.name for metric in self.metrics))
+
+    @cached_property
+    def points(self) -> Sequence[Mapping[str, Value]]:
+        """The value of each axis by run, computed on access."""
+        return Points(self.axes, self.method, self.samples, self.design_seed)
+
+    @cached_property
+    def _paths(self) -> dict[str, tuple[str, ...]]:
+        """The paths of each target."""
+        listed = [target for axis in self.axes for target in axis.targets]
+        listed += [target for each in self.together for target in each.targets]
+        return {target: paths_in(self.base, target) for target in dict.fromkeys(listed)}
+
+    def system(self, index: int, starts: Mapping[str, float]) -> System:
+        """The system of one run; `starts` are the FMUs' own parameters, as COMPONENT.NAME.
+
+        Raises `UsageError` for an invalid value.
+        """
+        return self.settings_and_system(index, starts)[1]
+
+    def settings_and_system(self, index: int, starts: Mapping[str, float]) -> tuple[Mapping[str, Value], System]:
+        """The value of each axis in one run, and its system; raises as `system` does."""
+        cached, cached_starts = self._cache
+        if cached_starts != starts:
+            cached_starts.clear()
+            cached.clear()
+            cached_starts.update(starts)
+        if index in cached:
+            return cached[index]
+        point = self.points[index]
+        run = point, self._system(point, starts)
+        if len(cached) < _CACHE_SIZE:
+            cached[index] = run
+        return run
+
+    @cached_property
+    def _cache(self) -> tuple[dict[int, tuple[Mapping[str, Value], System]], dict[str, float]]:
+        """Runs, each of which is requested for checks, for its key and for its execution; and the start values used."""
+        return {}, {}
+
+    def _system(self, point: Mapping[str, Value], starts: Mapping[str, float]) -> System:
+        changes: dict[str, Any] = {}
+        if self.vary_seed and "seed" not in point:
+            changes["seed"] = _own_seed(self.origin.seed, point)
+        with errors_in_own_terms(self.base):
+            for axis in self.axes:
+                value = point[axis.name]
+                for path in self._paths_of(axis.targets):
+                    changes[path] = _product(value, path, {}, self.origin, starts) if axis.multiplies else value
+            for each in self.together:
+                sets, multiplies = each.of(point)
+                changes |= {path: value for target, value in sets.items() for path in self._paths[target]}
+                for target, factor in multiplies.items():
+                    for path in self._paths[target]:
+                        changes[path] = _product(factor, path, changes, self.origin, starts)
+            system = changed(self.origin, changes)
+        return native_twins(system) if self._varies_fmu else system
+
+    @cached_property
+    def _varies_fmu(self) -> bool:
+        """Whether it is native, and an axis sets FMUs, which may not be."""
+        return self.native and any(names_fmu(path) for paths in self._paths.values() for path in paths)
+
+    def _paths_of(self, targets: Iterable[str]) -> Iterator[str]:
+        return (path for target in targets for path in self._paths[target])
+
+    def keeps_signals(self, index: int) -> bool:
+        """Whether the signals of a run are kept."""
+        return self.keep_signals if isinstance(self.keep_signals, bool) else index in self.keep_signals
+
+    def files(self) -> Files:
+        """The files of all runs; missing FMUs are built."""
+        values = [
+            (path, str(v)) for axis in self.axes for path in self._paths_of(axis.targets) for v in axis.values or ()
+        ]
+        linked = [item for each in self.together for sets in each.sets.values() for item in sets.items()]
+        values += [(path, str(value)) for target, value in linked for path in self._paths[target]]
+        return files_of(
+            self.origin,
+            fmus_too=[native_twin(value) if self.native else value for path, value in values if names_fmu(path)],
+            tables_too=[value for path, value in values if is_source_file(path)] + _traces(values),
+        )
+
+
+def _traces(values: Iterable[tuple[str, str]]) -> list[str]:
+    """The files of distributions among the values."""
+    paths = (trace_path(value) for path, value in values if is_table(value) and ".parameters." not in path)
+    return [path for path in paths if path is not None]
+
+
+_CACHE_SIZE = 2**14
+"""Runs, some kB each"""
+_NAME = re.compile(r"[^\W_][\w .+-]{0,99}")
+
+
+def names_fmu(path: str) -> bool:
+    """Whether the value at a path is an FMU."""
+    return path.startswith("components.") and path.endswith(".fmu") and ".parameters." not in path
+
+
+def _own_seed(seed: int, point: Mapping[str, Value]) -> int:
+    """A seed determined by that of the base and the point only, so that a design may grow."""
+    text = json.dumps([seed, dict(point)], sort_keys=True)
+    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:6], "big")
+
+
+def _product(value: Value, path: str, changes: Mapping[str, Any], origin: System, starts: Mapping[str, float]) -> float:
+    """`value` times the changed value at a path, else that of the base, else that of its FMU."""
+    if not isinstance(value, (int, float)):
+        raise UsageError(f"{path}: expected a number to multiply with, got {value}")
+    base = changes[path] if path in changes else value_at(origin, path)
+    if base is None:
+        base = starts.get(path.removeprefix("components.").replace(".parameters.", ".", 1))
+    if isinstance(base, bool) or not isinstance(base, (int, float)):
+        raise UsageError(f"{path}: expected a number of the base or of an FMU to multiply")
+    return float(value) * float(base)

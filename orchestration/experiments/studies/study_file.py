@@ -1,0 +1,174 @@
+"""Reads study files."""
+
+from collections.abc import Callable
+from dataclasses import field
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+from orchestration.experiments.studies.axes import Axis, Scale, Value, span
+from orchestration.experiments.studies.study import Study, names_fmu
+from orchestration.foundation.basics.documents import read_toml
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.records import record
+from orchestration.foundation.basics.typed_tables import parsed, table_of
+from orchestration.simulation.requests.request import load_request, request_from_tables
+from orchestration.systems.system.distribution_table import as_text
+from orchestration.systems.system.paths import is_source_file
+from orchestration.systems.system.request import ControlLoop, Request
+
+
+@record()
+class AxisTable:
+    """`[[axes]]`: one or several targets, and a list, a range with a number, or a range to sample."""
+
+    name: str
+    """The name of the axis: a column of the table of runs."""
+    sets: list[str] | None = None
+    """The paths that get its value; without `sets` and `multiplies`, the name is the path."""
+    multiplies: list[str] | None = None
+    """The paths whose value in the base it multiplies."""
+    values: list[Value | dict[str, Any]] | None = None
+    """The values; a table is a distribution."""
+    start: float | None = None
+    """The first value of a range."""
+    stop: float | None = None
+    """The last value of a range."""
+    number: int | None = None
+    """The number of values in the range; a range without a number is sampled."""
+    scale: Scale = "linear"
+    """Whether the range has equal steps or equal ratios."""
+
+
+class DesignTable(
+    table_of(  # type: ignore[misc]
+        Study, only=["method", "samples", "design_seed", "vary_seed"], called={"design_seed": "seed"}
+    )
+):
+    """`[design]`: how axes without values are sampled."""
+
+
+@record()
+class StudyFile:
+    """The study file: the base as the tables of a system or a scenario, or the path of one; axes, design."""
+
+    name: str | None = None
+    """The name of the study and of its folder in `results/`; default: that of the file."""
+    scenario: str | None = None
+    """The path of the system file or scenario file that the study varies."""
+    base: dict[str, Any] = field(default_factory=dict)
+    """The same given here instead of in a separate file: the tables of a system file or a scenario file."""
+    axes: list[AxisTable] = field(default_factory=list)
+    """The axes."""
+    design: DesignTable = field(default_factory=DesignTable)
+    """How the axes without values are sampled."""
+    keep_signals: list[int] | bool = False
+    """The runs whose signals are kept, by their index in the design; true for all."""
+
+
+def load_study(path: str | Path) -> Study:
+    """Read a study file; paths in it are relative to its folder.
+
+    Raises `UsageError` for a file that cannot be read, an unknown key (naming the known ones) or an invalid value.
+    """
+    return load(Path(path), "study file", StudyFile, _study)
+
+
+class HasBase(Protocol):
+    """A file that is based on a system or a scenario: its tables, or the path of one."""
+
+    @property
+    def scenario(self) -> str | None:
+        """The path."""
+
+    @property
+    def base(self) -> dict[str, Any]:
+        """The tables."""
+
+
+File = TypeVar("File")
+Result = TypeVar("Result")
+
+
+def load(path: Path, kind: str, shape: type[File], make: Callable[[File, Path], Result]) -> Result:
+    """Read a file of a shape and convert it by `make`; raises `UsageError` that names the file."""
+    tables = read_toml(path, kind)
+    try:
+        return make(parsed(tables, shape), path)
+    except UsageError as error:
+        raise UsageError(f"{path}: {error}") from error
+
+
+def base_of(file: HasBase, folder: Path) -> Request:
+    """The system or scenario that a file is based on."""
+    if file.scenario is not None and file.base:
+        raise UsageError("scenario and base: expected one of them")
+    return load_request(folder / file.scenario) if file.scenario else request_from_tables(file.base, folder)
+
+
+def control_loop_of(file: HasBase, folder: Path) -> ControlLoop:
+    """Likewise for files that need initial conditions; raises `UsageError` for a system without known ones."""
+    base = base_of(file, folder)
+    if not isinstance(base, ControlLoop):
+        raise UsageError("base: expected a scenario of the quadrotor, whose initial conditions are known")
+    return base
+
+
+def _study(file: StudyFile, path: Path) -> Study:
+    if file.design.design_seed < 0:
+        raise UsageError(f"design.seed = {file.design.design_seed}: expected a whole number from 0")
+    base = base_of(file, path.parent)
+    study = Study(
+        name=file.name or path.stem,
+        base=base,
+        axes=tuple(axis_of(table, path.parent) for table in file.axes),
+        **file.design.model_dump(),
+        keep_signals=file.keep_signals if isinstance(file.keep_signals, bool) else tuple(file.keep_signals),
+    )
+    if not study.points:
+        raise UsageError("axes: expected at least one point")
+    _expect_consumed(file, study)
+    return study
+
+
+def _expect_consumed(file: StudyFile, study: Study) -> None:
+    """Raise `UsageError` for sampling keys without sampled axes, and for indices of runs that do not exist."""
+    if all(axis.values is not None for axis in study.axes):
+        for key, field in (("method", "method"), ("samples", "samples"), ("seed", "design_seed")):
+            if getattr(file.design, field) != getattr(Study, field):
+                raise UsageError(f"design.{key}: expected none; every axis has its values, so nothing is sampled")
+    for index in () if isinstance(study.keep_signals, bool) else study.keep_signals:
+        if not 0 <= index < len(study.points):
+            raise UsageError(f"keep_signals: {index}: expected the indices of runs, from 0 to {len(study.points) - 1}")
+
+
+def axis_of(table: AxisTable, folder: Path) -> Axis:
+    """The axis of a table; raises `UsageError` for an invalid one."""
+    if table.sets is not None and table.multiplies is not None:
+        raise UsageError(f"axis {table.name}: expected sets or multiplies, not both")
+    targets = tuple(table.multiplies or table.sets or [table.name])
+    ranged = table.start is not None and table.stop is not None
+    range_keys = (table.start, table.stop, table.number) != (None, None, None) or table.scale != "linear"
+    if (table.values is None) != ranged or (table.values is not None and range_keys):
+        raise UsageError(f"axis {table.name}: expected values, or start and stop, with number or to be sampled")
+    values: tuple[Value, ...] | None = None if table.values is None else _values(table.values, targets, folder)
+    low, high = table.start or 0.0, 1.0 if table.stop is None else table.stop
+    if table.number is not None:
+        values = span(table.name, low, high, table.number, table.scale)
+    return Axis(
+        name=table.name,
+        targets=targets,
+        multiplies=table.multiplies is not None,
+        values=values,
+        low=low,
+        high=high,
+        scale=table.scale,
+    )
+
+
+def _values(listed: list[Value | dict[str, Any]], targets: tuple[str, ...], folder: Path) -> tuple[Value, ...]:
+    """Listed values: paths made relative to the study file, distributions as the text of their table."""
+    are_paths = all(names_fmu(target) or is_source_file(target) or target.endswith(".fmu") for target in targets)
+    plain = [as_text(value, folder) if isinstance(value, dict) else value for value in listed]
+    return tuple(
+        str(folder / str(value)) if are_paths and str(value).endswith((".fmu", ".csv")) else value for value in plain
+    )

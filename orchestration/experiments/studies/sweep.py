@@ -1,0 +1,291 @@
+"""Runs what is missing of a study, without repeating runs."""
+
+import contextlib
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from orchestration.experiments.studies import store
+from orchestration.experiments.studies.checks import check_design, describe_run
+from orchestration.experiments.studies.lane_agreement import lane_agreement, with_python_twins
+from orchestration.experiments.studies.run_key import design_parts, difference, place_parts, run_key, study_parts
+from orchestration.experiments.studies.store_columns import UNITS
+from orchestration.experiments.studies.study import Study
+from orchestration.experiments.studies.swept import Swept
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.extras import explains_missing
+from orchestration.foundation.basics.interrupt import Interrupted
+from orchestration.foundation.basics.progress import CountProgress, runs_reporter
+from orchestration.foundation.basics.terminal import Count, inform
+from orchestration.simulation.engines.engine import Engine
+from orchestration.simulation.engines.wiring import check_against_fmus
+from orchestration.simulation.requests.ranges import paths_in, unit_at
+from orchestration.simulation.results.own_metrics import metrics_from_sources
+from orchestration.simulation.runs.result import Result
+from orchestration.simulation.workers.batching import chunks
+from orchestration.simulation.workers.choice import EngineChoice, Execution, choose_execution
+from orchestration.simulation.workers.executors import TaskRunner, cluster, expect_scheduler, local_workers
+from orchestration.simulation.workers.pool import Inputs
+from orchestration.simulation.workers.provenance import versions
+from orchestration.simulation.workers.row import Row
+from orchestration.simulation.workers.task import RunTask, TaskOutcome
+from orchestration.systems.system.files import Files
+from orchestration.systems.system.model import System
+
+Announce = Callable[[str], None]
+"""Called with lines about the engine and failed runs."""
+
+TOTAL, STUDY_PARTS, DESIGN_PARTS, PLACE_PARTS, AXES = "total", "study", "design", "place", "axes"
+ENGINE, AGREEMENT = "engine", "agreement"
+"""Names of entries of a store: the engine used last, and the agreement of runs in lanes with their FMUs"""
+_ANNOUNCED = 3
+"""Largest number of failed runs that are announced"""
+
+
+@explains_missing
+def sweep(
+    study: Study,
+    *,
+    metrics: Mapping[str, Callable[[Result], float | None]] | None = None,
+    folder: str | Path | None = None,
+    workers: int = 1,
+    dask: str | None = None,
+    retry_failed: bool = False,
+    engine: EngineChoice = "auto",
+    time_limit: float | None = None,
+    progress: CountProgress = "bar",
+    announce: Announce | None = inform,
+) -> Swept:
+    """Run what the store of a study does not have, writing each row as it comes.
+
+    `metrics` are further metrics by name: functions of a run's `Result` that return a number, or None for no value.
+    Their source is executed in other processes and identifies the run, so a function must contain everything that it
+    uses, except modules. Such runs are executed one at a time.
+
+    The store is in `folder`, default `results/NAME`; runs in it are not repeated, so that a sweep may be stopped and
+    called again. Runs are executed by `workers` processes of this machine, which need no guard of the main module and
+    work from a notebook, or by those of the `dask` scheduler at this address. The engine `batch` runs native FMUs in
+    SIMD lanes, `cuda` in threads of a GPU, and repeats some runs with the FMUs to compare; `auto` uses lanes if
+    available, else native FMUs one at a time, else the FMUs as they are. A run that takes more than `time_limit` [s] of
+    processor time fails. `progress` is called with the number of runs done and the total, `announce` with the engine
+    and failed runs; None for silence.
+
+    Raises `UsageError`, before any run, for a design with an invalid run, or if the store holds another study, stating
+    the difference; `QuadcosimError` for failures not caused by a run, without a row; `KeyboardInterrupt`, stating how
+    far it came, after Ctrl-C.
+    """
+    _expect_workers(workers, dask)
+    if time_limit is not None and not time_limit > 0.0:
+        raise UsageError(f"--time-limit {time_limit:g}: expected a positive number of seconds")
+    if metrics is not None:
+        study = replace(study, metrics=metrics_from_sources(metrics))
+    study, files, execution, follows = prepare(study, engine)
+    path = store.store_path(study.name, folder)
+    with runs_reporter(progress) as report, store.open_for_writing(path, study.metric_names) as opened:
+        _describe(opened, study, files)
+        missing = _missing(opened, study, retry_failed)
+        sweep_progress = _Progress(len(study.points), opened, report, announce)
+        agreement = None
+        if missing:
+            opened.describe({ENGINE: execution.name})
+            if announce is not None and engine == "auto":
+                announce(str(execution))
+            all_files = with_python_twins(files) if execution.in_lanes else files
+            task_of = partial(_task, study, files.start_values_of(study.origin), time_limit)
+            tasks = (task_of(index, key, execution.engine) for index, key in missing.items())
+            lanes: dict[str, Row] = {}
+            try:
+                with _workers(Inputs.of(all_files), workers, dask) as run:
+                    parts = chunks(tasks, len(missing), workers, execution.on_gpu) if execution.in_lanes else tasks
+                    with contextlib.closing(run(parts)) as results:
+                        for outcomes in results:
+                            _keep(outcomes, opened)
+                            sweep_progress.add(outcomes)
+                            lanes |= {each.row.key: each.row for each in outcomes if each.in_lanes}
+                    agreement = lane_agreement(lanes, all_files, partial(task_of, engine=None), run)
+            except KeyboardInterrupt:
+                raise Interrupted(f"with {sweep_progress.done} of {sweep_progress.total} runs done") from None
+        if agreement is not None:
+            opened.describe({AGREEMENT: agreement.as_text()})
+            agreement.expect()
+        failed = opened.counts().get("failed", 0)
+    return Swept(
+        study=study, total=len(study.points), flown=len(missing), failed=failed, path=path, engine=execution.name,
+        agreement=agreement, follows=follows,
+    )  # fmt: skip
+
+
+def prepare(study: Study, engine: EngineChoice) -> tuple[Study, Files, Execution, tuple[str, ...]]:
+    """A study as an engine runs it, its files, how it is executed, and its references with their followers.
+
+    Raises `UsageError` for an invalid run.
+    """
+    candidates: dict[bool, tuple[Study, Files, tuple[str, ...]]] = {}
+
+    def first(native: bool) -> tuple[System, Files]:
+        candidate = replace(study, native=native)
+        files = candidate.files()
+        candidates[native] = candidate, files, check_design(candidate, files)
+        return candidate.system(0, files.start_values_of(candidate.origin)), files
+
+    no_lanes = "metrics that are functions need whole runs, one at a time" if study.metrics else None
+    execution = choose_execution(engine, study.native, first, no_lanes=no_lanes)
+    if execution.native not in candidates:
+        first(execution.native)
+    prepared, files, follows = candidates[execution.native]
+    return prepared, files, execution, follows
+
+
+def _expect_workers(workers: int, dask: str | None) -> None:
+    if workers < 1:
+        raise UsageError(f"--workers {workers}: expected at least 1")
+    if dask is not None:
+        expect_scheduler(dask)
+
+
+def _workers(inputs: Inputs, workers: int, dask: str | None) -> AbstractContextManager[TaskRunner]:
+    """The workers that run tasks, local or on a cluster."""
+    return local_workers(inputs, workers) if dask is None else cluster(inputs, dask)
+
+
+def expect_current(opened: store.Store, study: Study) -> None:
+    """Raise `UsageError` if `study` is not, or no longer, the one whose rows are in the store."""
+    about = opened.about()
+    if STUDY_PARTS not in about:
+        raise UsageError(f"{opened.path}: expected the store of a study that has begun")
+    changes = difference(
+        {**json.loads(about[STUDY_PARTS]), **json.loads(about[DESIGN_PARTS])},
+        {**study_parts(study), **design_parts(study)},
+    )
+    if changes:
+        raise UsageError(
+            f"{opened.path}: the study file has changed since ({changes}); expected the study that was run: "
+            "quadcosim sweep runs what is missing"
+        )
+
+
+class _Progress:
+    """Counts the runs of a sweep, and reports progress and failures."""
+
+    def __init__(self, total: int, opened: store.Store, report: Count, announce: Announce | None) -> None:
+        self.total, self.failed = total, 0
+        self._callback, self._announce = report, announce
+        self._missing = opened.missing_counts()
+        self.done = total - sum(self._missing.values())
+        self._report()
+
+    def add(self, outcomes: Iterable[TaskOutcome]) -> None:
+        """Count runs that have been written."""
+        for row in (outcome.row for outcome in outcomes):
+            if row.status == "failed":
+                self.failed += 1
+                if self._announce is not None and self.failed <= _ANNOUNCED:
+                    more = "; further ones are not shown" if self.failed == _ANNOUNCED else ""
+                    self._announce(f"{describe_run(row.index, row.settings)} failed: {row.message}{more}")
+            self.done += self._missing.pop(row.key, 0)
+        self._report()
+
+    def _report(self) -> None:
+        self._callback(self.done, self.total)
+
+
+def _task(
+    study: Study,
+    starts: Mapping[str, float],
+    time_limit: float | None,
+    index: int,
+    key: str,
+    engine: Engine | None,
+) -> RunTask:
+    settings, system = study.settings_and_system(index, starts)
+    return RunTask(
+        index=index, key=key, settings=settings, system=system,
+        keep_signals=study.keeps_signals(index), metrics=study.metrics, engine=engine, time_limit=time_limit,
+    )  # fmt: skip
+
+
+def _missing(opened: store.Store, study: Study, retry_failed: bool) -> dict[int, str]:
+    """The indices and keys of the design to run: without a row, or without the signals to keep."""
+    missing = opened.missing(failed_too=retry_failed)
+    if not study.keep_signals:
+        return missing
+    without_signals = {
+        row["design_index"]: row["key"]
+        for row in opened.rows()
+        if study.keeps_signals(row["design_index"])
+        and row["status"] == "done"
+        and not _signals_path(opened, row["key"]).is_file()
+    }
+    return dict(sorted({**missing, **without_signals}.items()))
+
+
+def _signals_path(opened: store.Store, key: str) -> Path:
+    return opened.path.parent / "signals" / f"{key[:16]}.parquet"
+
+
+def _keep(outcomes: Sequence[TaskOutcome], opened: store.Store) -> None:
+    """Write signals first, then the rows, so that every row has its signals."""
+    for outcome in outcomes:
+        if outcome.signals is not None:
+            target = _signals_path(opened, outcome.row.key)
+            target.parent.mkdir(exist_ok=True)
+            partial = target.with_suffix(".partial")
+            partial.write_bytes(outcome.signals)
+            partial.replace(target)
+    opened.add([outcome.row for outcome in outcomes])
+
+
+def _describe(opened: store.Store, study: Study, files: Files) -> None:
+    """Describe the study in its store, which may hold no other; the design may grow."""
+    about = opened.about()
+    parts, place = study_parts(study), place_parts(study, files)
+    if STUDY_PARTS in about:
+        changes = difference(
+            {**json.loads(about[STUDY_PARTS]), **json.loads(about[PLACE_PARTS])}, {**parts, **place}
+        )  # fmt: skip
+        if changes:
+            raise UsageError(
+                f"{opened.path}: holds another study ({changes}); expected the same one: take another --out, "
+                "or remove the store"
+            )
+    design = json.dumps(design_parts(study))
+    if about.get(DESIGN_PARTS) == design:
+        return
+    grid: dict[str, Any] | None = {axis.name: axis.values for axis in study.axes}
+    opened.describe(
+        {
+            STUDY_PARTS: json.dumps(parts),
+            PLACE_PARTS: json.dumps(place),
+            DESIGN_PARTS: design,
+            TOTAL: str(len(study.points)),
+            AXES: json.dumps([axis.name for axis in study.axes]),
+            "grid": json.dumps(grid if all(axis.values is not None for axis in study.axes) else None),
+            "guids": json.dumps({name: m.description.guid for name, m in files.models_of(study.origin).items()}),
+            "versions": json.dumps(versions()),
+            UNITS: json.dumps(_units(study, files)),
+        },
+        _design_points(study, files),
+    )
+
+
+def _units(study: Study, files: Files) -> dict[str, str]:
+    """The units of axes and metrics, as in the first run."""
+    first = study.system(0, files.start_values_of(study.origin))
+    models = files.models_of(first)
+    of_axes = {
+        axis.name: unit_at(paths_in(study.base, axis.targets[0])[0], models)
+        for axis in study.axes
+        if axis.targets and not axis.multiplies
+    }
+    return {name: unit for name, unit in of_axes.items() if unit} | check_against_fmus(first, models).units
+
+
+def _design_points(study: Study, files: Files) -> Iterator[store.DesignPoint]:
+    starts = files.start_values_of(study.origin)
+    for index in range(len(study.points)):
+        settings, system = study.settings_and_system(index, starts)
+        yield store.DesignPoint(index=index, key=run_key(system, files, study.metrics), settings=settings)

@@ -1,0 +1,83 @@
+"""The result of a sweep."""
+
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from orchestration.experiments.studies.store import open_for_reading
+from orchestration.experiments.studies.study import Study
+from orchestration.foundation.basics.extras import explains_missing
+from orchestration.simulation.results import html
+from orchestration.simulation.workers.batching import LaneAgreement
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+    from orchestration.simulation.figures.gallery import Figures
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Swept:
+    """The result of a sweep: counts of runs, and the store with the rows."""
+
+    total: int
+    """The number of runs of the study."""
+    flown: int
+    """How many of them this sweep has run; the others were in the store."""
+    failed: int
+    """How many runs in the store have failed, with `message` in their row; divergence is not a failure."""
+    study: Study
+    """The study as it was run."""
+    path: Path
+    """The store of the study."""
+    engine: str
+    """The engine, by its name in `--engine`."""
+    agreement: LaneAgreement | None = None
+    """Agreement of runs in SIMD lanes with the same runs by FMUs; None if there were none."""
+    follows: tuple[str, ...] = ()
+    """The references of its runs and the components that follow them."""
+
+    def __repr__(self) -> str:
+        return f"<Swept: {self._counts()}, in {self.path}>"
+
+    def _counts(self) -> str:
+        failed = f", {self.failed} failed" if self.failed else ""
+        return f"{self.total} runs, {self.flown} of them new{failed}"
+
+    def _repr_html_(self) -> str:
+        """The form that notebooks show: the number of runs by outcome."""
+        with open_for_reading(self.path) as opened:
+            outcomes = Counter(str(outcome or "failed") for block in opened.blocks() for outcome in block["outcome"])
+        rows = [(outcome, str(count), "runs") for outcome, count in outcomes.most_common()]
+        return html.card("A study", None, None, self._counts(), rows)
+
+    @explains_missing
+    def plot(self, metric: str | None = None) -> "Figures":
+        """The figures of a metric over the axes, default: the first that varies; a notebook shows them.
+
+        Raises `UsageError` for an unknown metric, or axes for which there is no figure.
+        """
+        from orchestration.experiments.studies.drawing import study_figures
+        from orchestration.simulation.figures.gallery import Figures
+        from orchestration.simulation.figures.style import SCREEN
+
+        figures, _ = study_figures(self.study, self.path, metric, SCREEN)
+        return Figures(figures, SCREEN)
+
+    @explains_missing
+    def to_pandas(self) -> "pd.DataFrame":
+        """A row for each run: axes, metrics, seed, status; units are in its `attrs["units"]`, by column."""
+        from orchestration.experiments.studies.table import frame, units_in
+
+        table = frame(self.path)
+        table.attrs["units"] = units_in(self.path)
+        return table
+
+    @explains_missing
+    def to_xarray(self) -> "xr.Dataset":
+        """The metrics over the axes, with units as attributes; raises `UsageError` if some axis is sampled."""
+        from orchestration.experiments.studies.table import dataset
+
+        return dataset(self.path)

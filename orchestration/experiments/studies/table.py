@@ -1,0 +1,126 @@
+"""The rows of a study as tables for analysis."""
+
+import json
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from pyarrow import csv
+
+from orchestration.experiments.studies.store import Store, open_for_reading
+from orchestration.experiments.studies.store_columns import SETTINGS, TEXTS, UNITS
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.recording import mat_file
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+
+FORMATS = ("parquet", "csv", "mat")
+
+SHARED = (*TEXTS, "status", "machine")
+"""Columns with few distinct texts"""
+
+
+def frame(path: Path) -> "pd.DataFrame":
+    """All rows sorted by design index: settings by axis, metrics, seed, status, duration, machine, GUIDs, versions."""
+    import pandas as pd
+
+    with open_for_reading(path) as opened:
+        about = opened.about()
+        if "axes" not in about:
+            raise UsageError(f"{path}: expected the store of a study that has begun")
+        axes = json.loads(about["axes"])
+        settings_by_axis, columns = _columns(opened, axes)
+    settings, table = pd.DataFrame(settings_by_axis, columns=axes), pd.DataFrame(columns)
+    for name in ("diverged", "good"):
+        table[name] = table[name].astype("boolean")
+    for name in ("steps", "design_index", "seed"):
+        table[name] = table[name].astype("Int64")
+    settings = settings.drop(columns=[name for name in settings if name in table])  # only an axis of seeds can coincide
+    table = pd.concat([table[["design_index"]], settings, table.drop(columns="design_index")], axis=1)
+    for kind, prefix in (("guids", "guid"), ("versions", "version")):
+        for name, value in json.loads(about[kind]).items():
+            table[f"{prefix}.{name}"] = value
+    return table
+
+
+def _columns(store: Store, axes: Sequence[str]) -> tuple[dict[str, list[Any]], dict[str, Any]]:
+    """The settings by axis and the other columns of a store's rows, read block by block."""
+    settings: dict[str, list[Any]] = {name: [] for name in axes}
+    blocks: dict[str, list[Any]] = {name: [] for name in store.columns}
+    known: dict[Any, Any] = {}  # keeps one object per text
+    for block in store.blocks():
+        points = json.loads(f"[{','.join(block.pop(SETTINGS))}]")
+        for name, values in settings.items():
+            values += [point[name] for point in points]
+        for name, column in block.items():
+            if name in store.metrics and name not in TEXTS:
+                blocks[name].append(np.array(column, dtype=float))
+            else:
+                blocks[name] += [known.setdefault(each, each) for each in column] if name in SHARED else column
+    numeric = {name: np.concatenate(blocks[name] or [[]]) for name in store.metrics if name not in TEXTS}
+    return settings, {**blocks, **numeric}
+
+
+def dataset(path: Path) -> "xr.Dataset":
+    """The metrics over the axes of a grid, with units as attributes; raises `UsageError` if some axis is sampled."""
+    import xarray as xr
+
+    with open_for_reading(path) as opened:
+        grid, metrics = json.loads(opened.about()["grid"]), opened.metrics
+    if grid is None:
+        raise UsageError(f"{path}: expected a study whose axes all list their values, to make a grid of it")
+    kept = [name for name in (*metrics, "seed", "duration") if name not in grid]
+    table = frame(path).set_index(list(grid))[kept]
+    table = table.astype({name: float for name in kept if name not in TEXTS})
+    cube: xr.Dataset = xr.Dataset.from_dataframe(table).reindex(grid)
+    for name, unit in units_in(path).items():
+        if name in cube:
+            cube[name].attrs["units"] = unit
+    return cube
+
+
+def units_in(path: Path) -> dict[str, str]:
+    """The units of the axes and metrics in a store."""
+    with open_for_reading(path) as opened:
+        units: dict[str, str] = json.loads(opened.about().get(UNITS, "{}"))
+    return {**units, "duration": "s"}
+
+
+def _with_units(table: Any, units: Mapping[str, str]) -> Any:
+    """A table with the units in the metadata of its fields."""
+    fields = [f.with_metadata({"unit": units[f.name]}) if f.name in units else f for f in table.schema]
+    return table.cast(pa.schema(fields, metadata=table.schema.metadata))
+
+
+def export(path: Path, folder: Path, formats: Collection[str] = ("parquet", "csv")) -> list[Path]:
+    """Write the rows by design index as `runs.parquet`, `runs.csv` or `runs.mat`; their paths.
+
+    Parquet has units in the metadata of its fields, as `unit`; MAT has a structure `runs` with a field for each column,
+    and `units` with the same fields.
+    """
+    table = _with_units(pa.Table.from_pandas(frame(path), preserve_index=False), units_in(path))
+    folder.mkdir(parents=True, exist_ok=True)
+    writers = {"parquet": pq.write_table, "csv": csv.write_csv, "mat": _write_mat}
+    written = [folder / f"runs.{kind}" for kind in formats]
+    for kind, file in zip(formats, written):
+        writers[kind](table, file)
+    return written
+
+
+def _write_mat(table: Any, file: Path) -> None:
+    columns = {field.name: _column(table[field.name]) for field in table.schema}
+    units = {f.name: (f.metadata or {}).get(b"unit", b"").decode() for f in table.schema}
+    mat_file.write(file, {"runs": mat_file.flat(columns), "units": mat_file.flat(units)})
+
+
+def _column(values: Any) -> Any:
+    """The values for MATLAB: NaN for missing numbers, empty for missing texts."""
+    if pa.types.is_string(values.type) or pa.types.is_large_string(values.type):
+        return [text or "" for text in values.to_pylist()]
+    return values.to_pandas().to_numpy(float, na_value=np.nan)

@@ -1,0 +1,98 @@
+"""Tuning without runs: the parameters that minimise the exact expectation of a cost."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from orchestration.components.fmi.foreign import isolated_call
+from orchestration.experiments.tuning.tuning_problem import COST, SearchResult, TuningProblem, minimise
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.records import record
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.systems.system.model import System
+from orchestration.systems.system.request import errors_in_own_terms
+from orchestration.theory.exact.expect import Expected, expected_of
+from orchestration.theory.exact.loops import Loops
+from orchestration.theory.stability.known_loops import rested
+
+UNSTABLE = 1e100
+"""Factor on the mean-square radius in place of an infinite cost, so that a search can find where it becomes finite"""
+
+
+@record()
+class ExactTuning(TuningProblem):
+    """A tuning for the exact expectation of its cost; raises `UsageError` for invalid values."""
+
+    @cached_property
+    def origin(self) -> System:
+        """The system that the base describes, at its operating point."""
+        with errors_in_own_terms(self.base):
+            return rested(self.base)
+
+    def describe_cost(self) -> list[str]:
+        """The definition of the cost, for the file of tuned parameters."""
+        return [f"the exact expectation of ({self.cost})."]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExactTuningResult(SearchResult):
+    """The result of one search by expectations; its cost is infinite if no evaluated point has a finite one."""
+
+    mean_square_radius: float
+    """growth factor of second moments in a common period"""
+    accuracy: float
+    """relative, of the cost"""
+
+    @property
+    def judgement(self) -> str:
+        """The margin to an infinite cost, in words."""
+        return f"the mean-square radius is {self.mean_square_radius:.6g}"
+
+    @property
+    def figures(self) -> dict[str, float | None]:
+        """The same in numbers, by name."""
+        return {"mean-square radius": self.mean_square_radius}
+
+
+def search_exactly(
+    tuning: ExactTuning, period: float, seed: int, progress: Callable[[float], None]
+) -> ExactTuningResult:
+    """The result of one search."""
+    files = tuning.files()
+    loops = Loops(files.models)
+
+    def expected(points: Sequence[Sequence[float]]) -> list[Expected]:
+        systems = [tuning.system(period, tuning.values(shares)) for shares in points]
+        with errors_in_own_terms(tuning.base):
+            return isolated_call(files.fmus.values(), _expected, systems, loops)
+
+    def costs(points: Sequence[Floats]) -> list[float]:
+        return [_cost(each) for each in expected([point.tolist() for point in points])]
+
+    best = minimise(tuning, seed, costs, progress)
+    (expectation,) = expected([best.shares.tolist()])
+    cost = expectation.objectives[COST]
+    return ExactTuningResult(
+        period=period,
+        seed=seed,
+        values=tuning.values(best.shares.tolist()),
+        cost=math.inf if cost is None else cost,
+        evaluations=best.evaluations,
+        mean_square_radius=expectation.mean_square_radius,
+        accuracy=expectation.accuracy,
+    )
+
+
+def _expected(systems: Sequence[System], loops: Loops) -> list[Expected]:
+    """The expectations of each system, in order; raises `UsageError` if a cost has no expectation at all."""
+    results = [expected_of(system, loops) for system in systems]
+    for one in results:
+        if one.objectives[COST] is None and one.mean_square_radius < 1.0:
+            raise UsageError(one.reasons[COST])
+    return results
+
+
+def _cost(one: Expected) -> float:
+    cost = one.objectives[COST]
+    return UNSTABLE * one.mean_square_radius if cost is None else cost

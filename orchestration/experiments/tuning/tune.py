@@ -1,0 +1,194 @@
+"""Runs the searches of a tuning for every period and seed, without repeating finished ones."""
+
+import dataclasses
+import functools
+import hashlib
+import json
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+from orchestration.experiments.tuning.exact import ExactTuning, ExactTuningResult, search_exactly
+from orchestration.experiments.tuning.tuning import Tuning, TuningResult, search
+from orchestration.experiments.tuning.tuning_file import gains_text
+from orchestration.experiments.tuning.tuning_problem import SearchResult, TuningProblem, best_by_period
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.extras import explains_missing, needs
+from orchestration.foundation.basics.progress import ShareProgress, share_reporter
+from orchestration.foundation.basics.terminal import inform
+from orchestration.simulation.results import html
+from orchestration.simulation.workers.choice import EngineChoice, choose_execution, single_run_execution
+from orchestration.simulation.workers.executors import RunEvaluator
+from orchestration.simulation.workers.provenance import versions
+from orchestration.systems.system.files import Files
+from orchestration.systems.system.references import describe_references
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Result = TypeVar("Result", bound=SearchResult)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Tuned:
+    """The result of a tuning."""
+
+    searches: tuple[SearchResult, ...]
+    """The results of all searches, one for each period and seed."""
+    written: tuple[Path, ...]
+    """The files of tuned parameters, one for each period, that scenario files and comparisons read."""
+
+    @property
+    def best(self) -> dict[float, SearchResult]:
+        """By period [s], the search with the lowest cost."""
+        return {one.period: one for one in best_by_period(self.searches)}
+
+    def __repr__(self) -> str:
+        best = "; ".join(f"{period:g} s: {result.judgement}" for period, result in self.best.items())
+        return f"<Tuned: {len(self.searches)} searches; {best}>"
+
+    def _repr_html_(self) -> str:
+        """The form that notebooks show: the best search for each period."""
+        rows = [
+            (f"{name} at {period:g} s", html.number(value), "")
+            for period, result in self.best.items()
+            for name, value in {**result.values, "cost": result.cost, **result.figures}.items()
+        ]
+        return html.card("A tuning", None, None, f"{len(self.searches)} searches", rows)
+
+    @explains_missing
+    def to_pandas(self) -> "pd.DataFrame":
+        """A row for each search: period [s], seed, tuned values, cost and the other fields of its result."""
+        import pandas as pd
+
+        table = pd.DataFrame(
+            [
+                {**{k: v for k, v in dataclasses.asdict(one).items() if k != "values"}, **one.values}
+                for one in self.searches
+            ]
+        )
+        table.attrs["units"] = {"period": "s"}
+        return table
+
+
+@needs("cma", "filelock")
+def tune(
+    tuning: Tuning | ExactTuning,
+    *,
+    out: str | Path,
+    folder: str | Path | None = None,
+    workers: int = 1,
+    engine: EngineChoice = "auto",
+    command: str = "quadcosim.tune",
+    progress: ShareProgress = "bar",
+    announce: Callable[[str], None] | None = inform,
+) -> Tuned:
+    """Tune the parameters of a controller, by runs or by exact expectations.
+
+    A `Tuning` runs an ensemble of initial conditions and is judged on others, by `workers` processes and an engine as
+    in `sweep`. An `ExactTuning` needs no runs; it linearises native FMUs if available.
+
+    Writes a file of parameters into `out` for each period; it names `command` as its origin. The result of each search
+    is kept in `folder`, default `results/NAME`, so that no search is repeated. `progress` is called with the share
+    done, `announce` with a line for each search; None for silence.
+
+    Raises `UsageError` for an invalid tuning, `QuadcosimError` if a run fails, `KeyboardInterrupt` after Ctrl-C.
+    """
+    folder, announce = Path(folder or Path("results") / tuning.name), announce or (lambda line: None)
+    done: Sequence[SearchResult]
+    if isinstance(tuning, Tuning):
+        done = _search_by_runs(tuning, folder, workers, engine, progress, announce)
+    elif workers != 1 or engine != "auto":
+        raise UsageError("--workers and --engine: expected none; a tuning by expect makes no runs")
+    else:
+        exact = dataclasses.replace(tuning, base=single_run_execution(tuning.base, "auto")[0])
+        with share_reporter(progress, "searching") as report:
+            find = functools.partial(search_exactly, exact)
+            done = run_searches(
+                exact, exact.files(), folder, find, ExactTuningResult, progress=report, announce=announce
+            )
+    return Tuned(searches=tuple(done), written=tuple(write(tuning, done, Path(out), command)))
+
+
+def _search_by_runs(
+    tuning: Tuning,
+    folder: Path,
+    workers: int,
+    engine: EngineChoice,
+    progress: ShareProgress,
+    announce: Callable[[str], None],
+) -> list[TuningResult]:
+    """The results of the searches of a tuning by runs."""
+    execution = choose_execution(
+        engine, tuning.native, lambda native: dataclasses.replace(tuning, native=native).first_run()
+    )
+    tuning = dataclasses.replace(tuning, native=execution.native)
+    files = tuning.files()
+    if engine == "auto":
+        announce(str(execution))
+    if follows := describe_references(tuning.origin, files.models_of(tuning.origin)):
+        announce(f"follows {follows}")
+    with share_reporter(progress, "searching") as report, RunEvaluator(files, workers, execution.engine) as pool:
+        run = functools.partial(pool.run_all, in_lanes=execution.in_lanes, on_gpu=execution.on_gpu)
+
+        def find(period: float, seed: int, report: Callable[[float], None]) -> TuningResult:
+            return search(tuning, period, seed, run, pool.run_all, report)
+
+        return run_searches(tuning, files, folder, find, TuningResult, progress=report, announce=announce)
+
+
+def run_searches(
+    tuning: TuningProblem,
+    files: Files,
+    folder: Path,
+    find: Callable[[float, int, Callable[[float], None]], Result],
+    kind: type[Result],
+    *,
+    progress: Callable[[float], None],
+    announce: Callable[[str], None],
+) -> list[Result]:
+    """The results of all searches; `find` makes one of class `kind` from period, seed and progress function.
+
+    They are kept in `folder`: a finished search of the same tuning with the same software is not repeated.
+    """
+    record = folder / f"{_key(tuning, files, kind)[:16]}.json"
+    done = [kind(**each) for each in json.loads(record.read_text())] if record.is_file() else []
+    searches = [(period, seed) for period in tuning.periods for seed in tuning.seeds]
+    for i, (period, seed) in enumerate(searches):
+        if any((one.period, one.seed) == (period, seed) for one in done):
+            continue
+        one = find(period, seed, _part(progress, i, len(searches)))
+        done.append(one)
+        announce(f"period {period:g} s, seed {seed}: cost {one.cost:.5g}; {one.judgement}")
+        folder.mkdir(parents=True, exist_ok=True)
+        record.write_text(json.dumps([dataclasses.asdict(each) for each in done], indent=2))
+    return done
+
+
+def write(tuning: TuningProblem, done: Sequence[SearchResult], out: Path, command: str) -> Iterator[Path]:
+    """Write the files of tuned parameters, one for each period; their paths."""
+    out.mkdir(parents=True, exist_ok=True)
+    for best in best_by_period(done):
+        path = out / f"{tuning.name}_{1000.0 * best.period:g}ms.toml"
+        path.write_text(gains_text(tuning, best, done, command))
+        yield path
+
+
+def _part(progress: Callable[[float], None], index: int, count: int) -> Callable[[float], None]:
+    """The progress of one of several searches."""
+    return lambda share: progress((index + share) / count)
+
+
+def _key(tuning: TuningProblem, files: Files, kind: type[SearchResult]) -> str:
+    """A hash of everything that a search depends on."""
+    content_of_tuning = json.dumps(dataclasses.asdict(tuning), default=str)
+    fields = [each.name for each in dataclasses.fields(kind)]
+    content = [
+        type(tuning).__name__,
+        content_of_tuning,
+        sorted(files.hashes.items()),
+        sorted(versions().items()),
+        fields,
+    ]
+    return hashlib.sha256(json.dumps(content).encode()).hexdigest()

@@ -1,0 +1,109 @@
+"""Reads tuning files, and writes files of tuned parameters."""
+
+from collections.abc import Sequence
+from dataclasses import field
+from pathlib import Path
+from typing import Any, Literal
+
+from orchestration.experiments.studies.study_file import AxisTable, axis_of, base_of, control_loop_of, load
+from orchestration.experiments.tuning.exact import ExactTuning
+from orchestration.experiments.tuning.tuning import Tuning
+from orchestration.experiments.tuning.tuning_problem import SearchResult, TuningProblem
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.records import record
+from orchestration.foundation.basics.typed_tables import table_of
+from orchestration.systems.system.model import System
+
+By = Literal["runs", "expect"]
+
+
+class CostTable(table_of(TuningProblem, only=["cost"], called={"cost": "of"})):  # type: ignore[misc]
+    """`[cost]`: the cost of a run, and of one that diverges; or its exact expectation, without runs."""
+
+    by: By = "runs"
+    """`runs`: the cost is evaluated by runs; `expect`: it is the exact expectation, as of `quadcosim expect`."""
+    bad: float | None = None
+    """The cost of a run that diverges, or whose cost has no value; no run costs more."""
+
+
+JUDGED = "judged"
+"""Key of `[starts]`: the number of further initial conditions that the result is judged on"""
+DEFAULT_JUDGED = 200
+
+
+class SearchTable(table_of(TuningProblem, only=["periods", "evaluations", "seeds"])):  # type: ignore[misc]
+    """`[search]`: the effort."""
+
+
+@record()
+class TuningFile:
+    """The tuning file: a scenario, or the path of one, and its parameters to tune."""
+
+    cost: CostTable
+    """The cost to minimise."""
+    search: SearchTable
+    """The effort of the search."""
+    parameters: list[AxisTable]
+    """The parameters to tune, each in a range: at least two."""
+    starts: dict[str, Any] = field(default_factory=dict)
+    """The initial conditions; and `judged`: the number of further ones that the result is judged on (200)."""
+    name: str | None = None
+    """The beginning of the names of the written files; default: the name of this file."""
+    scenario: str | None = None
+    """The path of the scenario file, or with `expect` of the system file, whose parameters are tuned."""
+    base: dict[str, Any] = field(default_factory=dict)
+    """The same given here instead of in a separate file: its tables."""
+
+
+def load_tuning(path: str | Path) -> Tuning | ExactTuning:
+    """Read a tuning file; paths in it are relative to its folder.
+
+    Raises `UsageError` for a file that cannot be read, an unknown key (naming the known ones) or an invalid value.
+    """
+    return load(Path(path), "tuning file", TuningFile, _tuning)
+
+
+def _tuning(file: TuningFile, path: Path) -> Tuning | ExactTuning:
+    parameters = tuple(axis_of(table, path.parent) for table in file.parameters)
+    for axis in parameters:
+        if axis.values is not None or axis.multiplies:
+            raise UsageError(f"parameters {axis.name}: expected start and stop, and what it sets")
+    common: dict[str, Any] = {
+        "name": file.name or path.stem, "parameters": parameters, "cost": file.cost.cost, **file.search.model_dump()
+    }  # fmt: skip
+    if file.cost.by == "expect":
+        for key, present in (("cost.bad", file.cost.bad is not None), ("starts", bool(file.starts))):
+            if present:
+                raise UsageError(f'{key}: expected none with cost.by = "expect", which makes no runs')
+        return ExactTuning(base=base_of(file, path.parent), **common)
+    if file.cost.bad is None:
+        raise UsageError("cost.bad: expected a value")
+    base, starts = control_loop_of(file, path.parent), dict(file.starts)
+    judged = starts.pop(JUDGED, DEFAULT_JUDGED)
+    if isinstance(judged, bool) or not isinstance(judged, int):
+        raise UsageError(f"starts.{JUDGED} = {judged!r}: expected a valid integer")
+    ensemble = base.ensemble(starts, beside=(JUDGED,))
+    return Tuning(base=base, **common, bad=file.cost.bad, starts=ensemble, judged=judged)
+
+
+def gains_text(tuning: TuningProblem, best: SearchResult, all_results: Sequence[SearchResult], command: str) -> str:
+    """The content of a file of tuned parameters by their tables, with their origin in comments."""
+    import tomli_w
+
+    others = [one for one in all_results if one.period == best.period]
+    of, *more = tuning.describe_cost()
+    lines = [
+        f"Tuned for a period of {best.period:g} s by: {command}",
+        f"{best.evaluations} evaluations of {of}",
+        *more,
+        f"Of {len(others)} searches that of seed {best.seed} is taken: it costs least on these, {best.cost:.5g}.",
+        *(f"Seed {one.seed}: {one.judgement}." for one in others),
+    ]
+    document: dict[str, Any] = {}
+    for target, value in best.values.items():
+        *tables, name = target.split(".", 3 if isinstance(tuning.base, System) else 1)
+        place = document
+        for table in tables:
+            place = place.setdefault(table, {})
+        place[name] = float(f"{value:.6g}")
+    return "".join(f"# {line}\n" for line in lines) + "\n" + tomli_w.dumps(document)

@@ -1,0 +1,164 @@
+"""The tuning problem: parameters with their ranges, a cost, the search effort; and its minimisation by CMA-ES."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from orchestration.experiments.studies.axes import Axis
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.records import record
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.simulation.requests.ranges import Varied, default_quantity, paths_in
+from orchestration.systems.system.files import Files, files_of
+from orchestration.systems.system.model import System
+from orchestration.systems.system.paths import changed
+from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
+
+COST = "cost"
+"""Name of the objective that a tuning adds"""
+_WIDTH = 0.25
+"""Standard deviation of the first generation, as a share of each range"""
+
+
+@record()
+class TuningProblem:
+    """Parameters to tune for a cost; raises `UsageError` for invalid values."""
+
+    name: str
+    """The name of the tuning, with which the names of its files begin."""
+    base: Request
+    """The scenario or the system whose parameters are tuned."""
+    parameters: tuple[Axis, ...]
+    """The parameters to tune, each between its `low` and its `high`."""
+    cost: str
+    """The cost to minimise: an expression over the objectives of the base."""
+    periods: tuple[float, ...]
+    """The sampling periods [s], for each of which it is tuned separately."""
+    evaluations: int
+    """The number of evaluations of the cost in a search, per parameter."""
+    seeds: tuple[int, ...]
+    """The seeds of the optimiser, each for a separate search; the search with the lowest cost is taken."""
+
+    def __post_init__(self) -> None:
+        if len(self.parameters) < 2:
+            raise UsageError("parameters: expected at least two; one is found by a study with an axis")
+        if self.evaluations < 1:
+            raise UsageError(f"evaluations = {self.evaluations}: expected at least 1")
+        for name in ("periods", "seeds"):
+            if not getattr(self, name):
+                raise UsageError(f"{name}: expected at least one")
+        if COST in self.origin.objectives:
+            raise UsageError(f"objectives.{COST}: expected another name, which a tuning adds")
+        assert self._paths
+        assert self._period_paths
+
+    @cached_property
+    def origin(self) -> System:
+        """The system that the base describes."""
+        return system_of(self.base)
+
+    @cached_property
+    def _paths(self) -> dict[str, tuple[str, ...]]:
+        return {target: paths_in(self.base, target) for axis in self.parameters for target in axis.targets}
+
+    @cached_property
+    def _period_paths(self) -> tuple[str, ...]:
+        try:
+            return Varied(request=self.base, of=default_quantity(self.base)).paths
+        except UsageError:
+            raise UsageError("search.periods: expected a base with one period, of its only sampled component") from None
+
+    def describe_cost(self) -> list[str]:
+        """The definition of the cost, line by line, for the file of tuned parameters."""
+        raise NotImplementedError
+
+    @property
+    def budget(self) -> int:
+        """Evaluations of the cost in one search."""
+        return self.evaluations * len(self.parameters)
+
+    def files(self) -> Files:
+        """All files of the runs; missing FMUs are built."""
+        return files_of(self.origin)
+
+    def values(self, shares: Sequence[float]) -> dict[str, float]:
+        """The value of each target, at a share in [0, 1] of the range of each parameter."""
+        return {
+            target: axis.at(float(share)) for axis, share in zip(self.parameters, shares) for target in axis.targets
+        }
+
+    def system(self, period: float, values: Mapping[str, float]) -> System:
+        """The system with a period and values of the targets; raises `UsageError` for an invalid value."""
+        changes = {path: value for target, value in values.items() for path in self._paths[target]}
+        with errors_in_own_terms(self.base):
+            system = changed(self.origin, {**changes, **dict.fromkeys(self._period_paths, period)})
+            return replace(system, objectives={**system.objectives, COST: self.cost})
+
+
+@dataclass(frozen=True, kw_only=True)
+class SearchResult:
+    """The result of one search."""
+
+    period: float
+    """[s]"""
+    seed: int
+    values: dict[str, float]
+    """of each target"""
+    cost: float
+    """of these values, as minimised"""
+    evaluations: int
+
+    @property
+    def judgement(self) -> str:
+        """An assessment besides the cost, in words."""
+        raise NotImplementedError
+
+    @property
+    def figures(self) -> dict[str, float | None]:
+        """The same assessment in numbers, by name."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Minimum:
+    """The point of lowest cost that a search has evaluated."""
+
+    shares: Floats
+    cost: float
+    evaluations: int
+
+
+def minimise(
+    tuning: TuningProblem,
+    seed: int,
+    costs: Callable[[Sequence[Floats]], Sequence[float]],
+    progress: Callable[[float], None],
+) -> Minimum:
+    """The best point of one search by CMA-ES (Hansen, arXiv:1604.00772), which starts at a point drawn by the seed.
+
+    `costs` gives the costs of points of the unit cube, a generation at a time.
+    """
+    import cma  # deferred: it imports matplotlib
+
+    first = np.random.default_rng(seed).uniform(0.25, 0.75, len(tuning.parameters))
+    options = {"bounds": [0.0, 1.0], "seed": seed + 1, "verbose": -9}
+    strategy = cma.CMAEvolutionStrategy(first, _WIDTH, options)
+    best, least, count = first, np.inf, 0
+    while count < tuning.budget:  # no other stopping rule: every controller gets the same effort
+        candidates = [np.asarray(candidate) for candidate in strategy.ask()]
+        values = costs(candidates)
+        strategy.tell(candidates, values)
+        count += len(candidates)
+        place = int(np.argmin(values))
+        if values[place] < least:
+            best, least = candidates[place], values[place]
+        progress(min(1.0, count / tuning.budget))
+    return Minimum(shares=best, cost=float(least), evaluations=count)
+
+
+def best_by_period(results: Sequence[SearchResult]) -> Iterator[SearchResult]:
+    """The search with the lowest cost for each period."""
+    for period in dict.fromkeys(one.period for one in results):
+        yield min((one for one in results if one.period == period), key=lambda one: one.cost)

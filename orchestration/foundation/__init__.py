@@ -1,0 +1,1 @@
+"""What everything stands on: processes, errors, documents, units, records of rows and events."""

@@ -1,0 +1,42 @@
+"""A recording as pandas tables."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from orchestration.foundation.recording.recording import KINDS, About, Events, Recording
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def units_of(about: About) -> dict[str, str]:
+    """The units of the columns that have one."""
+    return {name: words["unit"] for name, words in about.items() if "unit" in words}
+
+
+def signals(recording: Recording, about: About) -> "pd.DataFrame":
+    """A row for each instant, indexed by `time` [s]; the units are in `attrs["units"]`, by column."""
+    import pandas as pd
+
+    rows = np.concatenate([chunk.rows for chunk in recording.chunks()])
+    table = pd.DataFrame(rows, columns=list(recording.columns)).set_index("time")
+    table.attrs["units"] = units_of(about)
+    return table
+
+
+def events(recording: Recording) -> "pd.DataFrame":
+    """A row for each event in order of time: `time` [s], `event`, its object (`what`) and the index `sample`."""
+    import pandas as pd
+
+    table = pd.concat([_events(chunk.events) for chunk in recording.chunks(("time",))], ignore_index=True)
+    table.attrs["units"] = {"time": "s"}
+    return table
+
+
+def _events(events: Events) -> "pd.DataFrame":
+    import pandas as pd
+
+    time, kind, what, sample = events.table.T
+    words, names = np.array(KINDS, dtype=object), np.array([*events.names], dtype=object)
+    return pd.DataFrame({"time": time / 1e9, "event": words[kind], "what": names[what], "sample": sample})

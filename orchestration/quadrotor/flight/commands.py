@@ -1,0 +1,118 @@
+"""Thrust and torques as applied, with marks for events and for active limits of the plant."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from orchestration.quadrotor.scenarios.measures import saturated
+from orchestration.quadrotor.scenarios.wiring import COMMAND
+from orchestration.simulation.figures.lines import TIME, clip_peaks, legend_of_runs, quantity, set_span
+from orchestration.simulation.figures.palette import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RED
+from orchestration.simulation.figures.run import Run, Window, title
+from orchestration.simulation.figures.style import Style
+
+NAMES = dict(zip(COMMAND, ("thrust", "torque x", "torque y", "torque z"), strict=True))
+UNITS = dict(zip(COMMAND, ("N", "N.m", "N.m", "N.m"), strict=True))
+COLUMNS = tuple(f"plant.{name}" for name in COMMAND)
+MOST_MARKS = 150
+"""of one kind that can be told apart in a window"""
+AT_LIMIT = "a limit of the plant is active"
+
+
+def commands(runs: Sequence[Run], style: Style) -> Figure:
+    """The whole run, and a window of it: by default the first second. In a narrow figure the window alone, if any."""
+    end = max(float(run.rows[-1, 0]) for run in runs)
+    window = runs[0].window
+    zoom = window or (0.0, min(1.0, end))
+    spans: list[Window] = [(0.0, end), zoom] if style.is_wide else [window or (0.0, end)]
+    figure = style.figure(3.0 + 10.5 * len(COMMAND))
+    rows = figure.subplots(len(COMMAND), len(spans), sharex="col", squeeze=False, width_ratios=(1.0, 1.3)[: len(spans)])
+    for row, name in zip(rows, COMMAND, strict=True):
+        for panel, span in zip(row, spans, strict=True):
+            is_zoom = panel is not row[0] or (len(spans) == 1 and window is not None)
+            _draw(panel, runs, name, span, style, clips=not is_zoom)
+            if is_zoom and len(runs) == 1:
+                mark_events(panel, runs[0], span)
+        row[0].set_ylabel(quantity(NAMES[name], UNITS[name]))
+        if len(spans) > 1 and window is not None:
+            row[0].axvspan(*zoom, color=GREY, alpha=0.15, linewidth=0.0)
+    for panel in rows[-1]:
+        panel.set_xlabel(TIME)
+    if style.has_titles:
+        rows[0][0].set_title(title(runs))
+        if len(spans) > 1:
+            rows[0][1].set_title(f"{zoom[0]:g} s to {zoom[1]:g} s")
+    _legend(figure, list(rows.ravel()))
+    legend_of_runs(figure, runs, style)
+    return figure
+
+
+def _draw(panel: Axes, runs: Sequence[Run], name: str, span: Window, style: Style, *, clips: bool) -> None:
+    """One command over one span, with the limits that are near."""
+    lines = []
+    for run in runs:
+        t, values = run.signals["time"], run.signals[f"plant.{name}"]
+        color = BLUE if len(runs) == 1 else run.color
+        panel.plot(t, values, drawstyle="steps-post", color=color, linestyle=run.dashes if len(runs) > 1 else "-")
+        inside = (t >= span[0]) & (t <= span[1])
+        lines.append((t[inside], values[inside]) if inside.any() else (t, values))
+    set_span(panel, span)
+    low, high = min(float(y.min()) for _, y in lines), max(float(y.max()) for _, y in lines)
+    room = (high - low) or 1.0  # below for samples and arrivals, above for losses
+    panel.set_ylim(low - (0.1 if clips else 0.25) * room, high + 0.15 * room)
+    if not (clips and clip_peaks(panel, lines, UNITS[name], style)):
+        _mark_limits(panel, runs, name)
+    _mark_saturation(panel, runs, name)
+
+
+def _mark_limits(panel: Axes, runs: Sequence[Run], name: str) -> None:
+    """A line at each limit within the range of the axis."""
+    bottom, top = panel.get_ylim()
+    for run in runs:
+        most = run.parameters.get("plant.thrust_max" if name == COMMAND[0] else "plant.torque_max", np.inf)
+        for limit in (run.parameters.get("plant.thrust_min", 0.0) if name == COMMAND[0] else -most, most):
+            if bottom <= limit <= top:
+                panel.axhline(limit, color=BLACK, linestyle=":", label="limit of the plant")
+
+
+def _mark_saturation(panel: Axes, runs: Sequence[Run], name: str) -> None:
+    """Shade the time during which a limit alters the command."""
+    for run in runs:
+        t = run.signals["time"]
+        active = saturated(run.signals, run.parameters)[name]
+        if active.any():
+            panel.fill_between(
+                t, 0.0, 1.0, where=active, step="post", transform=panel.get_xaxis_transform(),
+                color=RED if len(runs) == 1 else run.color, alpha=0.2, linewidth=0.0, label=AT_LIMIT,
+            )  # fmt: skip
+
+
+def mark_events(axes: Axes, run: Run, span: Window) -> None:
+    """Marks along the lower and upper edge for the events in the window; for losses only where there are too many."""
+    for kind, what, marker, color, height, label in (
+        ("sampled", "measurement", "|", GREY, 0.04, "sampled"),
+        ("arrived", "command", "^", GREEN, 0.11, "command arrives"),
+        ("lost", "measurement", "x", ORANGE, 0.93, "measurement lost"),
+        ("lost", "command", "x", PURPLE, 0.98, "command lost"),
+    ):
+        times = run.instants(kind, what)
+        times = times[(times >= span[0]) & (times <= span[1])]
+        if len(times) and (kind == "lost" or len(times) <= MOST_MARKS):
+            axes.plot(
+                times, [height] * len(times), linestyle="", marker=marker, color=color, markersize=4,
+                markeredgewidth=0.8,
+                transform=axes.get_xaxis_transform(), label=label, clip_on=False,
+            )  # fmt: skip
+
+
+def _legend(figure: Figure, panels: Sequence[Axes]) -> None:
+    """One legend below the panels, each label once."""
+    handles: dict[str, Artist] = {}
+    for panel in panels:
+        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+            handles.setdefault(label, handle)
+    if handles:
+        figure.legend([*handles.values()], [*handles], loc="outside lower center", ncols=len(handles))

@@ -1,0 +1,141 @@
+"""The four errors: their norms, and component by component as in Fig. 3 of the paper."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.quadrotor.scenarios.measures import desired
+from orchestration.quadrotor.scenarios.wiring import POSITION, components
+from orchestration.simulation.figures.lines import (
+    TIME,
+    clip_peaks,
+    legend_of_runs,
+    logarithmic,
+    positive,
+    quantity,
+    set_time_axis,
+    wrapped,
+)
+from orchestration.simulation.figures.palette import BLUE, GREEN, RED
+from orchestration.simulation.figures.run import Run, title
+from orchestration.simulation.figures.style import Style
+
+AXES = tuple(zip("xyz", (BLUE, RED, GREEN), ("-", "--", "-."), strict=True))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Error:
+    """One of the four."""
+
+    name: str
+    unit: str
+    of: Callable[[Run], Floats | None]
+    """shape (n, 3); None: not an output of the controller"""
+
+
+def errors(runs: Sequence[Run], style: Style) -> Figure:
+    """Norms of the errors on logarithmic axes; position at every row, the others as of the last sample."""
+    figure, panels = _panels(runs, style)
+    for panel, error in panels:
+        for run in runs:
+            values = error.of(run)
+            if values is not None:
+                color = BLUE if len(runs) == 1 else run.color
+                norm = positive(np.linalg.norm(values, axis=1))
+                panel.plot(run.time, norm, color=color, linestyle=run.dashes, label=run.name)
+        logarithmic(panel)
+        panel.set_ylabel(wrapped(quantity(f"{error.name}, norm", error.unit)))
+        panel.minorticks_off()
+        set_time_axis(panel, runs)
+    return figure
+
+
+def components_of_errors(runs: Sequence[Run], style: Style) -> Figure:
+    """x, y and z of each error; with several runs a panel for each component."""
+    if len(runs) > 1:
+        return _overlaid(runs, style)
+    figure, panels = _panels(runs, style)
+    for i, (panel, error) in enumerate(panels):
+        draw_components(panel, runs[0], error, style)
+        if i == 0:
+            panel.legend(loc="upper right", ncols=3)
+    return figure
+
+
+def draw_components(panel: Axes, run: Run, error: Error, style: Style, *, clips: bool = True) -> None:
+    """x, y and z of an error that the run has."""
+    values = error.of(run)
+    assert values is not None
+    for k, (axis, color, dashes) in enumerate(AXES):
+        panel.plot(run.time, values[:, k], color=color, linestyle=dashes, label=axis)
+    panel.set_ylabel(wrapped(quantity(error.name, error.unit)))
+    set_time_axis(panel, [run])
+    if clips:
+        clip_peaks(panel, [(run.time, values[:, k]) for k in range(3)], error.unit, style)
+
+
+def _overlaid(runs: Sequence[Run], style: Style) -> Figure:
+    """A row for each error, a column for each component, a line for each run."""
+    available = _available_errors(runs)
+    figure = style.figure(2.0 + 11.0 * len(available))
+    rows = figure.subplots(len(available), 3, sharex=True, squeeze=False)
+    for i, (row, error) in enumerate(zip(rows, available, strict=True)):
+        for k, panel in enumerate(row):
+            drawn = [(run, values[:, k]) for run in runs if (values := error.of(run)) is not None]
+            for run, values in drawn:
+                panel.plot(run.time, values, color=run.color, linestyle=run.dashes, label=run.name)
+            set_time_axis(panel, runs)
+            panel.set_ylabel(wrapped(quantity(f"{error.name} {'xyz'[k]}", error.unit), 18))
+            if i == len(available) - 1:
+                panel.set_xlabel(TIME)
+    legend_of_runs(figure, runs, style)
+    return figure
+
+
+def _panels(runs: Sequence[Run], style: Style) -> tuple[Figure, list[tuple[Axes, Error]]]:
+    """A figure with legend and title, and a panel for each available error."""
+    available = _available_errors(runs)
+    columns = 2 if style.is_wide and len(available) > 1 else 1
+    rows = -(-len(available) // columns)
+    figure = style.figure(3.0 + 14.0 * rows)
+    panels = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
+    for panel in panels[len(available) :]:
+        panel.set_visible(False)
+    for panel in panels[max(0, len(available) - columns) : len(available)]:
+        panel.set_xlabel(TIME)
+    if style.has_titles and title(runs):
+        figure.suptitle(title(runs))
+    legend_of_runs(figure, runs, style)
+    return figure, list(zip(panels, available))
+
+
+def _available_errors(runs: Sequence[Run]) -> list[Error]:
+    return [error for error in ERRORS if any(error.of(run) is not None for run in runs)]
+
+
+def _position_error(run: Run) -> Floats | None:
+    position = run.stacked([f"plant.{name}" for name in POSITION])
+    return position - desired(run.signals)[run.visible]
+
+
+def _output_of_controller(name: str) -> Callable[[Run], Floats | None]:
+    columns = [f"controller.{component}" for component in components(name)]
+    return lambda run: run.stacked(columns) if run.has(columns) else None
+
+
+ERRORS = (
+    Error(name="position error", unit="m", of=_position_error),
+    Error(name="velocity error", unit="m/s", of=_output_of_controller("velocity_error")),
+    Error(name="attitude error", unit="1", of=_output_of_controller("attitude_error")),
+    Error(name="angular velocity error", unit="rad/s", of=_output_of_controller("angular_velocity_error")),
+)
+"""P̃, Ṽ, q̃ and Ω̃"""
+DRAWN = tuple(
+    f"controller.{name}"
+    for stem in ("velocity_error", "attitude_error", "angular_velocity_error")
+    for name in components(stem)
+)

@@ -1,0 +1,130 @@
+"""The sampled closed loop linearised about hover, by differentiating the FMUs through their saved states.
+
+The state is the vehicle's twelve coordinates at a sampling instant (the attitude as its vector part: with all four
+components the norm of the quaternion would give an eigenvalue at one), the actuators if they lag, and the commands in
+transit. At an equilibrium the derivative of a period is the product of the derivatives of its steps.
+"""
+
+import itertools
+import math
+
+import numpy as np
+
+from orchestration.components.building import fmus
+from orchestration.components.fmi.instance import Instance
+from orchestration.components.fmi.reuse import Instances
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.quadrotor.flight.hover import COORDINATES, STEP, displaced, hover_of, initialise, measurement_at
+from orchestration.quadrotor.flight.plant_step import INSTANT, PlantStep
+from orchestration.quadrotor.scenarios import wiring
+from orchestration.quadrotor.scenarios.scenario import Scenario
+from orchestration.simulation.runs.prepared import prepared
+
+_COMMANDS = len(wiring.COMMAND)
+_FORGOTTEN = 1e-9
+"""relative change of a command that is tolerated after the controller measured another state in between"""
+
+
+class HoverLoop:
+    """The linear closed loop of a scenario about hover, for any period and delay."""
+
+    def __init__(self, feedback: Floats, step: PlantStep) -> None:
+        self._feedback = feedback
+        self._step = step
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> "HoverLoop":
+        """The loop of `scenario`; raises `UsageError` if hover is no equilibrium, or the feedback not a single one."""
+        _expect_one_feedback(scenario)
+        hover, fleet = located(hover_of(scenario)), Instances()
+        trim, feedback = controller_at_hover(hover, fleet)
+        return cls(feedback, PlantStep(hover, fleet, trim))
+
+    def with_law(self, scenario: Scenario) -> "HoverLoop":
+        """The loop of the same plant with the controller of `scenario`, whose command at hover must be the same."""
+        _, feedback = controller_at_hover(located(hover_of(scenario)), Instances())
+        return HoverLoop(feedback, self._step)
+
+    def continuous(self) -> tuple[Floats, Floats, Floats]:
+        """A and B of the plant in continuous time, dx = A x + B u, and F of its controller, u = F x."""
+        from scipy.linalg import logm
+
+        size = self._step.size
+        generator = np.real(logm(self._step.one_interval())) / self._step.interval
+        feedback = np.zeros((_COMMANDS, size))
+        feedback[:, : len(COORDINATES)] = self._feedback
+        return generator[:size, :size], generator[:size, size:], feedback
+
+    def spectral_radius(self, period: float, delay: float) -> float:
+        """The largest modulus of the eigenvalues of one sample period [s] with a delay [s]."""
+        return float(np.abs(np.linalg.eigvals(self.matrix(period, delay))).max())
+
+    def matrix(self, period: float, delay: float) -> Floats:
+        """d(state after one period)/d(state): vehicle, actuators, then commands in transit, oldest first."""
+        whole = math.floor(delay / period + 1e-9)
+        rest = delay - whole * period if delay - whole * period > INSTANT else 0.0
+        pending = whole + (rest > 0.0)
+        size = self._step.size + _COMMANDS * pending
+        newest = np.zeros((_COMMANDS, size))
+        newest[:, : len(COORDINATES)] = self._feedback
+        sent = [np.eye(_COMMANDS, size, self._step.size + _COMMANDS * i) for i in range(pending)] + [newest]
+        flow = np.eye(self._step.size, size)
+        for duration, command in ((rest, sent[0]), (period - rest, sent[1] if rest else sent[0])):
+            A, B = self._step.over(duration)
+            flow = A @ flow + B @ command
+        return np.vstack([flow, *sent[1:]])
+
+
+def controller_at_hover(hover: Scenario, fleet: Instances) -> tuple[Floats, Floats]:
+    """The command at hover and its derivative by the coordinates, shape (4, 12).
+
+    Raises `UsageError` for a controller with memory: its command is not a function of the vehicle's state.
+    """
+    with prepared(hover, load=fleet.load) as flight:
+        controller = flight.instances["controller"]
+        at_rest = measurement_at({})
+        initialise(controller, wiring.MEASUREMENT, at_rest)
+        step = min(STEP, 1e-3 * _value(controller, wiring.BOUNDARY_LAYER, absent=1.0))
+
+        instants = itertools.count()
+
+        def command(measurement: Floats) -> Floats:
+            result: Floats = np.zeros(_COMMANDS)
+            controller.writer(wiring.MEASUREMENT, measurement)()
+            controller.step(next(instants) * hover.timing.period, hover.timing.period)
+            controller.reader(wiring.COMMAND, result)()
+            return result
+
+        columns = []
+        for name in COORDINATES:
+            plus, minus = (command(measurement_at(displaced(name, size))) for size in (step, -step))
+            columns.append((plus - minus) / (2.0 * step))
+        trim = command(at_rest)
+        away = at_rest + 1e3 * step
+        later = [command(x) for x in (away, away, at_rest)]
+        if np.abs(later[-1] - trim).max() > _FORGOTTEN * max(1.0, float(np.abs(trim).max())):
+            raise UsageError("the controller's command depends on what it measured before")
+        return trim, np.column_stack(columns)
+
+
+def located(hover: Scenario) -> Scenario:
+    """`hover` with its FMUs by their paths."""
+    return hover.with_fmus(plant=fmus.locate(hover.plant.fmu), controller=fmus.locate(hover.controller.fmu))
+
+
+def _expect_one_feedback(scenario: Scenario) -> None:
+    """Raise `UsageError` for a controller whose feedback depends on the period or on earlier commands."""
+    for name, plain in wiring.UNREDESIGNED.items():
+        value = scenario.controller.parameters.get(name, plain[0])
+        if value not in plain:
+            raise UsageError(f"the loop about hover is for controllers with {name} = {plain[0]} only")
+
+
+def _value(fmu: Instance, name: str, *, absent: float) -> float:
+    """The value of a Real variable of an FMU; `absent` if it has none of that name."""
+    if name not in fmu.variables:
+        return absent
+    value: Floats = np.zeros(1)
+    fmu.reader((name,), value)()
+    return float(value[0])

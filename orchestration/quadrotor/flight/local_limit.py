@@ -1,0 +1,106 @@
+"""The local limits of the quadrotor in period and delay, about hover; in any other quantity those of any system."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import cast
+
+from orchestration.foundation.basics.bisection import Range, first_failure
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.quadrotor.flight.hover import at_edge, at_hover
+from orchestration.quadrotor.flight.hover_loop import HoverLoop
+from orchestration.quadrotor.flight.plant_step import NotSmooth
+from orchestration.quadrotor.scenarios.quantities import range_of
+from orchestration.quadrotor.scenarios.scenario import Scenario
+from orchestration.simulation.requests.ranges import Varied
+from orchestration.systems.system.distribution import lowest
+from orchestration.systems.system.model import System
+from orchestration.systems.system.paths import changed
+from orchestration.systems.system.request import Request
+from orchestration.theory.stability.known_loops import LocalLimit
+from orchestration.theory.stability.local_limit import about_rest
+
+HOVER = "spectral radius of the sampled loop about hover, by differences through saved states"
+HOVER_ACCURACY = 1e-3
+"""relative accuracy of the limit with these differences"""
+KNOWN = ("period", "delay")
+"""Quantities for which the loop about hover applies"""
+
+
+class AboutHover:
+    """The loop of a `Scenario` about hover."""
+
+    def at_rest(self, request: Request) -> System:
+        """The system of a scenario at hover."""
+        return at_hover(cast(Scenario, request))
+
+    def local_limits(self, varied: Varied, span: Range) -> LocalLimit:
+        """The local limit of a quantity: of the loop about hover where that applies, else as for any system."""
+        scenario = cast(Scenario, varied.request)
+        if varied.of in ("jitter", "loss"):
+            return LocalLimit(reason=f"linear theory has no local limit of {varied.of}")
+        why = "the loop about hover is for period and delay only"
+        try:
+            if varied.of in KNOWN:
+                return about_hover(scenario, varied.of)
+        except NotSmooth as error:
+            return LocalLimit(reason=f"no local limit: {error}")
+        except UsageError as error:
+            why = str(error)
+        return _without_hover_loop(scenario, varied, span, why)
+
+    def radius_over(self, request: Request, of: str) -> Callable[[float], float] | None:
+        """The spectral radius over a period or delay [s]; raises `UsageError` if there is no linear loop at hover."""
+        if of not in KNOWN:
+            return None
+        scenario = cast(Scenario, request)
+        loop = HoverLoop.of(scenario)
+        return lambda value: radius(loop, scenario, of, value)
+
+
+def local_limit(loop: HoverLoop, scenario: Scenario, of: str) -> float | None:
+    """Where the spectral radius first crosses one from below, in period or delay [s]; None: nowhere in the range."""
+    span = range_of(scenario.timing, of)
+    assert span is not None
+    low = min((*span.before, span.first))
+    fine = [low + 0.001 * i for i in range(int((span.last - low) / 0.001))]
+    bracket = first_failure(lambda value: radius(loop, scenario, of, value) >= 1.0, fine, 1e-6)
+    return bracket.good if bracket is not None else None
+
+
+def radius(loop: HoverLoop, scenario: Scenario, of: str, value: float) -> float:
+    """The spectral radius of `scenario` about hover with another period or delay [s]."""
+    timing = scenario.timing
+    period = (value if of == "period" else timing.period) / timing.clock_ratio
+    delay = (value if of == "delay" else lowest(timing.delay)) + (period if timing.order == "jacobi" else 0.0)
+    return loop.spectral_radius(period, delay)
+
+
+def about_hover(scenario: Scenario, of: str) -> LocalLimit:
+    """The local limits of the quadrotor in period or delay, inside its boundary layer and just outside of it.
+
+    Raises `UsageError` for a scenario without a linear loop about hover.
+    """
+    if scenario.timing.hold != "zero":
+        raise UsageError("the loop about hover is for zero-order hold only")
+    loop = HoverLoop.of(scenario)
+    edge = at_edge(scenario)
+    limit = local_limit(loop, scenario, of)
+    return LocalLimit(
+        limit=limit,
+        outside=None if edge is None else local_limit(loop.with_law(edge), edge, of),
+        method=HOVER,
+        accuracy=None if limit is None else HOVER_ACCURACY * limit,
+        reason="the spectral radius about hover stays below one in the range, or above",
+    )
+
+
+def _without_hover_loop(scenario: Scenario, varied: Varied, span: Range, why: str) -> LocalLimit:
+    """The local limit of the quadrotor as of any other system, with the reason `why`."""
+    try:
+        hover = at_hover(scenario)
+    except UsageError as error:
+        return LocalLimit(reason=f"no local limit: {error}")
+    found = about_rest(lambda value: changed(hover, dict.fromkeys(varied.paths, value)), span)
+    if found.method is None:
+        return replace(found, reason=f"{found.reason} ({why})")
+    return replace(found, method=f"{found.method} ({why})")

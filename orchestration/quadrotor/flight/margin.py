@@ -1,0 +1,48 @@
+"""The delays that a scenario's loop about hover tolerates: exact for constant ones, bounds for varying ones."""
+
+from dataclasses import dataclass
+
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.quadrotor.flight.hover_loop import HoverLoop
+from orchestration.quadrotor.flight.local_limit import local_limit
+from orchestration.quadrotor.scenarios.scenario import Scenario
+from orchestration.systems.system.distribution import lowest
+from orchestration.theory.stability.delay_bounds import SampledLoop, breaking_jitter, certain_jitter
+
+
+@dataclass(frozen=True, kw_only=True)
+class Margin:
+    """Delay margins of the linear loop about hover, all in seconds."""
+
+    period: float
+    delay: float
+    """of every command, the smallest if it varies"""
+    delay_limit: float | None
+    """the largest constant delay, exact; None: every delay of the range is stable, or none"""
+    certain_jitter: float
+    """addition to the delay, different for each command, with which no sequence makes the loop unstable"""
+    breaking_jitter: float | None
+    """the smallest addition found that can make it unstable; None: no sequence that was tried does"""
+    breaking_sequence: tuple[float, ...]
+    """the shares of it, in turn, that do"""
+
+
+def margin_of(scenario: Scenario) -> Margin:
+    """The margin of a scenario; raises `UsageError` if it has no linear loop about hover."""
+    timing = scenario.timing
+    if timing.hold != "zero" or timing.order != "gauss-seidel":
+        raise UsageError("margin: expected hold zero and order gauss-seidel; the bounds are for no other")
+    hover = HoverLoop.of(scenario)
+    A, B, F = hover.continuous()
+    period, delay = timing.period / timing.clock_ratio, lowest(timing.delay)
+    loop = SampledLoop(A=A, B=B, F=F, period=period, delay=delay)
+    limit = local_limit(hover, scenario, "delay")
+    broken = None if limit is None else breaking_jitter(loop, max(limit - delay, 0.0) + period)
+    return Margin(
+        period=period,
+        delay=delay,
+        delay_limit=limit,
+        certain_jitter=certain_jitter(loop),
+        breaking_jitter=None if broken is None else broken[0],
+        breaking_sequence=() if broken is None else broken[1],
+    )

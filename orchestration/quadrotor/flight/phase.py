@@ -1,0 +1,80 @@
+"""Phase portraits: each position error against its rate, with the surface on which the law slides."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.quadrotor.scenarios.wiring import BOUNDARY_LAYER, SURFACE_EXPONENT, SURFACE_GAIN, components
+from orchestration.simulation.figures.lines import legend_of_runs, quantity
+from orchestration.simulation.figures.palette import BLUE, GREY
+from orchestration.simulation.figures.run import Run, title
+from orchestration.simulation.figures.style import Style
+
+ERROR, RATE = (tuple(f"controller.{c}" for c in components(name)) for name in ("position_error", "velocity_error"))
+DRAWN = (*ERROR, *RATE)
+
+
+def phase(runs: Sequence[Run], style: Style) -> Figure | None:
+    """A panel each for x, y and z, as of the samples; None if no controller has its errors as outputs."""
+    with_errors = [run for run in runs if run.has(DRAWN)]
+    if not with_errors:
+        return None
+    columns = 3 if style.is_wide else 1
+    figure = style.figure(24.0 if columns == 3 else 48.0)
+    panels = figure.subplots(3 // columns, columns, squeeze=False).ravel()
+    for k, (panel, axis) in enumerate(zip(panels, "xyz", strict=True)):
+        for run in with_errors:
+            _draw(panel, run, run[ERROR[k]], run[RATE[k]], alone=len(runs) == 1)
+        _draw_surfaces(panel, with_errors)
+        panel.set(xlabel=quantity(f"position error {axis}", "m"), ylabel=quantity(f"velocity error {axis}", "m/s"))
+    handles, names = panels[0].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside lower center", ncols=len(names))
+    if style.has_titles and title(runs):
+        figure.suptitle(title(runs))
+    legend_of_runs(figure, runs, style)
+    return figure
+
+
+def _draw(panel: Axes, run: Run, error: Floats, rate: Floats, *, alone: bool) -> None:
+    color, first = BLUE if alone else run.color, run.place == 0
+    panel.plot(error, rate, color=color, linestyle=run.dashes if not alone else "-", label="flown" if alone else None)
+    for k, marker, what in ((0, "o", "start"), (-1, "s", "end")):
+        filled = "white" if what == "start" else color
+        panel.plot(
+            error[k], rate[k], marker, color=color, markerfacecolor=filled, label=what if first else None, zorder=3
+        )
+
+
+def _draw_surfaces(panel: Axes, runs: Sequence[Run]) -> None:
+    """The surface s = 0 of each law that has one, over the visible range."""
+    panel.margins(0.06)
+    seen, rates = panel.get_xlim(), panel.get_ylim()
+    panel.set(xlim=seen, ylim=rates)
+    size = max(abs(end) for end in seen)
+    bend = np.geomspace(1e-6 * size, size, 200)
+    error = np.concatenate([-bend[::-1], bend])
+    drawn: list[Floats] = []
+    for run in runs:
+        rate = surface(error, run.parameters)
+        if rate is not None and not any(np.array_equal(rate, other) for other in drawn):
+            panel.plot(
+                error, rate, color=GREY, linestyle="--", label="sliding surface s = 0" if not drawn else None, zorder=1
+            )
+            drawn.append(rate)
+
+
+def surface(error: Floats, parameters: Mapping[str, float]) -> Floats | None:
+    """The rate of the error on the sliding surface (19)-(21) [m/s]; None if the controller has no such surface.
+
+    Where `surface` of the law is 0, solved for the rate: this package does not import the sources of FMUs.
+    """
+    names = [f"controller.{name}" for name in (SURFACE_GAIN, SURFACE_EXPONENT, BOUNDARY_LAYER)]
+    if not all(name in parameters for name in names):
+        return None
+    k_s, beta_t, epsilon = (parameters[name] for name in names)
+    size = np.abs(error)
+    rate: Floats = np.where(size < epsilon, -k_s * error, -k_s * size**beta_t * np.sign(error))
+    return rate

@@ -1,0 +1,1 @@
+"""The quadrotor: the first system, its scenario files, flags and presets."""

@@ -1,0 +1,108 @@
+"""The timing of the digital loop of a run as one frozen value."""
+
+from dataclasses import field, fields
+from typing import ClassVar
+
+from orchestration.foundation.basics.errors import shown
+from orchestration.foundation.basics.records import record
+from orchestration.systems.system.choices import Clock, Hold, Order, Spread
+from orchestration.systems.system.distribution import (
+    Varying,
+    highest,
+    lowest,
+    reads_file,
+    require_losses,
+    require_spread,
+    require_varying,
+)
+from orchestration.systems.system.requirements import (
+    is_finite,
+    require,
+    require_not_negative,
+    require_own_clock,
+    require_positive,
+)
+from orchestration.systems.system.times import is_at_least
+
+_PLACE = "timing."
+
+
+@record("timing.")
+class Timing:
+    """The timing of the digital loop; times in seconds.
+
+    Raises `UsageError` for invalid values: negative times, jitter not below the period, probabilities outside [0, 1].
+    """
+
+    SHORTHANDS: ClassVar[tuple[str, ...]] = ("loss", "preset")
+    """Keys of `[timing]` in a file that expand to others"""
+
+    period: float = 0.01
+    """The sampling period T of the controller [s], by its own clock: sample k is at offset + kT."""
+    offset: float = 0.0
+    """The time of the first sample [s]."""
+    plant_interval: float = 0.001
+    """The distance of the plant's own communication points [s], each of which is recorded."""
+    order: Order = "gauss-seidel"
+    """Whether a command can be applied at the instant of its sample (gauss-seidel) or at the next one (jacobi)."""
+    hold: Hold = "zero"
+    """The command of the plant between arrivals: the last one (zero), or the line through the last two (first)."""
+    clock: Clock = "master"
+    """What decides when the controller samples: the master, or the FMU by its parameters sample_period and
+    sample_offset."""
+    delay: Varying = 0.0
+    """The time d from a sample to the application of its command [s], or its distribution; it may exceed the period."""
+    delay_jitter: Varying = 0.0
+    """The largest random addition J_d to the delay of each command [s], or the distribution of the addition
+    itself."""
+    jitter: Varying = 0.0
+    """The largest lateness J of a sample [s], drawn for each, or the distribution of the lateness itself; it is less
+    than the period."""
+    jitter_distribution: Spread = "uniform"
+    """The distribution over [0, J], and over [0, J_d], of what is given by its largest value; normal is centred at J/2
+    with standard deviation J/6, cut to the range."""
+    measurement_loss: Varying = 0.0
+    """The probability that a measurement is lost, or values of 0 and 1, as of a trace: 1 for a lost one."""
+    command_loss: Varying = 0.0
+    """The probability that a command is lost, or likewise."""
+    burst_length: float | None = None
+    """The mean number of losses in a row (Gilbert-Elliott); default: losses are independent."""
+    clock_ratio: float = 1.0
+    """The seconds r that the controller believes pass per true second."""
+    noise: dict[str, float] = field(default_factory=dict)
+    """The standard deviation of normal noise by measurement, in its unit; a vector's name stands for its components."""
+    quantisation: dict[str, float] = field(default_factory=dict)
+    """The step to which a measurement is rounded, in its unit, by measurement, likewise."""
+
+    def __post_init__(self) -> None:
+        require_positive(self, "period", "plant_interval", "clock_ratio", place=_PLACE)
+        for name, ratio in (("period", self.clock_ratio), ("plant_interval", 1.0)):
+            value = getattr(self, name)
+            require(is_at_least(value, ratio), _PLACE + name, value, "at least a nanosecond")
+        require_not_negative(self, "offset", place=_PLACE)
+        require_varying(self, "delay", "delay_jitter", "jitter", place=_PLACE)
+        require_spread(self.jitter_distribution, self.jitter, self.delay_jitter, place=_PLACE)
+        require_losses(self, self.burst_length, "measurement_loss", "command_loss", place=_PLACE)
+        for what in ("noise", "quantisation"):
+            for variable, value in getattr(self, what).items():
+                require(is_finite(value) and value >= 0.0, f"{_PLACE}{what} of {variable}", value, "zero or positive")
+        longest = self.period / self.clock_ratio
+        if not reads_file(self.jitter):
+            most = highest(self.jitter)
+            require(most < longest, f"{_PLACE}jitter", most, f"less than the period of {longest:g} s")
+        if self.clock == "fmu":
+            require_own_clock(self, _PLACE)
+
+    def warnings(self, stop_time: float) -> tuple[str, ...]:
+        """Warnings where a run of this length [s] is too short to show this timing."""
+        end = f"the run ends at {shown(stop_time)} s"
+        if self.offset / self.clock_ratio >= stop_time:
+            return (f"timing.offset = {shown(self.offset)}: {end}, so the controller never samples",)
+        if (self.offset + self.period) / self.clock_ratio >= stop_time:
+            return (f"timing.period = {shown(self.period)}: {end}, so the controller samples only once",)
+        if (least := lowest(self.delay)) >= stop_time:
+            return (f"timing.delay = {shown(least)}: {end}, so no command arrives",)
+        return ()
+
+
+TIMING_KEYS = tuple(f.name for f in fields(Timing))

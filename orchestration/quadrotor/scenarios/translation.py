@@ -1,0 +1,152 @@
+"""Translates a scenario of the quadrotor into its system: names of parts, reference and disturbance."""
+
+import functools
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.quadrotor.scenarios.signals import DRAG, DisturbanceChoice, ReferenceChoice
+from orchestration.quadrotor.scenarios.timing import TIMING_KEYS
+from orchestration.quadrotor.scenarios.wiring import EXTERNAL_FORCE, POSITION_REFERENCE
+from orchestration.systems.signals.limits import AXES
+from orchestration.systems.signals.table_file import header_of
+from orchestration.systems.system.model import System
+from orchestration.systems.system.paths import TOP
+from orchestration.systems.system.source import Source
+from orchestration.systems.system.system_file import load_system
+
+SYSTEM = Path(__file__).with_name("system.toml")
+"""The paper's flight; every scenario is this system with changes"""
+
+
+@functools.cache
+def quadrotor() -> System:
+    """The system of the paper's flight."""
+    return load_system(SYSTEM)
+
+
+def in_scenario_terms(text: str) -> str:
+    """`text` with the paths of the system replaced by the names of a scenario."""
+    for path, name in SCENARIO_NAMES.items():
+        text = text.replace(path, name)
+    return text
+
+
+def reference_source(choice: ReferenceChoice) -> dict[str, Any]:
+    """The keys of the source of the reference; empty for the trajectory built into the controller."""
+    if choice.name is None and choice.file is None:
+        return {}
+    keys: dict[str, Any] = {"parameters": dict(choice.parameters)}
+    if choice.file is None:
+        return {**keys, "signal": choice.name}
+    columns = header_of(choice.file)
+    is_table = POSITION_REFERENCE[0] in columns or not {*AXES} & {*columns}
+    return {**keys, "file": choice.file, "interpolation": "linear" if is_table else "spline"}
+
+
+def disturbed(system: System, choice: DisturbanceChoice) -> System:
+    """`system` with the source of a disturbance of the plant."""
+    if choice.name is None and choice.file is None:
+        return system
+    keys: dict[str, Any] = {"to": tuple(f"plant.{name}" for name in EXTERNAL_FORCE)}
+    drag = DRAG if choice.drag is None else choice.drag
+    if choice.file is None:
+        keys |= {"signal": choice.name, "parameters": dict(choice.parameters), "scale": drag}
+    else:
+        keys |= {"file": choice.file, "interpolation": choice.interpolation}
+        if {*WIND} & {*header_of(choice.file)}:
+            keys |= {"columns": WIND, "scale": drag}
+        elif choice.drag is not None:
+            raise UsageError(f"disturbance.drag: expected columns {', '.join(WIND)} in {choice.file}")
+    try:
+        source = Source(**keys)
+    except UsageError as error:
+        raise UsageError(f"sources.disturbance.{error}") from error
+    return replace(system, sources={**system.sources, "disturbance": source})
+
+
+def paths_of(target: str) -> tuple[str, ...]:
+    """The paths in the system of `timing.KEY`, `controller.NAME` or `plant.NAME`; a path is returned as it is.
+
+    Raises `UsageError` for any other name.
+    """
+    table, _, key = target.partition(".")
+    kind, _, measurement = key.partition(".")
+    if target in TOP or table in ("components", "connections", "sources"):
+        return (target,)
+    if table == "timing" and key == "loss":
+        return (*TIMING["measurement_loss"], *TIMING["command_loss"])
+    if table == "timing" and key in TIMING:
+        return TIMING[key]
+    if table == "timing" and kind in BY_MEASUREMENT and measurement:
+        return (f"connections.measurement.{key}",)
+    if table in ("reference", "disturbance") and key:
+        return (f"sources.{table}.{SIGNAL_KEYS[table].get(key, f'parameters.{key}')}",)
+    if table in ("controller", "plant") and key:
+        return (f"components.{table}.fmu" if key == "fmu" else f"components.{table}.parameters.{key}",)
+    raise UsageError(
+        f"{target}: expected controller.NAME, plant.NAME, reference.NAME, disturbance.NAME, seed, stop_time, "
+        f"timing.loss, timing.noise.NAME, timing.quantisation.NAME or timing.KEY with KEY one of {', '.join(_SINGLE)}"
+    )
+
+
+SCENARIO_NAMES = {
+    "components.controller.parameters.": "controller.",
+    "components.plant.parameters.": "plant.",
+    "components.controller.record": "record.controller",
+    "components.plant.record": "record.plant",
+    "components.controller.sampling.": "timing.",
+    "components.controller.": "controller.",
+    "components.plant.step": "timing.plant_interval",
+    "components.plant.": "plant.",
+    "connections.measurement.from": "plant.fmu",
+    "connections.measurement.to": "controller.fmu",
+    "connections.command.from": "controller.fmu",
+    "connections.command.to": "plant.fmu",
+    "connections.measurement.noise": "timing.noise",
+    "connections.measurement.quantisation": "timing.quantisation",
+    "connections.measurement.loss": "timing.measurement_loss",
+    "connections.command.loss": "timing.command_loss",
+    "connections.measurement.burst_length": "timing.burst_length",
+    "connections.command.": "timing.",
+    "sources.reference.signal": "reference.name",
+    "sources.reference.parameters.": "reference.",
+    "sources.reference.": "reference.",
+    "sources.reference:": "reference:",
+    "sources.disturbance.signal": "disturbance.name",
+    "sources.disturbance.scale": "disturbance.drag",
+    "sources.disturbance.parameters.": "disturbance.",
+    "sources.disturbance.": "disturbance.",
+}
+"""Names in a scenario by the beginnings of paths in its system"""
+
+SIGNAL_KEYS = {
+    "reference": {"name": "signal", "file": "file"},
+    "disturbance": {"name": "signal", "file": "file", "interpolation": "interpolation", "drag": "scale"},
+}
+"""Keys of `[reference]` and `[disturbance]` that are not parameters, and the keys of their sources"""
+WIND = ("wind.x", "wind.y", "wind.z")
+"""Columns of a file that has a wind instead of a force"""
+
+_SAMPLING, _COMMAND = "components.controller.sampling", "connections.command"
+TIMING: dict[str, tuple[str, ...]] = {
+    "period": (f"{_SAMPLING}.period",),
+    "offset": (f"{_SAMPLING}.offset",),
+    "plant_interval": ("components.plant.step",),
+    "order": (f"{_COMMAND}.order",),
+    "delay": (f"{_COMMAND}.delay",),
+    "delay_jitter": (f"{_COMMAND}.delay_jitter",),
+    "jitter": (f"{_SAMPLING}.jitter",),
+    "jitter_distribution": (f"{_SAMPLING}.jitter_distribution", f"{_COMMAND}.jitter_distribution"),
+    "measurement_loss": ("connections.measurement.loss",),
+    "command_loss": (f"{_COMMAND}.loss",),
+    "burst_length": ("connections.measurement.burst_length", f"{_COMMAND}.burst_length"),
+    "clock_ratio": (f"{_SAMPLING}.clock_ratio",),
+    "hold": (f"{_COMMAND}.hold",),
+    "clock": (f"{_SAMPLING}.clock",),
+}
+"""Paths by key of `[timing]`"""
+BY_MEASUREMENT = ("noise", "quantisation")
+"""Keys of `[timing]` that are tables by measurement"""
+_SINGLE = tuple(key for key in TIMING_KEYS if key not in BY_MEASUREMENT)

@@ -1,0 +1,1 @@
+"""From a request to its result: engines, objectives, figures, runs, workers, other masters."""

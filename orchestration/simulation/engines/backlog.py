@@ -1,0 +1,148 @@
+"""Recorded rows and events of a run that have not been handed over, until a chunk of them is complete."""
+
+from typing import Protocol
+
+import numpy as np
+
+from orchestration.foundation.basics.simulator import Floats, Integers
+from orchestration.foundation.recording.recording import BYTES, EVENTS, ROWS, Chunk, Recorder
+from orchestration.simulation.engines.running_system import RunningSystem
+from orchestration.systems.schedule.run_events import RunEvents
+from orchestration.systems.system.times import NANOSECONDS
+
+
+class Tables(Protocol):
+    """Storage of rows and events until they are handed over."""
+
+    def is_empty(self) -> bool:
+        """Whether there are neither rows nor events."""
+
+    def rows(self) -> Floats:
+        """Rows of the board, shape (n, number of its columns)."""
+
+    def rows_with_sources(self) -> Floats:
+        """The same with the values of sources, shape (n, number of `RunningSystem.columns`)."""
+
+    def events(self) -> Integers:
+        """A table as that of `Events`."""
+
+    def replace_rows(self, rows: bytes) -> None:
+        """Store these rows of the board instead."""
+
+    def replace_events(self, events: Integers) -> None:
+        """Store these events instead."""
+
+
+class ListTables:
+    """Tables that the loop in Python appends to."""
+
+    def __init__(self, running: RunningSystem) -> None:
+        self.content = bytearray()
+        """rows of the board"""
+        self.noted: list[int] = []
+        """a table of `Events`, row after row: numbers, so that the garbage collector has no objects to track"""
+        self._running = running
+
+    def is_empty(self) -> bool:
+        """As `Tables`."""
+        return not (self.content or self.noted)
+
+    def rows(self) -> Floats:
+        """As `Tables`."""
+        return np.frombuffer(bytes(self.content), dtype=np.float64).reshape(-1, len(self._running.board.columns))
+
+    def rows_with_sources(self) -> Floats:
+        """As `Tables`."""
+        rows = self.rows()
+        return np.column_stack([rows, *(values.over(rows[:, 0]) for _, values in self._running.sources)])
+
+    def events(self) -> Integers:
+        """As `Tables`."""
+        return np.fromiter(self.noted, np.int64, len(self.noted)).reshape(-1, 4)
+
+    def replace_rows(self, rows: bytes) -> None:
+        """As `Tables`."""
+        self.content[:] = rows
+
+    def replace_events(self, events: Integers) -> None:
+        """As `Tables`."""
+        self.noted[:] = events.ravel().tolist()
+
+
+class Backlog:
+    """The contents of some tables, on their way to a recorder."""
+
+    def __init__(self, running: RunningSystem, tables: Tables, recorder: Recorder) -> None:
+        self._running, self.tables, self._recorder = running, tables, recorder
+        self._run_events = RunEvents(running.system)
+        self.handed_over: int | None = None
+        """up to this time [ns]; None: nothing has been handed over"""
+        recorder.begin(running.columns)
+
+    def pending(self) -> Chunk:
+        """What was recorded since the last chunk was handed over, without messages that are sent later."""
+        events, _ = self._past_and_later()
+        return Chunk(
+            columns=self._running.columns,
+            rows=self.tables.rows_with_sources(),
+            events=self._run_events.with_messages(events, self._running.now),
+        )
+
+    def hand_over(self) -> None:
+        """Hand the pending chunk over to the recorder."""
+        self._recorder.take(self.pending())
+        self.tables.replace_events(self._past_and_later()[1])
+        self.tables.replace_rows(b"")
+        self.handed_over = self._running.now
+        self._run_events.discard_until(self._running.now)
+
+    def hand_over_rest(self) -> None:
+        """Hand over the rest at the end of the run; a recorder receives at least one chunk."""
+        if self.handed_over is None or not self.tables.is_empty() or len(self.pending().events):
+            self.hand_over()
+
+    def drop_later_events(self) -> None:
+        """Drop the events of messages that would be sent after the end: in Jacobi order they are noted before."""
+        self.tables.replace_events(self._past_and_later()[0])
+
+    def has_row(self) -> bool:
+        """Whether a row was recorded, be it handed over or not."""
+        return self.handed_over is not None or len(self.tables.rows()) > 0
+
+    def ensure_row(self) -> None:
+        """Add a row with the current values for a run that ended before its first row."""
+        if not self.has_row():
+            self._running.board.row[0] = self._running.now / NANOSECONDS
+            self.tables.replace_rows(self._running.board.row.tobytes())
+
+    def rows(self) -> Floats:
+        """The rows of the board that are not handed over."""
+        return self.tables.rows()
+
+    def events(self) -> Integers:
+        """The events that are not handed over."""
+        return self.tables.events()
+
+    def restore(self, rows: bytes, events: Integers, *, handed_over: int | None) -> None:
+        """Continue with the rows and events of a paused run."""
+        self.tables.replace_rows(rows)
+        self.tables.replace_events(events)
+        self.handed_over = handed_over
+        if handed_over is not None:
+            self._run_events.discard_until(handed_over)
+
+    def _past_and_later(self) -> tuple[Integers, Integers]:
+        """The events up to now, and those of messages that are sent later."""
+        table = self.tables.events()
+        past = table[:, 0] <= self._running.now
+        return (table, table[:0]) if past.all() else (table[past], table[~past])
+
+
+def rows_of_a_chunk(running: RunningSystem) -> int:
+    """The number of rows of a complete chunk: `ROWS`, or as many as have `BYTES`."""
+    return min(ROWS, max(1, BYTES // running.board.row.nbytes))
+
+
+def events_of_a_chunk() -> int:
+    """The number of events of a complete chunk."""
+    return EVENTS

@@ -1,0 +1,156 @@
+"""Runs many systems in SIMD lanes; the result of each is a summary, or that the run must be done alone."""
+
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from orchestration.components.fmi.model import read_model
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.simulation.engines.batch.batch import NO_COLUMNS, Batch, BatchResult, Group, ParameterColumns
+from orchestration.simulation.engines.batch.combining import combined
+from orchestration.simulation.engines.batch.kernels import preferred_lanes
+from orchestration.simulation.engines.batch.shape import Shape, outline
+from orchestration.simulation.engines.structures import structures
+from orchestration.simulation.engines.watch import watch
+from orchestration.simulation.engines.wiring import check_against_fmus, source_values
+from orchestration.simulation.results.objectives import Metrics, metrics_of
+from orchestration.systems.schedule.schedule_cache import ScheduleCache, schedule_key
+from orchestration.systems.schedule.streams import Streams
+from orchestration.systems.system.model import System
+from orchestration.systems.system.references import connect_references
+from orchestration.systems.system.times import NANOSECONDS, nanoseconds
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunSummary:
+    """The results of a run."""
+
+    metrics: Metrics
+    message: str | None
+    """how it diverged; None if it did not"""
+
+
+BatchOutcome = tuple[int, RunSummary | None, Floats]
+"""The place of a run among the requested ones, its summary, its rows"""
+_NO_ROWS: Floats = np.zeros((0, 0))
+
+
+class BatchRunner(Protocol):
+    """Runs groups of runs of a shape, one after another or many at once."""
+
+    def each(self, groups: Sequence[Group], record: Sequence[str] | None) -> Iterator[tuple[Batch, BatchResult]]:
+        """The results of groups in their order, each with the batch that has run it."""
+
+
+class Batches:
+    """The batches of this process by the shape of their systems, whose FMUs are files."""
+
+    def __init__(self, runner: Callable[[Shape, ScheduleCache], BatchRunner] = Batch) -> None:
+        self._schedules = ScheduleCache()
+        self._lanes = preferred_lanes()
+        self._new_runner = runner
+        self._shapes: dict[Hashable, tuple[Shape, BatchRunner]] = {}
+
+    def run(self, systems: Sequence[System]) -> list[RunSummary | None]:
+        """The summaries of runs, in their order; None for one that must be run alone. Raises as `each`."""
+        summaries: list[RunSummary | None] = [None] * len(systems)
+        for place, summary, _ in self.each(systems):
+            summaries[place] = summary
+        return summaries
+
+    def each(
+        self, systems: Sequence[System], record: Sequence[str] | None = None, parameters: ParameterColumns = NO_COLUMNS
+    ) -> Iterator[BatchOutcome]:
+        """Runs as they end: their places among `systems`, their summaries, and the rows of the columns in `record`.
+
+        The summary is None for a run that must be repeated alone, by an engine for any FMUs; rows have the time [s]
+        first and are valid until the next run. `parameters` of each run override those of its system, which many may
+        share. Raises `UsageError` for systems that cannot be run in lanes.
+        """
+        known = {id(system): (outline(system), schedule_key(system)) for system in systems}
+        shapes: dict[Hashable, list[int]] = {}
+        for place, system in enumerate(systems):
+            shapes.setdefault(known[id(system)][0], []).append(place)
+        for key, places in shapes.items():
+            shape, runner = self._runner_of(key, systems[places[0]])
+            timings = {place: known[id(systems[place])][1] for place in places}
+            several = {id(systems[place]): systems[place] for place in places}
+            connected = {key: connect_references(system, shape.models) for key, system in several.items()}
+            groups = [*_groups(places, timings, self._lanes)]
+            group_runs = [
+                Group(
+                    systems=[connected[id(systems[i])] for i in group], timings=[timings[i] for i in group],
+                    parameters={name: values[group] for name, values in parameters.items()},
+                )
+                for group in groups
+            ]  # fmt: skip
+            for group, runs, (batch, result) in zip(groups, group_runs, runner.each(group_runs, record)):
+                rows = result.signals or [_NO_ROWS] * len(group)
+                yield from zip(group, [*_summaries(shape, batch, result, runs.systems)], rows)
+
+    def _runner_of(self, key: Hashable, system: System) -> tuple[Shape, BatchRunner]:
+        if key not in self._shapes:
+            models = {name: read_model(Path(component.fmu)) for name, component in system.components.items()}
+            shape = Shape(system=check_against_fmus(system, models).system, models=models, lanes=self._lanes)
+            self._shapes[key] = shape, self._new_runner(shape, self._schedules)
+        return self._shapes[key]
+
+
+def _groups(indices: Sequence[int], timings: Mapping[int, Hashable], lanes: int) -> Iterator[list[int]]:
+    """Runs that are simulated together, of one timing as far as possible."""
+    alike: dict[Hashable, list[int]] = {}
+    for index in indices:
+        alike.setdefault(timings[index], []).append(index)
+    rest: list[int] = []
+    for same in alike.values():
+        whole = len(same) - len(same) % lanes
+        for first in range(0, whole, lanes):
+            yield same[first : first + lanes]
+        rest += same[whole:]
+    for first in range(0, len(rest), lanes):
+        yield rest[first : first + lanes]
+
+
+def _summaries(
+    shape: Shape, batch: Batch, result: BatchResult, systems: Sequence[System]
+) -> Iterator[RunSummary | None]:
+    count, c = len(systems), structures(shape.lanes)
+    numbers = batch.numbers(systems)
+    values = zip(shape.nodes, combined([*shape.nodes.values()], result.reductions, numbers, count))
+    metric_values = {name: ((np.isfinite(value) & ~none).tolist(), value.tolist()) for name, (value, none) in values}
+    for lane, system in enumerate(systems):
+        steps = int(result.steps[lane])
+        if result.outcome[lane] == c.RUNNING and not result.doubtful[lane]:
+            end = nanoseconds(system.stop_time) / NANOSECONDS
+            metrics = {name: value[lane] if valid[lane] else None for name, (valid, value) in metric_values.items()}
+            yield RunSummary(
+                metrics=metrics_of(
+                    shape.system, metrics, end=end, stop_time=system.stop_time, divergence_time=None, steps=steps
+                ),
+                message=None,
+            )
+        elif result.outcome[lane] == c.DIVERGED:
+            time = int(result.time[lane]) / NANOSECONDS
+            message = _divergence_message(shape, batch, system, lane, time)
+            metrics = metrics_of(
+                shape.system, None, end=time, stop_time=system.stop_time, divergence_time=time, steps=steps
+            )
+            yield None if message is None else RunSummary(metrics=metrics, message=message)
+        else:
+            yield None
+
+
+def _divergence_message(shape: Shape, batch: Batch, system: System, lane: int, t: float) -> str | None:
+    """How the values of a lane have diverged, as reported by the monitor of a single run; None if it disagrees."""
+    streams, parameters = Streams(system.seed, system.streams), batch.parameters(lane, system)
+    sources = {name: source_values(system, name, parameters, streams) for name in system.sources}
+    signals = {name: system.sources[name].signals(name) for name in sources}
+    monitor = watch(system.criterion.diverged, shape.board, sources, signals, parameters)
+    shape.board.row[0] = t
+    for column, place in shape.board.place.items():
+        if column != "time":
+            shape.board.row[place] = batch.value(column, lane)
+    return monitor(t)

@@ -1,0 +1,90 @@
+"""Compiles what a batch calls: components in SIMD lanes, from the sources of FMUs, and batch.c for a system."""
+
+import ctypes
+import functools
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fmu_kit.bundle import PackagingError
+from fmu_kit.compiler.pack.c_compiler import FOR_THIS_PROCESSOR, OPTIONS, compiled_here
+from fmu_kit.compiler.pack.lanes import MAIN, Lanes, compiled_lanes
+from fmu_kit.compiler.pack.lanes import preferred_lanes as lanes_of_fmus
+from fmu_kit.compiler.runtime import FOLDER
+from orchestration.components.fmi.model import Model
+from orchestration.foundation.basics.errors import QuadcosimError, UsageError
+from orchestration.foundation.basics.libraries import cached_library
+from orchestration.simulation.engines.loop import INSTANTS
+from orchestration.simulation.engines.structures import HEADER, expect_same_sizes, shared
+
+FILES = (Path(__file__).with_name("batch.c"), INSTANTS, HEADER, FOLDER / "lanes.h", FOLDER / "mathematics.h")
+"""The sources of a batch, besides those that are generated for a system"""
+_SOURCES = "sources/"
+
+
+def preferred_lanes() -> int:
+    """How many runs this machine computes at once in a thread; raises `QuadcosimError` without a compiler."""
+    try:
+        return lanes_of_fmus()
+    except PackagingError as error:
+        raise QuadcosimError(str(error)) from error
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """A component in lanes: functions that take addresses."""
+
+    lanes: Lanes
+    path: Path
+
+    @property
+    def step(self) -> int:
+        """The address of the function that advances it."""
+        return ctypes.cast(ctypes.CDLL(str(self.path)).quadcosim_do_step, ctypes.c_void_p).value or 0
+
+
+def component(name: str, model: Model, lanes: int) -> Kernel:
+    """The kernel of a component; raises `UsageError` naming it if its FMU has no sources for lanes."""
+    return _compiled(tuple(sorted(sources_of(name, model).items())), lanes)
+
+
+def sources_of(name: str, model: Model) -> Mapping[str, bytes]:
+    """The sources of a component for lanes, by name; raises `UsageError` naming it if its FMU has none."""
+    sources = _sources_in(model.path, model.path.stat().st_mtime_ns)
+    if MAIN not in sources or model.version != 2:
+        raise UsageError(
+            f"components.{name}: {model.path.name}: expected a native FMU of this project's kit, as quadcosim build "
+            "--native makes them, to be one of many at once"
+        )
+    return sources
+
+
+@functools.lru_cache(maxsize=64)
+def _sources_in(path: Path, changed: int) -> Mapping[str, bytes]:
+    with zipfile.ZipFile(path) as archive:
+        names = [name for name in archive.namelist() if name.startswith(_SOURCES) and not name.endswith("/")]
+        return {name.removeprefix(_SOURCES): archive.read(name) for name in names}
+
+
+@functools.lru_cache(maxsize=64)
+def _compiled(sources: tuple[tuple[str, bytes], ...], lanes: int) -> Kernel:
+    key = (OPTIONS, FOR_THIS_PROCESSOR, lanes)
+    path = cached_library("lanes", dict(sources), key, lambda: compiled_lanes(dict(sources), lanes))
+    return Kernel(Lanes(path), path)
+
+
+@functools.lru_cache(maxsize=256)
+def batch(sizes: str, expressions: str, lanes: int) -> Any:
+    """The functions of batch.c, compiled with the expressions of a system."""
+    sources = {path.name: path.read_bytes() for path in FILES}
+    sources |= {"sizes.h": sizes.encode(), "expressions.h": expressions.encode()}
+    options = (*FOR_THIS_PROCESSOR, f"-DQUADCOSIM_LANES={lanes}", "-Wno-psabi")
+    compile_ = lambda: compiled_here(sources, "batch.c", options=options)  # noqa: E731
+    library = ctypes.CDLL(str(cached_library("batch", sources, (OPTIONS, options), compile_)))
+    expect_same_sizes(library, shared(lanes))
+    for name in ("run", "clear", "free_all"):
+        getattr(library, name).argtypes = (ctypes.c_void_p,)
+    library.grown.argtypes = (ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)
+    return library

@@ -1,0 +1,290 @@
+"""The loop of a run in C: the same rows, events and endings as those of the loop in Python to the byte, but faster.
+
+The data of a run is in arrays that C and Python share; `Master` begins, pauses and ends a run and reports errors.
+C processes some instants at a time, so that interruptions are noticed in between.
+"""
+
+import ctypes
+import time as clock
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, cast
+
+import numpy as np
+
+from orchestration.components.fmi.fmi2 import Fmi2Instance
+from orchestration.components.fmi.fmi3 import Fmi3Instance
+from orchestration.components.fmi.native import NativeInstance
+from orchestration.components.fmi.surroundings import ROUNDING
+from orchestration.foundation.basics.errors import QuadcosimError
+from orchestration.foundation.basics.simulator import Floats, Integers, Simulator
+from orchestration.foundation.recording.recording import Recorder
+from orchestration.simulation.engines.backlog import Backlog
+from orchestration.simulation.engines.board import Board
+from orchestration.simulation.engines.condition import Step
+from orchestration.simulation.engines.loop import Operation, library
+from orchestration.simulation.engines.room import Room, loop_in, private
+from orchestration.simulation.engines.run_structures import RunStructures
+from orchestration.simulation.engines.running_system import RunningSystem, SampledComponent, Terminated
+from orchestration.simulation.engines.shared_tables import SharedTables
+from orchestration.simulation.engines.sources import SourceValues
+from orchestration.simulation.engines.structures import address, structures
+from orchestration.systems.schedule.schedule import Schedule
+from orchestration.systems.system.times import NANOSECONDS
+
+c = structures(1)
+"""The structures of one run"""
+SLICE = 0.05
+"""[s] after which C returns, about"""
+_Look, _Stopped, _Collect = (dict(c.Loop._fields_)[name] for name in ("look", "stopped", "collect"))
+_EXACT = 2**53
+"""Up to here a float represents every integer"""
+
+Condition = Callable[[Board], tuple[Sequence[Step] | None, Sequence[SourceValues]]]
+"""The program of the condition of divergence, None if there is none, and the sources in it"""
+
+
+def reason_unavailable(simulators: Mapping[str, Simulator], stop: int) -> str | None:
+    """Why the compiled loop is not available for a run up to `stop` [ns], in a line; None: it is."""
+    for name, simulator in simulators.items():
+        if not isinstance(simulator, NativeInstance):
+            return f"components.{name} is not called in this process"
+        if type(simulator) not in (Fmi2Instance, Fmi3Instance):
+            return f"components.{name} does more than call its FMU"
+    if stop >= _EXACT:
+        return f"stop_time is longer than {_EXACT / NANOSECONDS:.0f} s"
+    try:
+        library()
+    except QuadcosimError as error:
+        return str(error)
+    return None
+
+
+class CompiledLoop:
+    """Processes the instants of a run for which there is no `reason_unavailable`."""
+
+    engine = "compiled"
+
+    def __init__(
+        self, running: RunningSystem, recorder: Recorder, *, condition: Condition, room: Room = private
+    ) -> None:
+        self._running = running
+        self._pace = 4  # instants of a slice
+        self._shared: list[_MessagesInFlight] = []
+        self._run = library()
+        self._failure: BaseException | None = None
+        names = running.wires.names
+        instances = cast(Mapping[str, NativeInstance], running.simulators)
+        self._structures = structures = RunStructures([instances[name] for name in names])
+        self._loop = loop = loop_in(room)
+        self._tables = SharedTables(running, loop, room)
+        self.backlog = Backlog(running, self._tables, recorder)
+        program, watched = condition(running.board)
+        self._watched = list(watched)
+        if self._watched == [values for _, values in running.sources]:
+            loop.in_rows = sum(len(signals) for signals, _ in running.sources)
+        self._feed_table = (c.Feed * len(running.feeds))(
+            *(structures.feed(names.index(feed.component), feed) for feed in running.feeds)
+        )
+        self._channel_table = (c.Channel * len(running.channels))(*map(self._channel_of, range(len(running.channels))))
+        self._components = (c.Component * len(names))(*map(self._component_of, range(len(names))))
+        self._reached: Integers = np.zeros(len(names), dtype=np.int64)
+        self._track = c.Track(lanes=1, stop=running.stop, now=address(self._reached))
+        fields: dict[str, Any] = {
+            "components": ctypes.addressof(self._components),
+            "channels": ctypes.addressof(self._channel_table),
+            "feeds": ctypes.addressof(self._feed_table),
+            "continuous": structures.indices(running.wires.continuous),
+            "sampled": structures.indices(running.wires.sampled),
+            "tracks": ctypes.addressof(self._track),
+            "track_count": 1,
+            "channel_count": len(running.channels),
+            "alive": 1,
+            "some_by_themselves": running.some_by_themselves,
+            "settles": running.settles,
+            "look": _Look(self._look_for_c),
+            "stopped": _Stopped(self._stopped_for_c),
+            "collect": _Collect(lambda index: structures.instances[index].collect_warnings()),
+            "calling": -1,
+        }
+        for name, value in fields.items():
+            setattr(loop, name, value)
+        if program is not None:
+            self._program = (Operation * len(program))(*(Operation(*step) for step in program))
+            loop.condition, loop.condition_length = ctypes.addressof(self._program), len(program)
+
+    def run(self, pause_at: int | None, progress: Callable[[float], None] | None) -> bool:
+        """As `PythonLoop.run`."""
+        running = self._running
+        self._loop.pause_at = running.stop if pause_at is None else pause_at
+        while (schedule := running.cursor.schedule()) is not None:
+            self._share(schedule)
+            try:
+                over = self._run_schedule(schedule, progress)
+            finally:
+                self._take_back()
+            if over is not None:
+                return over
+        return True
+
+    def _run_schedule(self, schedule: Schedule, progress: Callable[[float], None] | None) -> bool | None:
+        """Process the rest of a schedule; whether the run is over if it stops before its end, else None."""
+        running = self._running
+        while running.cursor.at < len(schedule):
+            code = self._slice(schedule)
+            if code == c.FULL:
+                self.backlog.hand_over()
+            elif code not in (c.AT_END, c.PAUSED):
+                self._raise(code)
+            if running.interrupted() and running.now < running.stop:
+                running.interrupted_at = running.now
+                return True
+            if code == c.PAUSED:
+                return False
+            if progress is not None:
+                progress(running.now / running.stop)
+        return None
+
+    def _slice(self, schedule: Schedule) -> int:
+        """Have C process instants for about `SLICE`; returns the code of why it has returned."""
+        running, loop, begin = self._running, self._loop, clock.perf_counter()
+        self._track.count = min(len(schedule), self._track.at + self._pace)
+        code = int(self._run(ctypes.addressof(loop)))
+        share = SLICE / max(clock.perf_counter() - begin, 1e-9)
+        self._pace = min(max(1, int(self._pace * min(share, 8.0))), len(schedule))
+        running.now, running.steps, running.cursor.at = loop.now, loop.steps[0], self._track.at
+        self._collect_rounding_changes()
+        return code
+
+    def _collect_rounding_changes(self) -> None:
+        """Add warnings of FMUs that have changed the rounding mode, which C has restored."""
+        for instance, component in zip(self._structures.instances, self._components):
+            if component.moved:
+                component.moved = 0
+                instance.warn_of_change(ROUNDING)
+
+    def _raise(self, code: int) -> None:
+        """Raise the error for the code that C has returned."""
+        index, part = self._loop.outcome_component[0], self._loop.failed
+        if code in (c.FAILED, c.REFUSED):
+            function, transfer = self._structures.calls[part]
+            if code == c.FAILED:
+                raise self._structures.instances[index].failure(function, self._loop.failed_status)
+            transfer()
+        elif code == c.NOT_FINITE:
+            self._running.component(index).expect_finite(self._running.now / NANOSECONDS)
+        elif code == c.OVER:
+            raise Terminated(self._running.termination)
+        elif self._failure is not None:  # of a Python function that C has called
+            raise self._failure
+        raise AssertionError(f"the compiled loop has ended with {code}, and Python finds no reason")
+
+    def _look_for_c(self, t: float) -> int:
+        """Whether the run has diverged; no exception goes through C."""
+        try:
+            self._running.check_divergence(t)
+        except BaseException as error:
+            self._failure = error
+            return 1
+        return 0
+
+    def _stopped_for_c(self, status: int, until: int) -> int:
+        """Whether a step to `until` [ns] failed and was not completed; no exception goes through C."""
+        try:
+            error = self._structures.instances[self._loop.component].step_error(status, self._loop.end)
+            self._running.handle_failed_step(error, until)
+        except BaseException as error:
+            self._failure = error
+            return 1
+        return 0
+
+    # -- between Python and C ------------------------------------------------------------------------------------
+
+    def _share(self, schedule: Schedule) -> None:
+        """Copy what a schedule needs to the structures of C, from the next instant on."""
+        running, loop, track = self._running, self._loop, self._track
+        track.at = running.cursor.at
+        for name, _ in c.Schedule._fields_:
+            setattr(track.schedule, name, address(getattr(schedule, name)))
+        self._tables.make_room(schedule)
+        self._share_sources(schedule.times[:-1] / NANOSECONDS)
+        for index, component in running.continuous.items():
+            self._reached[index] = component.now
+        loop.now, loop.steps[0] = running.now, running.steps
+        rest = schedule.part(track.at)
+        self._shared = [
+            _MessagesInFlight(channel, self._channel_table[i], *rest.of(i, running.wires.table(i)))
+            for i, channel in enumerate(running.channels)
+        ]
+
+    def _take_back(self) -> None:
+        """Copy the state that C has left back to the objects of Python."""
+        for each in self._shared:
+            each.take_back()
+        self._shared = []
+        for index, component in self._running.continuous.items():
+            component.now = int(self._reached[index])
+
+    def _share_sources(self, t: Floats) -> None:
+        self._fed = [np.ascontiguousarray(feed.each(t), dtype=np.float64) for feed in self._running.feeds]
+        for place, values in enumerate(self._fed):
+            self._feed_table[place].values = address(values)
+        if self._watched:
+            self._seen = np.ascontiguousarray(np.column_stack([values.over(t) for values in self._watched]))
+            self._loop.watched, self._loop.watched_size = address(self._seen), self._seen.shape[1]
+
+    # -- construction --------------------------------------------------------------------------------------------
+
+    def _channel_of(self, index: int) -> Any:
+        running = self._running
+        x = running.system.connections[index]
+        places = [running.board.place[start] for start in x.start]
+        receiver = running.wires.names.index(x.receiver)
+        channel = self._structures.channel(x, running.channels[index], receiver, running.board.row, places)
+        channel.read_ahead = index in running.wires.plan.read_ahead
+        return channel
+
+    def _component_of(self, index: int) -> Any:
+        running, structures, name = self._running, self._structures, self._running.wires.names[index]
+        component, into = running.component(index), running.wires.into(name)
+        structure = structures.component(index, component.read, running.outputs(name), len(component.outputs))
+        structure.rank = running.wires.rank(index)
+        structure.feeds = structures.indices([running.feeds.index(feed) for feed in component.feeds])
+        structure.held, structure.ahead, structure.behind = map(
+            structures.indices, (into.held, into.ahead, into.behind)
+        )
+        if isinstance(component, SampledComponent):
+            structure.ratio, structure.by_itself = structures.address(np.array([component.ratio])), component.by_itself
+        return structure
+
+
+class _MessagesInFlight:
+    """Messages and noise of one connection while C runs."""
+
+    def __init__(self, channel: Any, into: Any, count: int, keys: list[int]) -> None:
+        """`count` messages are sent, of which those with `keys` are stored until they arrive."""
+        self._channel, self._into, self._size = channel, into, into.size
+        self._keys = [*channel.in_flight, *keys]
+        self._flight: Floats = np.empty((1 << len(self._keys).bit_length(), self._size))
+        for i, value in enumerate(channel.in_flight.values()):
+            self._flight[i] = value
+        into.flight, into.capacity = address(self._flight), len(self._flight)
+        into.first[0], into.last[0] = 0, len(channel.in_flight)
+        self._applied: Floats = np.zeros((2, self._size))
+        into.applied, into.applied_count[0] = address(self._applied), len(channel.applied)
+        for i, (time, value) in enumerate(channel.applied):
+            self._applied[i], into.applied_time[i] = value, time
+        self._before = channel.stream.bit_generator.state if into.noisy else None
+        self._noise: Floats = channel.stream.standard_normal((count if into.noisy else 0, self._size))
+        into.noise[0] = address(self._noise)
+
+    def take_back(self) -> None:
+        """Set the state of the channel to that which the loop in Python would have left."""
+        channel, into = self._channel, self._into
+        channel.in_flight = {self._keys[i]: self._flight[i].copy() for i in range(into.first[0], into.last[0])}
+        if into.extrapolates:
+            channel.applied = [(into.applied_time[i], self._applied[i].copy()) for i in range(into.applied_count[0])]
+        if self._before is not None:
+            used = (into.noise[0] - address(self._noise)) // (self._noise.itemsize * self._size)
+            if used < len(self._noise):
+                channel.stream.bit_generator.state = self._before
+                channel.stream.standard_normal((used, self._size))

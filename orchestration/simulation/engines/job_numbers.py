@@ -1,0 +1,102 @@
+"""Terms of expressions about jobs and frames: numbers of a run that do not depend on signals."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from orchestration.foundation.basics.errors import UsageError, expected_name
+from orchestration.systems.computers.results import Frames, Jobs, Timeline
+from orchestration.systems.expressions.over_run import evaluate
+from orchestration.systems.expressions.recorded import Recorded
+from orchestration.systems.expressions.syntax import (
+    Call,
+    JobMeasure,
+    Name,
+    Node,
+    Operation,
+    Sampled,
+    children,
+    names,
+    names_job_measure,
+    parse,
+    parse_job_measures,
+    text,
+)
+from orchestration.systems.schedule.resources import timeline_of
+from orchestration.systems.system.model import System, expressions
+from orchestration.systems.system.times import NANOSECONDS
+
+_JOBS = "jobs"
+
+
+def job_numbers(system: System) -> dict[str, float]:
+    """The values of terms about jobs in the expressions of a system, by the text of the term; NaN without a value.
+
+    Raises `UsageError` for an unknown task, and for a term with jobs of several tasks.
+    """
+    terms = dict.fromkeys(
+        name for _, expression in expressions(system) for name in names(parse(expression)) if names_job_measure(name)
+    )
+    if not terms:
+        return {}
+    timeline = timeline_of(system)
+    values = {}
+    for name in terms:
+        call = parse_job_measures(name)
+        assert isinstance(call, Call)
+        value = evaluate({name: _at_jobs(call)}, lambda call=call: iter([_recorded(timeline, call)]))[name]  # type: ignore[misc]
+        values[name] = np.nan if value is None else value
+    return values
+
+
+def _at_jobs(call: Call) -> Call:
+    """The same term of a signal that has a value for each job."""
+    argument, *rest = call.arguments
+    return Call(call.function, (Sampled(_JOBS, _named(argument)), *rest))
+
+
+def _named(node: Node) -> Node:
+    match node:
+        case JobMeasure():
+            return Name(text(node))
+        case Operation(sign, operands):
+            return Operation(sign, tuple(map(_named, operands)))
+        case Call(function, arguments):
+            return Call(function, tuple(map(_named, arguments)))
+    return node
+
+
+def _recorded(timeline: Timeline, call: Call) -> Recorded:
+    quantities = [*dict.fromkeys(_of_jobs(call))]
+    if len(quantities) > 1:
+        both = " and ".join(map(text, quantities))
+        raise UsageError(f"{text(call)}: expected jobs of one task in one way, not {both}")
+    (of,) = quantities
+    jobs = _jobs(timeline, of)
+    if of.what == "response":
+        times, values = jobs.ended[jobs.done], jobs.responses / NANOSECONDS
+    else:
+        times, values = jobs.deadline[jobs.due], jobs.missed[jobs.due].astype(np.float64)
+    return Recorded(
+        time=times / NANOSECONDS,
+        signals={text(of): values},
+        arrivals={_JOBS: np.ones(len(times), dtype=np.bool_)},
+        stop_time=timeline.stop / NANOSECONDS,
+    )
+
+
+def _of_jobs(node: Node) -> Iterable[JobMeasure]:
+    if isinstance(node, JobMeasure):
+        yield node
+    for child in children(node):
+        yield from _of_jobs(child)
+
+
+def _jobs(timeline: Timeline, of: JobMeasure) -> Jobs | Frames:
+    """The jobs of a task, or the frames of a message, by its name alone where that is unique."""
+    every: dict[str, Jobs | Frames] = {**timeline.jobs, **timeline.frames}
+    matching = [name for name in every if of.task in (name, name.partition(".")[2])]
+    if of.task in every or len(matching) == 1:
+        return every[of.task if of.task in every else matching[0]]
+    expected = f"one of {', '.join(matching)}" if matching else expected_name(of.task, list(every))
+    raise UsageError(f"{text(of)}: {expected}")

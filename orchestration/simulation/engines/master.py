@@ -1,0 +1,236 @@
+"""The master of one run: initialises it, has a loop process its instants, pauses it, and states how it ended."""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+
+from orchestration.foundation.basics.errors import SimulatorError, StoppedStepError
+from orchestration.foundation.basics.simulator import Booleans, Floats, Simulator
+from orchestration.foundation.recording.recording import Chunk, Recorder
+from orchestration.simulation.engines import initial
+from orchestration.simulation.engines.backlog import Backlog
+from orchestration.simulation.engines.board import Board
+from orchestration.simulation.engines.channel import Channel
+from orchestration.simulation.engines.feeds import Feed
+from orchestration.simulation.engines.instants import PythonLoop
+from orchestration.simulation.engines.running_system import Diverged, RunningSystem, Sources, Terminated
+from orchestration.simulation.engines.watch import Watch
+from orchestration.simulation.engines.wires import clock_of
+from orchestration.systems.schedule.streams import Streams
+from orchestration.systems.schedule.timetable import Timetable
+from orchestration.systems.system.model import System
+from orchestration.systems.system.times import NANOSECONDS
+
+ROWS_PENDING = "rows"
+"""Key in `Master.saved` beside the names of the components"""
+
+
+class Loop(Protocol):
+    """Processes the instants of a run."""
+
+    @property
+    def engine(self) -> str:
+        """Its name."""
+
+    @property
+    def backlog(self) -> Backlog:
+        """The recorded data that has not been handed over."""
+
+    def run(self, pause_at: int | None, progress: Callable[[float], None] | None) -> bool:
+        """Go on to the end, an interruption, or the first instant from `pause_at` [ns]; whether the run is over.
+
+        Raises `Diverged`, `Terminated` or `SimulatorError` if the run ends before.
+        """
+
+
+class Master:
+    """One run of a system whose components are instantiated and have their parameters."""
+
+    def __init__(
+        self,
+        system: System,
+        simulators: Mapping[str, Simulator],
+        *,
+        timetable: Timetable,
+        streams: Streams,
+        recorded: Mapping[str, Sequence[str]],
+        recorder: Recorder,
+        sources: Sources = (),
+        feeds: Sequence[Feed] = (),
+        interrupted: Callable[[], bool] = lambda: False,
+        watch: Callable[[Board], Watch] | None = None,
+        first_exchange: Sequence[Sequence[int]] | None = None,
+        waiting: Collection[str] = (),
+        loop: Callable[[RunningSystem, Recorder], Loop] = PythonLoop,
+    ) -> None:
+        """`waiting` are components that begin at 0 and are stepped to their first sample without sampling.
+
+        Other sampled components, unless they have their own clock, begin at their first sample.
+        """
+        self._running = running = RunningSystem(
+            system, simulators, timetable=timetable, streams=streams, recorded=recorded, sources=sources, feeds=feeds,
+            interrupted=interrupted, watch=watch,
+        )  # fmt: skip
+        self.board, self.columns, self.recorder = running.board, running.columns, recorder
+        self.divergence: str | None = None
+        self.divergence_time: int | None = None
+        self.failure: SimulatorError | None = None
+        """the error of an FMU that has ended the run after its first row; it has been raised"""
+        self._first_exchange = (
+            [(i,) for i in range(len(running.channels))] if first_exchange is None else first_exchange
+        )
+        self._first_samples, self._waiting = timetable.first_samples, waiting
+        self._loop = loop(running, recorder)
+        self.backlog = self._loop.backlog
+        self.engine = self._loop.engine
+        """the name of the loop"""
+
+    # -- state ---------------------------------------------------------------------------------------------------
+
+    @property
+    def now(self) -> int:
+        """The current instant [ns]."""
+        return self._running.now
+
+    @property
+    def steps(self) -> int:
+        """Of all components in continuous time."""
+        return self._running.steps
+
+    @property
+    def termination(self) -> str | None:
+        """How an FMU has ended the run; None if none has."""
+        return self._running.termination
+
+    @property
+    def interrupted_at(self) -> int | None:
+        """When Ctrl-C or an error of an FMU has ended the run [ns]; None if neither has."""
+        return self._running.interrupted_at
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        """The connections, in the order of the system."""
+        return self._running.channels
+
+    # -- a run ---------------------------------------------------------------------------------------------------
+
+    def initialise(self) -> None:
+        """Initialise with the first exchange, in the order of dependencies: never lost, late or noisy."""
+        try:
+            self._exchange_first()
+        except (Diverged, SimulatorError) as error:
+            self._ended(error)
+
+    def run(self, *, pause_at: int | None = None, progress: Callable[[float], None] | None = None) -> bool:
+        """Run to the end or to the first instant from `pause_at` [ns]; whether it is over.
+
+        The end may be divergence, or caused by an FMU. A run is also over at the first instant after an interruption.
+        Raises `SimulatorError` if an FMU refuses a call; all up to the last row has then been handed over.
+        """
+        over = self.divergence is not None or self._run(pause_at, progress)
+        if over:
+            self.backlog.hand_over_rest()
+        return over
+
+    def _run(self, pause_at: int | None, progress: Callable[[float], None] | None) -> bool:
+        try:
+            if not self._loop.run(pause_at, progress):
+                return False
+        except (Diverged, Terminated, SimulatorError) as error:
+            if isinstance(error, SimulatorError) and not isinstance(error, StoppedStepError):
+                error.timed(self.now / NANOSECONDS)
+            self._ended(error)
+        if self.interrupted_at is not None:
+            self.backlog.drop_later_events()
+        elif progress is not None:
+            progress(1.0)
+        return True
+
+    def pending(self) -> Chunk:
+        """What was recorded since the last chunk was handed over, without messages that are sent later."""
+        return self.backlog.pending()
+
+    def state(self) -> dict[str, Any]:
+        """The state of the run, of its messages, and of events that are not handed over, without `saved`."""
+        return {
+            "instants": self._running.cursor.past,
+            "row": self.board.row.tolist(),
+            "handed_over": self.backlog.handed_over,
+            "channels": [channel.state() for channel in self.channels],
+            "events": self.backlog.events().ravel().tolist(),
+        }
+
+    def saved(self) -> dict[str, bytes]:
+        """The states of the components, and the rows that are not handed over, as bytes."""
+        return {
+            **{name: simulator.save() for name, simulator in self._running.simulators.items()},
+            ROWS_PENDING: self.backlog.rows().tobytes(),
+        }
+
+    def restore(self, state: Mapping[str, Any], saved: Mapping[str, bytes]) -> None:
+        """Continue where `state` and `saved` were taken, instead of `initialise`."""
+        for name, simulator in self._running.simulators.items():
+            simulator.restore(saved[name])
+        for schedule in self._running.cursor.move_to(state["instants"]):
+            self._running.skip(schedule)
+        self.board.row[:] = state["row"]
+        events = np.array(state["events"], dtype=np.int64).reshape(-1, 4)
+        self.backlog.restore(saved[ROWS_PENDING], events, handed_over=state["handed_over"])
+        for channel, content in zip(self.channels, state["channels"], strict=True):
+            channel.restore(content)
+
+    def _ended(self, error: Exception) -> None:
+        """End the run by divergence or by an FMU that ends it; any other failure of an FMU is raised."""
+        if isinstance(error, Terminated):
+            self._running.termination = str(error)
+        elif isinstance(error, SimulatorError) and not error.divergence:
+            if self.backlog.has_row():
+                self.failure = error
+                self._running.now = self._running.interrupted_at = round(self.board.row[0] * NANOSECONDS)
+                self.backlog.drop_later_events()
+                self.backlog.hand_over_rest()
+            raise error
+        else:
+            self.divergence, self.divergence_time, self._running.termination = str(error), self.now, None
+        self.backlog.drop_later_events()
+        self.backlog.ensure_row()
+
+    # -- initialisation ------------------------------------------------------------------------------------------
+
+    def _exchange_first(self) -> None:
+        running, stop = self._running, self._running.stop / NANOSECONDS
+        for name in running.wires.names:
+            ratio, first = clock_of(running.system, name, self._first_samples)
+            running.simulators[name].enter_initialization(0.0 if name in self._waiting else ratio * first, ratio * stop)
+        for feed in running.feeds:
+            feed.write(0.0)
+        for group in self._first_exchange:
+            self._exchange(group)
+        for name in running.wires.names:
+            running.simulators[name].exit_initialization()
+            running.readers[name]()
+        for channel in running.channels:
+            channel.start()
+        for index in range(len(running.wires.names)):
+            running.component(index).expect_finite(0.0)
+        for name in self._waiting:
+            ratio, first = clock_of(running.system, name, self._first_samples)
+            if first > 0.0:
+                running.simulators[name].step(0.0, ratio * first)
+        running.check_divergence(0.0)
+
+    def _exchange(self, group: Sequence[int]) -> None:
+        running, connections = self._running, self._running.system.connections
+
+        def pass_on(index: int, open_: Booleans) -> tuple[Floats, Floats]:
+            running.readers[connections[index].sender]()
+            before = running.channels[index].received.copy()
+            running.channels[index].pass_on()
+            return before, running.channels[index].received
+
+        if initial.exchange(group, pass_on).any():
+            ends = "; ".join(f"{', '.join(connections[i].start)} -> {', '.join(connections[i].end)}" for i in group)
+            raise SimulatorError(
+                f"initialisation: no values found around the loop {ends} after {initial.ITERATIONS} exchanges"
+            )

@@ -1,0 +1,176 @@
+"""Prepares a system for any engine: checks it against its FMUs, and provides its sources and its columns."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from fmu_kit.trajectory import Trajectory
+from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD, TRAJECTORY
+from orchestration.components.fmi.model import NUMERIC, Model
+from orchestration.components.fmi.values import number_of
+from orchestration.foundation.basics.errors import UsageError, at_place
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.simulation.engines.job_numbers import job_numbers
+from orchestration.simulation.engines.sources import (
+    BuiltIn,
+    ConstantValues,
+    HeldValues,
+    Moving,
+    Scaled,
+    SourceValues,
+    TableValues,
+    WhiteNoise,
+    gusts,
+    motion_values,
+    spline_values,
+)
+from orchestration.simulation.results import objectives
+from orchestration.simulation.results.units import units
+from orchestration.systems.schedule.fixed_step import FixedStep
+from orchestration.systems.schedule.streams import VALUE, Streams
+from orchestration.systems.signals.library import make_signal
+from orchestration.systems.signals.table_file import read_table
+from orchestration.systems.signals.waypoints import read_waypoints
+from orchestration.systems.system.check import check, recorded_variables
+from orchestration.systems.system.component import Component
+from orchestration.systems.system.model import System
+from orchestration.systems.system.references import connect_references, describe_references
+from orchestration.systems.system.sampling import has_scheduled_instants
+from orchestration.systems.system.source import MOTION, Source
+from orchestration.systems.system.times import Grid, exact_nanoseconds
+from orchestration.systems.system.variable_names import variable_of
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckedSystem:
+    """A system that has been checked against its FMUs."""
+
+    system: System
+    """with the objectives whose variables exist, and with each reference connected to the component that follows it"""
+    parameters: dict[str, float]
+    """the numeric ones of all components, as COMPONENT.NAME"""
+    units: dict[str, str]
+    """of the metrics that have one"""
+    follows: str
+    """which component follows which reference, as text; empty where none does"""
+
+
+def check_against_fmus(system: System, models: Mapping[str, Model]) -> CheckedSystem:
+    """Check a system against its FMUs; raises `UsageError` for what they do not have or do not accept."""
+    check(system, models)
+    words, system = describe_references(system, models), connect_references(system, models)
+    for name, component in system.components.items():
+        _expect_clock(name, component, models[name])
+    parameters = _parameters(system, models)
+    of_jobs = job_numbers(system)
+    system = objectives.with_available_objectives(system, signals_of(system, models), {*parameters, *of_jobs})
+    return CheckedSystem(system=system, parameters=parameters, units=units(system, models), follows=words)
+
+
+def columns_of(system: System) -> tuple[str, ...]:
+    """The columns that every run of `system` has, whatever else is recorded."""
+    exchanged = [start for x in system.connections for start in x.start]
+    applied = [end for x in system.connections for end in x.end if system.components[x.receiver].sampling is None]
+    sources = [signal for name, source in system.sources.items() for signal in source.signals(name)]
+    return ("time", *dict.fromkeys((*applied, *exchanged, *sources)))
+
+
+def _expect_clock(name: str, component: Component, model: Model) -> None:
+    """Raise `UsageError` for a clock that the FMU does not have, or for parameters of it that the master sets."""
+    sampling = component.sampling
+    if sampling is None or not model.has_clock:
+        if sampling is not None and sampling.clock == "fmu":
+            raise UsageError(f"components.{name}.sampling.clock = fmu: expected an FMU with {SAMPLE_PERIOD}")
+        return
+    for parameter in (SAMPLE_PERIOD, SAMPLE_OFFSET):
+        if parameter in component.parameters:
+            raise UsageError(
+                f"components.{name}.parameters.{parameter}: expected sampling instead; the master sets it, to 0 "
+                "with clock master (the master decides when to sample) and to that of sampling with clock fmu"
+            )
+
+
+def _parameters(system: System, models: Mapping[str, Model]) -> dict[str, float]:
+    parameters = {}
+    for name, model in models.items():
+        values = system.components[name].parameters
+        with at_place(f"components.{name}.parameters"):
+            for variable in model.variables.values():
+                value = values.get(variable.name, variable.start)
+                is_one = variable.causality == "parameter" or variable.is_constant
+                if is_one and variable.kind in NUMERIC and value is not None:
+                    parameters[f"{name}.{variable.name}"] = number_of(variable, value)
+    return parameters
+
+
+def signals_of(system: System, models: Mapping[str, Model]) -> set[str]:
+    """All signals that are recorded or come from a source."""
+    signals = {f"{name}.{each}" for name, variables in recorded_variables(system, models).items() for each in variables}
+    return signals.union(columns_of(system)) - {"time"}
+
+
+def source_values(system: System, name: str, parameters: Mapping[str, float], streams: Streams) -> SourceValues:
+    """The values of a source in a run; `parameters` are those of the component of a trajectory, as COMPONENT.NAME."""
+    source = system.sources[name]
+    if source.constant is not None:
+        return ConstantValues([source.constant] * len(source.to))
+    if source.noise is not None and source.period is not None:
+        return WhiteNoise(source.noise, source.period, len(source.to), streams.of(f"sources.{name}", VALUE))
+    if not source.is_built_in:
+        values = _of_file_or_signal(system, name, streams)
+        return values if source.scale == 1.0 else Scaled(values, source.scale)
+    fields = {f"{source.trajectory}.{name}": field for name, field in TRAJECTORY.items()}
+    values_of_fields = {field: parameters[name] for name, field in fields.items() if name in parameters}
+    return BuiltIn(Trajectory(**values_of_fields))
+
+
+def source_signals(system: System, parameters: Mapping[str, float], t: Floats) -> dict[str, Floats]:
+    """The values of the sources of a run at times t [s], by signal, each of the shape of t; `parameters` as above."""
+    streams = Streams(system.seed, system.streams)
+    signals: dict[str, Floats] = {}
+    for name, source in system.sources.items():
+        values = source_values(system, name, parameters, streams).over(t)
+        signals |= dict(zip(source.signals(name), values.T))
+    return signals
+
+
+def _of_file_or_signal(system: System, name: str, streams: Streams) -> SourceValues:
+    source = system.sources[name]
+    quantities = [MOTION.index(".".join(signal.split(".")[-2:])) for signal in source.signals(name) if source.is_motion]
+    if source.signal is not None:
+        signal = make_signal(source.signal, source.parameters)
+        if source.is_motion:
+            return Moving(motion_values(signal), quantities)
+        return gusts(signal, system.stop_time, streams.of(f"sources.{name}", VALUE))
+    assert source.file is not None
+    if source.is_motion:
+        return Moving(spline_values(read_waypoints(source.file, source.parameters)), quantities)
+    table = read_table(source.file, table_columns(source), system.stop_time)
+    return HeldValues(*table) if source.interpolation == "previous" else TableValues(*table)
+
+
+def table_columns(source: Source) -> Sequence[str]:
+    """The columns of the file of a source, in the order of the inputs."""
+    return [variable_of(end) for end in source.to] if source.columns is None else source.columns
+
+
+def fixed_steps(system: System, models: Mapping[str, Model]) -> dict[str, FixedStep]:
+    """Components in continuous time with a fixed step, by name."""
+    steps = {}
+    for name, component in system.components.items():
+        if component.step is not None and not models[name].varies_step:
+            grid = Grid(Fraction(0), exact_nanoseconds(component.step))
+            steps[name] = FixedStep(name=name, grid=grid, moves=component.align == "next")
+    return steps
+
+
+def uneven_steps(system: System, models: Mapping[str, Model]) -> list[str]:
+    """A warning for each sampled component whose steps differ although its FMU takes those of one length only."""
+    return [
+        f"{name} ({models[name].name}): its steps differ in length, as its samples are not evenly spaced; it declares "
+        "that it takes steps of one length only"
+        for name, sampling in ((name, component.sampling) for name, component in system.components.items())
+        if sampling is not None
+        and (sampling.is_random or has_scheduled_instants(sampling))
+        and not models[name].varies_step
+    ]

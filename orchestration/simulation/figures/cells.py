@@ -1,0 +1,92 @@
+"""Maps drawn cell by cell: only cells with runs are coloured."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PatchCollection
+from matplotlib.colors import ListedColormap, LogNorm, Normalize
+from matplotlib.patches import Patch, Rectangle
+
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.simulation.figures.palette import GREY, RED, SHADES
+from orchestration.simulation.figures.shades import shades_of
+from orchestration.simulation.figures.ticks import plain
+
+LIMIT = {"colors": RED, "linewidths": 1.8}
+"""Style of the line between good and other cells"""
+_HATCH: Mapping[str, Any] = {"facecolor": "none", "edgecolor": GREY, "hatch": "////", "linewidth": 0.0}
+
+
+def edges(values: Sequence[float] | Floats, *, logarithmic: bool = False) -> Floats:
+    """Edges of cells around increasing values, half-way between neighbours; shape (n + 1,)."""
+    at = np.log(np.asarray(values, float)) if logarithmic else np.asarray(values, float)
+    if len(at) == 1:
+        around = np.array([at[0] - 0.5, at[0] + 0.5])
+    else:
+        inner = 0.5 * (at[1:] + at[:-1])
+        around = np.array([1.5 * at[0] - 0.5 * at[1], *inner, 1.5 * at[-1] - 0.5 * at[-2]])
+    return np.exp(around) if logarithmic else around
+
+
+def fill(panel: Axes, x: Floats, y: Floats, values: Floats, **how: Any) -> Any:
+    """Colour cells between edges `x` and `y` by `values`, shape (rows, columns); none where they are nan.
+
+    The range of the colours is that of `shades_of`, or starts at `vmin`. Returns the mesh for a colour bar.
+    """
+    if "vmin" not in how and (shades := shades_of(values)) is not None:
+        how["norm"] = (LogNorm if shades.logarithmic else Normalize)(shades.low, shades.high)
+    panel.grid(False)
+    mesh = panel.pcolormesh(
+        x, y, np.ma.masked_invalid(values), shading="flat", **{"cmap": SHADES, "rasterized": True, **how}
+    )
+    panel.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
+    return mesh
+
+
+def color_bar(panel: Axes, mesh: Any, values: Floats, label: str) -> None:
+    """Add a colour bar for `values`, with an arrow where some lie beyond; nothing without finite values."""
+    shades = shades_of(values)
+    if shades is not None:
+        ends = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
+        bar = panel.get_figure().colorbar(mesh, ax=panel, label=label, extend=ends[shades.leaves_out])  # type: ignore[union-attr]
+        plain(bar.ax.yaxis)
+
+
+def fill_kinds(panel: Axes, x: Floats, y: Floats, kinds: Floats, colors: Sequence[str]) -> None:
+    """Colour cells by category: 0 the first colour and so on; none where nan."""
+    fill(panel, x, y, kinds, cmap=ListedColormap([*colors]), vmin=-0.5, vmax=len(colors) - 0.5)
+
+
+def hatch(panel: Axes, x: Floats, y: Floats, where: npt.NDArray[np.bool_]) -> None:
+    """Hatch the cells without a value."""
+    cells = [Rectangle((x[j], y[i]), x[j + 1] - x[j], y[i + 1] - y[i]) for i, j in zip(*np.nonzero(where), strict=True)]
+    if cells:
+        panel.add_collection(PatchCollection(cells, label="missing", **_HATCH))
+
+
+def hatched() -> Patch:
+    """The legend entry of hatched cells."""
+    return Patch(label="missing", **_HATCH)
+
+
+def limit(panel: Axes, x: Floats, y: Floats, good: Floats, **how: Any) -> LineCollection | None:
+    """A line along the edges between good cells and neighbours that are not good; None if there are none.
+
+    `good` is 1, 0, or nan where it is not known, shape (rows, columns).
+    """
+    segments = [
+        [(x[j + 1], y[i]), (x[j + 1], y[i + 1])] for i, j in zip(*np.nonzero(_differ(good[:, :-1], good[:, 1:])))
+    ] + [[(x[j], y[i + 1]), (x[j + 1], y[i + 1])] for i, j in zip(*np.nonzero(_differ(good[:-1], good[1:])))]
+    if not segments:
+        return None
+    drawn = LineCollection(segments, capstyle="projecting", **{**LIMIT, **how})
+    panel.add_collection(drawn)
+    return drawn
+
+
+def _differ(one: Floats, other: Floats) -> npt.NDArray[np.bool_]:
+    differ: npt.NDArray[np.bool_] = (one != other) & ~np.isnan(one) & ~np.isnan(other)
+    return differ

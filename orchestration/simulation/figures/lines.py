@@ -1,0 +1,126 @@
+"""Common parts of figures over time: lines of runs, legends, and peaks that do not fit the axis."""
+
+import textwrap
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.simulation.figures.palette import BLACK, GREY
+from orchestration.simulation.figures.run import Run, Window
+from orchestration.simulation.figures.shades import CLIPPED, OUTSIDE
+from orchestration.simulation.figures.style import Style
+from orchestration.simulation.results import display_names as labels
+
+Lines: TypeAlias = Sequence[tuple[Floats, Floats]]
+"""Times [s] and values, shape (n,) each"""
+
+TIME = "time [s]"
+
+
+def positive(values: Floats) -> Floats:
+    """The values that a logarithmic axis can show; nan for the rest."""
+    return np.where(values > 0.0, values, np.nan)
+
+
+def logarithmic(axes: Axes) -> None:
+    """Make the vertical axis logarithmic if any value on it is positive."""
+    values = [np.asarray(line.get_ydata(), float) for line in axes.get_lines()]
+    if any((one > 0.0).any() for one in values):
+        axes.set_yscale("log")
+
+
+def set_time_axis(axes: Axes, runs: Sequence[Run]) -> None:
+    """Set the limits of the time axis to the span of the runs, or to the window."""
+    set_span(axes, (min(run.span[0] for run in runs), max(run.span[1] for run in runs)))
+
+
+def set_span(axes: Axes, span: Window) -> None:
+    """Set the limits of the time axis to a span, unless it is that of a run of one row."""
+    if span[0] < span[1]:
+        axes.set_xlim(span)
+
+
+def legend_of_runs(figure: Figure, runs: Sequence[Run], style: Style) -> None:
+    """A legend of the runs above all panels; none for one run."""
+    if len(runs) > 1:
+        handles = [Line2D([], [], color=run.color, linestyle=run.dashes, label=run.name) for run in runs]
+        columns = abreast([run.name for run in runs], style)
+        figure.legend(handles=handles, loc="outside upper center", ncols=columns)
+
+
+def abreast(names: Sequence[str], style: Style, *, width: float = 1.0) -> int:
+    """The number of columns of a legend that fit a figure; `width` is its share of the style's."""
+    longest = max(map(len, names)) + 6
+    return min(len(names), max(1, int(width * style.width / (0.5 * longest * style.font * 0.353))))
+
+
+def quantity(name: str, unit: str | None) -> str:
+    """The label of an axis; a dimensionless quantity has [1]."""
+    return f"{name} [1]" if unit == "1" else labels.with_unit(name, unit)
+
+
+def wrapped(label: str, width: int = 24) -> str:
+    """A label broken into lines of `width` characters, its unit never alone on a line."""
+    return "\n".join(textwrap.wrap(label.replace(" [", "\u00a0["), width, break_long_words=False))
+
+
+def clip_peaks(axes: Axes, lines: Lines, unit: str, style: Style) -> bool:
+    """Clip short peaks that would hide the rest of the signals, and show them in an inset with a note.
+
+    `lines` are those drawn on `axes`; returns whether anything was clipped.
+    """
+    inner = [_without_peaks(t, y) for t, y in lines if len(t) > 1 and np.isfinite(y).any()]
+    if not inner:
+        return False
+    low, high = min(one[0] for one in inner), max(one[1] for one in inner)
+    bottom, top = (f([f(y[np.isfinite(y)]) for _, y in lines if np.isfinite(y).any()]) for f in (min, max))
+    if high <= low or top - bottom <= CLIPPED * (high - low):
+        return False
+    room = 0.25 * (high - low)
+    seen = (max(bottom, low - room) if bottom >= low - room else low - room, min(top, high + room))
+    axes.set_ylim(seen[0] - 0.05 * (seen[1] - seen[0]), seen[1] + 0.9 * (seen[1] - seen[0]))
+    _inset(axes, lines, (low - room, high + room), unit, style)
+    return True
+
+
+def _without_peaks(t: Floats, values: Floats) -> tuple[float, float]:
+    """The range of a signal without a small share of the time."""
+    held = np.append(np.diff(t), 0.0)
+    order = np.argsort(values)
+    share = np.cumsum(held[order]) / max(float(held.sum()), 1e-300)
+    low, high = np.searchsorted(share, (OUTSIDE, 1.0 - OUTSIDE))
+    return float(values[order[min(low, len(order) - 1)]]), float(values[order[min(high, len(order) - 1)]])
+
+
+def _inset(axes: Axes, lines: Lines, seen: tuple[float, float], unit: str, style: Style) -> None:
+    """The time span of the peaks in the upper right; the title states the largest."""
+    outside = np.concatenate([t[(y < seen[0]) | (y > seen[1])] for t, y in lines])
+    t, y = max(lines, key=lambda line: float(np.nanmax(np.abs(line[1]))))
+    k = int(np.nanargmax(np.abs(y)))
+    span = axes.get_xlim()[1] - axes.get_xlim()[0]
+    width = max(float(np.ptp(outside)), 0.01 * span)
+    inset = axes.inset_axes((0.42, 0.5, 0.56, 0.48), label="peak")
+    start, end = max(outside.min() - 0.15 * width, axes.get_xlim()[0]), outside.max() + 0.4 * width
+    for drawn in axes.get_lines():
+        times, values = (np.asarray(data, float) for data in drawn.get_data())
+        first, last = np.searchsorted(times, (start, end))
+        near = slice(max(int(first) - 1, 0), int(last) + 1)
+        inset.plot(
+            times[near], values[near], color=drawn.get_color(), linestyle=drawn.get_linestyle(),
+            linewidth=0.8 * style.line, drawstyle=drawn.get_drawstyle(),
+        )  # fmt: skip
+    inset.set_xlim(start, end)
+    inset.tick_params(labelsize=0.7 * style.font, length=0.2 * style.font, pad=0.15 * style.font)
+    inset.locator_params(nbins=4)
+    inset.set_in_layout(False)  # it lies inside
+    inset.set_title(
+        f"clipped: peak {labels.amount(float(y[k]), unit)} at {t[k]:.3g} s".replace("-", "−"),
+        fontsize=0.8 * style.font, color=BLACK, pad=0.2 * style.font,
+    )  # fmt: skip
+    for side in inset.spines.values():
+        side.set(visible=True, color=GREY, linewidth=0.05 * style.font)

@@ -1,0 +1,83 @@
+"""The figure of the signals that are exchanged in a system of any FMUs."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from orchestration.simulation.figures.lines import TIME, abreast, legend_of_runs, quantity, set_time_axis, wrapped
+from orchestration.simulation.figures.palette import CYCLE, DASHES, MOST_LINES, MOST_PANELS
+from orchestration.simulation.figures.run import Run, title
+from orchestration.simulation.figures.style import Style
+from orchestration.simulation.results import display_names as labels
+from orchestration.simulation.results.column_info import ColumnInfo
+from orchestration.systems.system.model import System
+from orchestration.systems.system.variable_names import component_of
+
+Panel = tuple[str, str | None, list[str]]
+"""Name of the connection or component, unit, columns"""
+
+
+def signals(runs: Sequence[Run], style: Style) -> Figure:
+    """A panel for each connection and unit, its signals as the receiver has them.
+
+    Without connections, the recorded outputs of each component. Of more than `MOST_PANELS` the first are drawn,
+    and the number of signals of the others is stated.
+    """
+    available = [*_panels(runs[0].system, runs[0].described)]
+    contents = available[:MOST_PANELS]
+    figure = style.figure(3.0 + 10.5 * max(1, len(contents)))
+    panels = figure.subplots(max(1, len(contents)), 1, sharex=True, squeeze=False)[:, 0]
+    for panel, (name, unit, columns) in zip(panels, contents):
+        for run in runs:
+            _draw(panel, run, columns, alone=len(runs) == 1)
+        panel.set_ylabel(wrapped(quantity(labels.words(name), unit), 16))
+        set_time_axis(panel, runs)
+        handles, names = panel.get_legend_handles_labels()
+        panel.legend(handles, names, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=abreast(names, style))
+    if style.has_titles and title(runs):
+        figure.suptitle(title(runs))
+    panels[-1].set_xlabel(TIME)
+    if left_out := sum(len(columns) for _, _, columns in available[MOST_PANELS:]):
+        figure.supxlabel(f"and {left_out} more signals")
+    legend_of_runs(figure, runs, style)
+    return figure
+
+
+def drawn(system: System, described: Mapping[str, ColumnInfo]) -> set[str]:
+    """The columns that the figure of a run reads, of all that are `described`."""
+    shown = [*_panels(system, described)][:MOST_PANELS]
+    return {"time", *(column for _, _, columns in shown for column in columns)}
+
+
+def _panels(system: System, described: Mapping[str, ColumnInfo]) -> Iterator[Panel]:
+    of_connections = {
+        x.name: [end if end in described else start for start, end in zip(x.start, x.end)] for x in system.connections
+    }
+    of_components = {
+        name: [column for column in described if column.startswith(f"{name}.")] for name in system.components
+    }
+    for name, columns in (of_connections or of_components).items():
+        by_unit: dict[str | None, list[str]] = {}
+        for column in columns:
+            if column in described:
+                by_unit.setdefault(described[column].unit, []).append(column)
+        for unit, of_unit in by_unit.items():
+            for first in range(0, len(of_unit), MOST_LINES):
+                yield name, unit, of_unit[first : first + MOST_LINES]
+
+
+def _draw(panel: Axes, run: Run, columns: Sequence[str], *, alone: bool) -> None:
+    """Colours distinguish the signals of one run, or several runs; dashes then the signals."""
+    system = run.system
+    applied = {end for x in system.connections for end in x.end}
+    for k, column in enumerate(columns):
+        if column not in run:
+            continue
+        held = column in applied or system.components[component_of(column)].sampling is not None
+        panel.plot(
+            run.time, run[column], drawstyle="steps-post" if held else "default",
+            color=CYCLE[k % len(CYCLE)] if alone else run.color,
+            linestyle="-" if alone else DASHES[k % len(DASHES)],
+            label=labels.signal(column, run.described) if run.place == 0 else None,
+        )  # fmt: skip

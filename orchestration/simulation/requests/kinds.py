@@ -1,0 +1,30 @@
+"""The table of kinds of requests beside systems, which higher districts register."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from orchestration.foundation.basics.registry import Registry
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from orchestration.systems.system.request import Request
+
+
+@dataclass(frozen=True, kw_only=True)
+class RequestKind:
+    """A kind of request beside systems."""
+
+    default: Callable[[], Request]
+    """What runs if nothing is said"""
+    from_tables: Callable[[dict[str, Any], Path], Request]
+    """Reads a TOML document whose paths are relative to a folder; raises `UsageError`"""
+    files: tuple[Path, ...]
+    """The files that it is based on, beside the code"""
+
+
+KINDS: Registry[RequestKind] = Registry()
+"""At present one, the scenarios of the quadrotor"""

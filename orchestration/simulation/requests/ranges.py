@@ -1,0 +1,138 @@
+"""Search ranges of limits: the quantities, and the scan of each."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from orchestration.components.fmi.model import Model
+from orchestration.foundation.basics.bisection import Range
+from orchestration.foundation.basics.errors import UsageError, expected_name
+from orchestration.foundation.basics.units import after
+from orchestration.simulation.results.quantities import is_in_seconds
+from orchestration.systems.system.distribution import Distribution
+from orchestration.systems.system.model import System
+from orchestration.systems.system.paths import TOP, changed, value_at
+from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
+from orchestration.systems.system.sampling import TaskSampling
+
+PERIOD = "period"
+QUANTITIES = (PERIOD, "delay", "jitter", "loss")
+"""Names of quantities that a request may have; any other is a path"""
+STEPS, PARTS = 20, 50
+"""Of a given range: the number of steps of the scan, and of tolerances in a step"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Varied:
+    """A request as a function of one quantity."""
+
+    request: Request
+    of: str
+    """`period`, `delay`, `jitter` or `loss` of the quadrotor, or a path"""
+
+    def __post_init__(self) -> None:
+        for path in self.paths:
+            value = value_at(self.system, path)
+            if value is not None and (isinstance(value, bool) or not isinstance(value, (int, float, Distribution))):
+                raise UsageError(f"--of {self.of}: expected the path of a number")
+
+    @cached_property
+    def system(self) -> System:
+        """The unchanged system."""
+        return system_of(self.request)
+
+    @cached_property
+    def paths(self) -> tuple[str, ...]:
+        """The paths of the quantity; raises `UsageError` for an unknown one."""
+        known = [name for name in QUANTITIES if self.request.range_of(name) is not None]
+        if self.of in known:
+            return paths_in(self.request, f"timing.{self.of}")
+        if self.of in QUANTITIES:
+            raise UsageError(f"--of {self.of}: for the quadrotor only; expected a path, as connections.NAME.delay")
+        if "." not in self.of and self.of not in TOP:
+            words = f"{expected_name(self.of, known)}, or" if known else "expected"
+            raise UsageError(f"--of {self.of}: {words} a path, as connections.NAME.delay")
+        return paths_in(self.request, self.of)
+
+    def at(self, value: float) -> System:
+        """The system with another value; raises `UsageError` for an invalid one."""
+        with errors_in_own_terms(self.request):
+            return changed(self.system, dict.fromkeys(self.paths, value))
+
+
+def search_range(
+    varied: Varied,
+    models: Mapping[str, Model],
+    *,
+    first: float | None,
+    last: float | None,
+    tolerance: float | None,
+    scan: float | None,
+) -> Range:
+    """The range in which a limit is searched; raises `UsageError` for an invalid one."""
+    for flag, value in (("tolerance", tolerance), ("scan", scan)):
+        if value is not None and not (value > 0.0 and math.isfinite(value)):
+            raise UsageError(f"--{flag} {value}: expected a positive number")
+    known = varied.request.range_of(varied.of) or _range_of_period(varied)
+    if known is None and (first is None or last is None):
+        raise UsageError(f"--of {varied.of}: expected --from and --to, between which it is searched")
+    low = first if first is not None else known.first if known is not None else 0.0
+    high = last if last is not None else known.last if known is not None else 0.0
+    if not (math.isfinite(low) and math.isfinite(high) and low < high):
+        raise UsageError(f"--from {low:g} --to {high:g}: expected finite numbers, the first one smaller")
+    step = scan if scan is not None else known.step if known is not None else float(f"{(high - low) / STEPS:.12g}")
+    return Range(
+        before=known.before if known is not None and first is None else (),
+        first=low,
+        step=step,
+        last=high,
+        tolerance=tolerance if tolerance is not None else known.tolerance if known is not None else step / PARTS,
+        unit=known.unit if known is not None else after(unit_at(varied.paths[0], models)),
+    )
+
+
+def default_quantity(request: Request) -> str:
+    """The default quantity: the period, or that of the only sampled component of a system.
+
+    Raises `UsageError` for a system that has none or several, naming the periods.
+    """
+    if request.range_of(PERIOD) is not None:
+        return PERIOD
+    components = system_of(request).components.items()
+    sampled = [(name, each.sampling) for name, each in components if each.sampling is not None]
+    owners = [one.task if isinstance(one, TaskSampling) else f"components.{name}.sampling" for name, one in sampled]
+    paths = [path for owner in owners if value_at(system_of(request), path := f"{owner}.{PERIOD}") is not None]
+    if len(paths) != 1:
+        listed = f", one of {', '.join(paths)}" if paths else ""
+        raise UsageError(f"--of: expected a path, as connections.NAME.delay{listed}")
+    return paths[0]
+
+
+def _range_of_period(varied: Varied) -> Range | None:
+    """From half to fifty times the period of a sampled component, as for the quadrotor."""
+    is_task = varied.of.startswith("computers.") and varied.of.endswith(f".{PERIOD}")
+    if not (is_task or varied.of.endswith(f".sampling.{PERIOD}")):
+        return None
+    period = float(value_at(varied.system, varied.of))
+    return Range(first=period / 2.0, step=period / 2.0, last=50.0 * period, tolerance=period / 20.0)
+
+
+def unit_at(path: str, models: Mapping[str, Model]) -> str | None:
+    """The unit of the value at a path of a system; None if it has none or is unknown."""
+    if is_in_seconds(path):
+        return "s"
+    for name, model in models.items():
+        prefix = f"components.{name}.parameters."
+        variable = model.variables.get(path.removeprefix(prefix)) if path.startswith(prefix) else None
+        if variable is not None and variable.unit:
+            return variable.unit
+    return None
+
+
+def paths_in(base: Request, target: str) -> tuple[str, ...]:
+    """The paths of a target in the system of `base`; raises `UsageError` for an unknown target."""
+    paths = base.paths_of(target)
+    for path in paths:
+        value_at(system_of(base), path)
+    return paths

@@ -1,0 +1,82 @@
+"""The files of an SSP: a folder with its SystemStructure.ssd; an archive is unpacked once into the user's cache."""
+
+import hashlib
+import shutil
+import tempfile
+import zipfile
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+from orchestration.foundation.basics.documents import readable
+from orchestration.foundation.basics.errors import UsageError
+
+STRUCTURE = "SystemStructure.ssd"
+LARGEST = 2**32
+"""Bytes of an archive's files together"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Package:
+    """The files of an SSP."""
+
+    structure: Path
+    """its .ssd"""
+
+    def file(self, source: str, base: Path | None = None) -> Path:
+        """The file of a source in a document, relative to the .ssd or to `base`; raises `UsageError`."""
+        parts = urlsplit(source)
+        if parts.scheme not in ("", "file") or parts.netloc:
+            raise UsageError(f"source {source}: expected a file of the SSP")
+        path = ((base or self.structure).parent / unquote(parts.path)).resolve()
+        if not path.is_file():
+            raise UsageError(f"source {source}: there is no such file in the SSP")
+        return path
+
+
+def open_package(path: Path) -> Package:
+    """The SSP of an .ssp or .ssd file; raises `UsageError` for anything else."""
+    if path.suffix.lower() == ".ssd":
+        return Package(structure=path)
+    with readable(path, "SSP archive"), path.open("rb") as file:
+        key = hashlib.file_digest(file, "sha256").hexdigest()[:20] if hasattr(hashlib, "file_digest") else _digest(path)
+    folder = _cache() / key
+    if not folder.is_dir():
+        _unpack(path, folder)
+    if not (folder / STRUCTURE).is_file():
+        raise UsageError(f"{path}: expected an SSP archive: it has no {STRUCTURE}")
+    return Package(structure=folder / STRUCTURE)
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:20]
+
+
+def _cache() -> Path:
+    import platformdirs
+
+    return Path(platformdirs.user_cache_dir("quadcosim")) / "ssp"
+
+
+def _unpack(path: Path, folder: Path) -> None:
+    """Unpack all files or none; zipfile cuts names that lead out of the folder."""
+    if not zipfile.is_zipfile(path):
+        raise UsageError(f"{path}: expected an SSP archive, which is a zip file")
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    partial = Path(tempfile.mkdtemp(prefix=f"{folder.name}.", dir=folder.parent))
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(info.file_size for info in archive.infolist())
+            if size > LARGEST:
+                raise UsageError(f"{path}: expected an SSP archive of at most {LARGEST} bytes, unpacked")
+            archive.extractall(partial)
+        if not folder.is_dir():
+            partial.rename(folder)
+    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError) as error:
+        raise UsageError(f"{path}: expected an SSP archive: {error}") from error
+    except OSError:
+        if not folder.is_dir():  # else another process was first
+            raise
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)

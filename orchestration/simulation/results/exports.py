@@ -1,0 +1,46 @@
+"""Exports of a run to the formats of other programs."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orchestration.foundation.recording import mat_file
+from orchestration.foundation.recording.frames import units_of
+from orchestration.foundation.recording.recording import About, Chunk, Recording
+from orchestration.simulation.results.objectives import Metrics
+
+
+def to_mat(path: Path, recording: Recording, about: About, metrics: Metrics, units: Mapping[str, str]) -> Path:
+    """Write a run as the structure `run` of a MAT-file; returns its path.
+
+    `run.time` [s] and `run.signals.plant.position.x` are columns of n rows; `run.units` has the same fields as
+    `run.signals`, with the unit of each as text, empty where it has none. `run.events` has `time` [s], `event`, `what`
+    and `sample`; `run.metrics` the metrics, `run.metric_units` their units. `run.columns` lists the signals by their
+    usual names.
+    """
+    chunks = list(recording.chunks())
+    rows = np.concatenate([chunk.rows for chunk in chunks])
+    columns = {name: rows[:, i] for i, name in enumerate(recording.columns)}
+    time, known = columns.pop("time"), units_of(about)
+    run = {
+        "time": time,
+        "columns": [*columns],
+        "signals": mat_file.nested(columns),
+        "units": mat_file.nested({name: known.get(name, "") for name in columns}),
+        "events": _events(chunks),
+        "metrics": mat_file.flat(metrics),
+        "metric_units": mat_file.flat({name: units.get(name, "") for name in metrics}),
+    }
+    return mat_file.write(path, {"run": run})
+
+
+def _events(chunks: list[Chunk]) -> dict[str, Any]:
+    listed = [event for chunk in chunks for event in chunk.events]
+    return {
+        "time": np.array([event.time / 1e9 for event in listed]),
+        "event": [event.kind for event in listed],
+        "what": [event.what for event in listed],
+        "sample": np.array([event.sample for event in listed], dtype=float),
+    }

@@ -1,0 +1,212 @@
+"""The metrics of a run: the objectives and the criterion of its system."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.simulator import Booleans, Floats
+from orchestration.foundation.recording.recording import Events, Recording
+from orchestration.systems.expressions.over_run import evaluate, expect_names
+from orchestration.systems.expressions.recorded import Recorded, Spans, vectors
+from orchestration.systems.expressions.syntax import names, parse
+from orchestration.systems.system.criterion import DIVERGED, TERMINATED
+from orchestration.systems.system.model import System, expressions
+from orchestration.systems.system.times import NANOSECONDS
+
+Metrics = dict[str, float | int | bool | str | None]
+
+GOOD = "criterion.good"
+FIXED = ("outcome", "good", "horizon", "diverged", "divergence_time", "steps")
+"""Metrics that every run has beside its objectives."""
+PRINTED = ("wall_time", "engine")
+"""What `run` prints beside them."""
+
+
+def compute(
+    system: System,
+    spans: Spans,
+    *,
+    end: float,
+    divergence_time: float | None,
+    steps: int,
+    terminated: bool = False,
+) -> Metrics:
+    """The objectives of a run by name, and its outcome at its `end` [s].
+
+    A run that diverged has no objectives: an average over the time that it lasted would favour runs that end early.
+    One that an FMU has `terminated` has those of the time that it lasted, and is not good for the same reason.
+    Raises `UsageError`, naming it, for an objective that cannot be evaluated.
+    """
+    if divergence_time is not None:
+        return metrics_of(
+            system, None, end=end, stop_time=system.stop_time, divergence_time=divergence_time, steps=steps
+        )
+    nodes = {name: parse(text) for name, text in system.objectives.items()}
+    if system.criterion.good is not None:
+        nodes[GOOD] = parse(system.criterion.good)
+    return metrics_of(
+        system,
+        evaluate(nodes, spans),
+        end=end,
+        stop_time=system.stop_time,
+        divergence_time=None,
+        steps=steps,
+        terminated=terminated,
+    )
+
+
+def metrics_of(
+    system: System,
+    values: Mapping[str, float | None] | None,
+    *,
+    end: float,
+    stop_time: float,
+    divergence_time: float | None,
+    steps: int,
+    terminated: bool = False,
+) -> Metrics:
+    """The metrics of a run from the `values` of its expressions, that of `GOOD` included; None: it diverged.
+
+    `system` has the names of the expressions and of the outcomes.
+    """
+    objectives: dict[str, float | None] = dict.fromkeys((*system.objectives, *system.optional))
+    good = None if system.criterion.good is None else False
+    if values is not None:
+        objectives |= values
+        if good is not None:
+            good = bool(objectives.pop(GOOD)) and not terminated
+    return {
+        "outcome": DIVERGED if values is None else TERMINATED if terminated else outcome(system, good),
+        "good": good,
+        "horizon": stop_time if values is None else end,
+        **objectives,
+        "diverged": values is None,
+        "divergence_time": divergence_time,
+        "steps": steps,
+    }
+
+
+def outcome(system: System, good: bool | None) -> str | None:
+    """The outcome of a run that reached its end; None if its system has no criterion."""
+    return None if good is None else system.criterion.outcomes[0 if good else 1]
+
+
+def spans(system: System, recording: Recording, parameters: Mapping[str, float], end: float) -> Iterator[Recorded]:
+    """The data that expressions of a run up to `end` [s] use, chunk by chunk, each with the last row of the one before.
+
+    Their `stop_time` is the end, so that the last third of an interrupted run is that of its recording.
+    """
+    named = {name for _, expression in expressions(system) for name in names(parse(expression))}
+    columns = [c for c in recording.columns if c == "time" or c in named or c.rpartition(".")[0] in named]
+    lines = {x.name: _Line() for x in system.connections if x.hold == "first"}
+    before: Floats | None = None
+    for chunk in recording.chunks(columns):
+        rows = chunk.rows if before is None else np.vstack([before, chunk.rows])
+        signals = {name: rows[:, i] for i, name in enumerate(chunk.columns)}
+        arrivals = _arrivals(system, signals["time"], chunk.events)
+        yield Recorded(
+            time=signals["time"],
+            signals={name: values for name, values in signals.items() if name != "time"},
+            ends=_ends(system, signals, arrivals, lines),
+            numbers=parameters,
+            arrivals=arrivals,
+            stop_time=end,
+            goes_on=before is not None,
+        )
+        before = rows[-1:]
+
+
+def not_finite(spans: Spans) -> str | None:
+    """The first value that is not finite of the signals that expressions use, as text; None if all are finite."""
+    for span in spans():
+        for name, values in span.signals.items():
+            for place in np.flatnonzero(~np.isfinite(values))[:1]:
+                return f"{name} = {values[place]} at t = {span.time[place]:g} s: what uses it may have no value"
+    return None
+
+
+def _arrivals(system: System, time: Floats, events: Events) -> dict[str, Booleans]:
+    """By connection, the rows at which a message of it arrived, or was measured and not lost."""
+    instants = np.round(time * NANOSECONDS).astype(np.int64)
+    rows = {}
+    for x in system.connections:
+        arrived = events.table[events.are("arrived", x.name)]
+        sampled, lost = events.table[events.are("sampled", x.name)], events.table[events.are("lost", x.name)]
+        if len(lost):
+            sampled = sampled[~np.isin(sampled[:, 3], lost[:, 3])]  # the event of a loss has the time of its sample
+        times = np.concatenate([arrived[:, 0], sampled[:, 0]])
+        times = times[(times >= instants[0]) & (times <= instants[-1])]
+        at = np.searchsorted(instants, times)
+        rows[x.name] = np.zeros(len(instants), dtype=np.bool_)
+        rows[x.name][at[instants[at] == times]] = True
+    return rows
+
+
+def with_available_objectives(system: System, signals: set[str], numbers: set[str]) -> System:
+    """`system` without the optional objectives whose variables its FMUs do not have.
+
+    Raises `UsageError` for an expression with an unknown name, and for a name that is taken.
+    """
+    valid = {"time", "stop_time", *signals, *vectors(dict.fromkeys(signals)), *numbers}
+    available = {}
+    for name, text in system.objectives.items():
+        if name in (*FIXED, *PRINTED):
+            raise UsageError(f"objectives.{name}: every run has a result of that name, expected another")
+        if name in valid:
+            raise UsageError(f"objectives.{name}: that name has another meaning in expressions, expected another")
+        if name in system.optional and not valid.issuperset(names(parse(text))):
+            continue
+        expect_names(parse(text), valid, f"objectives.{name}")
+        available[name] = text
+        valid.add(name)
+    for place, expression in (("good", system.criterion.good), ("diverged", system.criterion.diverged)):
+        if expression is not None:
+            expect_names(parse(expression), valid, f"criterion.{place}")
+    return system if len(available) == len(system.objectives) else replace(system, objectives=available)
+
+
+def _ends(
+    system: System, signals: Mapping[str, Floats], arrivals: Mapping[str, Booleans], lines: Mapping[str, "_Line"]
+) -> dict[str, Floats]:
+    """The value of every signal that is held between rows, just before the next row."""
+    ends: dict[str, Floats] = {}
+    for name, component in system.components.items():
+        if component.sampling is not None:
+            ends |= {key: values[:-1] for key, values in signals.items() if key.startswith(f"{name}.")}
+    for x in system.connections:
+        held = [end for end in x.end if end in signals]
+        if x.hold == "zero":
+            ends |= {end: signals[end][:-1] for end in held}
+        else:
+            ends |= lines[x.name].ends(signals["time"], {end: signals[end] for end in held}, arrivals[x.name])
+    for name, source in system.sources.items():
+        if source.is_held:
+            ends |= {key: values[:-1] for key, values in signals.items() if key.startswith(f"{name}.")}
+    return ends
+
+
+class _Line:
+    """First-order hold: the line through the last two values that arrived, continued from chunk to chunk."""
+
+    def __init__(self) -> None:
+        self._last: dict[str, list[tuple[float, float]]] = {}
+
+    def ends(self, time: Floats, values: Mapping[str, Floats], arrived: Booleans) -> dict[str, Floats]:
+        """The values on the line just before each next row."""
+        return {name: self._end(name, time, held, arrived) for name, held in values.items()}
+
+    def _end(self, name: str, time: Floats, held: Floats, arrived: Booleans) -> Floats:
+        past = self._last.get(name)
+        rows = np.flatnonzero(arrived)
+        if past is None:  # the value of initialisation is the first
+            past = [(float(time[0]), float(held[0]))]
+            rows = rows[rows > 0]
+        points = [*past, *((float(time[i]), float(held[i])) for i in rows)]
+        times, heights = np.array(points).T
+        slopes = np.concatenate([[0.0], np.diff(heights) / np.diff(times)])
+        latest = np.searchsorted(times, time[:-1], side="right") - 1
+        self._last[name] = points[-2:]
+        line: Floats = held[:-1] + slopes[latest] * np.diff(time)
+        return line

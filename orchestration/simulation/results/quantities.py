@@ -1,0 +1,70 @@
+"""Quantities for display: their names, units, and values in these units."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.simulation.results import display_names as labels
+
+LONG = 1.0
+"""[s]: times that are all shorter are shown in milliseconds"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quantity:
+    """A metric or a setting: its display name, and the unit in which its values are shown."""
+
+    name: str
+    unit: str | None = None
+    """in which values are shown, as FMI writes it; None: they have none, or it is unknown"""
+    factor: float = 1.0
+    """by which stored values are multiplied to have that unit"""
+
+    @property
+    def title(self) -> str:
+        """Its name with its unit in brackets, as on axes and in heads of tables."""
+        return labels.with_unit(self.name, self.unit)
+
+    def of(self, values: object) -> Floats:
+        """Stored values in its unit; of the same shape."""
+        scaled: Floats = self.factor * np.asarray(values, float)
+        return scaled
+
+    def text_of(self, value: float, digits: int = 6) -> str:
+        """A stored value as text, in its unit and with it."""
+        return f"{self.factor * value:.{digits}g} {labels.unit(self.unit) or ''}".rstrip()
+
+
+def quantity(name: str, unit: str | None, values: Iterable[Any]) -> Quantity:
+    """A quantity with these values in `unit`; times that are all below a second are shown in milliseconds."""
+    sizes = [abs(value) for value in values if isinstance(value, int | float) and not isinstance(value, bool)]
+    if unit == "s" and sizes and max(sizes) < LONG:
+        return Quantity(name=name, unit="ms", factor=1e3)
+    return Quantity(name=name, unit=unit)
+
+
+def setting(path: str, values: Iterable[Any], unit: str | None = None) -> Quantity:
+    """The quantity of a path of a scenario, system or study file; the `unit` of a store takes precedence."""
+    return quantity(labels.setting(path), unit or unit_known(path), values)
+
+
+def unit_known(path: str) -> str | None:
+    """The unit of a path, as far as its words determine it."""
+    return labels.unit_of_setting(path) or ("s" if is_in_seconds(path) else None)
+
+
+def is_in_seconds(path: str) -> bool:
+    """Whether a path sets a time [s]; the unit of a parameter is declared by its FMU."""
+    table, _, rest = path.partition(".")
+    is_parameter = ".parameters." in path or (table in ("controller", "plant") and bool(rest))
+    is_of_values = table == "connections" and path.endswith(".offset")
+    return not is_parameter and not is_of_values and path.rpartition(".")[2] in _SECONDS
+
+
+_SECONDS = (
+    *("period", "offset", "step", "plant_interval", "jitter", "delay", "delay_jitter", "stop_time"),
+    *("execution", "deadline", "switch", "latency"),
+)

@@ -1,0 +1,94 @@
+"""The figures by name of one run, or of several runs overlaid."""
+
+from collections.abc import Collection, Sequence
+
+from matplotlib.figure import Figure
+
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.recording.recording import thinned
+from orchestration.simulation.figures.gallery import Figures
+from orchestration.simulation.figures.run import Run, Window
+from orchestration.simulation.figures.style import SCREEN, Style, style_named
+from orchestration.simulation.figures.views import VIEWS, view_of
+from orchestration.simulation.runs.run_labels import labels_of_runs
+from orchestration.simulation.runs.run_like import RunLike
+
+MOST = 2**16
+"""The most rows that are drawn of the whole of a run, beside all in the window"""
+
+
+def draw(
+    results: RunLike | Sequence[RunLike],
+    which: Collection[str] | None = None,
+    *,
+    names: Sequence[str] | None = None,
+    window: Window | None = None,
+    style: Style = SCREEN,
+) -> dict[str, Figure]:
+    """Figures of a run, or of several runs overlaid, by name; default: all.
+
+    `names` label the runs; default: the settings that differ between their scenarios. `window` is the span of time [s]
+    that is shown. A figure that is not available, as the energy of a controller that has none, is left out.
+
+    Raises `UsageError` for an unknown figure, and for runs of different systems.
+    """
+    listed = list(results) if isinstance(results, Sequence) else [results]
+    views = [view_of(result.request.kind, result.recording.columns) for result in listed]
+    components = {frozenset(result.system.components) for result in listed}
+    if any(view is not views[0] for view in views) or len(components) != 1:
+        raise UsageError("expected runs of one system to lay over each other")
+    view = views[0]
+    for name in which or ():
+        if not any(name in each.names for each in VIEWS.values()):
+            raise UsageError(f"--figure {name}: expected one of {', '.join(view.names)}")
+    drawing = view.load()
+    labels = names or labels_of_runs(listed, [f"run {i + 1}" for i in range(len(listed))])
+    runs = runs_of(listed, labels, drawing.columns(listed[0].system, listed[0].described), window)
+    with style.applied():
+        figures = {name: drawing.makers[name](runs, style) for name in view.names if which is None or name in which}
+    return {name: figure for name, figure in figures.items() if figure is not None}
+
+
+def figures_of(
+    results: Sequence[RunLike], which: Collection[str] | None, *, window: Window | None, style: str
+) -> Figures:
+    """The figures of runs overlaid; raises `UsageError` for an unknown figure or style."""
+    chosen = style_named(style)
+    names = labels_of_runs(results, [f"run {i + 1}" for i in range(len(results))])
+    return Figures(draw(results, which, names=names, window=window, style=chosen), chosen)
+
+
+def runs_of(
+    results: Sequence[RunLike], names: Sequence[str], columns: Collection[str] | None, window: Window | None
+) -> list[Run]:
+    """Runs ready to be drawn: of more than `MOST` rows every n-th and all in the window; default: all columns."""
+    return [
+        Run(
+            name=name,
+            place=place,
+            title=_title(result),
+            system=result.system,
+            recording=thinned(
+                result.recording,
+                set(result.recording.columns if columns is None else columns),
+                window or (0.0, 1.0),
+                MOST,
+            ),
+            whole=result.recording,
+            described=result.described,
+            parameters=result.parameters,
+            window=window,
+        )
+        for place, (result, name) in enumerate(zip(results, names, strict=True))
+    ]
+
+
+def _title(result: RunLike) -> str:
+    parts = [headline] if (headline := result.request.headline()) else []
+    if result.divergence is not None:
+        parts.append(f"diverged at {result.metrics['divergence_time']:g} s")
+    if result.termination is not None:
+        parts.append(f"terminated at {result.metrics['horizon']:g} s")
+    if result.interrupted_at is not None:
+        parts.append(f"interrupted at {result.interrupted_at:g} s")
+    return ", ".join(parts)

@@ -1,0 +1,215 @@
+"""Many runs of one system from arrays into arrays: in SIMD lanes where available, else one by one."""
+
+import logging
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orchestration.components.building import fmus
+from orchestration.components.fmi.model import Model, read_model
+from orchestration.foundation.basics.errors import QuadcosimError, UsageError, expected_name
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.simulation.engines.batch.batch import MOST_ROWS
+from orchestration.simulation.engines.batch.batches import Batches
+from orchestration.simulation.engines.batch.shape import expect_lanes
+from orchestration.simulation.engines.wiring import check_against_fmus, columns_of, source_signals
+from orchestration.simulation.requests.request import RequestLike, request_of
+from orchestration.simulation.results.objectives import FIXED, Metrics
+from orchestration.simulation.runs.columns import Columns, columns
+from orchestration.simulation.runs.simulation import run
+from orchestration.systems.system.check import check, recorded_variables
+from orchestration.systems.system.model import System
+from orchestration.systems.system.references import connect_references
+from orchestration.systems.system.request import errors_in_own_terms
+from orchestration.systems.system.variable_names import component_of, variable_of
+
+BATCH = "batch"
+_NOTES = logging.getLogger("quadcosim")
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Flights(Mapping[str, Floats]):
+    """The results of many runs as arrays by name: `flights["position_rmse"]` has a value for each run."""
+
+    arrays: Mapping[str, Floats]
+    """By name: of an output shape (runs,), NaN where it has no value; of `time` and what was recorded shape
+    (runs, rows), NaN after the last row of a run that has fewer."""
+    engine: str
+    """The engine of the runs: `batch`, which is SIMD lanes, `compiled` or `python`; the numbers are the same."""
+    reason: str | None
+    """Why they did not run in lanes, in a line; None: they did."""
+    units: Mapping[str, str]
+    """The units of the outputs that have one, by name, as FMI writes them (`N.m`)."""
+
+    def __getitem__(self, name: str) -> Floats:
+        """The array of a name."""
+        return self.arrays[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Over the names."""
+        return iter(self.arrays)
+
+    def __len__(self) -> int:
+        """The number of arrays."""
+        return len(self.arrays)
+
+    def __repr__(self) -> str:
+        count = len(next(iter(self.arrays.values())))
+        return f"<Flights: {count} runs by {self.engine}; {', '.join(self.arrays)}>"
+
+
+def run_many(
+    request: RequestLike, values: Mapping[str, Any], *, outputs: Sequence[str] | None = None, record: Sequence[str] = ()
+) -> Flights:
+    """Run a system, or a scenario, many times, from arrays into arrays, without a store or a result for each run.
+
+    `values` are arrays of shape (runs,) by path, as axes of a study name them (`plant.initial.position.x`,
+    `timing.period`, `seed`), or one value for all runs. `outputs` are names of objectives, or of `good`, `horizon` [s],
+    `diverged`, `divergence_time` [s] and `steps`; default: all of them. `record` are columns whose rows are kept, with
+    their `time` [s]. All arrays are of float64; truth values are 0.0 and 1.0.
+
+    Native FMUs run in lanes of vector registers where this machine has a C compiler and the FMUs have code for lanes,
+    else each run is one of `run`. Raises `UsageError` for a path, an output or a column that does not exist, arrays of
+    different lengths and invalid values; and what `run` raises for a run that fails, naming it.
+    """
+    loaded = request_of(request)
+    with errors_in_own_terms(loaded):
+        system = located(loaded.as_system())
+        models = {name: read_model(Path(component.fmu)) for name, component in system.components.items()}
+        check(system, models)
+        system = connect_references(system, models)
+        fits = check_against_fmus(_recording(system, models, record), models)
+        names = _outputs(fits.system, outputs)
+        runs = columns(loaded, fits.system, models, values)
+        reason = _reason_unavailable(fits.system, models)
+        table = _Table(runs.count, names, record)
+        for row in _one_by_one(runs, range(runs.count), record) if reason else _in_lanes(runs, fits.parameters, record):
+            table.put(row)
+    engine = table.engine if reason else BATCH
+    _NOTES.debug("%d runs by the engine %s%s", runs.count, engine, f": {reason}" if reason else "")
+    known = {"time": "s", "horizon": "s", "divergence_time": "s", **fits.units}
+    units = {name: known[name] for name in table.arrays if name in known}
+    return Flights(arrays=table.arrays, engine=engine, reason=reason, units=units)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _RunRow:
+    """The results of one run, on their way into the table."""
+
+    place: int
+    metrics: Metrics
+    rows: Sequence[Floats]
+    """the time, then the recorded columns"""
+    engine: str = BATCH
+
+
+class _Table:
+    """Arrays that fill with runs."""
+
+    def __init__(self, count: int, outputs: Sequence[str], record: Sequence[str]) -> None:
+        self._outputs = {name: np.full(count, np.nan) for name in outputs}
+        self._recorded = ("time", *(name for name in record if name != "time")) if record else ()
+        self._rows: Floats = np.full((len(self._recorded), count, 0), np.nan)
+        self.engine = BATCH
+
+    @property
+    def arrays(self) -> dict[str, Floats]:
+        """All of them by name."""
+        return {**self._outputs, **dict(zip(self._recorded, self._rows))}
+
+    def put(self, run: _RunRow) -> None:
+        """Add a run."""
+        self.engine = run.engine
+        for name, column in self._outputs.items():
+            value = run.metrics[name]
+            column[run.place] = np.nan if value is None else float(value)
+        if self._recorded:
+            longer = len(run.rows[0]) - self._rows.shape[2]
+            if longer > 0:
+                self._rows = np.pad(self._rows, ((0, 0), (0, 0), (0, longer)), constant_values=np.nan)
+            self._rows[:, run.place, : len(run.rows[0])] = run.rows
+
+
+def _in_lanes(runs: Columns, parameters: Mapping[str, float], record: Sequence[str]) -> Iterator[_RunRow]:
+    """All runs, in lanes but for those that must run alone; `parameters` are those of all components."""
+    places = {name: i for i, name in enumerate(_of_components(runs.system, record), 1)}
+    for place, summary, rows in Batches().each(runs.systems, list(places) if record else None, runs.parameters):
+        if len(rows) == MOST_ROWS:
+            raise UsageError(f"record: run {place} has more than {MOST_ROWS} rows; expected runs of fewer")
+        if summary is None:
+            yield from _one_by_one(runs, [place], record)
+            continue
+        signals = {"time": rows[:, 0], **{name: rows[:, i] for name, i in places.items()}} if record else {}
+        if record and len(places) < len(record):
+            numbers = {**parameters, **{name: float(column[place]) for name, column in runs.parameters.items()}}
+            signals |= source_signals(runs.systems[place], numbers, signals["time"])
+        yield _RunRow(place=place, metrics=summary.metrics, rows=_rows(signals, record))
+
+
+def _one_by_one(runs: Columns, places: Iterable[int], record: Sequence[str]) -> Iterator[_RunRow]:
+    """Runs one by one, by `run`."""
+    for place in places:
+        try:
+            result = run(runs.alone(place))
+        except QuadcosimError as error:
+            raise type(error)(f"run {place}: {error}") from error
+        rows = _rows(result.signals, record)
+        yield _RunRow(place=place, metrics=result.metrics, rows=rows, engine=result.provenance["engine"])
+
+
+def _rows(signals: Mapping[str, Floats], record: Sequence[str]) -> list[Floats]:
+    return [signals[name] for name in ("time", *(name for name in record if name != "time"))] if record else []
+
+
+def _of_components(system: System, record: Sequence[str]) -> list[str]:
+    """The recorded columns of components: lanes have no others."""
+    return [name for name in record if component_of(name) in system.components]
+
+
+def located(system: System) -> System:
+    """The system with the paths of its FMUs: native twins where they can be built, else those that it names."""
+    try:
+        twins = fmus.native_twins(system)
+        paths = fmus.of_components(twins.fmus)
+    except QuadcosimError as error:
+        _NOTES.debug("no native twins: %s", error)
+        paths = fmus.of_components(system.fmus)
+    components = {name: replace(each, fmu=str(paths[name])) for name, each in system.components.items()}
+    return replace(system, components=components)
+
+
+def _recording(system: System, models: Mapping[str, Model], record: Sequence[str]) -> System:
+    """The system, recording these columns too; raises `UsageError` for one that cannot be recorded."""
+    known, usual = {"time", *columns_of(system)}, recorded_variables(system, models)
+    components = dict(system.components)
+    for column in record:
+        name, variable = component_of(column), variable_of(column)
+        if column in known or variable in usual.get(name, ()):
+            continue
+        if name not in components:
+            listed = [*components, *system.sources]
+            raise UsageError(f"record: {column}: expected COMPONENT.VARIABLE of {', '.join(listed)}")
+        usual[name] = (*usual[name], variable)
+        components[name] = replace(components[name], record=usual[name])
+    return replace(system, components=components)
+
+
+def _outputs(system: System, names: Sequence[str] | None) -> tuple[str, ...]:
+    """The names of the results of a run; default: all. Raises `UsageError` for an unknown one."""
+    known = [name for name in (*system.objectives, *system.optional, *FIXED) if name != "outcome"]
+    for name in names or ():
+        if name not in known:
+            raise UsageError(f"outputs: {name}: {expected_name(name, known)}")
+    return tuple(dict.fromkeys(known if names is None else names))
+
+
+def _reason_unavailable(system: System, models: Mapping[str, Model]) -> str | None:
+    """Why a system that its FMUs fit cannot run in lanes here, in a line; None: it can."""
+    try:
+        expect_lanes(system, models)
+    except QuadcosimError as error:
+        return str(error)
+    return None

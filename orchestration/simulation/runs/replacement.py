@@ -1,0 +1,97 @@
+"""A system in which the caller's code replaces one component: which one, its inputs, and its outputs."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from orchestration.components.building import fmus
+from orchestration.components.fmi.model import Model, read_model
+from orchestration.foundation.basics.errors import UsageError, expected_name
+from orchestration.simulation.engines.wiring import check_against_fmus
+from orchestration.simulation.runs.resolved import ResolvedRequest
+from orchestration.systems.system.model import System
+from orchestration.systems.system.paths import changed
+from orchestration.systems.system.request import Request, errors_in_own_terms
+from orchestration.systems.system.variable_names import component_of, variable_of
+
+
+@dataclass(frozen=True, kw_only=True)
+class Replacement:
+    """A request, and the component of its system that the caller's code replaces."""
+
+    request: Request
+    component: str
+    system: System
+    paths: Mapping[str, Path]
+    models: Mapping[str, Model]
+    """of the replaced component without the variables that have no value after initialisation"""
+    measured: tuple[str, ...]
+    """its inputs that are connected or fed by a source"""
+    commanded: tuple[str, ...]
+    """its outputs that are connected"""
+
+    def resolve(self, values: Mapping[str, Any]) -> ResolvedRequest:
+        """Resolve it with other values by target; raises `UsageError` for values that are invalid."""
+        with errors_in_own_terms(self.request):
+            paths = {path: value for target, value in values.items() for path in self.request.paths_of(target)}
+            system = changed(self.system, paths) if paths else self.system
+            if system.fmus != self.system.fmus:
+                raise UsageError("values: expected those of a run of the same FMUs; others are another Simulation")
+            fits = check_against_fmus(system, self.models)
+        return ResolvedRequest(
+            request=self.request, system=fits.system, paths=self.paths, models=self.models, parameters=fits.parameters,
+            units=fits.units, follows=fits.follows,
+        )  # fmt: skip
+
+
+def replace_component(request: Request, component: str | None) -> Replacement:
+    """Replace a component of a request; None: the only sampled one. Raises `UsageError` if it cannot be replaced."""
+    with errors_in_own_terms(request):
+        system = request.as_system()
+        name = component_named(system, component, "to replace")
+        _expect_no_clock(system, name)
+        measured, commanded = _ends(system, name)
+        whole = replace(system, components={**system.components, name: replace(system.components[name], record=None)})
+        paths = fmus.of_components(system.fmus)
+        models = {each: read_model(path) for each, path in paths.items()}
+    models[name] = _initialising(models[name], commanded)
+    return Replacement(
+        request=request, component=name, system=whole, paths=paths, models=models, measured=measured,
+        commanded=commanded,
+    )  # fmt: skip
+
+
+def component_named(system: System, component: str | None, to: str) -> str:
+    """A component by name, None: the only sampled one; raises `UsageError` stating what it is needed for (`to`)."""
+    sampled = [name for name, each in system.components.items() if each.sampling is not None]
+    if component is None:
+        if len(sampled) != 1:
+            listed = ", ".join(system.components)
+            raise UsageError(f"component: expected the one {to}, as {len(sampled)} are sampled; one of {listed}")
+        component = sampled[0]
+    if component not in system.components:
+        raise UsageError(f"component: {component}: {expected_name(component, list(system.components))}")
+    return component
+
+
+def _expect_no_clock(system: System, component: str) -> None:
+    sampling = system.components[component].sampling
+    if sampling is not None and sampling.clock == "fmu":
+        raise UsageError(f"components.{component}.sampling.clock = fmu: expected master: your code has no clock")
+
+
+def _ends(system: System, component: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The inputs of a component that are fed, and its outputs that are connected, in the order of the system."""
+    fed = [end for x in system.connections for end in x.end] + [end for s in system.sources.values() for end in s.to]
+    read = dict.fromkeys(start for x in system.connections for start in x.start)
+    inputs, outputs = (tuple(variable_of(e) for e in ends if component_of(e) == component) for ends in (fed, read))
+    if not outputs:
+        raise UsageError(f"component: {component}: expected one with an output that is connected")
+    return inputs, outputs
+
+
+def _initialising(model: Model, outputs: Sequence[str]) -> Model:
+    """The model of a component whose FMU is used for initialisation only: inputs, parameters and some outputs."""
+    kept = {name: v for name, v in model.variables.items() if v.causality in ("input", "parameter") or name in outputs}
+    return replace(model, variables=kept)

@@ -1,0 +1,194 @@
+"""The result of a run."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, TypedDict
+
+import numpy as np
+import numpy.typing as npt
+
+from orchestration.foundation.basics.extras import explains_missing
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.recording import frames
+from orchestration.foundation.recording.recording import About, Event, Recording
+from orchestration.simulation.results import display_names as labels
+from orchestration.simulation.results import exports, html
+from orchestration.simulation.results.column_info import ColumnInfo
+from orchestration.simulation.results.criterion import unmet
+from orchestration.simulation.results.objectives import Metrics
+from orchestration.systems.system.model import System
+from orchestration.systems.system.request import Request
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from orchestration.simulation.figures.gallery import Figures
+
+
+class Origin(TypedDict):
+    """The FMU of a component."""
+
+    model: str
+    """The name of its model."""
+    guid: str
+    """Identifies the build."""
+    path: str
+    """Its file."""
+
+
+class Provenance(TypedDict, total=False):
+    """Where the numbers of a run come from."""
+
+    versions: dict[str, str]
+    """Of Python and of the packages that are used."""
+    platform: str
+    """The operating system and the processor."""
+    fmus: dict[str, Origin]
+    """By component."""
+    engine: str
+    """The engine, `compiled` or `python`; the numbers are the same."""
+    follows: str
+    """Which component follows which reference, as text; empty where none does."""
+    wall_time: float
+    """The duration of the run [s]."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Result:
+    """One run: its request, its recording and its metrics.
+
+    A run that diverged has a result too: `divergence` states what diverged, and objectives have no value. So has one
+    that an FMU ended: `termination` states which. In a notebook a result shows its metrics.
+    """
+
+    request: Request
+    """What was run, as the user wrote it: a `Scenario` or a `System`."""
+    system: System
+    """The system of the request, with the objectives that its FMUs have the variables for."""
+    recording: Recording
+    """Rows and events in chunks, for runs that do not fit into memory; `rows` and `events` have all of them."""
+    metrics: Metrics
+    """The results of the run: `outcome`, `good`, `horizon` [s], the objectives by name, `diverged`, `divergence_time`
+    [s] and `steps`. None is a metric without a value."""
+    units: Mapping[str, str]
+    """The units of those metrics that have one, by name, as FMI writes them (`N.m`)."""
+    described: Mapping[str, ColumnInfo]
+    """The unit and the description of each recorded column, by name, as its FMU gives them."""
+    parameters: Mapping[str, float]
+    """The numeric parameters of all components in the run, by COMPONENT.NAME, in the units of their FMUs."""
+    divergence: str | None
+    """What diverged, as text; None if nothing did."""
+    termination: str | None
+    """Which FMU ended the run, and how; None if none did."""
+    interrupted_at: float | None
+    """The time [s] at which Ctrl-C, or an FMU that failed, ended the run; None if neither did."""
+    provenance: Provenance
+    """Where the numbers come from: versions of the software, the GUID of each FMU, the engine, the wall time [s]."""
+    warnings: tuple[str, ...] = ()
+    """Warnings of likely mistakes in the request, and those of the FMUs, a sentence each."""
+
+    def __repr__(self) -> str:
+        outcome = self.metrics["outcome"] or "run"
+        return f"<Result: {outcome}, {self.end:g} s in {len(self.recording)} rows of {len(self.columns)} columns>"
+
+    def _repr_html_(self) -> str:
+        """As notebooks show it."""
+        good = self.metrics["good"]
+        named = [name for name in self.metrics if name not in ("outcome", "good")]
+        return html.card(
+            f"A {self.request.kind}",
+            str(self.metrics["outcome"] or "") or None,
+            good if isinstance(good, bool) else None,
+            f"{self.end:g} s in {len(self.recording)} rows of {len(self.columns)} columns"
+            + (f"; diverged: {self.divergence}" if self.divergence else "")
+            + (f"; not good: {missed}" if (missed := unmet(self.system, self.metrics, self.units)) else "")
+            + (f"; terminated: {self.termination}" if self.termination else ""),
+            [
+                (labels.metric(name), html.number(self.metrics[name]), labels.unit(self.units.get(name)) or "")
+                for name in named
+            ],
+        )
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The names of all columns: `time`, then COMPONENT.NAME, then the signals of the sources."""
+        return self.recording.columns
+
+    @cached_property
+    def rows(self) -> Floats:
+        """All rows, shape (n, number of columns); a row is the value just after its instant."""
+        return np.concatenate([chunk.rows for chunk in self.recording.chunks()])
+
+    @cached_property
+    def events(self) -> tuple[Event, ...]:
+        """All events of messages, jobs of tasks and frames of networks, in order of time."""
+        return tuple(event for chunk in self.recording.chunks(("time",)) for event in chunk.events)
+
+    @property
+    def about(self) -> About:
+        """The `unit` and the `description` of each column, where it has them."""
+        return {name: one.as_metadata() for name, one in self.described.items()}
+
+    @property
+    def end(self) -> float:
+        """The time of the last row [s]."""
+        return [float(t) for chunk in self.recording.chunks(("time",)) for t in chunk.rows[-1:, 0]][-1]
+
+    @cached_property
+    def signals(self) -> dict[str, Floats]:
+        """Every recorded column by its name, as an array of shape (n,)."""
+        return {name: self.rows[:, i] for i, name in enumerate(self.columns)}
+
+    @cached_property
+    def sampled(self) -> npt.NDArray[np.bool_]:
+        """Which rows are sampling instants, shape (n,)."""
+        return rows_of(self.rows[:, 0], self.events, "sampled")
+
+    def plot(
+        self,
+        *which: str,
+        beside: Sequence["Result"] = (),
+        window: tuple[float, float] | None = None,
+        style: Literal["screen", "paper", "slides"] = "screen",
+    ) -> "Figures":
+        """Figures of the run; default: all. A notebook shows what is returned.
+
+        Of a flight `which` is among path, errors, components, commands, energy, phase and spectrum, of any other system
+        it is signals. Runs `beside` it are overlaid. `window` is the span of time [s] that is shown, `style` sets sizes
+        and fonts, as in `quadcosim plot`. The figures are those of matplotlib, by name.
+
+        Raises `UsageError` for an unknown figure, and for runs of different systems.
+        """
+        from orchestration.simulation.runs.draw import figures_of  # not before: loads matplotlib
+
+        return figures_of([self, *beside], which or None, window=window, style=style)
+
+    @explains_missing
+    def to_pandas(self, what: Literal["signals", "events"] = "signals") -> "pd.DataFrame":
+        """The signals as a table indexed by `time` [s], or the events; units are in its `attrs["units"]`, by column.
+
+        Raises `QuadcosimError` where pandas is not installed.
+        """
+        return frames.events(self.recording) if what == "events" else frames.signals(self.recording, self.about)
+
+    def to_csv(self, folder: str | Path) -> list[Path]:
+        """Write `signals.csv` and `events.csv` into a folder, with units in the column heads; returns their paths."""
+        from orchestration.foundation.recording import csv_files  # not before: loads pyarrow
+
+        return csv_files.write(self.recording, self.about, Path(folder))
+
+    @explains_missing
+    def to_mat(self, path: str | Path) -> Path:
+        """Write the run as the structure `run` of a MAT-file, as `quadcosim export --format mat` does; returns it.
+
+        Raises `QuadcosimError` where SciPy is not installed.
+        """
+        return exports.to_mat(Path(path), self.recording, self.about, self.metrics, self.units)
+
+
+def rows_of(time: Floats, events: tuple[Event, ...], kind: str, what: str | None = None) -> npt.NDArray[np.bool_]:
+    """At which of the recorded times [s] there is an event of a kind, and of `what` if it is given; shape of `time`."""
+    instants = [event.time for event in events if event.kind == kind and what in (None, event.what)]
+    return np.isin(np.round(time * 1e9).astype(np.int64), np.array(instants, dtype=np.int64))

@@ -1,0 +1,201 @@
+"""The directory of a run. It appears when complete: a killed run leaves none that looks complete."""
+
+import hashlib
+import json
+from collections.abc import Callable, Container, Mapping
+from contextlib import AbstractContextManager
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any, cast
+
+from orchestration.foundation.basics.documents import read_json
+from orchestration.foundation.basics.errors import SimulatorError, UsageError, one_line, shown
+from orchestration.foundation.recording import tables
+from orchestration.foundation.recording.tables import ToFolder
+from orchestration.simulation.engines.wiring import columns_of
+from orchestration.simulation.figures.views import files, view_of
+from orchestration.simulation.requests.request import load_request
+from orchestration.simulation.results.column_info import ColumnInfo
+from orchestration.simulation.runs.folder import NewFolder, new_folder
+from orchestration.simulation.runs.outcome import RunInterrupted
+from orchestration.simulation.runs.result import Provenance, Result
+from orchestration.systems.system.request import system_of
+
+SIGNALS, EVENTS = tables.SIGNALS, tables.EVENTS
+METRICS, SCENARIO, PROVENANCE = "metrics.json", "scenario.toml", "provenance.json"
+CHECKSUMS = "checksums"
+"""in the provenance, of all files of a run"""
+_CHECKED = (SIGNALS, EVENTS, METRICS, SCENARIO)
+LARGEST = 2**26
+"""Largest number of characters of its JSON files: the provenance describes each column"""
+MAT = "run.mat"
+"""of a run that has been exported to it"""
+STATE = "paused.npz"
+"""of a run that has been paused"""
+
+
+def save_run(result: Result, folder: str | Path, *, figures: bool = True) -> Path:
+    """Write the directory of a run, replacing an earlier run there; returns it.
+
+    Raises `UsageError` if `folder` holds something else.
+    """
+    with run_folder(Path(folder), (METRICS,)) as new:
+        tables.copy(result.recording, new.path, result.about)
+        _write(result, new.path, figures=figures)
+    return Path(folder)
+
+
+def _write(result: Result, folder: Path, *, figures: bool) -> None:
+    """Write all files of the directory of a run but its recording."""
+    notes = {
+        **result.provenance,
+        "units": dict(result.units),
+        "described": {name: asdict(one) for name, one in result.described.items()},
+        "parameters": dict(result.parameters),
+        "divergence": result.divergence,
+        "termination": result.termination,
+        "interrupted_at": result.interrupted_at,
+        "warnings": list(result.warnings),
+    }
+    (folder / METRICS).write_text(json.dumps(result.metrics, indent=2) + "\n", encoding="utf-8")
+    (folder / SCENARIO).write_text(result.request.to_toml(), encoding="utf-8")
+    notes[CHECKSUMS] = _checksums(folder, notes)
+    (folder / PROVENANCE).write_text(json.dumps(notes, indent=2) + "\n", encoding="utf-8")
+    if figures:
+        from orchestration.simulation.figures import style
+        from orchestration.simulation.runs import (
+            draw,
+        )  # not before: loads matplotlib, which takes longer than a short run
+
+        style.save(draw.draw(result, view_of(result.request.kind, result.recording.columns).first), folder)
+
+
+def load_run(folder: str | Path) -> Result:
+    """Read the directory of a run; raises `UsageError` if it is none, or if a file in it has changed."""
+    folder = Path(folder)
+    missing = [name for name in (*_CHECKED, PROVENANCE) if not (folder / name).is_file()]
+    if missing:
+        raise UsageError(f"{folder}: expected the directory of a run; it has no {', '.join(missing)}")
+    notes = _object(
+        folder / PROVENANCE, divergence=_TEXT, termination=_TEXT, units=(dict,), described=(dict,), parameters=(dict,),
+        interrupted_at=_NUMBER, warnings=(list,), checksums=(dict,),
+    )  # fmt: skip
+    checksums = notes.pop(CHECKSUMS)
+    recording = tables.InFolder(folder)
+    request = load_request(folder / SCENARIO)
+    system = system_of(request)
+    missing = [name for name in columns_of(system) if name not in recording.columns]
+    if missing:
+        raise UsageError(f"{folder / SIGNALS}: no column {', '.join(missing)}; expected those of a run")
+    if not len(recording):
+        raise UsageError(f"{folder}: expected the directory of a run; it has no rows")
+    for _ in recording.chunks():  # damage is found now
+        pass
+    metrics = _object(folder / METRICS, diverged=(bool,), divergence_time=_NUMBER)
+    for name, checksum in _checksums(folder, notes).items():  # a file may be intact and of another run
+        if checksums.get(name) != checksum:
+            raise UsageError(f"{folder / name}: has been changed since the run; expected it as it was written")
+    return Result(
+        request=request,
+        system=system,
+        recording=recording,
+        metrics=metrics,
+        units=notes.pop("units"),
+        described={name: ColumnInfo(**one) for name, one in notes.pop("described").items()},
+        parameters=notes.pop("parameters"),
+        divergence=notes.pop("divergence"),
+        termination=notes.pop("termination"),
+        interrupted_at=notes.pop("interrupted_at"),
+        warnings=tuple(notes.pop("warnings")),
+        provenance=cast(Provenance, notes),
+    )
+
+
+def _checksums(folder: Path, notes: Mapping[str, object]) -> dict[str, str]:
+    """The checksums of all files of a run, by name; that of the provenance covers the other notes in it."""
+    checksums = {name: _checksum(folder / name) for name in _CHECKED}
+    return {**checksums, PROVENANCE: hashlib.sha256(json.dumps(notes).encode()).hexdigest()}
+
+
+def _checksum(path: Path) -> str:
+    """SHA-256 of a file, which may be larger than the memory."""
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while block := file.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()
+
+
+_TEXT, _NUMBER = (str, type(None)), (int, float, type(None))
+
+
+def _object(path: Path, **types: tuple[type, ...]) -> dict[str, Any]:
+    """The object in a JSON file; raises `UsageError` unless the values by these names have one of these types."""
+    content = read_json(path, LARGEST)
+    if not isinstance(content, dict):
+        raise UsageError(f"{path}: expected an object")
+    for name, kinds in types.items():
+        if name not in content or not isinstance(content[name], kinds):
+            raise UsageError(f"{path}: {name}: expected what was written, got {shown(content.get(name))}")
+    return content
+
+
+def keep_run(
+    folder: str | Path,
+    simulate: Callable[[ToFolder], Result | None],
+    *,
+    figures: bool = True,
+    replaces: Container[str] = (METRICS,),
+) -> Result | None:
+    """Run, and write the directory of the run, whose place is checked before; returns the result.
+
+    `simulate` receives a recorder that writes into the new directory; if it returns None, it has written there what is
+    to be kept. The directory replaces an earlier one that has a file of `replaces`. If it cannot, it is kept beside
+    `folder`, and `QuadcosimError` states where. After Ctrl-C, or if an FMU or its process has failed, what was recorded
+    is kept too, but replaces nothing: `RunInterrupted` or `SimulatorError` states where. Raises `UsageError` if
+    `folder` holds something else or cannot be written.
+    """
+    ended: RunInterrupted | SimulatorError | None = None
+    with run_folder(Path(folder), replaces) as new:
+        try:
+            result = simulate(ToFolder(new.path))
+        except (RunInterrupted, SimulatorError) as stop:
+            if stop.result is None:
+                raise
+            ended, result = stop, stop.result
+            new.replaces = result.interrupted_at is None
+        new.precious = True
+        if result is not None:
+            _write(result, new.path, figures=figures)
+    if ended is not None and result is not None:
+        ended.result = replace(result, recording=tables.InFolder(new.place))
+        ended.args = (f"{ended}; what was recorded is in {one_line(str(new.place))}",)
+        raise ended
+    return result and replace(result, recording=tables.InFolder(new.place))
+
+
+def run_folder(folder: Path, replaces: Container[str] = ()) -> AbstractContextManager[NewFolder]:
+    """A new folder of a run, which replaces `folder` if that has a file of `replaces` and no unknown file."""
+    kinds = {METRICS: "an earlier run", STATE: "a paused run"}
+    allowed = [text for name, text in kinds.items() if name in replaces]
+    expected = ", or that of ".join(["a new or empty directory", *allowed]) + " with nothing else in it" * bool(allowed)
+
+    def replaceable(place: Path) -> bool:
+        names = {path.name for path in place.iterdir() if path.is_file()}
+        others = {path.name for path in place.iterdir()} - _KNOWN - files()
+        return not others and any(name in names and name in replaces for name in kinds)
+
+    return new_folder(folder, replaceable, expected)
+
+
+_KNOWN = {
+    SIGNALS,
+    EVENTS,
+    METRICS,
+    SCENARIO,
+    PROVENANCE,
+    STATE,
+    MAT,
+    "signals.csv",
+    "events.csv",
+}

@@ -1,0 +1,79 @@
+"""The schedule of the computers and networks of a system; no FMU is loaded, and none needs to exist."""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from orchestration.foundation.basics.documents import read_toml
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.simulation.requests.request import SSP, SSP_ENDINGS, RequestLike, request_from_tables, request_of
+from orchestration.systems.computers.results import Timeline
+from orchestration.systems.schedule.resources import timeline_of
+from orchestration.systems.schedule.responses import Responses, responses_of
+from orchestration.systems.system.request import Request, system_of
+
+if TYPE_CHECKING:
+    from orchestration.simulation.figures.gallery import Figures
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scheduled:
+    """The jobs of the tasks and the frames of the messages of a system, up to a time."""
+
+    until: float
+    """The end of the schedule [s]."""
+    tasks: Mapping[str, Responses]
+    """By COMPUTER.TASK."""
+    messages: Mapping[str, Responses]
+    """By NETWORK.MESSAGE."""
+    busy: Mapping[str, float]
+    """The share of the time in which a computer was busy, switches included, or a link carried a frame."""
+    timeline: Timeline
+    """All jobs and frames, in nanoseconds."""
+
+    def plot(self, window: tuple[float, float] | None = None, style: str = "screen") -> "Figures":
+        """Its Gantt chart, over a `window` of time [s]; default: from the start, as long as jobs can be told apart."""
+        from orchestration.simulation.figures import gantt
+        from orchestration.simulation.figures.gallery import Figures
+        from orchestration.simulation.figures.style import style_named
+
+        chosen = style_named(style)
+        with chosen.applied():
+            return Figures({"schedule": gantt.draw(self.timeline, chosen, window)}, chosen)
+
+
+def schedule(request: RequestLike, until: float | None = None) -> Scheduled:
+    """Schedule the tasks and messages of a system up to a time; default: its `stop_time`.
+
+    `request` may also be the path of a file or a dictionary with the content of one; its FMUs need not exist.
+
+    Raises `UsageError` for a system without computers and networks.
+    """
+    system = system_of(request_until(request, until))
+    if not (system.computers or system.networks):
+        raise UsageError("computers: none, and no networks: expected at least one of them to schedule")
+    timeline = timeline_of(system)
+    responses = responses_of(system, timeline)
+    return Scheduled(
+        until=timeline.stop / 1e9,
+        tasks=responses.tasks,
+        messages=responses.messages,
+        busy=responses.busy,
+        timeline=timeline,
+    )
+
+
+def request_until(request: RequestLike, until: float | None) -> Request:
+    """A request with this stop time; a file that is used for this only need not have one."""
+    if until is None:
+        return request_of(request)
+    if isinstance(request, (str, os.PathLike)) and Path(request).suffix.lower() not in SSP_ENDINGS:
+        path = Path(request)
+        tables = read_toml(path, "system or scenario file")
+        if SSP not in tables:
+            return request_from_tables({**tables, "stop_time": until}, path.parent)
+    if isinstance(request, Mapping):
+        return request_of({**request, "stop_time": until})
+    return replace(system_of(request_of(request)), stop_time=until)

@@ -1,0 +1,223 @@
+"""A run that is stepped from sample to sample, with the caller's code in place of one component."""
+
+import math
+import threading
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from queue import SimpleQueue
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+from orchestration.components.fmi.instance import Instance
+from orchestration.components.fmi.reuse import Instances
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.recording.recording import InMemory
+from orchestration.simulation.requests.request import RequestLike, request_of
+from orchestration.simulation.runs.outcome import RunOutcome, result_of
+from orchestration.simulation.runs.prepared import PreparedRun, prepared
+from orchestration.simulation.runs.replacement import replace_component
+from orchestration.simulation.runs.result import Result
+from orchestration.simulation.runs.substitute import Abandoned, Substitute
+from orchestration.systems.schedule.streams import Streams
+from orchestration.systems.system.times import NANOSECONDS
+
+
+class Simulation:
+    """A run of a system, or a scenario, in which your code takes the place of one component.
+
+    The run stops wherever that component is to be stepped, returns its inputs (late, lost and noisy as in the system),
+    and goes on with the outputs that your code computes::
+
+        with quadcosim.Simulation(Scenario()) as simulation:
+            measurement = simulation.reset(seed=1)
+            while not simulation.is_over:
+                measurement = simulation.step(law(measurement))
+            print(simulation.result.metrics)
+
+    The component's own FMU computes its outputs at initialisation, with its parameters, and is not called after. All
+    else is as in the run with that FMU, by the same engine, to the bit.
+    """
+
+    def __init__(self, request: RequestLike, component: str | None = None) -> None:
+        """`component` is the one that is replaced; default: the only sampled one.
+
+        Raises `UsageError` for a system that cannot run, and for a component that does not exist or has its own clock.
+        """
+        self._replacement = replacement = replace_component(request_of(request), component)
+        self.component = replacement.component
+        """The name of the component that is replaced."""
+        self.measured = replacement.measured
+        """The names in a measurement, in order: its inputs that are connected or fed by a source."""
+        self.commanded = replacement.commanded
+        """The names in a command, in order: its outputs that are connected."""
+        self._instances = Instances()
+        self._thread: threading.Thread | None = None
+        self._run: PreparedRun | None = None
+        self._outcome: RunOutcome | None = None
+        self._result: Result | None = None
+
+    # -- a run -----------------------------------------------------------------------------------------------------
+
+    def reset(self, seed: int | None = None, values: Mapping[str, Any] | None = None) -> Floats:
+        """Begin a run and return the first measurement, shape (number of `measured`,).
+
+        `seed` is that of all random numbers; default: the one of the system. `values` are other values by path, as
+        axes of studies name them. Raises `UsageError` for invalid values, `SimulatorError` if an FMU refuses them.
+        """
+        self._abandon()
+        self._resolved = self._replacement.resolve({**(values or {}), **({} if seed is None else {"seed": seed})})
+        self._reports: SimpleQueue[BaseException | None] = SimpleQueue()
+        self._replies: SimpleQueue[bool] = SimpleQueue()
+        self._outcome, self._result, self._run = None, None, None
+        self._recorder, self._started = InMemory(), time.perf_counter()
+        self._sources = self._resolved.sources(Streams(self._resolved.system.seed, self._resolved.system.streams))
+        self._thread = threading.Thread(target=self._simulate, name="quadcosim run", daemon=True)
+        self._thread.start()
+        return self._next_measurement()
+
+    def step(self, command: Any) -> Floats:
+        """Go on with a command and return the next measurement; at the end of the run, what would be measured then.
+
+        `command` is an array with one number for each of `commanded`, or their values by name. Raises `UsageError` for
+        anything else, and where no run is under way.
+        """
+        if self._thread is None:
+            raise UsageError("step: no run is under way; expected reset before it")
+        self._substitute.command[:] = self._read(command)
+        self._replies.put(True)
+        return self._next_measurement()
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the run is over: at its end, diverged, or ended by an FMU."""
+        return self._outcome is not None
+
+    @property
+    def time(self) -> float:
+        """The time [s] of the last measurement."""
+        return self._under_way.master.now / NANOSECONDS
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The values of all columns and sources now, by name; commands are the last ones before now."""
+        master, t = self._under_way.master, self.time
+        board = {column: float(master.board.row[place]) for column, place in master.board.place.items()}
+        sources = {
+            signal: float(value)
+            for name, each in self._sources.items()
+            for signal, value in zip(self._resolved.system.sources[name].signals(name), each.at(t))
+        }
+        return {**board, "time": t, **sources}
+
+    @property
+    def result(self) -> Result:
+        """The result of the run, as `run` returns it; raises `UsageError` before the run is over."""
+        if self._outcome is None:
+            raise UsageError("result: the run is not over; expected it after the last step")
+        if self._result is None:
+            wall_time = time.perf_counter() - self._started
+            self._result = result_of(self._resolved, self._outcome, self._recorder, wall_time, interrupted=False)
+        return self._result
+
+    def close(self) -> None:
+        """Abandon the run and free the FMUs."""
+        self._abandon()
+        self._instances.close()
+
+    def __enter__(self) -> "Simulation":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    # -- the thread of the run -------------------------------------------------------------------------------------
+
+    def _simulate(self) -> None:
+        """The whole run; its outcome is reported to the thread that waits for it."""
+        error: BaseException | None = None
+        try:
+            with prepared(
+                self._resolved.request, load=self._load, recorder=self._recorder, resolved=self._resolved
+            ) as self._run:  # fmt: skip
+                self._run.master.initialise()
+                self._substitute.begin()
+                self._run.master.run()
+                self._measure_end(self._run)
+                self._outcome = self._run.outcome()
+        except BaseException as raised:  # raised again in the thread that waits for the run
+            error = raised
+        self._reports.put(error)
+
+    @contextmanager
+    def _load(self, path: Path, instance_name: str) -> Iterator[Instance]:
+        """An instance of a component, or its substitute."""
+        with self._instances.load(path, instance_name) as instance:
+            if instance_name == self.component:
+                self._substitute = Substitute(instance, self.measured, self.commanded, self._await_command)
+                yield self._substitute
+            else:
+                yield instance
+
+    def _await_command(self) -> None:
+        """Wait for a command; raises `Abandoned` if there will be none."""
+        self._reports.put(None)
+        if not self._replies.get():
+            raise Abandoned
+
+    def _measure_end(self, run: PreparedRun) -> None:
+        """Deliver the measurement at the end of the run, where the component is not stepped."""
+        for x, channel in zip(self._resolved.system.connections, run.master.channels):
+            if x.receiver == self.component:
+                channel.pass_on()
+
+    # -- the thread that waits for it ------------------------------------------------------------------------------
+
+    def _next_measurement(self) -> Floats:
+        """Wait for the next measurement; raises the error that ended the run, if one did."""
+        assert self._thread is not None
+        error = self._reports.get()
+        if error is not None or self._outcome is not None:
+            self._thread.join()
+            self._thread = None
+        if error is not None:
+            raise error
+        measurement: Floats = self._substitute.measurement.copy()
+        return measurement
+
+    def _abandon(self) -> None:
+        """End the run that is under way, if there is one."""
+        if self._thread is not None:
+            self._replies.put(False)
+            self._thread.join()
+            self._thread = None
+
+    @property
+    def _under_way(self) -> PreparedRun:
+        if self._run is None:
+            raise UsageError("no run is under way; expected reset before")
+        return self._run
+
+    def _read(self, command: Any) -> Floats:
+        """A command as numbers in order; raises `UsageError` for an invalid one."""
+        names = self.commanded
+        if isinstance(command, Mapping):
+            for name in (*command, *names):
+                if name not in names or name not in command:
+                    raise UsageError(f"command: {name}: expected values of {', '.join(names)}")
+            command = [command[name] for name in names]
+        values: Floats = np.zeros((0, 0))
+        with suppress(TypeError, ValueError):  # of numpy, for what is no array of numbers
+            values = np.asarray(command, dtype=np.float64)
+        if values.shape != (len(names),):
+            raise UsageError(f"command: expected {len(names)} numbers: {', '.join(names)}")
+        for name, value in zip(names, values.tolist()):
+            if not math.isfinite(value):
+                raise UsageError(f"command: {name} = {value}: expected a finite number")
+        return values

@@ -1,0 +1,118 @@
+"""Runs of a sweep in SIMD lanes: chunks for the workers, and a sample that is repeated with FMUs for comparison."""
+
+import hashlib
+import json
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass
+from itertools import islice
+from typing import Any
+
+from orchestration.foundation.basics.errors import QuadcosimError
+from orchestration.simulation.engines.batch.kernels import preferred_lanes
+from orchestration.simulation.engines.batch.shape import outline
+from orchestration.simulation.workers.task import RunTask, TaskBatch
+from orchestration.systems.schedule.schedule_cache import schedule_key
+
+SAMPLE = 8
+"""Runs that are repeated with FMUs"""
+TOLERATED = 1e-9
+"""largest relative difference of a metric"""
+CHUNK, SORTED = 256, 4096
+"""Largest number of runs in a chunk, and number of runs sorted at a time so that those of a chunk are alike"""
+ON_GPU = 2**15
+"""Largest number of runs in a chunk on a GPU, enough to fill its threads"""
+
+
+def chunks(tasks: Iterable[RunTask], total: int, workers: int, on_gpu: bool = False) -> Iterator[RunTask | TaskBatch]:
+    """Tasks in chunks, several for each worker; tasks whose signals are kept remain single."""
+    size = max(preferred_lanes(), min(CHUNK, total // (4 * workers) // preferred_lanes() * preferred_lanes()))
+    size, order = (ON_GPU, ON_GPU) if on_gpu else (size, SORTED)
+    waiting = iter(tasks)
+    while window := list(islice(waiting, order)):
+        yield from (task for task in window if task.keep_signals)
+        places: dict[Any, int] = {}
+        rest = [(task, (outline(task.system), schedule_key(task.system))) for task in window if not task.keep_signals]
+        for _, key in rest:
+            places.setdefault(key, len(places))
+        ordered = [task for task, _ in sorted(rest, key=lambda pair: places[pair[1]])]
+        for first in range(0, len(ordered), size):
+            yield TaskBatch(tasks=tuple(ordered[first : first + size]), on_gpu=on_gpu)
+
+
+def sample(keys: Iterable[str]) -> set[str]:
+    """The keys of the runs to repeat with FMUs, chosen by their content alone."""
+    return set(sorted(keys, key=lambda key: hashlib.sha256(f"sample {key}".encode()).digest())[:SAMPLE])
+
+
+Pair = tuple[int, Mapping[str, Any], Mapping[str, Any]]
+"""The index of a run, its metrics in lanes, and its metrics with FMUs"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LaneAgreement:
+    """Agreement of a sample of runs in lanes with the same runs by FMUs."""
+
+    runs: int
+    difference: float
+    """the largest relative difference of any metric"""
+    metric: str | None
+    index: int | None
+    """the run in which it occurs; None if there is none"""
+    python: "LaneAgreement | None" = None
+    """the same for the beginning of non-chaotic runs with FMUs in Python; None: there are no such FMUs"""
+
+    def __str__(self) -> str:
+        text = f"{self.runs} runs repeated with FMUs: largest relative difference {self._largest}"
+        if self.python is None:
+            return text
+        return f"{text}; the beginning of {self.python.runs} with FMUs in Python: {self.python._largest}"
+
+    @property
+    def _largest(self) -> str:
+        at = "" if self.metric is None else f" ({self.metric} of run {self.index})"
+        return f"{self.difference:.1g}{at}"
+
+    def as_text(self) -> str:
+        """The form in which a store keeps it."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def from_text(cls, text: str) -> "LaneAgreement":
+        """From the form in which a store keeps it."""
+        fields = json.loads(text)
+        python = fields.pop("python", None)
+        return cls(**fields, python=None if python is None else cls(**python))
+
+    @classmethod
+    def of(cls, pairs: Iterable[Pair]) -> "LaneAgreement":
+        """Compare runs in lanes with the same runs by FMUs."""
+        differences = [
+            (_difference(lanes.get(name), value), name, index)
+            for index, lanes, alone in pairs
+            for name, value in alone.items()
+        ]
+        largest, name, index = max(differences, key=lambda each: each[0], default=(0.0, "", 0))
+        runs = len({index for _, _, index in differences})
+        if largest == 0.0:
+            return cls(runs=runs, difference=0.0, metric=None, index=None)
+        return cls(runs=runs, difference=largest, metric=name, index=index)
+
+    def expect(self, by: str = "its FMUs") -> None:
+        """Raise `QuadcosimError`, naming run and metric, if the difference exceeds the tolerance."""
+        if self.difference > TOLERATED:
+            raise QuadcosimError(
+                f"run {self.index}: {self.metric} in lanes differs by {self.difference:.3g} "
+                f"from that by {by}; expected at most {TOLERATED:g}"
+            )
+        if self.python is not None:
+            self.python.expect("its FMUs in Python, at the beginning of the run")
+
+
+def _difference(one: Any, other: Any) -> float:
+    if one == other:
+        return 0.0
+    numbers = [value for value in (one, other) if isinstance(value, (int, float)) and not isinstance(value, bool)]
+    if len(numbers) < 2:
+        return math.inf
+    return abs(one - other) / max(abs(one), abs(other))  # type: ignore[no-any-return]

@@ -1,0 +1,104 @@
+"""The choice of an engine for many runs: by default the fastest available, with the reason if it is not the fastest."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, cast, get_args
+
+from orchestration.components.building.fmus import native_twins
+from orchestration.foundation.basics.errors import QuadcosimError, UsageError, expected_name
+from orchestration.simulation.engines.batch.shape import expect_lanes
+from orchestration.simulation.engines.engine import Engine
+from orchestration.simulation.engines.wiring import check_against_fmus
+from orchestration.systems.system.files import Files, files_of
+from orchestration.systems.system.model import System
+from orchestration.systems.system.request import Twin, system_of
+
+EngineChoice = Literal["auto", "python", "compiled", "batch", "cuda"]
+"""`auto`: `batch` if available, else native FMUs one at a time, else the FMUs as they are"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Execution:
+    """How a number of runs is executed."""
+
+    native: bool
+    """whether with the native twins of the FMUs"""
+    in_lanes: bool
+    """whether many at once, in SIMD lanes"""
+    engine: Engine | None
+    """for runs one at a time; None: the fastest that each can use"""
+    reason: str | None = None
+    """why `auto` did not choose the fastest"""
+    on_gpu: bool = False
+    """whether the lanes are threads of a GPU"""
+
+    @property
+    def name(self) -> str:
+        """The name as in `--engine`."""
+        if self.in_lanes:
+            return "cuda" if self.on_gpu else "batch"
+        return self.engine or "compiled"
+
+    def __str__(self) -> str:
+        if self.in_lanes:
+            return f"engine {self.name}: native FMUs, many runs at once"
+        what = "native FMUs" if self.native else "the FMUs as they are"
+        return f"engine {self.name}: {what}, one run at a time" + (f" ({self.reason})" if self.reason else "")
+
+
+def engine_choice(name: str) -> EngineChoice:
+    """The engine of this name; raises `UsageError` for an unknown name."""
+    known = get_args(EngineChoice)
+    if name not in known:
+        raise UsageError(f"--engine {name}: {expected_name(name, known)}")
+    return cast(EngineChoice, name)
+
+
+def choose_execution(
+    engine: EngineChoice, native: bool, first: Callable[[bool], tuple[System, Files]], *, no_lanes: str | None = None
+) -> Execution:
+    """How runs are executed by an engine, with native twins if `native` is requested.
+
+    `first` returns the first run, checked, and its files, with native twins or not; `no_lanes` is a reason that rules
+    out lanes. Raises `UsageError`, naming the obstacle, if requested lanes are impossible, and `QuadcosimError` if
+    there is no GPU for `cuda`.
+    """
+    if engine in ("python", "compiled"):
+        return Execution(native=native, in_lanes=False, engine=engine)
+    if engine in ("batch", "cuda"):
+        if no_lanes is not None:
+            raise UsageError(f"--engine {engine}: {no_lanes}")
+        if engine == "cuda":
+            from orchestration.simulation.engines.cuda.fleet import expect_gpu  # deferred: slow to load
+
+            expect_gpu()
+        _expect_lanes(*first(True))
+        return Execution(native=True, in_lanes=True, engine=None, on_gpu=engine == "cuda")
+    try:
+        system, files = first(True)
+    except QuadcosimError as error:  # an invalid request is reported when it is run
+        return Execution(native=native, in_lanes=False, engine=None, reason=str(error))
+    try:
+        if no_lanes is not None:
+            raise UsageError(no_lanes)
+        _expect_lanes(system, files)
+    except QuadcosimError as error:
+        return Execution(native=True, in_lanes=False, engine=None, reason=str(error))
+    return Execution(native=True, in_lanes=True, engine=None)
+
+
+def _expect_lanes(system: System, files: Files) -> None:
+    models = files.models_of(system)
+    expect_lanes(check_against_fmus(system, models).system, models)
+
+
+def single_run_execution(request: Twin, engine: Engine | Literal["auto"]) -> tuple[Twin, Execution]:
+    """The request to run one at a time, and how: with `auto`, the native twins of its FMUs if available."""
+    if engine != "auto":
+        return request, Execution(native=False, in_lanes=False, engine=engine)
+    native = native_twins(request)
+    try:
+        files_of(system_of(native))
+    except QuadcosimError as error:
+        return request, Execution(native=False, in_lanes=False, engine=None, reason=str(error))
+    return native, Execution(native=True, in_lanes=False, engine=None)

@@ -1,0 +1,198 @@
+"""Runs tasks in worker processes, locally or on a dask cluster, and yields the outcomes as they come."""
+
+import atexit
+import concurrent.futures
+import re
+import socket
+import threading
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
+from functools import partial
+from itertools import islice
+from typing import Any
+
+from orchestration.foundation.basics.errors import QuadcosimError, UsageError
+from orchestration.simulation.engines.engine import Engine
+from orchestration.simulation.workers.batching import chunks
+from orchestration.simulation.workers.pool import Inputs, InterruptedWorker, Pool
+from orchestration.simulation.workers.task import RunTask, TaskBatch, TaskOutcome
+from orchestration.systems.system.files import Files
+from orchestration.systems.system.model import System
+
+TaskRunner = Callable[[Iterable[RunTask | TaskBatch]], Generator[list[TaskOutcome], None, None]]
+"""Yields the outcomes of tasks as they come, in any order."""
+Submit = Callable[[RunTask | TaskBatch], "Future[list[TaskOutcome]]"]
+_PATIENCE = 10.0
+"""[s] to wait for the scheduler"""
+_WORKERS_PATIENCE = 60.0
+"""[s] to wait for its first worker"""
+_ADDRESS = re.compile(r"(?:(?:tcp|tls|ws|wss)://)?(\[[0-9a-fA-F:.]+\]|[^\s:/\[\]]+):(\d{1,5})")
+
+
+class RunEvaluator:
+    """Evaluates a few runs at a time for searches that choose the next runs by the metrics."""
+
+    def __init__(self, files: Files, workers: int, engine: Engine | None = None) -> None:
+        if workers < 1:
+            raise UsageError(f"--workers {workers}: expected at least 1")
+        self._files, self._workers, self._engine = files, workers, engine
+        self._stack = ExitStack()
+
+    def __enter__(self) -> "RunEvaluator":
+        self._submit = _local_submit(self._stack, Inputs.of(self._files), self._workers)
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._stack.close()
+
+    def run_all(self, systems: Sequence[System], *, in_lanes: bool = False, on_gpu: bool = False) -> list[Any]:
+        """The metrics of all runs in their order; `in_lanes`: with native FMUs, many at once, `on_gpu` or not.
+
+        Raises `QuadcosimError` if a run fails.
+        """
+        if not in_lanes:
+            return self.run_until(systems, stop=lambda metrics: False)
+        tasks = (self._task(i, system) for i, system in enumerate(systems))
+        metrics: list[Any] = [None] * len(systems)
+        for future in [self._submit(part) for part in chunks(tasks, len(systems), self._workers, on_gpu)]:
+            for outcome in future.result():
+                metrics[outcome.row.index] = _metrics(outcome)
+        return metrics
+
+    def run_until(
+        self, systems: Sequence[System], stop: Callable[[Any], bool], report: Callable[[int], None] = lambda done: None
+    ) -> list[Any]:
+        """The metrics of the runs in their order, up to the first for whose metrics `stop` is true.
+
+        The result does not depend on the number of workers. `report` is called after each run with the number of runs
+        done. Raises `QuadcosimError` if a run fails.
+        """
+        futures = [self._submit(self._task(i, system)) for i, system in enumerate(systems)]
+        metrics: list[Any] = []
+        try:
+            for future in futures:
+                (outcome,) = future.result()
+                metrics.append(_metrics(outcome))
+                report(len(metrics))
+                if stop(metrics[-1]):
+                    break
+        finally:
+            for future in futures:
+                future.cancel()
+        return metrics
+
+    def _task(self, index: int, system: System) -> RunTask:
+        return RunTask(index=index, key="", settings={}, system=system, keep_signals=False, engine=self._engine)
+
+
+def _metrics(outcome: TaskOutcome) -> Any:
+    """The metrics of a run; raises `QuadcosimError` if it has failed."""
+    if outcome.row.metrics is None:
+        raise QuadcosimError(str(outcome.row.message))
+    return outcome.row.metrics
+
+
+@contextmanager
+def local_workers(inputs: Inputs, workers: int) -> Iterator[TaskRunner]:
+    """Run tasks in `workers` processes of this machine, which start with the first task.
+
+    Raises `QuadcosimError` for failures not caused by a run, `KeyboardInterrupt` if a worker is interrupted.
+    """
+    with ExitStack() as stack:
+        submit = _local_submit(stack, inputs, workers)
+        try:
+            yield partial(_drain, submit=submit, most=2 * workers)
+        except InterruptedWorker as error:
+            raise KeyboardInterrupt from error
+
+
+@contextmanager
+def cluster(inputs: Inputs, address: str) -> Iterator[TaskRunner]:
+    """Run tasks in the workers of a dask scheduler.
+
+    Raises `QuadcosimError` if the scheduler cannot be reached or has no workers, and for failures not caused by a run.
+    """
+    import asyncio
+
+    import distributed
+
+    with ExitStack() as stack:
+        try:
+            client: Any = stack.enter_context(distributed.Client(address, timeout=_PATIENCE, set_as_default=False))
+            client.wait_for_workers(1, timeout=_WORKERS_PATIENCE)
+        except (
+            OSError,
+            TimeoutError,
+            asyncio.TimeoutError,
+            ValueError,
+        ) as error:  # the TimeoutErrors are distinct before Python 3.11
+            raise QuadcosimError(f"--dask {address}: expected a dask scheduler with workers there: {error}") from error
+        # Files are sent once, identified by the hash of their content.
+        scattered = client.scatter(inputs, broadcast=True, hash=True)
+        executor = stack.enter_context(client.get_executor(pure=False))
+        slots = sum(client.nthreads().values())
+
+        def submit(task: RunTask | TaskBatch) -> "Future[list[TaskOutcome]]":
+            return executor.submit(run_on_cluster, task, scattered)  # type: ignore[no-any-return]
+
+        try:
+            yield partial(_drain, submit=submit, most=2 * max(1, slots))
+        except (concurrent.futures.CancelledError, OSError, distributed.KilledWorker) as error:
+            raise QuadcosimError(
+                f"--dask {address}: the scheduler or its workers were lost ({type(error).__name__}); finished "
+                "runs are kept, start the sweep again"
+            ) from error
+
+
+def expect_scheduler(address: str) -> None:
+    """Raise `UsageError` for an invalid address, `QuadcosimError` immediately if nothing listens there."""
+    match = _ADDRESS.fullmatch(address)
+    if match is None or not 0 < int(match[2]) < 65536:
+        raise UsageError(f"--dask {address}: expected the address of a scheduler, as in tcp://host:8786")
+    try:
+        socket.create_connection((match[1].strip("[]"), int(match[2])), timeout=_PATIENCE).close()
+    except OSError as error:
+        raise QuadcosimError(f"--dask {address}: expected a dask scheduler with workers there: {error}") from error
+
+
+def run_on_cluster(task: RunTask | TaskBatch, inputs: Inputs) -> list[TaskOutcome]:
+    """The outcomes of runs; called in a dask worker, simulates in a separate process there too."""
+    with _POOLS_LOCK:
+        if inputs.digest not in _POOLS:
+            _POOLS[inputs.digest] = pool = Pool(inputs)
+            atexit.register(pool.remove)  # last
+            atexit.register(pool.close)
+    return _POOLS[inputs.digest].run(task)
+
+
+_POOLS: dict[str, Pool] = {}
+_POOLS_LOCK = threading.Lock()
+
+
+def _local_submit(stack: ExitStack, inputs: Inputs, workers: int) -> Submit:
+    """A function that submits tasks to threads, each of which waits for a worker process; ends with `stack`."""
+    pool = Pool(inputs)
+    stack.callback(pool.remove)  # last: a thread may still have been starting a process
+    executor = ThreadPoolExecutor(workers)
+    stack.callback(executor.shutdown, cancel_futures=True)
+    stack.callback(pool.close)  # first: it ends what the threads wait for
+    stack.callback(executor.shutdown, wait=False, cancel_futures=True)
+    return lambda task: executor.submit(pool.run, task)
+
+
+def _drain(tasks: Iterable[RunTask | TaskBatch], submit: Submit, most: int) -> Generator[list[TaskOutcome], None, None]:
+    """Keep `most` tasks in progress; yield their outcomes as they finish, of several the one that was begun first."""
+    waiting = iter(tasks)
+    in_progress = [submit(task) for task in islice(waiting, most)]
+    try:
+        while in_progress:
+            done, _ = concurrent.futures.wait(in_progress, timeout=1.0, return_when=concurrent.futures.FIRST_COMPLETED)
+            finished = [future for future in in_progress if future in done]
+            in_progress = [future for future in in_progress if future not in done]
+            for future in finished:
+                yield future.result()
+            in_progress += [submit(task) for task in islice(waiting, len(finished))]
+    finally:
+        for future in in_progress:
+            future.cancel()

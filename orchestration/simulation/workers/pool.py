@@ -1,0 +1,264 @@
+"""Worker processes in their coordinator: the assignment of tasks, and what follows from the death of a worker."""
+
+import hashlib
+import os
+import pickle
+import queue
+import signal
+import tempfile
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from orchestration.foundation.basics import scratch
+from orchestration.foundation.basics.errors import QuadcosimError
+from orchestration.foundation.processes import subprocesses
+from orchestration.foundation.processes.child import Child, Died
+from orchestration.simulation.workers.provenance import sources, versions
+from orchestration.simulation.workers.task import (
+    EnvironmentFailure,
+    Ready,
+    RunTask,
+    TaskBatch,
+    TaskOutcome,
+    WorkerEnvironmentError,
+    row_of,
+)
+from orchestration.systems.system.files import Files, all_with_files, with_files
+
+ATTEMPTS = 3
+"""How often a run is tried, from the second time in a new process, before the death of its worker is its result"""
+_FROM_OUTSIDE = {-getattr(signal, name) for name in ("SIGKILL", "SIGTERM", "SIGHUP") if hasattr(signal, name)}
+"""Exit codes of processes ended from outside: by a user, or by the system when out of memory"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inputs:
+    """The content of the files that the runs of a study need, as hashed, for workers on any machine."""
+
+    contents: Mapping[str, bytes]
+    """files by their names in systems"""
+    versions: dict[str, str]
+
+    @classmethod
+    def of(cls, files: Files) -> "Inputs":
+        """The content of `files`."""
+        return cls(contents=files.contents, versions=versions())
+
+    @cached_property
+    def digest(self) -> str:
+        """A hash of contents and versions."""
+        return hashlib.sha256(pickle.dumps((dict(self.contents), self.versions))).hexdigest()
+
+
+class InterruptedWorker(QuadcosimError):
+    """A worker process received an interrupt, which is meant for all."""
+
+
+class WorkerProcess:
+    """One worker process with its own folder for temporary files."""
+
+    def __init__(self, root: Path) -> None:
+        self._folder = tempfile.TemporaryDirectory(dir=root, prefix="worker-", ignore_cleanup_errors=True)
+        path = self._folder.name
+        self._child = Child(
+            subprocesses.Module.of("orchestration.simulation.workers.worker_process", path),
+            environment=subprocesses.environment(**dict.fromkeys(("TMPDIR", "TEMP", "TMP"), path)),
+        )
+
+    def request(self, task: RunTask | TaskBatch) -> Any:
+        """Send a task and return the answer; raises `Died`, also at its time limit."""
+        self._child.allow(task.time_limit)
+        self._child.send(task)
+        answer = self._child.receive()
+        self._child.allow(None)
+        return answer
+
+    def wait_until_ready(self) -> Ready:
+        """The report of the process once it has started; raises `Died`."""
+        self._child.send(sources())
+        answer = self._child.receive()
+        assert isinstance(answer, Ready)
+        return answer
+
+    def close(self) -> None:
+        """End it and remove its folder."""
+        self._child.close()
+        self._folder.cleanup()
+
+
+class Supervisor:
+    """Runs one task at a time in a worker process, which is replaced when it dies."""
+
+    def __init__(self, root: Path, inputs: Inputs) -> None:
+        self._root, self._inputs = root, inputs
+        self._lock = threading.Lock()
+        self._closed = False
+        self._worker: WorkerProcess | None = None
+        self._machine: str | None = None
+
+    def run(self, task: RunTask) -> TaskOutcome:
+        """The outcome of a run; a run that ends its process `ATTEMPTS` times has failed.
+
+        Raises `QuadcosimError` for failures not caused by the run.
+        """
+        crashes = killed = 0
+        while True:
+            worker = self._ready_worker()
+            try:
+                answer = worker.request(task)
+            except Died as death:
+                self._drop()
+                if death.ending.reached is not None:
+                    message = f"it was ended: {death.ending.reached}"
+                    return TaskOutcome(row=row_of(task, None, message, 0.0, self._machine), ended=True)
+                _expect_no_interrupt(death)
+                if death.ending.code in _FROM_OUTSIDE:
+                    killed += 1
+                else:
+                    crashes += 1
+                if crashes == ATTEMPTS:
+                    message = f"its worker process {death}, {ATTEMPTS} times, the last times in a new process"
+                    return TaskOutcome(row=row_of(task, None, message, 0.0, self._machine))
+                if killed == ATTEMPTS:
+                    raise QuadcosimError(
+                        f"the worker process of run {task.index} {death} {ATTEMPTS} times: not caused by the run, or "
+                        "too little memory; start the sweep again, with fewer workers"
+                    ) from None
+                continue
+            if isinstance(answer, EnvironmentFailure):
+                raise WorkerEnvironmentError(f"not a failure of a run: {answer.message}")
+            assert isinstance(answer, TaskOutcome)
+            return answer
+
+    def run_chunk(self, chunk: TaskBatch) -> list[TaskOutcome]:
+        """The outcomes of many runs; they are run one by one if together they end their process or exceed their
+        common time limit.
+
+        Raises `QuadcosimError` for failures not caused by a run.
+        """
+        try:
+            answer = self._ready_worker().request(chunk)
+        except Died as death:
+            self._drop()
+            _expect_no_interrupt(death)
+            return [self.run(task) for task in chunk.tasks]
+        if isinstance(answer, EnvironmentFailure):
+            raise WorkerEnvironmentError(f"not a failure of a run: {answer.message}")
+        assert isinstance(answer, list)
+        return answer
+
+    def close(self) -> None:
+        """End the process; a waiting `run` raises `QuadcosimError`."""
+        with self._lock:
+            self._closed = True
+        self._drop()
+
+    def _drop(self) -> None:
+        with self._lock:
+            worker, self._worker = self._worker, None
+        if worker is not None:
+            worker.close()
+
+    def _ready_worker(self) -> WorkerProcess:
+        """The worker process, started if there is none; raises `QuadcosimError` if none can be started."""
+        for attempt in range(ATTEMPTS):
+            with self._lock:
+                if self._closed:
+                    raise QuadcosimError("the sweep has ended")
+                if self._worker is not None:
+                    return self._worker
+                self._worker = worker = WorkerProcess(self._root)
+            try:
+                ready = worker.wait_until_ready()
+            except Died as death:
+                self._drop()
+                _expect_no_interrupt(death)
+                if attempt == ATTEMPTS - 1:
+                    raise WorkerEnvironmentError(f"worker processes cannot start: the last one {death}") from None
+                continue
+            self._expect_same_software(ready)
+            self._machine = ready.machine
+        with self._lock:
+            if self._worker is not None:
+                return self._worker
+        raise QuadcosimError("the sweep has ended")
+
+    def _expect_same_software(self, ready: Ready) -> None:
+        other = [name for name, version in self._inputs.versions.items() if ready.versions.get(name) != version]
+        if other:
+            raise WorkerEnvironmentError(
+                f"{os.uname().nodename if hasattr(os, 'uname') else 'a worker'}: has another version of "
+                f"{', '.join(other)} than the coordinator; expected the same"
+            )
+
+
+def _expect_no_interrupt(death: Died) -> None:
+    if death.ending.code == -signal.SIGINT:
+        raise InterruptedWorker("a worker process was interrupted") from None
+
+
+class Pool:
+    """Supervisors for the inputs of one study: as many as there are concurrent calls."""
+
+    def __init__(self, inputs: Inputs) -> None:
+        self._scratch = scratch.temporary()
+        self._root = self._scratch.path
+        self._inputs = inputs
+        self._idle: queue.SimpleQueue[Supervisor] = queue.SimpleQueue()
+        self._lock = threading.Lock()
+        self._closed = False
+        self._supervisors: list[Supervisor] = []
+        try:
+            self._paths = {name: self._unpack(i, name) for i, name in enumerate(inputs.contents)}
+        except BaseException:
+            self._scratch.remove()
+            raise
+
+    def run(self, task: RunTask | TaskBatch) -> list[TaskOutcome]:
+        """The outcomes of runs; may be called from several threads, each of which gets its own process.
+
+        Raises `QuadcosimError` once it is closed.
+        """
+        supervisor = self._supervisor()
+        try:
+            if isinstance(task, TaskBatch):
+                systems = all_with_files([each.system for each in task.tasks], self._paths)
+                each = tuple(replace(one, system=system) for one, system in zip(task.tasks, systems))
+                return supervisor.run_chunk(replace(task, tasks=each))
+            return [supervisor.run(replace(task, system=with_files(task.system, self._paths)))]
+        finally:
+            self._idle.put(supervisor)
+
+    def close(self) -> None:
+        """End all processes, and start no more."""
+        with self._lock:
+            self._closed = True
+        for supervisor in self._supervisors:
+            supervisor.close()
+
+    def remove(self) -> None:
+        """Remove the temporary files; to be called when no thread is in `run` any more."""
+        self._scratch.remove()
+
+    def _supervisor(self) -> Supervisor:
+        """An idle supervisor, or a new one."""
+        with self._lock:
+            if self._closed:
+                raise QuadcosimError("the sweep has ended")
+            try:
+                return self._idle.get_nowait()
+            except queue.Empty:
+                self._supervisors.append(Supervisor(self._root, self._inputs))
+                return self._supervisors[-1]
+
+    def _unpack(self, number: int, name: str) -> Path:
+        path = self._root / f"{number}-{Path(name).stem}{'.csv' if Path(name).suffix == '.csv' else '.fmu'}"
+        try:
+            path.write_bytes(self._inputs.contents[name])
+        except OSError as error:
+            raise QuadcosimError(f"{path}: expected to be written, for the workers: {error.strerror}") from error
+        return path

@@ -1,0 +1,49 @@
+"""A worker process: simulates the runs that it receives, one by one or in chunks."""
+
+import shutil
+import signal
+import sys
+import tempfile
+from pathlib import Path
+
+from orchestration.foundation.basics import scratch
+from orchestration.foundation.processes.channel import Parent
+from orchestration.simulation.workers.provenance import Sources, machine, software
+from orchestration.simulation.workers.task import (
+    EnvironmentFailure,
+    Ready,
+    Runner,
+    RunTask,
+    TaskBatch,
+    TaskOutcome,
+    WorkerEnvironmentError,
+)
+
+
+def main(own_folder: str) -> None:
+    """Answer tasks until the coordinator closes the channel."""
+    tempfile.tempdir = own_folder  # no fallback to other folders if it is full
+
+    def orphaned() -> None:
+        for folder in scratch.abandoned(iter([Path(own_folder).parent])):
+            shutil.rmtree(folder, ignore_errors=True)
+
+    # An FMU must not be blamed for an interrupt.
+    parent = Parent(interrupt=signal.SIG_DFL, on_orphaned=orphaned)
+    coordinator_sources: Sources = parent.receive()
+    parent.send(Ready(versions=software(coordinator_sources.current()), machine=machine()))
+    runner = Runner(machine())
+    for task in parent:
+        parent.send(_run(runner, task))
+    parent.leave()
+
+
+def _run(runner: Runner, task: RunTask | TaskBatch) -> TaskOutcome | list[TaskOutcome] | EnvironmentFailure:
+    try:
+        return runner.run_chunk(task) if isinstance(task, TaskBatch) else runner.run(task)
+    except WorkerEnvironmentError as error:
+        return EnvironmentFailure(message=str(error))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

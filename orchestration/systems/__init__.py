@@ -1,0 +1,1 @@
+"""What is connected to what, and when what happens: descriptions, signals, clocks, processors, buses."""

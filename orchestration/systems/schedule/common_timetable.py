@@ -1,0 +1,129 @@
+"""The part of a timetable that no seed changes: the regular instants, and checks of the system."""
+
+from collections import OrderedDict
+from collections.abc import Mapping
+from fractions import Fraction
+from functools import cached_property
+
+import numpy as np
+
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.systems.schedule.fixed_step import FixedStep, seconds
+from orchestration.systems.schedule.longest import expect_no_longer
+from orchestration.systems.schedule.plan import Plan
+from orchestration.systems.schedule.resources import Resources
+from orchestration.systems.schedule.spans import InstantCollector, Instants
+from orchestration.systems.system.distribution import highest
+from orchestration.systems.system.model import System
+from orchestration.systems.system.placement import messages_by_connection, placed_tasks, tasks_of
+from orchestration.systems.system.sampling import has_scheduled_instants
+from orchestration.systems.system.times import Grid, exact_nanoseconds, nanoseconds
+
+_KEPT = 8
+"""Spans whose regular instants are cached"""
+
+
+class CommonTimetable:
+    """The common part of all timetables of a system."""
+
+    def __init__(self, system: System, fixed: Mapping[str, FixedStep]) -> None:
+        """`fixed` has the components of fixed step.
+
+        Raises `UsageError` if the end is between two points of one of them, or for times beyond `LONGEST`.
+        """
+        expect_no_longer(system)
+        self.system, self.fixed, self.plan = system, fixed, Plan(system)
+        self.stop = nanoseconds(system.stop_time)
+        for each in fixed.values():
+            each.expect_end(self.stop)
+        _expect_moves(system, fixed)
+        names = list(system.components)
+        self.continuous = np.array([names.index(name) for name in self.plan.continuous], dtype=np.int64)
+        """indices of components in continuous time, in the order in which they are stepped"""
+        self.place = np.full(len(names), -1)
+        """the position of each component among those, -1 for a sampled one"""
+        self.place[self.continuous] = np.arange(len(self.continuous))
+        self.points = {
+            i: Grid(Fraction(0), exact_nanoseconds(system.components[names[i]].step or 0.0))
+            for i in sorted(self.continuous.tolist())
+        }
+        """the grids of the components in continuous time, by their indices"""
+        self.sender = np.array([names.index(x.sender) for x in system.connections], dtype=np.int64)
+        self.receiver = np.array([names.index(x.receiver) for x in system.connections], dtype=np.int64)
+        """the components at the ends of the connections"""
+        self.uses_scheduler = bool(system.computers or system.networks) or any(
+            each.sampling is not None and has_scheduled_instants(each.sampling) for each in system.components.values()
+        )
+        """whether the scheduler computes the instants of any component or connection"""
+        self.mean_interval = _mean_interval(system)
+        """the approximate mean time between instants [ns]"""
+        self._changes = [
+            (Grid(Fraction(0), exact_nanoseconds(source.period)), [names.index(end.split(".")[0]) for end in source.to])
+            for source in system.sources.values()
+            if source.period is not None
+        ]
+        self._kept: OrderedDict[tuple[int, int], Instants] = OrderedDict()
+
+    @cached_property
+    def resources(self) -> Resources:
+        """The computers and networks for the scheduler, up to the time until which it has to run.
+
+        That is after the end for measurements ahead of a sample after the end, and up to the deadlines of jobs that
+        read at their release.
+        """
+        measured = (self.system.connections[i] for i in self.plan.measured)
+        ahead = (nanoseconds(highest(x.delay)) + nanoseconds(highest(x.delay_jitter)) for x in measured)
+        tasks = (each.task for each in placed_tasks(self.system.computers))
+        open_for = (nanoseconds(task.due) for task in tasks if task.read == "release" and task.overrun == "abort")
+        return Resources(self.system, self.stop + max(ahead, default=0) + max(open_for, default=0))
+
+    def regular(self, begin: int, end: int) -> Instants:
+        """The regular instants from `begin` to before `end` [ns]: points, changes of sources, the start and the end."""
+        if (begin, end) in self._kept:
+            self._kept.move_to_end((begin, end))
+            return self._kept[begin, end]
+        found = InstantCollector(len(self.continuous))
+        for component, grid in self.points.items():
+            found.add(grid.between(grid.index_from(begin), grid.index_from(end)), int(self.place[component]))
+        if begin == 0:
+            found.add(np.zeros(1, dtype=np.int64))
+        for grid, receivers in self._changes:  # the value at the start is that of initialisation
+            times = grid.between(max(grid.index_from(begin), 1), max(grid.index_from(end), 1))
+            found.add(times, *self.place[receivers].tolist())
+        if end > self.stop:
+            found.add(np.full(1, self.stop), *range(len(self.continuous)))
+        self._kept[begin, end] = instants = found.instants()
+        while len(self._kept) > _KEPT:
+            self._kept.popitem(last=False)
+        return instants
+
+
+def _expect_moves(system: System, fixed: Mapping[str, FixedStep]) -> None:
+    """Raise `UsageError` for a component of fixed steps beside a task or a network unless its instants may move."""
+    tasks, over = tasks_of(system), messages_by_connection(system)
+    for x in system.connections:
+        places = [of.place for of in (tasks.get(x.sender), tasks.get(x.receiver), over.get(x.name)) if of is not None]
+        for name in (x.sender, x.receiver):
+            if places and name in fixed and not fixed[name].moves:
+                raise UsageError(
+                    f"{places[0]}: components.{name} takes steps of {seconds(fixed[name].grid[1])} s only: expected "
+                    'align = "next" there'
+                )
+
+
+def _mean_interval(system: System) -> float:
+    """The approximate mean time between instants [ns]."""
+    periods = [component.step for component in system.components.values()]
+    periods += [source.period for source in system.sources.values()]
+    rates = [1.0 / float(exact_nanoseconds(period)) for period in periods if period is not None]
+    for component in system.components.values():
+        if component.sampling is not None:
+            instants = 2.0 if has_scheduled_instants(component.sampling) else 1.0  # it samples, and it writes
+            period = float(exact_nanoseconds(component.sampling.period))
+            rates.append(instants * component.sampling.clock_ratio / period)
+    by_connection = messages_by_connection(system)
+    periods = [by_connection[x.name].message.period for x in system.connections if x.name in by_connection]
+    rates += [1.0 / float(exact_nanoseconds(period)) for period in periods if period is not None]
+    if not rates:
+        return float(nanoseconds(system.stop_time))
+    return 1.0 / sum(rates)

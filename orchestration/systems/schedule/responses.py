@@ -1,0 +1,165 @@
+"""Statistics of the tasks and messages of a system: responses, missed deadlines, and the bounds of theory.
+
+Times are in seconds.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from orchestration.foundation.basics.simulator import Integers
+from orchestration.systems.computers.results import ABORTED, NEVER, SKIPPED, Frames, Jobs, Timeline
+from orchestration.systems.computers.system_bounds import bounds_of
+from orchestration.systems.system.computers import Message, Task
+from orchestration.systems.system.distribution import mean
+from orchestration.systems.system.frames import frame_nanoseconds
+from orchestration.systems.system.model import System
+from orchestration.systems.system.times import NANOSECONDS
+
+NO_DEADLINE = 2**60
+"""[ns]; a deadline this late or later counts as none"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spread:
+    """The spread of times."""
+
+    min: float
+    mean: float
+    p99: float
+    """the element ⌈.99 n⌉ of n in order"""
+    max: float
+
+    @classmethod
+    def of(cls, times: Integers) -> "Spread | None":
+        """The spread of times [ns]; None if there are none."""
+        if not len(times):
+            return None
+        ordered = np.sort(times)
+        last = ordered[-(-99 * len(ordered) // 100) - 1]
+        least, mean, most = int(ordered[0]), float(ordered.mean()), int(ordered[-1])
+        return cls(min=_seconds(least), mean=mean / NANOSECONDS, p99=_seconds(int(last)), max=_seconds(most))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Responses:
+    """Statistics of one task or message."""
+
+    jobs: int
+    """the number released, or queued; without skipped ones"""
+    utilisation: float
+    """the demanded share of the time of the processor or link: the mean demand of one, divided by the mean time
+    between them"""
+    response: Spread | None
+    """from the nominal release to the end, of those that are done"""
+    bound: float | None
+    """the bound of theory on the response; None where there is none"""
+    start_jitter: float | None
+    """the range of the times from nominal release to start"""
+    end_jitter: float | None
+    """the range of those to the end"""
+    latency: Spread | None
+    """of a task, from reading its inputs to writing its outputs"""
+    deadline: float | None
+    missed: float | None
+    """the share not done by its deadline, of those whose deadline is within the run; None if there are none"""
+    skipped: int
+    aborted: int
+    unfinished: int
+    """the number waiting or under way at the end"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SystemResponses:
+    """Statistics of all tasks and messages of a system, up to its end."""
+
+    tasks: Mapping[str, Responses]
+    """by COMPUTER.TASK"""
+    messages: Mapping[str, Responses]
+    """by NETWORK.MESSAGE"""
+    busy: Mapping[str, float]
+    """the share of the time in which a computer was busy, switches included, or a link carried a frame"""
+
+
+def responses_of(system: System, timeline: Timeline) -> SystemResponses:
+    """The statistics of the tasks and messages of a system."""
+    bounds, tasks, messages = bounds_of(system), {}, {}
+    for name, computer in system.computers.items():
+        for task_name, task in computer.tasks.items():
+            place = f"{name}.{task_name}"
+            jobs = timeline.jobs[place]
+            demand = mean(task.execution) * _rate(task, computer.clock_ratio, jobs)
+            tasks[place] = _of_jobs(jobs, demand, bounds[place], task.read == "release")
+    for name, network in system.networks.items():
+        for message_name, message in network.messages.items():
+            place = f"{name}.{message_name}"
+            frames = timeline.frames[place]
+            demand = _seconds(frame_nanoseconds(network, message)) * _rate(message, 1.0, frames)
+            messages[place] = _of_frames(frames, demand, bounds[place])
+    shared = {**timeline.processors, **timeline.links}
+    busy = {name: float((each.end - each.begin).sum()) / timeline.stop for name, each in shared.items()}
+    return SystemResponses(tasks=tasks, messages=messages, busy=busy)
+
+
+def _of_jobs(jobs: Jobs, utilisation: float, bound: int | None, read_at_release: bool) -> Responses:
+    done, skipped, aborted = jobs.done, int((jobs.outcome == SKIPPED).sum()), int((jobs.outcome == ABORTED).sum())
+    read = jobs.released if read_at_release else jobs.started
+    is_written = jobs.written != NEVER
+    return Responses(
+        jobs=len(jobs) - skipped,
+        utilisation=utilisation,
+        response=Spread.of(jobs.responses),
+        bound=None if bound is None else _seconds(bound),
+        start_jitter=_range((jobs.started - jobs.nominal)[jobs.started != NEVER]),
+        end_jitter=_range(jobs.responses),
+        latency=Spread.of((jobs.written - read)[is_written]),
+        deadline=_deadline(jobs),
+        missed=_missed(jobs),
+        skipped=skipped,
+        aborted=aborted,
+        unfinished=len(jobs) - int(done.sum()) - skipped - aborted,
+    )
+
+
+def _of_frames(frames: Frames, utilisation: float, bound: int | None) -> Responses:
+    return Responses(
+        jobs=len(frames),
+        utilisation=utilisation,
+        response=Spread.of(frames.responses),
+        bound=None if bound is None else _seconds(bound),
+        start_jitter=_range((frames.started - frames.nominal)[frames.started != NEVER]),
+        end_jitter=_range(frames.responses),
+        latency=None,
+        deadline=_deadline(frames),
+        missed=_missed(frames),
+        skipped=0,
+        aborted=0,
+        unfinished=len(frames) - int(frames.done.sum()),
+    )
+
+
+def _rate(of: Task | Message, clock_ratio: float, timeline: Jobs | Frames) -> float:
+    """The rate [1/s]: as declared, else as observed."""
+    if of.period is not None:
+        return clock_ratio / of.period
+    return of.arrivals.poisson if of.arrivals is not None else len(timeline) / _seconds(timeline.stop)
+
+
+def _deadline(of: Jobs | Frames) -> float | None:
+    """The deadline after the nominal release [s]."""
+    after = (of.deadline - of.nominal)[:1]
+    return _seconds(int(after[0])) if len(after) and after[0] < NO_DEADLINE else None
+
+
+def _missed(of: Jobs | Frames) -> float | None:
+    due = int(of.due.sum())
+    return int(of.missed.sum()) / due if due else None
+
+
+def _range(times: Integers) -> float | None:
+    return _seconds(int(times.max() - times.min())) if len(times) else None
+
+
+def _seconds(nanoseconds: int) -> float:
+    return nanoseconds / NANOSECONDS

@@ -1,0 +1,138 @@
+"""Reads tables over time from CSV files."""
+
+import csv
+import math
+from array import array
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+
+from orchestration.foundation.basics.documents import readable
+from orchestration.foundation.basics.errors import UsageError, shown
+from orchestration.foundation.basics.simulator import Floats
+
+LONGEST_LINE = 2**17
+"""The most characters of a line, so that a file without line ends is not read whole"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TableRows:
+    """The numbers of a CSV file by column, with the line of each row."""
+
+    path: Path
+    columns: Mapping[str, Floats]
+    """(n,) by name, in the order of the file"""
+    lines: Sequence[int]
+
+    def error(self, row: int, column: str, expected: str) -> UsageError:
+        """The error for an invalid value."""
+        value = shown(float(self.columns[column][row]))
+        return UsageError(f"{self.path}: line {self.lines[row]}: {column} = {value}: expected {expected}")
+
+    def expect_increasing_times(self) -> None:
+        """Raise `UsageError` for a time that is not later than the one before."""
+        steps = np.diff(self.columns[TIME])
+        if not (steps > 0.0).all():
+            row = 1 + int((steps <= 0.0).argmax())
+            raise self.error(row, TIME, "times that increase")
+
+
+TIME = "time"
+
+
+def read_table(path: Path, columns: Sequence[str], stop_time: float) -> tuple[Floats, Floats]:
+    """Times (n,) [s] and the values of `columns` (n, m) of a CSV file with a column `time`.
+
+    Raises `UsageError` if a column is missing, a value is not finite, time does not increase or the table does
+    not cover [0, stop_time].
+    """
+    rows = read_rows(path, (TIME, *columns))
+    rows.expect_increasing_times()
+    time = rows.columns[TIME]
+    if time[0] > 0.0 or time[-1] < stop_time:
+        raise UsageError(f"{path}: covers {time[0]:g} to {time[-1]:g} s, expected 0 to stop_time = {stop_time:g} s")
+    return time, np.column_stack([rows.columns[name] for name in columns])
+
+
+def read_rows(path: Path, columns: Sequence[str]) -> TableRows:
+    """A CSV file that has at least these columns.
+
+    Raises `UsageError` for a missing column and, naming line and column, for a value that is no finite number.
+    """
+    with _opened(path) as lines:
+        return _read_rows(path, lines, columns)
+
+
+def header_of(path: Path) -> list[str]:
+    """The names of the columns of a CSV file; raises `UsageError` for one that cannot be read."""
+    with _opened(path) as lines:
+        return _names(lines)
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    with readable(path, "CSV file"), path.open(newline="", encoding="utf-8-sig") as file:
+        try:
+            yield csv.reader(iter(lambda: _line(file), ""), strict=True)
+        except csv.Error as error:
+            raise UsageError(f"{path}: expected CSV: {error}") from error
+
+
+def _line(file: TextIO) -> str:
+    line = file.readline(LONGEST_LINE + 1)
+    if len(line) > LONGEST_LINE:
+        raise csv.Error(f"a line has more than {LONGEST_LINE} characters")
+    return line
+
+
+def _names(lines: Any) -> list[str]:
+    return [name.strip() for name in next(lines, [])]
+
+
+def _read_rows(path: Path, lines: Any, columns: Sequence[str]) -> TableRows:
+    header = _names(lines)
+    _expect_columns(path, header, columns)
+    numbers, places = array("d"), []
+    for row in lines:
+        if not row:
+            continue
+        place = f"{path}: line {lines.line_num}"
+        if len(row) != len(header):
+            raise UsageError(f"{place}: {len(row)} values, expected {len(header)} as in the header")
+        try:
+            numbers.extend(map(float, row))
+        except ValueError as error:
+            raise UsageError(f"{place}: {_first_invalid(header, row)}: expected numbers only") from error
+        if not all(map(math.isfinite, numbers[-len(header) :])):
+            raise UsageError(f"{place}: {_first_invalid(header, row)}: expected finite numbers only")
+        places.append(lines.line_num)
+    if len(places) < 2:
+        raise UsageError(f"{path}: expected at least two rows of numbers")
+    table = np.array(numbers).reshape(-1, len(header))
+    return TableRows(path=path, columns={name: table[:, i].copy() for i, name in enumerate(header)}, lines=places)
+
+
+def _expect_columns(path: Path, header: Sequence[str], columns: Sequence[str]) -> None:
+    missing = [name for name in columns if name not in header]
+    if not missing:
+        return
+    for separator, mark in ((";", "semicolons"), ("\t", "tabulators")):
+        if any(separator in name for name in header):
+            raise UsageError(f"{path}: columns separated by {mark}; expected commas, and points in numbers")
+    raise UsageError(f"{path}: no column {', '.join(missing)}; expected {', '.join(columns)}")
+
+
+def _first_invalid(header: Sequence[str], row: Sequence[str]) -> str:
+    """The first value of a row that is no finite number, with its column."""
+    return next(f"{name} = {shown(text)}" for name, text in zip(header, row) if not _is_finite(text))
+
+
+def _is_finite(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False

@@ -1,0 +1,189 @@
+"""Checks a system against the model descriptions of its FMUs, before any of them is loaded."""
+
+import difflib
+from collections.abc import Iterable, Mapping
+
+from orchestration.components.fmi.model import NUMERIC, Model, Variable
+from orchestration.components.fmi.values import convert_value
+from orchestration.foundation.basics.errors import UsageError, expected_name, listed
+from orchestration.systems.expressions.syntax import Name, names, parse, parts
+from orchestration.systems.system.component import Parameter
+from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.conversion import BECOMES, OtherQuantity, conversion
+from orchestration.systems.system.model import System, expressions
+from orchestration.systems.system.requirements import is_finite
+from orchestration.systems.system.variable_names import component_of, variable_of
+
+
+def check(system: System, models: Mapping[str, Model]) -> None:
+    """Raise `UsageError` for the first thing that is invalid, in one line that names the place and what is valid."""
+    for name, component in system.components.items():
+        place = f"components.{name}"
+        for parameter in component.parameters:
+            check_parameter(system, models, name, parameter)
+        for recorded in component.record or ():
+            variable = models[name].variables.get(recorded)
+            if variable is None:
+                names = [v.name for v in models[name].variables.values() if v.causality in ("output", "local")]
+                has_no = f"{place}.record: {models[name].name} has no variable {recorded}"
+                raise UsageError(f"{has_no}; {expected_name(recorded, names)}")
+            if variable.kind not in NUMERIC:
+                raise UsageError(f"{place}.record: {recorded} is a {variable.kind}; expected one of {listed(NUMERIC)}")
+            if variable.causality not in ("output", "local"):
+                what = f"{recorded} is {_with_article(variable)}"
+                raise UsageError(f"{place}.record: {what}; expected an output or a local")
+    for x in system.connections:
+        for what, ends, causality in (("from", x.start, "output"), ("to", x.end, "input")):
+            model = models[component_of(ends[0])]
+            missing = [variable_of(end) for end in ends if variable_of(end) not in model.variables]
+            unfit = [variable_of(end) for end in ends if not _has_causality(model, variable_of(end), causality)]
+            if missing or len(unfit) == len(ends) > 1:
+                missing = missing or unfit
+                raise UsageError(f"connections.{x.name}.{what}: {_missing_variables(model, causality, missing)}")
+        for start, end in zip(x.start, x.end):
+            _check_pair(f"connections.{x.name}", x, _end(models, start), _end(models, end))
+    for name, source in system.sources.items():
+        if not (source.to or source.trajectory or source.is_motion):
+            raise UsageError(f"sources.{name}.to = nothing: expected inputs; only a motion may feed none")
+        for end in source.to:
+            _expect_input(f"sources.{name}.to", end, _end(models, end))
+        if source.trajectory is not None and source.trajectory not in system.components:
+            known = ", ".join(system.components)
+            raise UsageError(f"sources.{name}.trajectory = {source.trajectory}: expected one of the components {known}")
+    if system.criterion.diverged is not None:
+        _check_divergence(system.criterion.diverged, models)
+
+
+def check_parameter(system: System, models: Mapping[str, Model], name: str, parameter: str) -> None:
+    """Raise `UsageError` for a parameter that the FMU of a component does not have, or for an invalid value."""
+    value, fed = system.components[name].parameters[parameter], f"{name}.{parameter}"
+    is_fed = any(fed in x.end for x in system.connections)
+    expect_parameter(f"components.{name}.parameters.{parameter}", models[name], parameter, value, is_fed=is_fed)
+
+
+def _check_divergence(condition: str, models: Mapping[str, Model]) -> None:
+    """Raise `UsageError` for a Real signal as a part of the condition: it would hold wherever it is not zero."""
+    for part in parts(parse(condition)):
+        name = part.text if isinstance(part, Name) else ""
+        model = models.get(component_of(name))
+        variable = None if model is None else model.variables.get(variable_of(name))
+        if variable is not None and variable.kind == "Real":
+            raise UsageError(f"criterion.diverged: {name} is a Real; expected a condition, as in {name} > 1")
+
+
+def recorded_variables(system: System, models: Mapping[str, Model]) -> dict[str, tuple[str, ...]]:
+    """The variables to record of each component beside exchanged ones: its `record`, or all outputs and local Reals.
+
+    Without `record`, constants are left out. A variable in an expression is recorded in any case.
+    """
+    named = {name for _, expression in expressions(system) for name in names(parse(expression))}
+    found = {}
+    for name, component in system.components.items():
+        model = models[name]
+        if component.record is not None:
+            needed = [v.name for v in model.variables.values() if f"{name}.{v.name}" in named and _is_recordable(v)]
+            found[name] = (*component.record, *(v for v in needed if v not in component.record))
+            continue
+        chosen = [
+            v.name
+            for v in model.variables.values()
+            if (v.causality == "output" and v.kind in NUMERIC)
+            or (v.causality == "local" and v.kind == "Real" and not v.is_constant)
+        ]
+        found[name] = tuple(chosen)
+    return found
+
+
+def _is_recordable(variable: Variable) -> bool:
+    return variable.kind in NUMERIC and variable.causality in ("output", "local")
+
+
+def _has_causality(model: Model, name: str, causality: str) -> bool:
+    found = model.variables[name].causality if name in model.variables else None
+    return found == causality or (found, causality) == ("local", "output")
+
+
+def _end(models: Mapping[str, Model], end: str) -> tuple[str, Model, Variable | None]:
+    model = models[component_of(end)]
+    return end, model, model.variables.get(variable_of(end))
+
+
+End = tuple[str, Model, Variable | None]
+
+
+def _check_pair(place: str, x: Connection, start: End, end: End) -> None:
+    _, model, output = start
+    if output is None or output.causality not in ("output", "local"):
+        raise UsageError(f"{place}.from: {_wrong_causality(start, 'output', model.names('output'))}")
+    if output.kind not in NUMERIC:
+        raise UsageError(f"{place}.from: {start[0]} is a {output.kind}; only {listed(NUMERIC)} can be connected")
+    receiver = _expect_input(f"{place}.to", end[0], end)
+    _check_kinds(place, start[0], output, end[0], receiver)
+    if not (x.stated or x.converts):
+        _check_units(place, start[0], model, output, end[0], end[1], receiver)
+
+
+def _check_units(
+    place: str, start: str, sender: Model, output: Variable, end: str, receiver: Model, into: Variable
+) -> None:
+    """Raise `UsageError`, proposing a conversion, for units that differ by more than their spelling."""
+    try:
+        found = conversion(sender, output, receiver, into)
+    except OtherQuantity:
+        needed = "; they are of different quantities"
+    else:
+        if found is not None and found.is_none:
+            return
+        needed = ", or scale and offset in the connection" if found is None else f": {found} in the connection"
+    raise UsageError(f"{place}: {start} is in {output.unit}, {end} in {into.unit}; expected the same unit{needed}")
+
+
+def _check_kinds(place: str, start: str, output: Variable, end: str, receiver: Variable) -> None:
+    if receiver.kind not in BECOMES[output.kind]:
+        expected = listed(kind for kind in NUMERIC if kind in BECOMES[output.kind])
+        raise UsageError(f"{place}: {start} is a {output.kind}, {end} a {receiver.kind}; expected {expected}")
+
+
+def _expect_input(place: str, end: str, found: End) -> Variable:
+    _, model, variable = found
+    if variable is None or variable.causality != "input":
+        raise UsageError(f"{place}: {_wrong_causality(found, 'input', model.names('input'))}")
+    if variable.kind not in NUMERIC:
+        raise UsageError(f"{place}: {end} is a {variable.kind}; only {listed(NUMERIC)} can be connected")
+    return variable
+
+
+def _missing_variables(model: Model, causality: str, missing: list[str]) -> str:
+    """The variables that a model lacks as ends of a connection, with those that it has."""
+    names = model.names(causality)
+    near = difflib.get_close_matches(missing[0], names, n=1)
+    hint = f"; did you mean {near[0]}?" if near else ""
+    return f"{model.name} has no {causality} {', '.join(missing)}; its {causality}s are {listed(names)}{hint}"
+
+
+def _wrong_causality(end: End, expected: str, valid: Iterable[str]) -> str:
+    name, model, variable = end
+    if variable is None:
+        return _missing_variables(model, expected, [variable_of(name)])
+    return f"{name} is {_with_article(variable)}; expected an {expected}: {listed(valid)}"
+
+
+def _with_article(variable: Variable) -> str:
+    return f"a{'n' if variable.causality[0] in 'aeiou' else ''} {variable.causality}"
+
+
+def expect_parameter(place: str, model: Model, name: str, value: Parameter, *, is_fed: bool = False) -> None:
+    """Raise `UsageError`, naming the `place`, for a parameter that a model does not have, or for an invalid value."""
+    variable = model.variable(name, place)
+    if not (variable.is_settable or variable.is_constant) or is_fed:
+        expected = "a parameter or an input that nothing is connected to"
+        raise UsageError(f"{place}: is {'connected' if is_fed else _with_article(variable)}; expected {expected}")
+    if isinstance(convert_value(variable, value, place), float) and not is_finite(value):
+        raise UsageError(f"{place} = {value}: expected a finite number")
+    low, high = variable.minimum, variable.maximum
+    outside = (low is not None and value < low) or (high is not None and value > high) if is_finite(value) else False
+    if outside:
+        bounds = " and ".join(
+            f"{word} {bound:g}" for word, bound in (("at least", low), ("at most", high)) if bound is not None
+        )
+        raise UsageError(f"{place} = {value}: expected {bounds}")

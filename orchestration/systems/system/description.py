@@ -1,0 +1,201 @@
+"""A system as text: its components with their rates, its connections with their faults."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from orchestration.foundation.basics.errors import listed
+from orchestration.foundation.basics.units import in_brackets
+from orchestration.systems.system.component import Component
+from orchestration.systems.system.computers import Message, Task
+from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.distribution import Distribution, Varying
+from orchestration.systems.system.model import System
+from orchestration.systems.system.placement import PlacedMessage, PlacedTask, placed_messages, placed_tasks
+from orchestration.systems.system.sampling import Sampling, SamplingOnArrival, TaskSampling
+from orchestration.systems.system.source import Source
+from orchestration.systems.system.variable_names import variable_of
+
+MOST = 6
+"""names in a cell; more are counted"""
+
+
+def as_text(system: System, units: Mapping[str, str] = {}, follows: str = "") -> str:
+    """Components, connections, sources, objectives with their `units`, and the criterion, a line each, in columns.
+
+    `follows` describes the references and the components that follow them.
+    """
+    components = [(name, _fmu(c), describe_rate(c), _parameters(c)) for name, c in system.components.items()]
+    connections = [
+        (x.name, f"{x.sender} -> {x.receiver}", describe_faults(x) or "at once", describe_signals(x))
+        for x in system.connections
+    ]
+    sources = [
+        (name, describe_source(s), _shortened(s.to) if s.to else "(objectives)") for name, s in system.sources.items()
+    ]
+    named = [in_brackets(name, units.get(name)) for name in system.objectives]
+    criterion = system.criterion
+    criteria = [("good", criterion.good), ("diverged", criterion.diverged)]
+    sections: list[tuple[str, Sequence[Sequence[str]]]] = [
+        ("components", components),
+        ("connections", connections),
+        ("sources", sources),
+        ("computers", [_task(each) for each in placed_tasks(system.computers)]),
+        ("networks", [_message(each) for each in placed_messages(system.networks)]),
+        ("follows", [(follows,)] if follows else []),
+        (
+            "objectives",
+            [(name, " ".join(text.split())) for name, text in zip(named, system.objectives.values())],
+        ),
+        ("criterion", [(name, " ".join(text.split())) for name, text in criteria if text is not None]),
+    ]
+    head = f"{len(system.components)} components, {len(system.connections)} connections, {system.stop_time:g} s"
+    return "\n".join([head, *(line for title, rows in sections if rows for line in ("", title, *_table(rows)))])
+
+
+def describe_rate(component: Component) -> str:
+    """How a component is stepped."""
+    if component.sampling is None:
+        return f"continuous, step {seconds(component.step or 0.0)}" + (
+            ", moved to its own grid" if component.align == "next" else ""
+        )
+    if isinstance(component.sampling, TaskSampling):
+        return component.sampling.task
+    if isinstance(component.sampling, SamplingOnArrival):
+        return f"on {component.sampling.on}"
+    return describe_sampling(component.sampling)
+
+
+def _task(of: PlacedTask) -> tuple[str, ...]:
+    task, computer = of.task, of.computer
+    how = [computer.scheduling.replace("-", " "), *([] if computer.preemptive else ["not preemptive"])]
+    how += [f"priority {task.priority}", f"{describe_varying(task.execution)} by {seconds(task.due)}"]
+    how += [f"reads at {task.read}"] if task.read != "start" else []
+    how += [f"writes at {task.write}"] if task.write != "end" else []
+    how += [f"overruns {task.overrun}"] if task.overrun != "queue" else []
+    released = f"on {task.on}" if task.on is not None else _released(task)
+    return f"{of.computer_name}.{of.name}", task.component or "load", released, ", ".join(how)
+
+
+def _message(of: PlacedMessage) -> tuple[str, ...]:
+    message, network = of.message, of.network
+    keys = ("identifier", "slot") if network.kind != "ethernet" else ("priority",)
+    how = [f"{network.kind}, {network.bit_rate:g} bit/s", f"{message.bytes} bytes"]
+    how += [f"{key} {getattr(message, key)}" for key in keys if getattr(message, key) is not None]
+    how += [f"corrupted {100.0 * network.error:g} %"] if network.error else []
+    released = _released(message) if message.period or message.arrivals else "when written"
+    return f"{of.network_name}.{of.name}", message.connection or "load", released, ", ".join(how)
+
+
+def _released(of: Task | Message) -> str:
+    if of.arrivals is not None:
+        return f"{of.arrivals.poisson:g} a second at random"
+    parts = [f"every {seconds(of.period or 0.0)}"]
+    parts += [f"from {seconds(of.offset)}"] if of.offset else []
+    parts += [f"jitter {describe_varying(of.jitter)}"] if of.jitter else []
+    return ", ".join(parts)
+
+
+def describe_sampling(sampling: Sampling) -> str:
+    """When a digital task runs."""
+    parts = [f"every {seconds(sampling.period)}"]
+    parts += [f"from {seconds(sampling.offset)}"] if sampling.offset else []
+    parts += [f"jitter {_largest(sampling.jitter, sampling.jitter_distribution)}"] if sampling.jitter else []
+    parts += [f"clock {sampling.clock_ratio:g} times true time"] if sampling.clock_ratio != 1.0 else []
+    parts += ["by its own clock"] if sampling.clock == "fmu" else []
+    return ", ".join(parts)
+
+
+def describe_signals(x: Connection) -> str:
+    """The variables that it carries, vectors as a whole; with the names at the receiver where they differ."""
+    names, others = (list(map(variable_of, ends)) for ends in (x.start, x.end))
+    carried = _shortened(names)
+    return carried if names == others else f"{carried} -> {_shortened(others)}"
+
+
+def describe_faults(x: Connection) -> str:
+    """The faults of a connection; empty if its messages arrive unchanged, at once."""
+    parts = [f"delay {describe_varying(x.delay)}"] if x.delay else []
+    parts += [f"delay jitter {_largest(x.delay_jitter, x.jitter_distribution)}"] if x.delay_jitter else []
+    if isinstance(x.loss, Distribution):
+        parts.append(f"loss {describe_varying(x.loss, '{:g}'.format)}")
+    elif x.loss:
+        bursts = f" in bursts of {x.burst_length:g}" if x.burst_length is not None else ""
+        parts.append(f"loss {100.0 * x.loss:g} %{bursts}")
+    parts += ["hold first"] if x.hold == "first" else []
+    for kind in ("noise", "quantisation"):
+        given = {name: value for name, value in getattr(x, kind).items() if value}
+        same = len(set(given.values())) == 1 and len(given) == len(x.start)
+        named = [f"{next(iter(given.values())):g}"] if same else [f"{name} {value:g}" for name, value in given.items()]
+        parts += [f"{kind} {', '.join(named)}"] if given else []
+    parts += [f"times {x.scale:g}"] if x.scale != 1.0 else []
+    parts += [f"plus {x.offset:g}"] if x.offset else []
+    parts += ["jacobi"] if x.order == "jacobi" else []
+    return ", ".join(parts)
+
+
+def describe_source(source: Source) -> str:
+    """The kind of a source, with its main parameter."""
+    if source.constant is not None:
+        return f"constant {source.constant:g}"
+    if source.noise is not None:
+        return f"white noise of intensity {source.noise:g}, held {seconds(source.period or 0.0)}"
+    if source.file is not None:
+        return f"{'way-points of' if source.is_motion else 'file'} {source.file.name}"
+    return source.signal or f"trajectory of {source.trajectory}"
+
+
+def describe_varying(of: Varying, formatted: Callable[[float], str] | None = None) -> str:
+    """A number, or its distribution; default of `formatted`: as times."""
+    formatted = formatted or seconds
+    if not isinstance(of, Distribution):
+        return formatted(of)
+    if of.uniform is not None:
+        return f"{formatted(of.uniform[0])} to {formatted(of.uniform[1])} uniform"
+    if of.normal is not None and of.range is not None:
+        mean, deviation = map(formatted, of.normal)
+        return f"{mean} ± {deviation} normal, cut to {formatted(of.range[0])} to {formatted(of.range[1])}"
+    if of.file is not None:
+        return f"{of.column} of {of.file.name}, {of.order}"
+    values = [formatted(value) for value in of.values or ()]
+    if of.probabilities is not None:
+        values = [f"{value} ({share:g})" for value, share in zip(values, of.probabilities, strict=True)]
+    return f"one of {listed(values, MOST)}"
+
+
+def _largest(jitter: Varying, spread: str) -> str:
+    return describe_varying(jitter) if isinstance(jitter, Distribution) else f"{seconds(jitter)} {spread}"
+
+
+def seconds(value: float) -> str:
+    """A time with a readable unit."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
+        if value >= size or value == 0.0:
+            return f"{value / size:.9g} {unit}"
+    return f"{value / 1e-9:.9g} ns"
+
+
+def _fmu(component: Component) -> str:
+    return Path(component.fmu).name
+
+
+def _parameters(component: Component) -> str:
+    return ", ".join(f"{name} = {value}" for name, value in component.parameters.items())
+
+
+def _shortened(names: Sequence[str]) -> str:
+    """Scalars of a vector under its name, as `position.{x,y,z}`; at most `MOST` names."""
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        stem, dot, last = name.rpartition(".")
+        groups.setdefault(stem if dot else name, []).append(f"{dot}{last}" if dot else "")
+    named = [
+        f"{stem}{parts[0]}" if len(parts) == 1 else f"{stem}.{{{','.join(part[1:] for part in parts)}}}"
+        for stem, parts in groups.items()
+    ]
+    return listed(named, MOST)
+
+
+def _table(rows: Sequence[Sequence[str]]) -> list[str]:
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = ("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in rows)
+    return [f"  {line}".rstrip() for line in lines]

@@ -1,0 +1,212 @@
+"""A system: components, what connects and drives them, and its objectives; checked without opening any FMU."""
+
+import functools
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import field, replace
+from typing import Any, ClassVar
+
+from orchestration.foundation.basics.errors import UsageError, listed
+from orchestration.foundation.basics.records import record
+from orchestration.systems.expressions.syntax import is_number, parse
+from orchestration.systems.system.component import Component
+from orchestration.systems.system.computers import Computer, Network
+from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.criterion import Criterion
+from orchestration.systems.system.file_tables import tables_of
+from orchestration.systems.system.placement import expect_placement, placed_messages, placed_tasks, with_tasks
+from orchestration.systems.system.requirements import require, require_positive
+from orchestration.systems.system.source import Source
+from orchestration.systems.system.times import is_at_least
+from orchestration.systems.system.variable_names import component_of
+
+
+@record()
+class System:
+    """Components, what connects and drives them, the objectives of a run and the criterion of a good one.
+
+    Raises `UsageError` for what is invalid with any FMUs.
+    """
+
+    stop_time: float
+    """The end of a run [s]."""
+    seed: int = 0
+    """The seed of all random numbers of a run."""
+    components: Mapping[str, Component] = field(default_factory=dict)
+    """The FMUs by name; their order decides ties."""
+    connections: tuple[Connection, ...] = ()
+    """The messages from component to component."""
+    sources: Mapping[str, Source] = field(default_factory=dict)
+    """What drives inputs from outside, by name."""
+    computers: Mapping[str, Computer] = field(default_factory=dict)
+    """The processors that run components as tasks, by name."""
+    networks: Mapping[str, Network] = field(default_factory=dict)
+    """The buses and switches over which connections go, by name."""
+    objectives: Mapping[str, str] = field(default_factory=dict)
+    """The expressions that are evaluated over a run, by name."""
+    optional: tuple[str, ...] = ()
+    """The objectives that may lack a value: where an FMU does not have one of their variables."""
+    criterion: Criterion = field(default_factory=Criterion)
+    """When a run is good, and when it has diverged."""
+    streams: Mapping[str, int] = field(default_factory=dict)
+    """The random streams that have a number instead of a name, as `connections.NAME.CAUSE` and
+    `components.NAME.jitter`."""
+    operating_point: Mapping[str, Any] = field(default_factory=dict)
+    """Changes, by path, with which the system rests: where the local limit is computed. It is checked when it is
+    used."""
+
+    def __repr__(self) -> str:
+        named = {
+            "components": self.components,
+            "connections": [x.name for x in self.connections],
+            "sources": self.sources,
+            "computers": self.computers,
+            "networks": self.networks,
+            "objectives": self.objectives,
+        }
+        parts = [f"{what}: {listed(names, most=6)}" for what, names in named.items() if names]
+        return f"<System of {self.stop_time:g} s; {'; '.join(parts)}>"
+
+    @property
+    def fmus(self) -> dict[str, str]:
+        """The FMU of each component, by its name."""
+        return {name: component.fmu for name, component in self.components.items()}
+
+    def to_toml(self) -> str:
+        """The system file that loads as this system, wherever it lies."""
+        import tomli_w
+
+        return tomli_w.dumps({key: value for key, value in tables_of(self).items() if value not in ({}, [])})
+
+    # The protocol `request.Request`: a system is its own system, and has no other terms.
+
+    kind: ClassVar[str] = "run"
+    title: ClassVar[str | None] = None
+    description: ClassVar[str] = ""
+
+    def as_system(self) -> "System":
+        """Itself."""
+        return self
+
+    def in_own_terms(self, text: str) -> str:
+        """`text` unchanged."""
+        return text
+
+    def paths_of(self, target: str) -> tuple[str, ...]:
+        """`target` is a path."""
+        return (target,)
+
+    def range_of(self, quantity: str) -> None:
+        """No quantity has a name."""
+
+    def with_twins(self, twin: Callable[[str], str]) -> "System":
+        """The same system with each FMU replaced by its `twin`."""
+        twins = {name: twin(fmu) for name, fmu in self.fmus.items()}
+        if twins == self.fmus:
+            return self
+        components = {name: replace(each, fmu=twins[name]) for name, each in self.components.items()}
+        return replace(self, components=components)
+
+    def near_continuous(self, period: float) -> None:
+        """None: which of its components are the digital ones is not known."""
+
+    def warnings(self, parameters: Mapping[str, float]) -> tuple[str, ...]:
+        """A system has no warnings."""
+        return ()
+
+    def headline(self) -> str:
+        """A system has no headline."""
+        return ""
+
+    def __post_init__(self) -> None:
+        require_positive(self, "stop_time")
+        require(is_at_least(self.stop_time, 1.0), "stop_time", self.stop_time, "at least a nanosecond")
+        whole = isinstance(self.seed, int) and not isinstance(self.seed, bool)
+        require(whole and 0 <= self.seed < 2**63, "seed", self.seed, "a whole number from 0 to 2^63 - 1")
+        if "rows" in self.components:
+            raise UsageError("components.rows: expected another name; this one is taken")
+        require(bool(self.components or self.computers or self.networks), "components", "none", "at least one")
+        _require_names("components", self.components, without=".")
+        _require_names("sources", self.sources, without=".")
+        for table in ("computers", "networks"):
+            _require_names(table, getattr(self, table), without=".")
+        for place, owner in self.computers.items():
+            _require_names(f"computers.{place}.tasks", owner.tasks, without=".")
+        for place, network in self.networks.items():
+            _require_names(f"networks.{place}.messages", network.messages, without=".")
+        components = with_tasks(self.components, self.connections, self.computers, self.networks)
+        object.__setattr__(self, "components", components)
+        _require_names("connections", (x.name for x in self.connections))
+        _require_names("objectives", self.objectives)
+        causes = self._causes()
+        for place, number in self.streams.items():
+            require(place in causes, "streams", place, f"one of {', '.join(causes) or 'none'}")
+            require(number >= 0, f"streams.{place}", number, "a number from 0 on")
+        for name in self.sources:
+            require(name not in self.components, f"sources.{name}", name, "another name than a component's")
+        fed: dict[str, str] = {}
+        for place, start, end in self._feeds():
+            for what, variable in (("from", start), ("to", end)):
+                if variable is not None and component_of(variable) not in self.components:
+                    known = ", ".join(self.components)
+                    raise UsageError(f"{place}.{what}: {variable}: no such component; expected one of {known}")
+            if end in fed:
+                raise UsageError(f"{place}.to: {end} is fed by {fed[end]} already; expected one connection or source")
+            fed[end] = place
+        names = [x.name for x in self.connections]
+        for name in names:
+            require(names.count(name) == 1, "connections", name, "a different name for each")
+        expect_placement(self)
+        _require_expressions(tuple(expressions(self)))
+
+    def _causes(self) -> list[str]:
+        """The names of its random streams."""
+        tasks = [f"components.{name}.jitter" for name, c in self.components.items() if c.sampling is not None]
+        sent = [f"connections.{x.name}.{cause}" for x in self.connections for cause in _CAUSES]
+        on_computers = [f"{each.place}.{cause}" for each in placed_tasks(self.computers) for cause in TASK_CAUSES]
+        over_networks = [f"{each.place}.{cause}" for each in placed_messages(self.networks) for cause in MESSAGE_CAUSES]
+        sent += [*on_computers, *over_networks]
+        return [*tasks, *sent, *(f"sources.{name}.value" for name, x in self.sources.items() if x.is_random)]
+
+    def _feeds(self) -> list[tuple[str, str | None, str]]:
+        feeds: list[tuple[str, str | None, str]] = [
+            (f"connections.{x.name}", start, end) for x in self.connections for start, end in zip(x.start, x.end)
+        ]
+        return feeds + [(f"sources.{name}", None, end) for name, source in self.sources.items() for end in source.to]
+
+
+_CAUSES = ("delay", "delay_jitter", "loss", "noise")
+"""The random streams of a connection"""
+TASK_CAUSES, MESSAGE_CAUSES = ("execution", "jitter", "arrivals"), ("jitter", "arrivals", "error")
+"""The random streams of a task, and of a message"""
+
+
+def _require_names(table: str, names: Iterable[str], without: str = "") -> None:
+    """Raise `UsageError` for a name that cannot be part of a path and of a message of one line."""
+    for name in names:
+        if not (name.isprintable() and name == name.strip() != "" and not (without and without in name)):
+            expected = "a name in printable characters" + (" without a dot" if without else "")
+            require(False, table, name.encode("unicode_escape").decode(), expected)
+
+
+def expressions(system: System) -> list[tuple[str, str]]:
+    """Every expression of a system, with its place in the file."""
+    found = [(f"objectives.{name}", text) for name, text in system.objectives.items()]
+    criterion = system.criterion
+    return found + [
+        (f"criterion.{key}", text)
+        for key, text in (("good", criterion.good), ("diverged", criterion.diverged))
+        if text is not None
+    ]
+
+
+@functools.lru_cache(maxsize=256)
+def _require_expressions(texts: tuple[tuple[str, str], ...]) -> None:
+    """Raise `UsageError` for one that is not valid, or for a criterion that is no condition; cached for studies."""
+    for place, text in texts:
+        try:
+            node = parse(text)
+        except UsageError as error:
+            raise UsageError(f"{place}: {error}") from error
+        if place.startswith("criterion."):
+            condition = parse(dict(texts).get(f"objectives.{text.strip()}", text))
+            require(not is_number(condition) and not is_number(node), place, text, "a condition, as in peak < 2.5")

@@ -1,0 +1,277 @@
+"""Changes of a system by path: axes of studies, `limit --of`, flags and operating points."""
+
+import dataclasses
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from orchestration.foundation.basics.errors import UsageError, did_you_mean
+from orchestration.foundation.basics.records import replaced
+from orchestration.systems.system.component import Component
+from orchestration.systems.system.computers import Arrivals, Computer, Network
+from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.model import System
+from orchestration.systems.system.placement import SHARED
+from orchestration.systems.system.sampling import Sampling, SamplingOnArrival, TaskSampling
+from orchestration.systems.system.source import Source
+
+TOP = ("stop_time", "seed")
+
+
+def changed(system: System, changes: Mapping[str, Any]) -> System:
+    """A system with new values, by path.
+
+    Paths are such as `components.tank.step`, `components.controller.sampling.period`, `connections.valve.delay`,
+    `components.controller.parameters.maxlevel`, `sources.wind.noise`, `computers.autopilot.tasks.telemetry.execution`,
+    `networks.bus.messages.status.period`, `stop_time`. Where a whole number is expected, 1.0 is 1; where a number may
+    vary, a table or the text of one is its distribution, as `{uniform = [0.001, 0.004]}`.
+
+    Raises `UsageError` for a path that does not exist, naming those that do, or an invalid value.
+    """
+    grouped: dict[tuple[str, str], dict[str, Any]] = {}
+    top: dict[str, Any] = {}
+    for path, given in changes.items():
+        value = _converted(path, given)
+        table, _, rest = path.partition(".")
+        if path in TOP:
+            top[path] = value
+            continue
+        name, key = _split(system, path, table, rest)
+        grouped.setdefault((table, name), {})[key] = value
+    components, sources = dict(system.components), dict(system.sources)
+    shared: dict[str, dict[str, Any]] = {table: dict(getattr(system, table)) for table in SHARED}
+    connections = {x.name: x for x in system.connections}
+    for (table, name), keys in grouped.items():
+        place = f"{table}.{name}"
+        if table == "components":
+            components[name] = _component(place, components[name], keys)
+        elif table == "connections":
+            connections[name] = _replaced(place, connections[name], _by_variable(connections[name], keys))
+        elif table in SHARED:
+            shared[table][name] = _with_parts(place, shared[table][name], keys)
+        else:
+            sources[name] = _replaced(
+                place, sources[name], _with_new_kind(sources[name], _by_parameter(sources[name], keys))
+            )
+    if _only_numbers(grouped, top):
+        return replaced(system, components=components, **top)
+    result: System = _replaced(
+        "",
+        system,
+        {**top, "components": components, "connections": tuple(connections.values()), "sources": sources, **shared},
+    )
+    return result
+
+
+def _only_numbers(grouped: Mapping[tuple[str, str], Mapping[str, Any]], top: Mapping[str, Any]) -> bool:
+    """Whether no change needs a check of the system: so it is in most runs of a study."""
+    is_seed = all(key == "seed" and type(value) is int and 0 <= value < 2**63 for key, value in top.items())
+    return is_seed and all(table == "components" and _are_parameters(keys) for (table, _), keys in grouped.items())
+
+
+def _are_parameters(keys: Iterable[str]) -> bool:
+    return all(key.startswith("parameters.") for key in keys)
+
+
+def is_source_file(path: str) -> bool:
+    """Whether the value at a path is the file of a source."""
+    return path.startswith("sources.") and path.endswith(".file")
+
+
+def _converted(path: str, value: Any) -> Any:
+    """A value as the system has it: ranges have no whole numbers, the command line no paths of files."""
+    is_whole = path == "seed" or (path.startswith(tuple(f"{table}." for table in SHARED)) and path.endswith(_WHOLE))
+    if is_whole and isinstance(value, float) and value.is_integer():
+        return int(value)
+    return Path(value) if is_source_file(path) and isinstance(value, str) else value
+
+
+def value_at(system: System, path: str) -> Any:
+    """The value at a path, None where it is not set; raises `UsageError` as `changed` does."""
+    if path in TOP:
+        return getattr(system, path)
+    table, _, rest = path.partition(".")
+    name, key = _split(system, path, table, rest)
+    if table == "components":
+        component = system.components[name]
+        kind, _, inner = key.partition(".")
+        if kind == "parameters":
+            return component.parameters.get(inner)
+        return getattr(component.sampling, inner) if kind == "sampling" else getattr(component, kind)
+    if table in SHARED:
+        return _value_of_part(getattr(system, table)[name], key)
+    owner: Any = system.sources[name] if table == "sources" else _connection(system, name)
+    kind, _, inner = key.partition(".")
+    found = getattr(owner, kind)
+    return found.get(inner) if inner else found
+
+
+def _connection(system: System, name: str) -> Connection:
+    return next(x for x in system.connections if x.name == name)
+
+
+def _split(system: System, path: str, table: str, rest: str) -> tuple[str, str]:
+    """Name and key of a path below one of the tables; a name may hold dots."""
+    tables: dict[str, Iterable[str]] = {
+        "components": system.components,
+        "connections": [x.name for x in system.connections],
+        "sources": system.sources,
+        **{shared: getattr(system, shared) for shared in SHARED},
+    }
+    if table not in tables:
+        listed = f"{', '.join(TOP)} or one that begins with {', '.join(tables)}"
+        raise UsageError(f"{path}: no such path; expected {listed}{did_you_mean(table, [*TOP, *tables])}")
+    known = list(tables[table])
+    names = [name for name in known if rest.startswith(f"{name}.")]
+    if not names:
+        raise UsageError(f"{path}: expected {table}.NAME.KEY with NAME one of {', '.join(known) or '(there is none)'}")
+    name = max(names, key=len)
+    key = rest[len(name) + 1 :]
+    _expect_key(path, table, system, name, key)
+    return name, key
+
+
+def _expect_key(path: str, table: str, system: System, name: str, key: str) -> None:
+    if table in ("components", "sources") and key.startswith("parameters.") and key != "parameters.":
+        return
+    keys: list[str]
+    if table == "components":
+        keys = _keys_of_stepping(system.components[name])
+        keys += ["align", "fmu", "record", "tolerance", "parameters.NAME"]
+        known = key in keys[:-1]
+    elif table == "connections":
+        fixed = ("name", "start", "end", "noise", "quantisation", "stated")
+        keys = [f.name for f in dataclasses.fields(Connection) if f.name not in fixed]
+        keys += ["noise", "quantisation", "noise.VARIABLE", "quantisation.VARIABLE"]
+        known = key in keys or key.partition(".")[0] in ("noise", "quantisation")
+    elif table in SHARED:
+        _expect_part(path, f"{table}.{name}", getattr(system, table)[name], key)
+        keys, known = _keys_of_parts(getattr(system, table)[name], key)
+    else:
+        keys = [f.name for f in dataclasses.fields(Source)] + ["parameters.NAME"]
+        known = key in keys[:-1]
+    if not known:
+        listed = f"{table}.{name}. and one of {', '.join(keys)}"
+        raise UsageError(f"{path}: no such key; expected {listed}{did_you_mean(key, keys)}")
+
+
+def _keys_of_stepping(component: Component) -> list[str]:
+    """The keys of when a component is stepped; none if it is a task, whose computer has them."""
+    if isinstance(component.sampling, TaskSampling):
+        return []
+    if isinstance(component.sampling, SamplingOnArrival):
+        return ["sampling.on", "sampling.clock_ratio"]
+    return ["step"] if component.sampling is None else [f"sampling.{f.name}" for f in dataclasses.fields(Sampling)]
+
+
+def _expect_part(path: str, place: str, of: Computer | Network, key: str) -> None:
+    """Raise `UsageError` for a task or a message that does not exist, naming those that do."""
+    parts, _, rest = key.partition(".")
+    if not rest or parts != SHARED[place.partition(".")[0]][0]:
+        return
+    known, name = [*getattr(of, parts)], rest.partition(".")[0]
+    if name not in known:
+        listed = f"{place}.{parts}.NAME.KEY with NAME one of {', '.join(known) or '(there is none)'}"
+        raise UsageError(f"{path}: expected {listed}{did_you_mean(name, known)}")
+
+
+_WHOLE = (".priority", ".bytes", ".identifier", ".slot")
+_ARRIVALS = "arrivals.poisson"
+
+
+def _keys_of_parts(of: Computer | Network, key: str) -> tuple[list[str], bool]:
+    """The keys of a computer or a network, and whether `key` is one of these."""
+    parts, kind = SHARED["computers" if isinstance(of, Computer) else "networks"]
+    own = [f.name for f in dataclasses.fields(of) if f.name != parts]
+    each = [_IN_FILES.get(f.name, f.name) for f in dataclasses.fields(kind) if f.name != "arrivals"] + [_ARRIVALS]
+    valid = {f"{parts}.{name}.{field}" for name in getattr(of, parts) for field in each}
+    return [*own, *(f"{parts}.NAME.{field}" for field in each)], key in own or key in valid
+
+
+_IN_FILES = {"start": "from", "end": "to"}
+_FIELDS = {"from": "start", "to": "end"}
+
+
+def _value_of_part(of: Computer | Network, key: str) -> Any:
+    kind, _, inner = key.partition(".")
+    if not inner:
+        return getattr(of, kind)
+    name, _, field = inner.partition(".")
+    part = getattr(of, kind)[name]
+    if field == _ARRIVALS:
+        return None if part.arrivals is None else part.arrivals.poisson
+    return getattr(part, _FIELDS.get(field, field))
+
+
+def _with_parts(place: str, of: Computer | Network, keys: Mapping[str, Any]) -> Any:
+    """A computer with other tasks, or a network with other messages."""
+    own = {key: value for key, value in keys.items() if "." not in key}
+    inner: dict[str, dict[str, Any]] = {}
+    for key, value in keys.items():
+        if "." in key:
+            _, name, field = key.split(".", 2)
+            inner.setdefault(name, {})[_FIELDS.get(field, field)] = value
+    parts, key = {}, SHARED[place.partition(".")[0]][0]
+    for name, part in getattr(of, key).items():
+        changes = inner.get(name, {})
+        if _ARRIVALS in changes:
+            changes["arrivals"] = Arrivals(poisson=changes.pop(_ARRIVALS))
+        parts[name] = _replaced(f"{place}.{key}.{name}", part, changes) if changes else part
+    return _replaced(place, of, {**own, key: parts})
+
+
+def _component(place: str, component: Component, keys: Mapping[str, Any]) -> Component:
+    if _are_parameters(keys) and all(type(value) is float for value in keys.values()):
+        return replaced(component, **_by_parameter(component, keys))
+    sampling = {key.partition(".")[2]: value for key, value in keys.items() if key.startswith("sampling.")}
+    rest = {key: value for key, value in _by_parameter(component, keys).items() if "." not in key}
+    if sampling:
+        rest["sampling"] = _replaced(f"{place}.sampling", component.sampling, sampling)
+    return _replaced(place, component, rest) if rest else component
+
+
+def _by_parameter(of: Component | Source, keys: Mapping[str, Any]) -> dict[str, Any]:
+    """Keys such as `parameters.radius` merged into their table."""
+    parameters = {key.partition(".")[2]: value for key, value in keys.items() if key.startswith("parameters.")}
+    rest = {key: value for key, value in keys.items() if not key.startswith("parameters.")}
+    return {**rest, "parameters": {**rest.get("parameters", of.parameters), **parameters}} if parameters else rest
+
+
+def _with_new_kind(source: Source, keys: Mapping[str, Any]) -> dict[str, Any]:
+    """With a new file, signal, constant or noise, the keys that clear the former kind of the source too."""
+    new = [kind for kind in _KINDS if keys.get(kind) is not None and getattr(source, kind) is None]
+    others = {f.name: f.default for f in dataclasses.fields(Source) if f.name in (*_KINDS, *_OF_KINDS)} if new else {}
+    return {**others, **keys}
+
+
+_KINDS, _OF_KINDS = ("constant", "file", "noise", "signal"), ("interpolation", "columns", "period")
+
+
+def _by_variable(connection: Connection, keys: Mapping[str, Any]) -> dict[str, Any]:
+    """Keys such as `noise.level` merged into their tables; a plain number is for every variable of the message."""
+    result: dict[str, Any] = {}
+    for key, value in keys.items():
+        kind, _, variable = key.partition(".")
+        if kind not in ("noise", "quantisation"):
+            result[key] = value
+        elif variable:
+            result[kind] = {**result.get(kind, getattr(connection, kind)), variable: value}
+        else:
+            result[kind] = for_each(connection.start, value)
+    return result | ({"stated": True} if {"scale", "offset"} & keys.keys() else {})
+
+
+def for_each(start: Iterable[str], value: Any) -> Any:
+    """A number for every variable of a message; a table is unchanged."""
+    return value if isinstance(value, Mapping) else {end.partition(".")[2]: value for end in start}
+
+
+def _replaced(place: str, of: Any, keys: Mapping[str, Any]) -> Any:
+    if any(isinstance(value, (str, Mapping)) for value in keys.values()):
+        from orchestration.systems.system.distribution_table import parsed_fields  # which loads what reads files
+
+        keys = parsed_fields(of, f"{place}.", keys)
+    try:
+        return dataclasses.replace(of, **dict(keys))
+    except UsageError as error:
+        raise UsageError(f"{place}.{error}" if place else str(error)) from error

@@ -1,0 +1,229 @@
+"""Proposes a system file for some FMUs from their model descriptions, with comments on what is undecided."""
+
+import itertools
+import json
+import os
+import re
+from collections.abc import Container, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from orchestration.components.fmi.model import Model
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.systems.system.matching import Match, match
+from orchestration.systems.system.variable_names import component_of
+
+STEP, PERIOD, STOP = 0.001, 0.01, 10.0
+"""[s], where no FMU has a default experiment"""
+WIDTH = 110
+"""Characters of a line; a longer list has a line for each of its members"""
+_TO_FILL_IN = (
+    "# Objectives of a run, and the criterion of a good one, which `quadcosim limit` needs. Fill in, for instance:",
+    "# [objectives]",
+    '# peak = "max(abs({0}))"',
+    '# final = "max(abs({0}) * (time >= 0.75 * stop_time))"',
+    "#",
+    "# [criterion]",
+    '# good = "final < 0.05"',
+    '# diverged = "abs({0}) > 1e3"',
+)
+TAKEN = frozenset(("rows", "time", "stop_time", "sampled"))
+"""Names that no component can have"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Proposal:
+    """A system file as text, its guesses, and what it leaves undecided."""
+
+    text: str
+    guessed: tuple[str, ...]
+    """connections of variables with different names, and which components are controllers"""
+    undecided: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProposedResources:
+    """Computers and networks of other files, for the proposal."""
+
+    tables: Mapping[str, Any] = field(default_factory=dict)
+    """of a system file"""
+    guessed: tuple[str, ...] = ()
+    undecided: tuple[str, ...] = ()
+
+
+def propose(fmus: Sequence[tuple[str, Model]], folder: Path, resources: ProposedResources | None = None) -> Proposal:
+    """Components named after their models, connected by name, type and unit; for a file that lies in `folder`.
+
+    Each FMU is given by the path or name that the user wrote, with its model description.
+
+    An FMU whose outputs are all discrete is proposed as sampled, and so is the controller of a loop; any other in
+    continuous time. Raises `UsageError` without any FMU.
+    """
+    resources = resources or ProposedResources()
+    if not (fmus or resources.tables):
+        raise UsageError("expected at least one FMU")
+    models = [model for _, model in fmus]
+    named = dict(zip(_names(models), models))
+    matches = match(named)
+    sampled = {name: "all its outputs are discrete" for name, model in named.items() if _is_discrete(model)}
+    guessed = _controllers(named, matches.matches, sampled)
+    sampled |= guessed
+    stop = max((_experiment(model, "stopTime") or 0.0 for model in models), default=0.0) or STOP
+    blocks = [
+        [
+            "# Proposed from what the FMUs say of themselves. Look at each line: names are no proof."
+            if fmus
+            else "# Proposed from what the files of tasks and messages say. Look at each line.",
+            f"stop_time = {stop!r}",
+        ],
+        *(_component(name, text, model, folder, sampled.get(name)) for name, (text, model) in zip(named, fmus)),
+        *_connections(sorted(matches.matches, key=lambda m: list(named).index(component_of(m.start)))),
+    ]
+    blocks += _resources(resources.tables)
+    undecided = (*matches.undecided, *resources.undecided)
+    if undecided:
+        blocks.append(["# Not decided:", *(f"# - {line}" for line in undecided)])
+    moving = sorted(named, key=lambda name: name in sampled)
+    first = next((f"{n}.{v}" for n in moving for v in named[n].names("output", kinds=("Real",))), None)
+    if first is not None:
+        blocks.append([line.format(first) for line in _TO_FILL_IN])
+    return Proposal(
+        text="\n\n".join("\n".join(block) for block in blocks) + "\n",
+        guessed=(
+            *_guesses(matches.matches),
+            *(f"{name} is sampled, as {why}" for name, why in guessed.items()),
+            *resources.guessed,
+        ),
+        undecided=undecided,
+    )
+
+
+def _resources(tables: Mapping[str, Any]) -> list[list[str]]:
+    import tomli_w
+
+    return [
+        [
+            f"[{table}.{_key(name)}]",
+            *tomli_w.dumps({key: value for key, value in one.items() if key != parts}).splitlines(),
+            *(f"{parts}.{_key(part)} = {_inline(keys)}" for part, keys in one[parts].items()),
+        ]
+        for table, parts in (("computers", "tasks"), ("networks", "messages"))
+        for name, one in tables.get(table, {}).items()
+    ]
+
+
+def _inline(keys: Mapping[str, Any]) -> str:
+    pairs = (f"{key} = {_text(value) if isinstance(value, str) else repr(value)}" for key, value in keys.items())
+    return f"{{ {', '.join(pairs)} }}"
+
+
+def _key(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _text(name)
+
+
+def _names(models: Iterable[Model]) -> list[str]:
+    """Unique names of components after the names of the models."""
+    names: list[str] = []
+    for model in models:
+        plain = re.sub(r"\W+", "_", model.name.rpartition(".")[2], flags=re.ASCII).strip("_") or "component"
+        plain = f"_{plain}" if plain[0].isdigit() else plain
+        numbered = (plain, *(f"{plain}_{k}" for k in range(2, 2 + len(names))), f"{plain}_{2 + len(names)}")
+        names.append(next(name for name in numbered if name not in names and name not in TAKEN))
+    return names
+
+
+def _is_discrete(model: Model) -> bool:
+    outputs = model.names("output")
+    return bool(outputs) and all(model.variables[name].variability != "continuous" for name in outputs)
+
+
+def _controllers(named: Mapping[str, Model], found: Iterable[Match], sampled: Container[str]) -> dict[str, str]:
+    """The likely controller of each two components in continuous time that feed each other, and the reason."""
+    pairs = {(component_of(m.start), component_of(m.end)) for m in found}
+    loops = [(a, b) for a, b in pairs if (b, a) in pairs and a not in sampled and b not in sampled]
+    by_feedthrough = {
+        a: _FEEDTHROUGH for a, b in loops if _has_feedthrough(named[a]) and not _has_feedthrough(named[b])
+    }
+    by_name = {a: _NAMED for a, b in loops if _NAMES.search(a) and not _NAMES.search(b)}
+    return dict(sorted((by_feedthrough | by_name).items()))
+
+
+_NAMES = re.compile(r"control|ctrl|pid|lqr|regulator|autopilot", re.IGNORECASE)
+_NAMED, _FEEDTHROUGH = (
+    "its name is that of a controller",
+    "all its outputs follow its inputs at once, as a controller's do",
+)
+
+
+def _has_feedthrough(model: Model) -> bool:
+    return all(model.depends_on(output) for output in model.names("output"))
+
+
+def _component(name: str, fmu: str, model: Model, folder: Path, sampled: str | None) -> list[str]:
+    """The lines of a component; `sampled` is the reason for sampling it."""
+    place = _relative(Path(fmu), folder) if fmu.endswith(".fmu") else fmu
+    lines = [f"[components.{name}]", f"fmu = {_text(place)}"]
+    step = _experiment(model, "stepSize")
+    if sampled is not None:
+        note = "" if step else "; its FMU does not say how often"
+        lines.append(f"sampling = {{ period = {step or PERIOD!r} }}    # sampled, as {sampled}{note}")
+    else:
+        note = "" if step else "    # its FMU does not say how long"
+        lines.append(f"step = {step or STEP!r}{note}")
+    return lines
+
+
+def _relative(path: Path, folder: Path) -> str:
+    try:
+        return Path(os.path.relpath(path.absolute(), folder.absolute())).as_posix()
+    except ValueError:  # another drive
+        return path.absolute().as_posix()
+
+
+def _experiment(model: Model, key: str) -> float | None:
+    """A number of the FMU's default experiment, if present and positive."""
+    try:
+        value = float(getattr(model.description.defaultExperiment, key, None) or 0.0)
+    except ValueError:
+        return None
+    return value if value > 0.0 else None
+
+
+def _connections(found: Sequence[Match]) -> list[list[str]]:
+    """A message for each pair of components, or several where signals are converted differently."""
+    groups: dict[tuple[str, str, str], list[Match]] = {}
+    for m in found:
+        pair = component_of(m.start), component_of(m.end)
+        groups.setdefault((*pair, "" if m.conversion.is_none else str(m.conversion)), []).append(m)
+    counts: dict[str, itertools.count[int]] = {}
+    blocks = []
+    for (sender, receiver, converted), members in groups.items():
+        base = f"{sender}_to_{receiver}"
+        count = next(counts.setdefault(base, itertools.count(1)))
+        blocks.append(_connection(base if count == 1 else f"{base}_{count}", members, converted))
+    return blocks
+
+
+def _connection(name: str, members: Sequence[Match], converted: str) -> list[str]:
+    lines = ["[[connections]]", f"name = {_text(name)}"]
+    lines += _list("from", [m.start for m in members])
+    lines += _list("to", [m.end for m in members])
+    if converted:
+        conversion = members[0].conversion
+        lines.append(f"scale = {conversion.scale!r}    # its units differ")
+        lines += [f"offset = {conversion.offset!r}"] if conversion.offset else []
+    return [*(f"# {guess}" for guess in _guesses(members)), *lines]
+
+
+def _guesses(matches: Iterable[Match]) -> tuple[str, ...]:
+    return tuple(f"{m.end} has {m.start} because {m.why}" for m in matches if m.why is not None)
+
+
+def _list(key: str, ends: Sequence[str]) -> list[str]:
+    line = f"{key} = [{', '.join(map(_text, ends))}]"
+    return [line] if len(line) <= WIDTH else [f"{key} = [", *(f"    {_text(end)}," for end in ends), "]"]
+
+
+def _text(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)

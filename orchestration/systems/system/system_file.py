@@ -1,0 +1,173 @@
+"""Reads system files (TOML), and provides the JSON schema with which editors complete them."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from orchestration.foundation.basics.documents import read_toml
+from orchestration.foundation.basics.errors import UsageError, at_place
+from orchestration.foundation.basics.typed_tables import fields_of, parsed, table_of
+from orchestration.systems.system.choices import Order
+from orchestration.systems.system.component import Component
+from orchestration.systems.system.computers import Arrivals, Computer, Message, Network, Task
+from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.criterion import Criterion
+from orchestration.systems.system.distribution_table import DistributionTable, with_distributions
+from orchestration.systems.system.model import System
+from orchestration.systems.system.parameters import flattened, parameters_in
+from orchestration.systems.system.paths import changed, for_each
+from orchestration.systems.system.requirements import require
+from orchestration.systems.system.sampling import Sampling, SamplingOnArrival
+from orchestration.systems.system.source import Source
+
+Part = TypeVar("Part")
+
+
+class SamplingTable(table_of(Sampling, within=[DistributionTable], period=(float | None, None))):  # type: ignore[misc]
+    """When a digital task runs: every period, or whenever a message arrives."""
+
+    on: str | None = None
+    """The connection whose arriving messages it runs on, in place of a period."""
+
+
+ComponentTable = table_of(Component, within=[SamplingTable], parameters=(dict[str, Any], {}))
+ConnectionTable = table_of(
+    Connection,
+    within=[DistributionTable],
+    called={"start": "from", "end": "to"},
+    without=["stated"],
+    name=(str | None, None),
+    order=(Order | None, None),
+    noise=(float | dict[str, Any], {}),
+    quantisation=(float | dict[str, Any], {}),
+)
+SourceTable = table_of(Source, file=(str | None, None))
+CriterionTable = table_of(Criterion)
+ArrivalsTable = table_of(Arrivals)
+TaskTable = table_of(Task, within=[ArrivalsTable, DistributionTable])
+ComputerTable = table_of(Computer, within=[TaskTable])
+MessageTable = table_of(Message, within=[ArrivalsTable, DistributionTable], called={"start": "from", "end": "to"})
+NetworkTable = table_of(Network, within=[MessageTable])
+
+
+_PARTS = [ComponentTable, ConnectionTable, SourceTable, ComputerTable, NetworkTable, CriterionTable]
+
+
+class SystemTable(table_of(System, within=_PARTS)):  # type: ignore[misc]
+    """Components, what connects and drives them, the objectives of a run and the criterion of a good one."""
+
+    order: Order = "gauss-seidel"
+    """The default order of connections."""
+
+
+def schema() -> dict[str, Any]:
+    """The JSON schema of a system file."""
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **SystemTable.model_json_schema(by_alias=True),
+        "title": "quadcosim system",
+    }
+
+
+def load_system(path: str | Path) -> System:
+    """Read a system file; paths in it are relative to its folder.
+
+    Raises `UsageError` in one line that names the place and what is valid there.
+    """
+    path = Path(path)
+    tables = read_toml(path, "system file")
+    try:
+        return system_from_tables(tables, path.parent)
+    except UsageError as error:
+        raise UsageError(f"{path}: {error}") from error
+
+
+def is_system(tables: Mapping[str, Any]) -> bool:
+    """Whether a TOML document is a system file rather than a scenario of the quadrotor."""
+    return not {"components", "computers", "networks"}.isdisjoint(tables)
+
+
+def system_from_tables(tables: Mapping[str, Any], folder: Path) -> System:
+    """The system of a TOML document whose relative paths start at `folder`; raises `UsageError`."""
+    table = parsed(tables, SystemTable)
+    given = {key: getattr(table, key) for key in fields_of(SystemTable) if key != "order"}
+    system = System(
+        **given
+        | {
+            "components": {name: _component(name, value, folder) for name, value in table.components.items()},
+            "connections": tuple(
+                _connection(i, value, table.order, folder) for i, value in enumerate(table.connections)
+            ),
+            "sources": {name: _source(name, value, folder) for name, value in table.sources.items()},
+            "computers": {name: _computer(name, value, folder) for name, value in table.computers.items()},
+            "networks": {name: _network(name, value, folder) for name, value in table.networks.items()},
+            "criterion": _part("criterion", Criterion, table.criterion.model_dump()),
+            "operating_point": dict(flattened(table.operating_point)),
+        }
+    )
+    for name in system.optional:
+        known = ", ".join(system.objectives) or "no objectives"
+        require(name in system.objectives, "optional", name, f"one of {known}")
+    try:
+        changed(system, system.operating_point)
+    except UsageError as error:
+        raise UsageError(f"operating_point: {error}") from error
+    return system
+
+
+def _component(name: str, table: Any, folder: Path) -> Component:
+    place = f"components.{name}"
+    keys = table.model_dump(exclude={"sampling"})
+    keys["fmu"] = str(folder / table.fmu) if table.fmu.endswith(".fmu") else table.fmu
+    keys["parameters"] = parameters_in(table.parameters, f"{place}.parameters")
+    if table.sampling is not None:
+        keys["sampling"] = _sampling(f"{place}.sampling", table.sampling, folder)
+    return _part(place, Component, keys)
+
+
+def _sampling(place: str, table: Any, folder: Path) -> Sampling:
+    keys = {key: value for key, value in with_distributions(f"{place}.", table, folder).items() if value is not None}
+    if table.on is None:
+        return _part(place, Sampling, keys)
+    require(table.period is None, f"{place}.period", table.period, "none beside on: messages say when it runs")
+    return _part(place, SamplingOnArrival, keys)
+
+
+def _computer(name: str, table: Any, folder: Path) -> Computer:
+    place = f"computers.{name}"
+    tasks = {key: _with_arrivals(f"{place}.tasks.{key}", Task, task, folder) for key, task in table.tasks.items()}
+    return _part(place, Computer, table.model_dump(exclude={"tasks"}) | {"tasks": tasks})
+
+
+def _network(name: str, table: Any, folder: Path) -> Network:
+    place, of = f"networks.{name}", table.messages.items()
+    messages = {key: _with_arrivals(f"{place}.messages.{key}", Message, one, folder) for key, one in of}
+    return _part(place, Network, table.model_dump(exclude={"messages"}) | {"messages": messages})
+
+
+def _with_arrivals(place: str, kind: type[Part], table: Any, folder: Path) -> Part:
+    arrivals = table.arrivals and _part(f"{place}.arrivals", Arrivals, table.arrivals.model_dump())
+    return _part(place, kind, with_distributions(f"{place}.", table, folder) | {"arrivals": arrivals})
+
+
+def _connection(index: int, table: Any, order: Order, folder: Path) -> Connection:
+    name = table.name if table.name is not None else str(index)
+    keys = with_distributions(f"connections.{name}.", table, folder) | {"name": name}
+    keys["order"] = table.order or order
+    keys["stated"] = bool({"scale", "offset"} & table.model_fields_set)
+    for what in ("noise", "quantisation"):
+        keys[what] = for_each(table.start, keys[what])
+        for variable, value in keys[what].items():
+            if isinstance(value, bool) or not isinstance(value, (int, float)):
+                raise UsageError(f"connections.{keys['name']}.{what}.{variable} = {value!r}: expected a number")
+    return _part(f"connections.{keys['name']}", Connection, keys)
+
+
+def _source(name: str, table: Any, folder: Path) -> Source:
+    file = None if table.file is None else folder / table.file
+    return _part(f"sources.{name}", Source, {**table.model_dump(), "file": file})
+
+
+def _part(place: str, kind: type[Part], keys: Mapping[str, Any]) -> Part:
+    with at_place(place):
+        return kind(**keys)

@@ -1,0 +1,1 @@
+"""What is computed without simulating: linear loops, exact costs, certificates."""

@@ -1,0 +1,95 @@
+"""Searches periodic sequences of letters that make a loop unstable, and so bound certificates from above."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from orchestration.foundation.basics.bisection import bisected
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.theory.certificates.family import LoopFamily
+
+LONGEST = 6
+"""letters after which a sequence repeats"""
+SCAN = 24
+"""values that are tried before the first unstable one is bisected"""
+FINE = 1e-4
+"""of the range: the tolerance of the bisection"""
+
+Draw = tuple[int, tuple[float, ...]]
+"""Which letter, and the values of its parameters"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BreakingSequence:
+    """A sequence that makes a loop unstable."""
+
+    value: float
+    """the least at which one was found"""
+    sequence: tuple[tuple[str, tuple[float, ...]], ...]
+    """letters with their parameters, repeated"""
+    radius: float
+    """spectral radius of the sequence"""
+
+
+def unstable_sequence(family: LoopFamily, longest: int = LONGEST) -> tuple[tuple[Draw, ...], float] | None:
+    """The sequence that grows most by letter, each parameter at an end of its range; None if none is unstable."""
+    draws = [(i, point) for i, x in enumerate(family.letters) for point in itertools.product(*x.ranges)]
+    maps = {draw: family.at(family.letters[draw[0]], draw[1]) for draw in dict.fromkeys(draws)}
+    best: tuple[float, tuple[Draw, ...]] | None = None
+    for word, product in _cycles(family, maps, longest):
+        radius = float(np.abs(np.linalg.eigvals(product)).max())
+        if radius >= 1.0 and (best is None or radius ** (1.0 / len(word)) > best[0] * (1.0 + 1e-12)):
+            best = radius ** (1.0 / len(word)), word
+    return None if best is None else (best[1], best[0] ** len(best[1]))
+
+
+def _cycles(family: LoopFamily, maps: dict[Draw, Floats], longest: int) -> Iterator[tuple[tuple[Draw, ...], Floats]]:
+    """Words that lead from a mode back to it, one of each rotation, with their products."""
+    draws = list(maps)
+    seen = set[tuple[int, ...]]()
+
+    def extended(
+        start: int, mode: int, word: tuple[int, ...], product: Floats
+    ) -> Iterator[tuple[tuple[Draw, ...], Floats]]:
+        if word and mode == start:
+            least = min(word[i:] + word[:i] for i in range(len(word)))
+            if least not in seen:
+                seen.add(least)
+                yield tuple(draws[i] for i in word), product
+        if len(word) == longest:
+            return
+        for i, draw in enumerate(draws):
+            for begin, end in family.letters[draw[0]].moves:
+                if begin == mode:
+                    yield from extended(start, end, (*word, i), maps[draw] @ product)
+
+    for start in sorted({begin for letter in family.letters for begin, _ in letter.moves}):
+        size = len(family.kept)
+        yield from extended(start, start, (), np.eye(size))
+
+
+def least_breaking(
+    family_up_to: Callable[[float], LoopFamily], limit: float, longest: int = LONGEST
+) -> BreakingSequence | None:
+    """The least value up to `limit` at which the scan finds an unstable sequence."""
+    found = functools.cache(lambda value: unstable_sequence(family_up_to(value), longest))
+    rising = [min(limit, limit * i / SCAN) for i in range(SCAN + 1)]
+    first = next((i for i in range(1, SCAN + 1) if found(rising[i])), None)
+    if first is None:
+        return None
+    value = bisected(lambda v: found(v) is not None, rising[first - 1], rising[first], FINE * limit).bad
+    return breaking_at(family_up_to(value), value, longest)
+
+
+def breaking_at(family: LoopFamily, value: float, longest: int = LONGEST) -> BreakingSequence | None:
+    """An unstable sequence of a family; None if none was found."""
+    found = unstable_sequence(family, longest)
+    if found is None:
+        return None
+    sequence = tuple((family.letters[i].name, point) for i, point in found[0])
+    return BreakingSequence(value=value, sequence=sequence, radius=found[1])

@@ -1,0 +1,149 @@
+"""Varying quantities of a computer or a network that delays a loop, translated to draws of a `Timeline`.
+
+Whatever the execution times are, a component samples within a window after its nominal sample, and its messages arrive
+within another. A loop that no sequence of draws from these windows makes unstable is stable on that computer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from orchestration.foundation.basics.bisection import bisected
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.systems.computers.windows import Window, windows_of
+from orchestration.systems.system.distribution import Distribution, lowest
+from orchestration.systems.system.distribution import Varying as Delay
+from orchestration.systems.system.model import System
+from orchestration.systems.system.paths import changed
+from orchestration.systems.system.placement import placed_messages, placed_tasks
+from orchestration.systems.system.times import NANOSECONDS, exact_nanoseconds, floor_to_nanoseconds
+from orchestration.theory.certificates.breaking import FINE
+from orchestration.theory.certificates.events import JITTER, LATENCY, SHIFT, Varying
+from orchestration.theory.certificates.family import LoopFamily
+from orchestration.theory.certificates.parts import CertifiedLoop
+from orchestration.theory.certificates.timeline import LoopTimeline
+
+EXECUTION = "execution"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cause:
+    """The execution time of a task, or the jitter of a task or of a message: each draw is from 0 to a value."""
+
+    key: str
+    path: str
+    period: float
+    """of that task or message [s]; the value is less"""
+
+    def with_draws_up_to(self, system: System, value: float) -> System:
+        """The system with draws up to a value [s]."""
+        spread = self.key == EXECUTION and value > 0.0
+        return changed(system, {self.path: Distribution(uniform=(0.0, value)) if spread else value})
+
+
+def cause_at(system: System, path: str) -> Cause | None:
+    """The cause at a path; None: it is no execution time and no jitter of a task or message."""
+    for task in placed_tasks(system.computers):
+        if path in (f"{task.place}.{EXECUTION}", f"{task.place}.jitter"):
+            return Cause(key=path.rpartition(".")[2], path=path, period=task.task.period or task.task.due)
+    for message in placed_messages(system.networks):
+        if path == f"{message.place}.jitter":
+            return Cause(key="jitter", path=path, period=message.message.period or message.message.due or 0.0)
+    return None
+
+
+class ScheduledLoop:
+    """A loop that a computer or a network delays."""
+
+    def __init__(self, loop: CertifiedLoop, system: System, cause: Cause) -> None:
+        """`loop` is that of the components of `system` without delays.
+
+        Raises `UsageError` where there is no bound of their lateness, where a message may arrive after the next sample,
+        and for more than one delayed component.
+        """
+        self._loop, self._system, self._cause = loop, system, cause
+        self.family(0.0)
+
+    def family(self, value: float) -> LoopFamily:
+        """The family for draws up to a value [s]; raises `UsageError` as above."""
+        windows = self._windows(value)
+        timeline = LoopTimeline(replace(self._loop, system=self._earliest_system(windows)), self._varying(windows))
+        largest_sum = [window.together / NANOSECONDS for window in windows.values() if not window.is_certain]
+        return timeline.family(_widths(windows), largest_sum=largest_sum[0] if largest_sum else None)
+
+    def largest(self) -> float:
+        """The largest value for which there is a family [s]."""
+
+        def fails(value: float) -> bool:
+            try:
+                self.family(value)
+            except UsageError:
+                return True
+            return False
+
+        return floor_to_nanoseconds(bisected(fails, 0.0, self._cause.period, FINE * self._cause.period).good or 0.0)
+
+    def value_of(self, family: LoopFamily) -> float:
+        """The largest value [s] whose windows are no wider than those of a family."""
+        most = family.largest()
+
+        def fails(value: float) -> bool:
+            try:
+                widths = _widths(self._windows(value))
+            except UsageError:
+                return True
+            return len(widths) > len(most) or (len(widths) == len(most) and any(a > b for a, b in zip(widths, most)))
+
+        found = bisected(fails, 0.0, self._cause.period, 0.5 / NANOSECONDS).good or 0.0
+        return min(floor_to_nanoseconds(found), self.largest())
+
+    def _windows(self, value: float) -> dict[str, Window]:
+        windows = windows_of(self._cause.with_draws_up_to(self._system, value))
+        late = [name for name, window in windows.items() if not window.is_certain]
+        if len(late) > 1:
+            raise UsageError(
+                f"{self._cause.path}: delays {', '.join(late)}; expected one delayed component, other tasks as load"
+            )
+        return windows
+
+    def _varying(self, windows: Mapping[str, Window]) -> list[Varying]:
+        path = self._cause.path
+        return [
+            Varying(kind=kind, name=name, path=path)
+            for name, window in windows.items()
+            for kind in _draw_widths(window)
+        ]
+
+    def _earliest_system(self, windows: Mapping[str, Window]) -> System:
+        """The system of the loop, each component and message as early as possible."""
+        components = dict(self._loop.system.components)
+        for name, window in windows.items():
+            of_loop, task = components[name].sampling, self._system.components[name].sampling
+            assert of_loop is not None
+            assert task is not None
+            offset = task.offset + window.earliest / NANOSECONDS * task.clock_ratio
+            components[name] = replace(components[name], sampling=replace(of_loop, offset=offset, jitter=0.0))
+        connections = tuple(
+            replace(x, delay=_least_delay(x.delay, windows[x.sender])) if x.sender in windows else x
+            for x in self._loop.system.connections
+        )
+        return replace(self._loop.system, components=components, connections=connections)
+
+
+def _least_delay(delay: Delay, window: Window) -> float:
+    """The delay plus the least time between an earliest sample and its messages [s]."""
+    least = window.least - (window.earliest if window.at_deadline else 0)
+    return float(exact_nanoseconds(lowest(delay)) + least) / NANOSECONDS
+
+
+def _draw_widths(window: Window) -> dict[str, int]:
+    """The kinds of draws of a window, each from 0 to a width [ns]."""
+    shift = SHIFT if window.at_deadline else JITTER
+    widths = {shift: window.shift, LATENCY: window.spread}
+    return {kind: width for kind, width in widths.items() if width}
+
+
+def _widths(windows: Mapping[str, Window]) -> list[float]:
+    """The widths of all draws [s]."""
+    return [width / NANOSECONDS for window in windows.values() for width in _draw_widths(window).values()]

@@ -1,0 +1,109 @@
+"""The check of a certificate's file: what it proves, and whether it is about a system."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.extras import needs
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.simulation.requests.request import RequestLike, request_of
+from orchestration.theory.certificates.causes import ScheduledLoop
+from orchestration.theory.certificates.certificate import Certificate, read_certificate
+from orchestration.theory.certificates.events import LOSS, Varying
+from orchestration.theory.certificates.family import LoopFamily
+from orchestration.theory.certificates.margin import cause_in, expect_without_scheduler, linear_loop_of, varying_of
+from orchestration.theory.certificates.timeline import LoopTimeline
+from orchestration.theory.stability.known_loops import rested
+
+ROUNDING = 1e-12
+"""of the largest entry of a row: the largest value that counts as 0"""
+
+
+class AnotherLoop(UsageError):
+    """A certificate is about another loop than that of the system."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Checked:
+    """What a certificate proves, from its numbers."""
+
+    ranges: dict[str, tuple[tuple[float, float], ...]]
+    """By letter, an event of a period: the ranges of its values [s]."""
+    runs: dict[str, int | None]
+    """By letter: how many times in a row it may come; None: any number."""
+    states: int
+    """The size of the state from period to period."""
+    radius: float
+    """Relative: the proof covers all matrices within it."""
+    of: tuple[str, ...]
+    """The paths that vary in the system that it was compared with; empty without a system."""
+    up_to: float | None = None
+    """Of a path of a computer or a network: the largest value [s] that delays the loop no more than these ranges."""
+
+
+@needs("flint")
+def check(path: str | Path, request: RequestLike | None = None) -> Checked:
+    """Verify the certificate of a file, and, with a system, that its matrices are those of that system's loop.
+
+    Raises `QuadcosimError` for a certificate that proves nothing, `UsageError` for a file that is none and for one of
+    another loop.
+    """
+    from orchestration.theory.certificates.checker import verified
+
+    certificate = read_certificate(Path(path))
+    proof, up_to = verified(certificate), None
+    if request is not None:
+        request = request_of(request)
+        cause = cause_in(request, certificate.of[0]) if len(certificate.of) == 1 else None
+        if cause is None:
+            expect_without_scheduler(request)
+            varying = [varying_of(request, of) for of in certificate.of]
+            family = _family_for(certificate, LoopTimeline(linear_loop_of(request), varying), varying)
+        else:
+            scheduled = ScheduledLoop(linear_loop_of(request), rested(request), cause)
+            up_to = scheduled.value_of(certificate.family)
+            family = scheduled.family(up_to)
+        expect_same_family(certificate, family)
+    return Checked(
+        ranges=proof.ranges, runs=proof.runs, states=proof.states, radius=proof.radius,
+        of=() if request is None else certificate.of, up_to=up_to,
+    )  # fmt: skip
+
+
+def _family_for(certificate: Certificate, timeline: LoopTimeline, varying: list[Varying]) -> LoopFamily | None:
+    """The family of a system for the ranges and runs of a certificate; None: the system has none."""
+    own = certificate.family
+    timed = sum(each.kind != LOSS for each in varying)
+    if any(len(letter.ranges) != timed for letter in own.letters):
+        raise AnotherLoop("other quantities vary in the certificate than at the paths that it names")
+    most = own.largest()
+    run = max(len(letter.moves) for letter in own.letters) - 1  # an arrival may follow any number of losses
+    return timeline.family(most, run=run) if not most or sum(most) <= timeline.largest() else None
+
+
+def expect_same_family(certificate: Certificate, family: LoopFamily | None) -> None:
+    """Raise `AnotherLoop` where a certificate is not of that family, within the radius that its proof covers."""
+    own = certificate.family
+    if family is None or (family.kept, family.letters) != (own.kept, own.letters):
+        raise AnotherLoop("the events of a period of the system are not those of the certificate")
+    if family.matrices.keys() != own.matrices.keys():
+        raise AnotherLoop("the system has other matrices than the certificate")
+    for name, theirs in family.matrices.items():
+        if not _is_within(own.matrices[name], theirs, certificate.radius):
+            raise AnotherLoop(f"{name}: the system's matrix is farther from the certificate's than the proof covers")
+
+
+def _is_within(own: Floats, theirs: Floats, radius: float) -> bool:
+    """Whether a matrix is in the set that the proof covers."""
+    from orchestration.theory.certificates.checker import OF_THE_LARGEST
+
+    if own.shape != theirs.shape:
+        return False
+    largest = np.abs(own).max(axis=1, keepdims=True)
+    exact = (np.count_nonzero(own, axis=1) == 1)[:, None] & (own.sum(axis=1, keepdims=True) == 1.0)
+    wide = np.where((own != 0.0) & ~exact, radius * (np.abs(own) + OF_THE_LARGEST * largest), ROUNDING * largest)
+    return bool((np.abs(own - theirs) <= wide).all())

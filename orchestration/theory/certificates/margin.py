@@ -1,0 +1,279 @@
+"""How far a quantity of a loop may vary from draw to draw: certified, breaking, and by the small-gain bound."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from orchestration.components.fmi.foreign import isolated_call
+from orchestration.components.fmi.reuse import Instances
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.extras import needs
+from orchestration.foundation.basics.progress import ShareProgress, share_reporter
+from orchestration.foundation.basics.terminal import Share
+from orchestration.simulation.requests.ranges import paths_in
+from orchestration.simulation.requests.request import RequestLike, request_of
+from orchestration.systems.system.distribution import lowest
+from orchestration.systems.system.files import files_of
+from orchestration.systems.system.placement import messages_by_connection, tasks_of
+from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
+from orchestration.systems.system.times import NANOSECONDS, floor_to_nanoseconds
+from orchestration.systems.system.variable_names import variable_of
+from orchestration.theory.certificates.breaking import LONGEST, BreakingSequence, breaking_at, least_breaking
+from orchestration.theory.certificates.causes import Cause, ScheduledLoop, cause_at
+from orchestration.theory.certificates.events import DELAY, JITTER, LOSS, Varying
+from orchestration.theory.certificates.family import LoopFamily
+from orchestration.theory.certificates.parts import CertifiedLoop, certified_loop
+from orchestration.theory.certificates.repeated import least_repeated
+from orchestration.theory.certificates.timeline import LoopTimeline
+from orchestration.theory.exact.scheduled import without_scheduler
+from orchestration.theory.stability.delay_bounds import SampledLoop, certain_jitter
+from orchestration.theory.stability.known_loops import rested
+from orchestration.theory.stability.loop_at_rest import at_rest
+
+MOST_LOST = 8
+"""losses in a row that are considered"""
+SHARES = (0.95, 0.97, 0.98, 0.99, 1.0)
+"""of the breaking or the largest value: tried for a certificate, upward; below the first by bisection"""
+FINEST = 0.02
+"""of the breaking value: the tolerance of the bisection"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Certified:
+    """How far a quantity may vary; times in seconds, losses as the longest run of them."""
+
+    of: str
+    """The path of the varying quantity: each draw is anywhere from 0 to the value."""
+    certified: float | None
+    """The largest value for which a proof was found that no sequence makes the loop unstable; None: the loop is
+    unstable even for 0, or on its computer no proof was found for 0."""
+    breaking: float | None
+    """The least value at which a periodic sequence was found that makes it unstable; None: none was found."""
+    breaking_sequence: tuple[tuple[str, tuple[float, ...]], ...]
+    """That sequence: the letter of each draw with its values, repeated."""
+    small_gain: float | None
+    """The small-gain bound of Kao and Lincoln; None where it does not apply."""
+    largest: float
+    """The largest value that was considered."""
+    searched: str
+    """Which sequences were tried for `breaking`."""
+    states: int
+    """The size of the state from period to period."""
+    certificate: str | None
+    """The proof, as the text of a file that `check` verifies."""
+
+    def save(self, path: str | Path) -> Path:
+        """Write the certificate; raises `UsageError` where there is none."""
+        if self.certificate is None:
+            raise UsageError("there is no certificate to write")
+        Path(path).write_text(self.certificate, encoding="utf-8")
+        return Path(path)
+
+
+@needs("flint", "clarabel")
+def margin(request: RequestLike, of: str, *, progress: ShareProgress = None) -> Certified:
+    """How far a quantity of a system may vary from draw to draw, the loop linearised about its operating point.
+
+    `of` is the path of a sampled component's `sampling.jitter`, of a connection's `delay_jitter`, or of its `loss`,
+    which means the longest run of messages lost in a row; all else is without jitter. Of a system with computers or
+    networks it is that of a task's `execution`, or of the `jitter` of a task or message; the others vary as the file
+    allows. The result is about the linear loop, not about large errors.
+
+    Raises `UsageError` where the loop has no linear form or the path is unsupported, saying why.
+    """
+    request = request_of(request)
+    cause = cause_in(request, of)
+    if cause is not None:
+        with share_reporter(progress, "certifying") as report:
+            return _of_cause(request, cause, report)
+    varying = varying_of(request, of)
+    expect_without_scheduler(request)
+    loop = linear_loop_of(request)
+    timeline = LoopTimeline(loop, [varying])
+    with share_reporter(progress, "certifying") as report:
+        return (_of_losses if varying.kind == LOSS else _of_times)(timeline, varying, report)
+
+
+def linear_loop_of(request: Request) -> CertifiedLoop:
+    """The loop of a request about its operating point, from its FMUs, without computers and networks."""
+    return isolated_call(files_of(system_of(request)).fmus.values(), _linear_loop_of, request)
+
+
+def _linear_loop_of(request: Request) -> CertifiedLoop:
+    instances = Instances()
+    try:
+        with errors_in_own_terms(request), at_rest(without_scheduler(rested(request)), instances) as rest:
+            return certified_loop(rest)
+    finally:
+        instances.close()
+
+
+def expect_without_scheduler(request: Request) -> None:
+    """Raise `UsageError` for a system with a scheduler, naming the paths to use instead."""
+    system = system_of(request)
+    for name, task in tasks_of(system).items():
+        raise UsageError(
+            f"{task.place}: a scheduler decides when {name} samples; expected --of {task.place}.execution, as a cause"
+        )
+    for name, message in messages_by_connection(system).items():
+        raise UsageError(f"{message.place}: {name} waits for other frames; expected --of the jitter of one, as a cause")
+
+
+def cause_in(request: Request, of: str) -> Cause | None:
+    """The cause at a path of a computer or a network; None: it is of neither."""
+    (path, *others) = paths_in(request, of) or (of,)
+    return None if others else cause_at(system_of(request), path)
+
+
+def varying_of(request: Request, of: str) -> Varying:
+    """The varying quantity at a path; raises `UsageError` for an unsupported path."""
+    found = paths_in(request, of)
+    for path in found[:1] if len(found) == 1 else ():
+        table, _, rest = path.partition(".")
+        name, _, key = rest.rpartition(".")
+        if table == "connections" and key in (DELAY, LOSS):
+            return Varying(kind=key, name=name, path=path)
+        if table == "components" and key == JITTER:
+            return Varying(kind=key, name=name.removesuffix(".sampling"), path=path)
+    raise UsageError(
+        f"--of {of}: expected connections.NAME.delay_jitter, connections.NAME.loss, components.NAME.sampling.jitter, "
+        "computers.NAME.tasks.NAME.execution or jitter, or networks.NAME.messages.NAME.jitter"
+    )
+
+
+def _of_times(timeline: LoopTimeline, varying: Varying, progress: Share) -> Certified:
+    def up_to(value: float) -> LoopFamily:
+        return timeline.family([value])
+
+    largest = floor_to_nanoseconds(timeline.largest())
+    searched = (
+        f"draws at either end of each range, sequences that repeat after at most {LONGEST}, values up to {largest:g} s"
+    )
+    if breaking_at(up_to(0.0), 0.0) is not None:
+        return _unstable(varying, largest, searched, up_to(0.0))
+    broken = least_breaking(up_to, largest)
+    top = largest if broken is None else broken.value
+    value, certificate = largest_certified(up_to, [varying.path], top, progress)
+    return Certified(
+        of=varying.path, certified=value, breaking=None if broken is None else broken.value,
+        breaking_sequence=() if broken is None else broken.sequence,
+        small_gain=small_gain(timeline.loop, varying), largest=largest, searched=searched,
+        states=len(up_to(top).kept), certificate=certificate,
+    )  # fmt: skip
+
+
+def _of_losses(timeline: LoopTimeline, varying: Varying, progress: Share) -> Certified:
+    from orchestration.theory.certificates.certify import find_certificate
+
+    searched = f"sequences that repeat after at most the run and {LONGEST // 2} messages, runs up to {MOST_LOST}"
+    if breaking_at(timeline.family(), 0.0) is not None:
+        return _unstable(varying, MOST_LOST, searched, timeline.family())
+    broken: BreakingSequence | None = None
+    value, certificate = None, None
+    for run in range(MOST_LOST + 1):
+        progress(run / (MOST_LOST + 1))
+        family = timeline.family(run=run)
+        broken = breaking_at(family, run, run + LONGEST // 2)
+        if broken is not None:
+            break
+        found = find_certificate(family, [varying.path])
+        if found is not None:
+            value, certificate = run, found.certificate.to_json()
+    return Certified(
+        of=varying.path, certified=value, breaking=None if broken is None else broken.value,
+        breaking_sequence=() if broken is None else broken.sequence, small_gain=None, largest=MOST_LOST,
+        searched=searched, states=len(timeline.family(run=MOST_LOST).kept), certificate=certificate,
+    )  # fmt: skip
+
+
+def _of_cause(request: Request, cause: Cause, progress: Share) -> Certified:
+    system, files = rested(request), files_of(system_of(request))
+    with errors_in_own_terms(request):
+        loop = linear_loop_of(request)
+        scheduled = ScheduledLoop(loop, system, cause)
+        search = isolated_call(files.fmus.values(), least_repeated, system, cause, files.models, loop.period)
+    largest = scheduled.largest()
+    top = largest if search.breaking is None else min(largest, search.breaking)
+    value, certificate = None, None
+    if search.breaking != 0.0:
+        value, certificate = largest_certified(scheduled.family, [cause.path], top, progress)
+    return Certified(
+        of=cause.path, certified=value, breaking=search.breaking,
+        breaking_sequence=search.sequence,
+        small_gain=None, largest=largest, searched=search.searched, states=len(scheduled.family(0.0).kept),
+        certificate=certificate,
+    )  # fmt: skip
+
+
+def _unstable(varying: Varying, largest: float, searched: str, family: LoopFamily) -> Certified:
+    return Certified(
+        of=varying.path, certified=None, breaking=0, breaking_sequence=(), small_gain=None, largest=largest,
+        searched=searched, states=len(family.kept), certificate=None,
+    )  # fmt: skip
+
+
+def largest_certified(
+    family_up_to: Callable[[float], LoopFamily],
+    of: Sequence[str],
+    top: float,
+    progress: Share,
+    shares: Sequence[float] | None = None,
+) -> tuple[float | None, str | None]:
+    """The largest value below `top` with a certificate, and that certificate; None where even 0 has none."""
+    from orchestration.theory.certificates.certify import find_certificate
+
+    first, *more = shares or SHARES
+    best: tuple[float | None, str | None] = (None, None)
+    step, attempts = 0, 0
+
+    def works(share: float) -> bool:
+        nonlocal best, step, attempts
+        attempts += 1
+        progress(1.0 - 0.7**attempts)
+        value = floor_to_nanoseconds(share * top)
+        found = find_certificate(family_up_to(value), of, step)
+        if found is not None:
+            best, step = (value, found.certificate.to_json()), found.step
+        return found is not None
+
+    if works(first):
+        all(works(share) for share in more)
+        return best
+    step = 0
+    low, high = 0.0, first
+    while high - low > FINEST:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if works(middle) else (low, middle)
+    if best[0] is None:
+        works(0.0)
+    return best
+
+
+def small_gain(loop: CertifiedLoop, varying: Varying) -> float | None:
+    """The bound of Kao and Lincoln [s]; None where it does not apply to the loop.
+
+    It applies to one component in continuous time and a sampled one without memory, with delays of the command alone.
+    """
+    names = list(loop.components)
+    sampled = [name for name in names if loop.is_sampled(name)]
+    if varying.kind != DELAY or len(names) != 2 or len(sampled) != 1 or len(loop.system.connections) != 2:
+        return None
+    law, plant = sampled[0], next(name for name in names if name not in sampled)
+    command = loop.connection(varying.name)
+    measurement = next(x for x in loop.system.connections if x.name != command.name)
+    controller, of = loop.components[law], loop.components[plant]
+    static = not len(controller.A) and not of.D.any() and len(loop.samples_of(law)) == 1
+    if command.sender != law or measurement.delay or command.order != "gauss-seidel" or not static:
+        return None
+    measured = [of.outputs.index(variable_of(start)) for start in measurement.start]
+    inputs = [controller.inputs.index(variable_of(end)) for end in measurement.end]
+    commands = [controller.outputs.index(variable_of(start)) for start in command.start]
+    driven = [of.inputs.index(variable_of(end)) for end in command.end]
+    F = command.scale * measurement.scale * controller.D[np.ix_(commands, inputs)] @ of.C[measured]
+    period = float(loop.period) / NANOSECONDS
+    delay = lowest(command.delay)
+    return certain_jitter(SampledLoop(A=of.A, B=of.B[:, driven], F=F, period=period, delay=delay))

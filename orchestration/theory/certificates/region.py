@@ -1,0 +1,137 @@
+"""Two quantities that vary at once: pairs of values that are certified, and pairs that break the loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.extras import needs
+from orchestration.foundation.basics.progress import ShareProgress, share_reporter
+from orchestration.simulation.figures.palette import BLUE, RED
+from orchestration.simulation.figures.style import SCREEN, Style, save
+from orchestration.simulation.requests.request import RequestLike, request_of
+from orchestration.systems.system.times import floor_to_nanoseconds
+from orchestration.theory.certificates.breaking import BreakingSequence, least_breaking, unstable_sequence
+from orchestration.theory.certificates.events import LOSS
+from orchestration.theory.certificates.family import LoopFamily
+from orchestration.theory.certificates.margin import (
+    expect_without_scheduler,
+    largest_certified,
+    linear_loop_of,
+    varying_of,
+)
+from orchestration.theory.certificates.timeline import LoopTimeline
+
+COLUMNS = 6
+"""values of the first quantity, from 0 to the one that alone breaks the loop"""
+SHARES = (0.95, 0.98)
+"""of the breaking value: tried for a certificate, as of one quantity"""
+LONGEST = 4
+"""draws after which the tried sequences repeat"""
+
+Pair = tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Region:
+    """Pairs of values [s]: at each draw both quantities are anywhere from 0 to theirs."""
+
+    of: tuple[str, str]
+    """The paths of the varying quantities."""
+    certified: tuple[Pair, ...]
+    """Pairs for which a proof was found, which covers all pairs smaller in both."""
+    breaking: tuple[Pair, ...]
+    """Pairs at which a periodic sequence was found that makes the loop unstable, the second value being the least."""
+    searched: str
+    """Which sequences were tried for `breaking`."""
+    states: int
+    """The size of the state from period to period."""
+    certificates: tuple[str, ...]
+    """The proofs, one for each certified pair, as the texts of files that `check` verifies."""
+
+    def save(self, folder: str | Path, style: Style = SCREEN) -> list[Path]:
+        """Write the certificates, `1.json` and so on, and the figure, into a folder; the paths."""
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        written = [folder / f"{i}.json" for i in range(1, len(self.certificates) + 1)]
+        for path, text in zip(written, self.certificates):
+            path.write_text(text, encoding="utf-8")
+        with style.applied():
+            figure = self.figure(style)
+        return [*written, *save({"region": figure}, folder, style)]
+
+    def figure(self, style: Style = SCREEN) -> Figure:
+        """The pairs that are certified, and those that break the loop."""
+        figure = style.figure(38.0)
+        axes = figure.add_subplot()
+        certified = [(1e3 * a, 1e3 * b) for a, b in self.certified]
+        if len(certified) > 1:
+            heights = [max(b for _, b in certified[i:]) for i in range(1, len(certified))]
+            axes.stairs(
+                heights, [0.0, *(a for a, _ in certified[1:])], fill=True, color=BLUE, alpha=0.25, label="certified"
+            )
+        axes.plot([a for a, _ in certified], [b for _, b in certified], ".", color=BLUE)
+        if self.breaking:
+            axes.plot(
+                *zip(*[(1e3 * a, 1e3 * b) for a, b in self.breaking]), "x-", color=RED, label="a sequence breaks it"
+            )
+        axes.set(xlabel=f"{self.of[0]} [ms]", ylabel=f"{self.of[1]} [ms]", xlim=(0.0, None), ylim=(0.0, None))
+        figure.legend(loc="outside lower center", ncols=2)
+        return figure
+
+
+@needs("flint", "clarabel")
+def region(
+    request: RequestLike, of: str, and_of: str, *, columns: int = COLUMNS, progress: ShareProgress = None
+) -> Region:
+    """How far two quantities of a system may vary at once, as `margin`; both are paths of times.
+
+    Raises `UsageError` as `margin` does, for two quantities of different sampled components, and for a loop that is
+    unstable without either.
+    """
+    request = request_of(request)
+    pair = [varying_of(request, each) for each in (of, and_of)]
+    if any(each.kind == LOSS for each in pair) or pair[0] == pair[1]:
+        raise UsageError(f"--of {of} --and {and_of}: expected two different jitters or delay jitters")
+    expect_without_scheduler(request)
+    timeline = LoopTimeline(linear_loop_of(request), pair)
+    if unstable_sequence(timeline.family([0.0, 0.0])) is not None:
+        raise UsageError("the loop is unstable where nothing varies, so nothing can be certified")
+    paths = (pair[0].path, pair[1].path)
+    with share_reporter(progress, "certifying") as report:
+        widest = _least_breaking(timeline, 0.0, first=True)
+        most = floor_to_nanoseconds(timeline.largest()) if widest is None else widest.value
+        certified, breaking, texts = list[Pair](), list[Pair](), list[str]()
+        for i in range(columns):
+            report(i / columns)
+            a = floor_to_nanoseconds(most * i / columns)
+            broken = _least_breaking(timeline, a)
+            top = floor_to_nanoseconds(timeline.largest() - a) if broken is None else broken.value
+            if broken is not None:
+                breaking.append((a, broken.value))
+            b, text = largest_certified(_second_varies(timeline, a), paths, top, lambda share: None, SHARES)
+            if b is not None and text is not None:
+                certified.append((a, b))
+                texts.append(text)
+    return Region(
+        of=paths, certified=tuple(certified), breaking=tuple(breaking), certificates=tuple(texts),
+        states=len(timeline.family([0.0, 0.0]).kept),
+        searched=f"draws at either end of both ranges, sequences that repeat after at most {LONGEST}",
+    )  # fmt: skip
+
+
+def _second_varies(timeline: LoopTimeline, a: float) -> Callable[[float], LoopFamily]:
+    return lambda b: timeline.family([a, b])
+
+
+def _least_breaking(timeline: LoopTimeline, other: float, *, first: bool = False) -> BreakingSequence | None:
+    """What breaks the loop in one quantity, the other one varying up to its value."""
+
+    def up_to(value: float) -> LoopFamily:
+        return timeline.family([value, other] if first else [other, value])
+
+    return least_breaking(up_to, floor_to_nanoseconds(timeline.largest() - other), LONGEST)

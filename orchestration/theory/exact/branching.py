@@ -1,0 +1,297 @@
+"""All courses of events between two cuts of a loop's hyperperiod, instant by instant in the order of `docs/timing.md`.
+
+An event with a random outcome splits a branch in two or more. Times are whole attoseconds.
+"""
+
+from __future__ import annotations
+
+import bisect
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from typing import Protocol
+
+import numpy as np
+
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.theory.exact.branch import ARRIVES, MEASURES, NEVER, POSTS, SAMPLES, Branch, BranchEvent, Mode
+from orchestration.theory.exact.links import RandomLink, SampledTask, attoseconds
+from orchestration.theory.exact.pieces import Piece
+from orchestration.theory.exact.random_times import Kinks
+
+NEGLIGIBLE = 1e-13
+"""A probability: less likely runs of losses count as the longest distinguished one"""
+LONGEST_AGE = 100
+"""messages that a first-order hold may lose in a row and still have a known age"""
+
+
+class Effects(Protocol):
+    """What events do to the state: the numbers of the loop, followed by the messages in transit."""
+
+    size: int
+    costs: int
+
+    def advance(self, piece: Piece, duration: int) -> Piece:
+        """Time passes."""
+
+    def send(self, piece: Piece, link: int) -> Piece:
+        """A message is appended to those in transit."""
+
+    def receive(self, piece: Piece, link: int, at: int, since: int, gap: int | None) -> Piece:
+        """The message that begins at number `at` arrives, and leaves the state.
+
+        The one before arrived `since` ago. Where that is 0, it arrived `gap` after the one before it.
+        """
+
+    def sample(self, piece: Piece, task: int, ages: Sequence[tuple[int, int | None]]) -> Piece:
+        """A task samples; `ages` has for each link the age of the last arrival, and its gap to the one before."""
+
+    def tick(self, piece: Piece, grid: int) -> Piece:
+        """A point of a grid of known times is reached."""
+
+
+class Branching:
+    """Follows branches from event to event, with the effects that these have."""
+
+    def __init__(
+        self,
+        tasks: Sequence[SampledTask],
+        links: Sequence[RandomLink],
+        effects: Effects,
+        *,
+        order: int,
+        kinks: Kinks,
+        hyperperiod: int,
+    ) -> None:
+        """`order` is that of Gauss's rule, `hyperperiod` in attoseconds."""
+        self.tasks, self.links, self._effects, self._order = tasks, links, effects, order
+        self._kinks_between, self._hyperperiod = kinks, hyperperiod
+
+    def mode_of(self, branch: Branch) -> tuple[Mode, float, Piece]:
+        """The mode that a branch has reached, its messages in the order of their events; its probability and piece."""
+        order = [event.token for event in branch.events if event.kind != "measure" and event.token >= 0]
+        places, at = {}, self._effects.size
+        for token, size in branch.in_transit:
+            places[token] = range(at, at + size)
+            at += size
+        sizes = dict(branch.in_transit)
+        rows = [*range(self._effects.size), *(row for token in order for row in places[token])]
+        piece = branch.piece if rows == list(range(at)) else branch.piece.mapped(np.eye(at)[rows])
+        events = tuple(
+            (x.time - branch.time if x.time != NEVER else NEVER, x.phase, x.rank, x.kind, x.of,
+             x.token if x.kind == "measure" or x.token < 0 else order.index(x.token), x.place)
+            for x in branch.events
+        )  # fmt: skip
+        holds = tuple(self._hold_age(i, branch.time - at, gap) for i, (at, gap) in enumerate(branch.holds))
+        return (events, tuple(sizes[token] for token in order), branch.bursts, holds), branch.probability, piece
+
+    def branch_of(self, mode: Mode, time: int) -> Branch:
+        """The branch that is in a mode at a time, with probability 1."""
+        events, sizes, bursts, holds = mode
+        return Branch(
+            time=time,
+            events=tuple(
+                BranchEvent(time + after if after != NEVER else NEVER, phase, rank, birth, kind, of, token, place)
+                for birth, (after, phase, rank, kind, of, token, place) in enumerate(events)
+            ),
+            in_transit=tuple(enumerate(sizes)),
+            bursts=bursts,
+            holds=tuple((time - age, gap) for age, gap in holds),
+            born=len(events) + len(sizes),
+            probability=1.0,
+            piece=Piece.start(self._effects.size + sum(sizes), self._effects.costs),
+        )
+
+    def _hold_age(self, i: int, age: int, gap: int | None) -> tuple[int, int | None]:
+        """Age and gap of the last arrival at a first-order hold; ages beyond the longest are folded."""
+        link = self.links[i]
+        if not link.first_order:
+            return 0, None
+        between = link.step if link.step is not None else self._clock_of(link).period
+        repeats = 1.0 - 1.0 / link.burst_length if link.has_bursts and link.burst_length is not None else link.loss
+        longest = math.ceil(math.log(NEGLIGIBLE) / math.log(repeats)) if 0.0 < repeats < 1.0 else 0
+        if longest > LONGEST_AGE or repeats >= 1.0:
+            raise UsageError(f"{link.name}: a first-order hold that may lose more than {LONGEST_AGE} messages in a row")
+        most = attoseconds((longest + 3) * between) + link.longest_delay + self._clock_of(link).jitter.highest
+        if age > most:
+            age -= math.ceil((age - most) / self._hyperperiod) * self._hyperperiod
+        return age, gap
+
+    def _clock_of(self, link: RandomLink) -> SampledTask:
+        which = link.sender if link.sender is not None else link.receiver
+        return self.tasks[which] if which is not None else SampledTask(name="", period=link.step or Fraction(1))
+
+    # -- events are planned --------------------------------------------------------------------------------------
+
+    def plan_nominal_sample(self, branch: Branch, task: int, nominal: int, place: int) -> Iterator[Branch]:
+        """A sample with the jitter of its task, and the measurements for it."""
+        for late, p in self.tasks[task].jitter.draws(nominal, self._kinks_between, self._order):
+            yield from self._plan_sample(_likely(branch, p), task, nominal + late, place)
+
+    def plan_post(self, branch: Branch, link: int, place: int) -> Branch:
+        """A message from continuous time to continuous time, sent now."""
+        return self._plan(branch, branch.time, POSTS, link, "post", link, place=place)
+
+    def tick(self, branch: Branch, grid: int) -> Branch:
+        """A point of a grid is reached."""
+        return replace(branch, piece=self._effects.tick(branch.piece, grid))
+
+    def _plan_sample(self, branch: Branch, task: int, time: int, place: int) -> Iterator[Branch]:
+        """A sample at a known time, with its measurements, and the dispatch of messages that wait for it."""
+        branches = [self._plan(branch, time, SAMPLES, 2 * task + 1, "sample", task, place=place)]
+        for i, link in enumerate(self.links):
+            if link.is_read_ahead and link.receiver == task:
+                branches = [after for each in branches for after in self._plan_measurement(each, i, time)]
+        for event in branch.events:
+            if event.time == NEVER and self.links[event.of].sender == task:
+                branches = [after for each in branches for after in self._dispatch(each, event, time)]
+        yield from branches
+
+    def _plan_measurement(self, branch: Branch, i: int, time: int) -> Iterator[Branch]:
+        link = self.links[i]
+        last = max((x.time for x in branch.events if x.kind == "measure" and x.of == i), default=0)
+        kinks = lambda low, high: [time - at for at in reversed(self._kinks_between(time - high, time - low))]  # noqa: E731
+        for late, p in link.delay_jitter.draws(link.delay, kinks, self._order):
+            measured = max(time - link.delay - late, last)
+            likely = _likely(branch, p)
+            yield self._plan(likely, measured, MEASURES, i, "measure", i, time - measured)
+
+    def _dispatch(self, branch: Branch, event: BranchEvent, sent: int) -> Iterator[Branch]:
+        """A message that waited for the next sample of its sender is sent then."""
+        rest = replace(branch, events=tuple(x for x in branch.events if x is not event))
+        for arrival, likely in self._arrivals(rest, event.of, sent):
+            yield self._plan(likely, arrival, ARRIVES, event.of, "arrive", event.of, event.token)
+
+    def _plan(
+        self, branch: Branch, time: int, phase: int, rank: int, kind: str, of: int, token: int = -1, place: int = 0
+    ) -> Branch:
+        events = list(branch.events)
+        bisect.insort(events, BranchEvent(time, phase, rank, branch.born, kind, of, token, place))
+        return replace(branch, events=tuple(events), born=branch.born + 1)
+
+    # -- events happen -------------------------------------------------------------------------------------------
+
+    def branches_until(self, branch: Branch, until: int) -> Iterator[Branch]:
+        """All outcomes of the events of a branch before a time."""
+        while branch.events and branch.events[0].time < until:
+            event = branch.events[0]
+            branch = self._advance(replace(branch, events=branch.events[1:]), event.time)
+            outcomes = list(self._outcomes(branch, event))
+            if len(outcomes) > 1:
+                for each in outcomes:
+                    yield from self.branches_until(each, until)
+                return
+            branch = outcomes[0]
+        yield self._advance(branch, until)
+
+    def _advance(self, branch: Branch, time: int) -> Branch:
+        if time == branch.time:
+            return branch
+        return replace(branch, time=time, piece=self._effects.advance(branch.piece, time - branch.time))
+
+    def _outcomes(self, branch: Branch, event: BranchEvent) -> Iterator[Branch]:
+        if event.kind == "arrive":
+            yield self._receive(branch, event.of, event.token)
+        elif event.kind == "sample":
+            yield from self._sample(branch, event.of, event.place)
+        else:  # a message from continuous time, measured or posted
+            for lost, likely in self._losses(branch, event.of):
+                if lost:
+                    yield likely
+                elif event.kind == "measure":
+                    after, token = self._put_in_transit(likely, event.of)
+                    rank = 2 * (self.links[event.of].receiver or 0)
+                    yield self._plan(after, branch.time + event.token, SAMPLES, rank, "arrive", event.of, token)
+                else:
+                    yield from self._send(likely, event.of, event.place)
+
+    def _sample(self, branch: Branch, task: int, place: int) -> Iterator[Branch]:
+        branches = [branch]
+        for i, link in enumerate(self.links):
+            if link.is_measured and not link.is_read_ahead and link.receiver == task:
+                branches = [
+                    each if lost else self._deliver_now(each, i) for b in branches for lost, each in self._losses(b, i)
+                ]
+        ages = [tuple((b.time - at, gap) for at, gap in b.holds) for b in branches]
+        branches = [replace(b, piece=self._effects.sample(b.piece, task, age)) for b, age in zip(branches, ages)]
+        for i, link in enumerate(self.links):
+            if link.sender == task:
+                branches = [
+                    after
+                    for b in branches
+                    for lost, each in self._losses(b, i)
+                    for after in ([each] if lost else self._send(each, i, place))
+                ]
+        yield from branches
+
+    def _losses(self, branch: Branch, i: int) -> list[tuple[bool, Branch]]:
+        """Whether the next message is lost, with the branch in which it is or is not."""
+        link = self.links[i]
+        p = link.loss
+        if link.has_bursts and link.burst_length is not None:
+            p = 1.0 - 1.0 / link.burst_length if branch.bursts[i] else p / (link.burst_length * (1.0 - p))
+        outcomes = [(p >= 1.0, 1.0)] if p <= 0.0 or p >= 1.0 else [(False, 1.0 - p), (True, p)]
+        found = []
+        for lost, probability in outcomes:
+            bursts = branch.bursts
+            if link.has_bursts:
+                bursts = (*bursts[:i], lost, *bursts[i + 1 :])
+            found.append((lost, replace(_likely(branch, probability), bursts=bursts)))
+        return found
+
+    def _send(self, branch: Branch, i: int, place: int) -> Iterator[Branch]:
+        """A message that is not lost."""
+        link = self.links[i]
+        transit_time = link.transit_times[place]
+        if transit_time is None:
+            yield branch
+            return
+        sent: int | None = branch.time + transit_time
+        if link.jacobi and link.sender is not None:
+            sent = next((x.time for x in branch.events if x.kind == "sample" and x.of == link.sender), None)
+        if sent is None:
+            after, token = self._put_in_transit(branch, i)
+            yield self._plan(after, NEVER, ARRIVES, i, "wait", i, token)
+            return
+        for arrival, likely in self._arrivals(branch, i, sent):
+            if arrival == branch.time:
+                yield self._deliver_now(likely, i)
+            else:
+                after, token = self._put_in_transit(likely, i)
+                yield self._plan(after, arrival, ARRIVES, i, "arrive", i, token)
+
+    def _arrivals(self, branch: Branch, i: int, sent: int) -> Iterator[tuple[int, Branch]]:
+        """Arrival times of a message sent at a time: none overtakes another."""
+        link = self.links[i]
+        last = max((x.time for x in branch.events if x.kind == "arrive" and x.of == i), default=0)
+        for late, p in link.delay_jitter.draws(sent + link.delay, self._kinks_between, self._order):
+            yield max(sent + link.delay + late, last), _likely(branch, p)
+
+    def _put_in_transit(self, branch: Branch, i: int) -> tuple[Branch, int]:
+        in_transit = (*branch.in_transit, (branch.born, self.links[i].size))
+        piece = self._effects.send(branch.piece, i)
+        return replace(branch, in_transit=in_transit, piece=piece, born=branch.born + 1), branch.born
+
+    def _deliver_now(self, branch: Branch, i: int) -> Branch:
+        after, token = self._put_in_transit(branch, i)
+        return self._receive(after, i, token)
+
+    def _receive(self, branch: Branch, i: int, token: int) -> Branch:
+        at = self._effects.size
+        for other, size in branch.in_transit:
+            if other == token:
+                break
+            at += size
+        last, gap = branch.holds[i]
+        since = branch.time - last
+        piece = self._effects.receive(branch.piece, i, at, since, gap)
+        holds = branch.holds
+        if self.links[i].first_order and since > 0:
+            holds = (*holds[:i], (branch.time, since), *holds[i + 1 :])
+        in_transit = tuple(x for x in branch.in_transit if x[0] != token)
+        return replace(branch, piece=piece, holds=holds, in_transit=in_transit)
+
+
+def _likely(branch: Branch, probability: float) -> Branch:
+    return branch if probability == 1.0 else replace(branch, probability=branch.probability * probability)

@@ -1,0 +1,117 @@
+"""The components of a system about its rest as matrices, identified from responses of their FMUs.
+
+A component whose responses to pulses of 1 and 1e-3 agree is taken as linear: the larger pulse identifies it to
+rounding. Any other is identified by small differences, as accurately as pulses of ten times the size agree.
+"""
+
+from __future__ import annotations
+
+import json
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from orchestration.foundation.basics.errors import SimulatorError, UsageError
+from orchestration.systems.system.times import NANOSECONDS
+from orchestration.theory.exact.linear import Continuous, SampledSystem
+from orchestration.theory.stability.linearised_component import Tangent
+from orchestration.theory.stability.loop_at_rest import AtRest
+from orchestration.theory.stability.matrices import (
+    INEXACT,
+    depends_on_step,
+    in_continuous_time,
+    of_samples,
+    whole_nanoseconds,
+)
+
+LARGE_PULSE, SMALL_PULSE = 1.0, 1e-3
+"""pulses with the same response of a linear component"""
+SAME = 1e-9
+"""of a response: the difference allowed between both pulses"""
+LARGER = 10.0
+"""factor of the pulses that check small ones"""
+ROUNDING = 1e-11
+"""of a response: the least effect of rounding on a result"""
+DIFFERS = 1e-9
+"""of a step of 2h: the difference allowed to two of h, of a component that is identified to rounding"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class IdentifiedComponent:
+    """A component as matrices."""
+
+    part: Continuous | SampledSystem
+    method: str
+    """it is identified"""
+    accuracy: float
+    """of its responses, relative"""
+    tangent: Tangent
+    """whose coordinates its state has"""
+
+
+class ComponentIdentifier:
+    """Identifies components, each once about each point where it rests."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[object, ...], IdentifiedComponent] = {}
+
+    def of(self, loop: AtRest) -> dict[str, IdentifiedComponent]:
+        """The components of a loop."""
+        found = {}
+        for name in loop.simulation.instances:
+            key = _cache_key(loop, name)
+            if key not in self._known:
+                self._known[key] = _identified(loop, name)
+            found[name] = self._known[key]
+        return found
+
+
+def _cache_key(loop: AtRest, name: str) -> tuple[object, ...]:
+    """All that the matrices of a component depend on."""
+    component = json.dumps(asdict(loop.simulation.system.components[name]), default=str, sort_keys=True)
+    rest = loop.rest_of(name)
+    return (
+        name,
+        component,
+        loop.saved_states[name],
+        rest.inputs,
+        rest.held.tobytes(),
+        rest.outputs,
+        rest.time,
+        loop.period,
+    )
+
+
+def _identified(loop: AtRest, name: str) -> IdentifiedComponent:
+    component, step = loop.simulation.system.components[name], _informative_step(loop, name)
+    tangent, is_linear, discrepancy = _tangent_by_pulses(loop, name, step)
+    part: Continuous | SampledSystem
+    if component.sampling is not None:
+        part = SampledSystem(**vars(of_samples(tangent, step)), depends_on_step=depends_on_step(tangent, step))
+    else:
+        matrices, unfit = in_continuous_time(tangent, step, DIFFERS if is_linear else INEXACT)
+        part = Continuous(**vars(matrices), step=tangent.derivatives, unfit=unfit)
+    method = "saved states, to rounding" if is_linear else "saved states, by differences"
+    return IdentifiedComponent(part=part, method=method, accuracy=max(ROUNDING, discrepancy), tangent=tangent)
+
+
+def _tangent_by_pulses(loop: AtRest, name: str, step: float) -> tuple[Tangent, bool, float]:
+    """A component by suitable pulses, whether it is linear, and the accuracy of its responses."""
+    with suppress(UsageError, SimulatorError, ValueError, np.linalg.LinAlgError):  # it accepts no large pulses
+        large = loop.tangent(name, LARGE_PULSE)
+        discrepancy = large.prediction_error(SMALL_PULSE, step)
+        if discrepancy <= SAME:
+            return large, True, discrepancy
+    small = loop.tangent(name, loop.pulse)
+    return small, False, small.prediction_error(LARGER * loop.pulse, step)
+
+
+def _informative_step(loop: AtRest, name: str) -> float:
+    """A step that shows much of a component [s]."""
+    component = loop.simulation.system.components[name]
+    if component.sampling is not None:
+        return component.sampling.period
+    if not loop.simulation.instances[name].model.varies_step:
+        return component.step or 0.0
+    return whole_nanoseconds(float(loop.period) / NANOSECONDS / 4.0)

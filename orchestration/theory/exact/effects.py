@@ -1,0 +1,325 @@
+"""The effects of events on the state of a loop: time passes, messages are sent and arrive, tasks sample.
+
+The numbers of the loop in it are: the states of components in continuous time; of each connection the value received
+last, and of a first-order hold its slope and the last arrival; of tasks their states and outputs. As simulated, held
+noise and outputs as of the last step follow.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+
+import numpy as np
+
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.simulation.engines.channel import of_each
+from orchestration.systems.schedule.plan import Plan
+from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.model import System
+from orchestration.systems.system.variable_names import component_of, variable_of
+from orchestration.theory.exact.flows import Flows
+from orchestration.theory.exact.initial_state import InitialState
+from orchestration.theory.exact.linear import Components, Continuous, SampledSystem
+from orchestration.theory.exact.links import ATTOSECONDS
+from orchestration.theory.exact.objectives import Mean
+from orchestration.theory.exact.pieces import Piece
+
+
+class Places:
+    """The layout of the state."""
+
+    def __init__(self) -> None:
+        self.size = 0
+        self._known: dict[tuple[str, str], slice] = {}
+
+    def add(self, kind: str, name: str, count: int) -> None:
+        """Append numbers."""
+        self._known[kind, name] = slice(self.size, self.size + count)
+        self.size += count
+
+    def __call__(self, kind: str, name: str) -> slice:
+        """The place of the numbers of a kind of a component or connection."""
+        return self._known[kind, name]
+
+    def has(self, kind: str, name: str) -> bool:
+        """Whether the state has such numbers."""
+        return (kind, name) in self._known
+
+
+class LoopEffects(ABC):
+    """The effects that a loop in continuous time and a simulated loop have in common."""
+
+    def __init__(
+        self, system: System, components: Components, tasks: Sequence[str], *, with_means: bool = False
+    ) -> None:
+        """`with_means` one number of the state is the constant 1, so that second moments contain means."""
+        self.system, self.parts, self.tasks = system, components, list(tasks)
+        self.places = places = Places()
+        self.wires = {system.connections[i].name for i in Plan(system).wires}
+        self.fed_by = {end: (x, j) for x in system.connections for j, end in enumerate(x.end)}
+        self.continuous = {n: c for n, c in components.items() if isinstance(c, Continuous)}
+        self.sampled_parts = {n: c for n, c in components.items() if isinstance(c, SampledSystem)}
+        for name, part in self.continuous.items():
+            places.add("state", name, len(part.A))
+        for x in system.connections:
+            if x.name not in self.wires or self.holds_wires:
+                places.add("received", x.name, len(x.start))
+            if x.hold == "first":
+                places.add("slope", x.name, len(x.start))
+                places.add("last", x.name, len(x.start))
+        for name, task in self.sampled_parts.items():
+            places.add("state", name, len(task.A))
+            places.add("output", name, len(task.outputs))
+        self._add_more_places(places)
+        if with_means:
+            places.add("constant", "", 1)
+        self.size = places.size
+        self.costs = 0
+        self._noise = {x.name: _noise_of(x) for x in system.connections}
+
+    holds_wires = False
+    """whether the value of a wire is held from step to step"""
+
+    @abstractmethod
+    def _add_more_places(self, places: Places) -> None:
+        """Add the places of a subclass."""
+
+    @property
+    def grids(self) -> Sequence[Fraction]:
+        """Periods [s] of points at which it ticks."""
+        return ()
+
+    @abstractmethod
+    def charge(self, means: Sequence[Mean]) -> None:
+        """Set the costs to the time integrals of these means."""
+
+    def initial_vector(self, initial: InitialState) -> Floats:
+        """The initial state as one vector."""
+        vector = np.zeros(self.size)
+        vector[self.places("constant", "")] = 1.0
+        for name in self.parts:
+            vector[self.places("state", name)] = initial.states[name]
+            if self.places.has("output", name):
+                vector[self.places("output", name)] = initial.outputs[name]
+        for x in self.system.connections:
+            for kind in ("received", "last"):
+                if self.places.has(kind, x.name):
+                    vector[self.places(kind, x.name)] = initial.received[x.name]
+        return vector
+
+    def quadratic_form(self, mean: Mean, rows: Floats) -> Floats:
+        """Q of z'Q z, the integrand of a mean by the rows of its signals, without its constant.
+
+        Without a constant 1 in the state, it is also without its linear part, whose stationary mean is 0.
+        """
+        found: Floats = rows.T @ mean.Q @ rows
+        if self.places.has("constant", ""):
+            linear = np.outer(rows.T @ mean.g, self.row("constant", "", 0))
+            found += 0.5 * (linear + linear.T)
+        return found
+
+    # -- rows over the state -------------------------------------------------------------------------------------
+
+    def row(self, kind: str, name: str, j: int) -> Floats:
+        """The row that selects one number."""
+        row: Floats = np.zeros(self.size)
+        row[self.places(kind, name).start + j] = 1.0
+        return row
+
+    def signal_row(self, name: str) -> Floats:
+        """The row of a signal, COMPONENT.VARIABLE or of a source; zero for a constant one.
+
+        Raises `UsageError` for an unknown one.
+        """
+        owner, variable = component_of(name), variable_of(name)
+        if owner in self.system.sources:
+            return self._source_row(name)
+        part = self.parts.get(owner)
+        if part is None:
+            raise UsageError(f"the linear loop has no {name}")
+        if variable in part.outputs:
+            return self.output_row(owner, part.outputs.index(variable))
+        return self.input_row(name)
+
+    def input_row(self, end: str) -> Floats:
+        """The row of an input."""
+        if end in self.fed_by:
+            x, j = self.fed_by[end]
+            if self.places.has("received", x.name):
+                return self.row("received", x.name, j)
+            sender = self.continuous[x.sender]
+            return x.scale * self.output_row(x.sender, sender.outputs.index(variable_of(x.start[j])))
+        return np.zeros(self.size)
+
+    def output_row(self, name: str, j: int) -> Floats:
+        """The row of an output of a component."""
+        if name in self.sampled_parts:
+            return self.row("output", name, j)
+        return self._continuous_output_row(name, j)
+
+    @abstractmethod
+    def _continuous_output_row(self, name: str, j: int) -> Floats:
+        """The row of an output of a component in continuous time."""
+
+    def _source_row(self, name: str) -> Floats:
+        return np.zeros(self.size)
+
+    # -- events ---------------------------------------------------------------------------------------------------
+
+    def send(self, piece: Piece, link: int) -> Piece:
+        """As `Effects`."""
+        x = self.system.connections[link]
+        rows = np.array([x.scale * self._message_row(start) for start in x.start]).reshape(len(x.start), self.size)
+        size = len(piece.Z)
+        change = np.vstack([np.eye(size), np.hstack([rows, np.zeros((len(rows), size - self.size))])])
+        covariance = np.zeros((len(change), len(change)))
+        covariance[size:, size:] = np.diag(self._noise[x.name])
+        return piece.mapped(change, covariance)
+
+    def _message_row(self, start: str) -> Floats:
+        """The row of an output as it is sent."""
+        outputs = self.parts[component_of(start)].outputs
+        variable = variable_of(start)
+        return (
+            self.output_row(component_of(start), outputs.index(variable))
+            if variable in outputs
+            else np.zeros(self.size)
+        )
+
+    def receive(self, piece: Piece, link: int, at: int, since: int, gap: int | None) -> Piece:
+        """As `Effects`."""
+        x = self.system.connections[link]
+        size, count = len(piece.Z), len(x.start)
+        message = np.eye(size)[at : at + count]
+        change = np.eye(size)
+        change[self.places("received", x.name)] = message
+        if x.hold == "first":
+            slope, last = self.places("slope", x.name), self.places("last", x.name)
+            before = np.eye(size)[last]
+            if since > 0:
+                change[slope] = (message - before) * (ATTOSECONDS / since)
+            elif gap is not None:  # it replaces one that arrived at the same instant
+                change[slope] += (message - before) * (ATTOSECONDS / gap)
+            change[last] = message
+        return piece.mapped(np.delete(change, slice(at, at + count), axis=0))
+
+    def sample(self, piece: Piece, task: int, ages: Sequence[tuple[int, int | None]]) -> Piece:
+        """As `Effects`."""
+        name = self.tasks[task]
+        part = self.sampled_parts[name]
+        size = len(piece.Z)
+        state, output = self.places("state", name), self.places("output", name)
+        inputs = np.array([self.input_row(f"{name}.{end}") for end in part.inputs]).reshape(len(part.inputs), self.size)
+        before = np.eye(self.size)[state]
+        change = np.eye(size)
+        change[output, : self.size] = part.C @ before + part.D @ inputs
+        change[state, : self.size] = part.A @ before + part.B @ inputs
+        return piece.mapped(change)
+
+    @abstractmethod
+    def advance(self, piece: Piece, duration: int) -> Piece:
+        """As `Effects`."""
+
+    def tick(self, piece: Piece, grid: int) -> Piece:
+        """As `Effects`."""
+        return piece
+
+
+def _noise_of(x: Connection) -> Floats:
+    """The variance of noise and quantisation of each number of a message, as it arrives."""
+    sigma, quantum = of_each(x, x.noise), of_each(x, x.quantisation)
+    found: Floats = x.scale**2 * (sigma**2 + quantum**2 / 12.0)
+    return found
+
+
+class ContinuousEffects(LoopEffects):
+    """The loop in continuous time: components evolve continuously, noise of sources is white."""
+
+    def __init__(
+        self,
+        system: System,
+        components: Components,
+        tasks: Sequence[str],
+        noise: Mapping[str, float] | None = None,
+        *,
+        with_means: bool = False,
+    ) -> None:
+        """`noise` has the intensities of white noise by input."""
+        super().__init__(system, components, tasks, with_means=with_means)
+        self._outputs = self._algebra(noise or {})
+
+    def _algebra(self, noise: Mapping[str, float]) -> dict[str, Floats]:
+        """The rows of all outputs in continuous time, through wires and direct feedthrough."""
+        rows = {name: np.zeros((len(part.outputs), self.size)) for name, part in self.continuous.items()}
+        noisy = {name: np.zeros((len(part.outputs), len(noise))) for name, part in self.continuous.items()}
+        names = list(noise)
+        for _ in range(len(self.continuous) + 1):
+            before = {name: each.copy() for name, each in rows.items()}
+            for name, part in self.continuous.items():
+                held, white = self._inputs_of(name, part, before, noisy, names)
+                own = np.eye(self.size)[self.places("state", name)]
+                rows[name], noisy[name] = part.C @ own + part.D @ held, part.D @ white
+        if any(not np.array_equal(before[name], rows[name]) for name in rows):
+            raise UsageError("a loop of components in continuous time with direct feedthrough: expected a state in it")
+        for name, part in self.continuous.items():
+            for j in np.flatnonzero(noisy[name].any(axis=1)):
+                raise UsageError(
+                    f"white noise reaches {name}.{part.outputs[j]} directly, and has no finite variance there; "
+                    "expected --as-simulated"
+                )
+        F, R = np.zeros((self.size, self.size)), np.zeros((self.size, self.size))
+        for name, part in self.continuous.items():
+            place = self.places("state", name)
+            held, white = self._inputs_of(name, part, rows, noisy, names)
+            F[place] += part.B @ held
+            F[place, place] += part.A
+            driven = np.zeros((self.size, len(names)))
+            driven[place] = part.B @ white
+            for k, input_ in enumerate(names):
+                R += noise[input_] * np.outer(driven[:, k], driven[:, k])
+        for x in self.system.connections:
+            if x.hold == "first":
+                F[self.places("received", x.name), self.places("slope", x.name)] = np.eye(len(x.start))
+        self.F, self.R = F, R
+        return rows
+
+    def _inputs_of(
+        self, name: str, part: Continuous, rows: Mapping[str, Floats], noisy: Mapping[str, Floats], noise: Sequence[str]
+    ) -> tuple[Floats, Floats]:
+        """The inputs of a component as rows over the state and over white noise."""
+        held, white = np.zeros((len(part.inputs), self.size)), np.zeros((len(part.inputs), len(noise)))
+        for j, variable in enumerate(part.inputs):
+            end = f"{name}.{variable}"
+            if end in noise:
+                white[j, noise.index(end)] = 1.0
+            elif end in self.fed_by:
+                x, i = self.fed_by[end]
+                if x.name not in self.wires:
+                    held[j] = self.row("received", x.name, i)
+                elif variable_of(x.start[i]) in self.continuous[x.sender].outputs:
+                    k = self.continuous[x.sender].outputs.index(variable_of(x.start[i]))
+                    held[j], white[j] = x.scale * rows[x.sender][k], x.scale * noisy[x.sender][k]
+        return held, white
+
+    def _continuous_output_row(self, name: str, j: int) -> Floats:
+        found: Floats = self._outputs[name][j]
+        return found
+
+    def _add_more_places(self, places: Places) -> None:
+        """There are none."""
+
+    def charge(self, means: Sequence[Mean]) -> None:
+        """As `LoopEffects`, by integrals."""
+        self.costs = len(means)
+        Q = np.zeros((self.costs, self.size, self.size))
+        for k, mean in enumerate(means):
+            rows = np.array([self.signal_row(name) for name in mean.signals])
+            Q[k] = self.quadratic_form(mean, rows)
+        self._flows = Flows(self.F, self.R, Q)
+
+    def advance(self, piece: Piece, duration: int) -> Piece:
+        """As `Effects`."""
+        return piece.flowed(self._flows.over(duration / ATTOSECONDS))

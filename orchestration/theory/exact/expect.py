@@ -1,0 +1,123 @@
+"""The exact average costs of a linear loop, without runs and seeds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from orchestration.components.fmi.foreign import isolated_call
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.simulation.requests.request import RequestLike, request_of
+from orchestration.systems.expressions.syntax import Call
+from orchestration.systems.system.files import files_of
+from orchestration.systems.system.model import System
+from orchestration.systems.system.request import errors_in_own_terms
+from orchestration.theory.exact.loops import Loops
+from orchestration.theory.exact.objective_means import ObjectiveMeans
+from orchestration.theory.exact.scheduled import is_scheduled
+from orchestration.theory.stability.known_loops import LOOPS, rested
+
+
+@dataclass(frozen=True, kw_only=True)
+class Expected:
+    """Expectations of a linear loop, stationary or from its initial conditions to a horizon."""
+
+    objectives: Mapping[str, float | None]
+    """By name; None: there is none."""
+    reasons: Mapping[str, str]
+    """Why there is none, by name."""
+    mean_square_radius: float
+    """The growth factor of second moments over a hyperperiod; from 1 on no mean of squares is finite."""
+    fourth_moment_radius: float | None
+    """Likewise of fourth moments; from 1 on no Monte-Carlo interval of a mean square means anything. None: too many to
+    compute."""
+    accuracy: float
+    """Of the results, relative: the change by the last refinement of the computation."""
+    method: str
+    """How the components were identified, and how the result was computed."""
+    period: float
+    """The hyperperiod of all that samples [s]."""
+    horizon: float | None = None
+    """Over which the means are, from initial conditions [s]; None: stationary ones."""
+
+    def __repr__(self) -> str:
+        listed = ", ".join(f"{name} {'-' if v is None else f'{v:.6g}'}" for name, v in self.objectives.items())
+        return f"<Expected: {listed or 'no objectives'}; mean-square radius {self.mean_square_radius:.6g}>"
+
+
+def expect(request: RequestLike, *, as_simulated: bool = False, horizon: float | None = None) -> Expected:
+    """The stationary expectation of each objective that consists of means of quadratic expressions of signals.
+
+    The system is linearised about its operating point, or its initial state. Noise of sources is white; delays, jitter
+    and losses are distributed as in a run. `as_simulated` it is the expectation of a long run: noise is held for
+    the period of its source, components in continuous time are stepped, means are over rows. With a `horizon` [s] means
+    are from 0 to there, from the initial state of the system instead of its operating point.
+
+    Raises `UsageError` for a system that does not rest there, or has no exact answer, naming why.
+    """
+    if horizon is not None and not 1e-9 <= horizon < math.inf:
+        raise UsageError(f"horizon = {horizon:g} s: expected a finite time above 0")
+    request = request_of(request)
+    if horizon is not None and request.kind in LOOPS:
+        raise UsageError("horizon: expected a system file, which has an initial state")
+    with errors_in_own_terms(request):
+        system = rested(request)
+        files = files_of(system)
+        loops = Loops(files.models, simulated=as_simulated)
+        return isolated_call(files.fmus.values(), expected_of, system, loops, horizon)
+
+
+def expected_of(system: System, loops: Loops, horizon: float | None = None) -> Expected:
+    """As `expect`, of a system whose FMUs are loaded in this process."""
+    solution = loops.solve(system)
+    linear, radius, means = solution.linear, solution.loop.radius, solution.means
+    difference, order = solution.difference, solution.order
+    if horizon is not None:
+        to_horizon = loops.solve_to(system, horizon)
+        means, difference, order = to_horizon.means, to_horizon.difference, to_horizon.order
+    if means is None:
+        why = f"the mean-square radius is {radius:.6g}: the mean has no finite expectation"
+        values: dict[str, float | None] = dict.fromkeys(system.objectives)
+        reasons = {**linear.objectives.reasons, **dict.fromkeys(linear.objectives.calls, why)}
+    else:
+        values, reasons = _finite_values(linear.objectives, means), linear.objectives.reasons
+    return Expected(
+        objectives=values, reasons={name: reasons[name] for name in system.objectives if name in reasons},
+        mean_square_radius=radius, fourth_moment_radius=solution.loop.fourth_moment_radius,
+        accuracy=difference + linear.accuracy, period=solution.period,
+        method=_method(linear.methods, order, system, simulated=loops.simulated, horizon=horizon),
+        horizon=horizon,
+    )  # fmt: skip
+
+
+def _finite_values(objectives: ObjectiveMeans, means: Mapping[Call, float]) -> dict[str, float | None]:
+    """The values of objectives; None for those that overflow."""
+    found = objectives.values(means)
+    for name, value in found.items():
+        if value is not None and not math.isfinite(value):
+            found[name] = None
+            objectives.reasons[name] = "overflows before the horizon"
+    return found
+
+
+def _method(
+    methods: Mapping[str, str], order: int | None, system: System, *, simulated: bool, horizon: float | None
+) -> str:
+    known: dict[str, list[str]] = {}
+    for name, method in methods.items():
+        known.setdefault(method, []).append(name)
+    parts = ["second moments of the loop about its operating point"]
+    parts += [f"{', '.join(listed)} known by {method}" for method, listed in known.items()]
+    if horizon is not None:
+        parts.append(f"from its initial conditions to {horizon:g} s")
+    if is_scheduled(system):
+        parts.append("computers and networks by their periodic timetable")
+    if simulated:
+        parts.append("noise held, steps and means over rows as in a run")
+    if order is not None:
+        parts.append(f"random times by Gauss's rule with {order} nodes between any two instants")
+    rounded = [x.name for x in system.connections if any(x.quantisation.values())]
+    if rounded:
+        parts.append(f"quantisation of {', '.join(rounded)} as noise of a variance of q²/12")
+    return "; ".join(parts)

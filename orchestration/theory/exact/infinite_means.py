@@ -1,0 +1,75 @@
+"""A warning for runs of loops in which means of squares have no finite expectation: their averages mean nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from orchestration.components.fmi.foreign import isolated_call
+from orchestration.components.fmi.model import Model
+from orchestration.foundation.basics.errors import QuadcosimError, UsageError
+from orchestration.systems.system.files import Files
+from orchestration.systems.system.model import System
+from orchestration.systems.system.randomness import depends_on_seed
+from orchestration.systems.system.request import Request
+from orchestration.theory.exact.loops import Loops
+from orchestration.theory.exact.objectives import inlined_objectives, means_of
+from orchestration.theory.stability.known_loops import LOOPS
+
+AGREE = 1e-3
+"""of a radius, from order to order: enough to know whether it is above 1"""
+MOST = 50
+"""systems that are examined"""
+
+
+def infinite_means_warning(request: Request, systems: Sequence[System], files: Files) -> str | None:
+    """A warning about averages over runs of these systems, in one line; None: none is due, or the radius is unknown.
+
+    Examined are systems with something random and an objective that is a mean of squares, unless their kind has its
+    own loop: those are not linear where they run.
+    """
+    if request.kind in LOOPS:
+        return None
+    chosen: dict[str, System] = {}
+    for system in systems:
+        if len(chosen) < MOST and depends_on_seed(system) and _averages(system):
+            once = replace(system, seed=0)
+            chosen.setdefault(once.to_toml(), once)
+    if not chosen:
+        return None
+    try:
+        radii = isolated_call(files.fmus.values(), radii_of, [*chosen.values()], files.models)
+    except QuadcosimError:
+        return None
+    above = [radius for radius in radii if radius is not None and radius >= 1.0]
+    if not above:
+        return None
+    where = "" if len(radii) == 1 else f" at {len(above)} of {len(radii)} points"
+    averages = ", ".join(_averages(systems[0]))
+    return (
+        f"{averages}: without a finite expectation{where}, so an average over runs means nothing; "
+        f"the mean-square radius is {max(above):.6g} (quadcosim expect)"
+    )
+
+
+def _averages(system: System) -> list[str]:
+    """The objectives that consist of means."""
+    found = []
+    for name, node in inlined_objectives(system.objectives).items():
+        try:
+            means_of(node)
+        except UsageError:
+            continue
+        found.append(name)
+    return found
+
+
+def radii_of(systems: Sequence[System], models: Mapping[str, Model]) -> list[float | None]:
+    """The mean-square radii of systems; None for one that is not linear about a rest, or too large."""
+    loops, found = Loops(models), list[float | None]()
+    for system in systems:
+        try:
+            found.append(loops.radius(system, agree=AGREE))
+        except QuadcosimError:
+            found.append(None)
+    return found

@@ -1,0 +1,84 @@
+"""Tasks and links: which components sample when, and the messages between them. Times are whole attoseconds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from orchestration.theory.exact.random_times import CERTAIN, RandomTime
+
+ATTOSECONDS = 10**18
+
+
+@dataclass(frozen=True, kw_only=True)
+class SampledTask:
+    """A component that samples at each offset + k period + jitter."""
+
+    name: str
+    period: Fraction
+    offsets: tuple[Fraction, ...] = (Fraction(0),)
+    """in ascending order"""
+    jitter: RandomTime = CERTAIN
+
+
+@dataclass(frozen=True, kw_only=True)
+class RandomLink:
+    """The messages of one connection: one at each sample of its sender, or of its receiver."""
+
+    name: str
+    size: int
+    """numbers in a message"""
+    sender: int | None = None
+    """index of the sending task; None: continuous time"""
+    receiver: int | None = None
+    """index of the receiving task, likewise"""
+    step: Fraction | None = None
+    """period of the messages, where no task sends or receives"""
+    send_offsets: tuple[Fraction, ...] = (Fraction(0),)
+    """of the messages in each step"""
+    transit_times: tuple[int | None, ...] = (0,)
+    """for each offset of its sender, or of `send_offsets`: the time in transit to which the delay is added; None:
+    nothing is sent"""
+    delay: int = 0
+    delay_jitter: RandomTime = CERTAIN
+    loss: float = 0.0
+    burst_length: float | None = None
+    jacobi: bool = False
+    first_order: bool = False
+    """whether its hold is of first order"""
+
+    @property
+    def longest_delay(self) -> int:
+        """The longest time from sending to arrival."""
+        transit = max((each for each in self.transit_times if each is not None), default=0)
+        return transit + self.delay + self.delay_jitter.highest
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether a task reads a signal in continuous time."""
+        return self.sender is None and self.receiver is not None
+
+    @property
+    def is_read_ahead(self) -> bool:
+        """Whether it is measured before the sample that uses it."""
+        return self.is_measured and self.longest_delay > 0
+
+    @property
+    def has_bursts(self) -> bool:
+        """Whether a loss makes the next one likelier."""
+        return self.burst_length is not None and 0.0 < self.loss < 1.0
+
+
+def hyperperiod(periods: Sequence[Fraction]) -> Fraction:
+    """The least common multiple of the periods; 1 s where there are none."""
+    if not periods:
+        return Fraction(1)
+    denominator = math.lcm(*(period.denominator for period in periods))
+    return Fraction(math.lcm(*(int(period * denominator) for period in periods)), denominator)
+
+
+def attoseconds(seconds: Fraction) -> int:
+    """A time in whole attoseconds."""
+    return round(seconds * ATTOSECONDS)

@@ -1,0 +1,340 @@
+"""Linear loops from their FMUs, each linearised once, solved under any timing."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from orchestration.components.fmi.model import Model
+from orchestration.components.fmi.reuse import Instances
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.systems.expressions.syntax import Call
+from orchestration.systems.schedule.plan import Plan
+from orchestration.systems.system.file_tables import tables_of
+from orchestration.systems.system.model import System
+from orchestration.systems.system.paths import changed
+from orchestration.systems.system.sampling import Sampling, has_scheduled_instants
+from orchestration.systems.system.times import NANOSECONDS, exact_nanoseconds
+from orchestration.systems.system.variable_names import component_of
+from orchestration.theory.exact.as_simulated import SimulatedEffects, expect_rows
+from orchestration.theory.exact.components import ComponentIdentifier
+from orchestration.theory.exact.effects import ContinuousEffects, LoopEffects
+from orchestration.theory.exact.horizon import costs_until
+from orchestration.theory.exact.initial_state import InitialState, initial_state_of
+from orchestration.theory.exact.linear import Components, Continuous, SampledSystem
+from orchestration.theory.exact.links import ATTOSECONDS, RandomLink, SampledTask
+from orchestration.theory.exact.moments import JumpLinear
+from orchestration.theory.exact.objective_means import ObjectiveMeans
+from orchestration.theory.exact.repeating import periodic_schedule
+from orchestration.theory.exact.scheduled import without_scheduler
+from orchestration.theory.exact.timing import links_of, sampled_tasks
+from orchestration.theory.exact.timing_chain import TimingChain
+from orchestration.theory.stability.loop_at_rest import ExtraSignals, at_rest
+from orchestration.theory.stability.operating_point import true_period
+
+T = TypeVar("T")
+
+ORDERS = (1, 2, 4, 8, 16, 32)
+"""of Gauss's rule, tried in turn until the next one changes nothing"""
+AGREE = 1e-10
+"""of a result: the difference allowed from order to order"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Linear:
+    """The components of a system linearised about its rest, and its objectives expanded there."""
+
+    parts: Components
+    methods: Mapping[str, str]
+    """by which each is identified"""
+    accuracy: float
+    """of the responses of the least accurately identified one, relative"""
+    objectives: ObjectiveMeans
+    noise: Mapping[str, float]
+    """the intensities of white noise, by input"""
+    initial: InitialState | None = None
+    """None: not requested"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Solution:
+    """A loop under its timing."""
+
+    linear: Linear
+    loop: JumpLinear
+    period: float
+    """[s]"""
+    means: Mapping[Call, float] | None
+    """None: the second moments are unbounded"""
+    difference: float
+    """change by the last doubling of the nodes, relative"""
+    order: int | None
+    """of Gauss's rule; None: all random times are enumerated"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class HorizonMeans:
+    """The means of a loop from its initial state to a given time, as `Solution`."""
+
+    means: Mapping[Call, float]
+    """over that time"""
+    difference: float
+    order: int | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Converged(Generic[T]):
+    result: T
+    numbers: Floats
+    """of the result, that were compared"""
+    period: float
+    difference: float
+    order: int | None
+
+
+class Loops:
+    """Linearises and solves systems; those that differ in delays, losses and jitter alone are linearised once.
+
+    Models are by the names of FMUs in systems.
+    """
+
+    def __init__(self, models: Mapping[str, Model], *, simulated: bool = False) -> None:
+        self.simulated = simulated
+        self._models = models
+        self._known: dict[str, Linear] = {}
+        self._identifier = ComponentIdentifier()
+
+    @cached_property
+    def _instances(self) -> Instances:
+        """FMUs in the computing process, kept from system to system."""
+        return Instances()
+
+    def linear(self, system: System, *, initial: System | None = None) -> Linear:
+        """The components and objectives of a system; raises `UsageError` for one that is not linear about a rest.
+
+        With the initial state of the system `initial`, if given.
+        """
+        system, initial = without_scheduler(system), None if initial is None else without_scheduler(initial)
+        key = json.dumps(
+            [tables_of(_without_random_timing(x)) for x in (system, initial) if x], default=str, sort_keys=True
+        )
+        if key not in self._known:
+            self._known[key] = self._linearised(system, initial)
+        return self._known[key]
+
+    def _linearised(self, system: System, initial: System | None) -> Linear:
+        noise = _white_noise(system, simulated=self.simulated)
+        models = {name: self._models[component.fmu] for name, component in system.components.items()}
+        objectives, initial_state = ObjectiveMeans(system, models), None
+        extra = ExtraSignals(inputs=tuple(noise), outputs=objectives.outputs)
+        with at_rest(system, self._instances, extra=extra, models=models) as loop:
+            objectives.expand_about(loop)
+            known = self._identifier.of(loop)
+            parts = {name: one.part for name, one in known.items()}
+            if initial is not None:
+                tangents = {name: one.tangent for name, one in known.items()}
+                initial_state = initial_state_of(initial, loop, parts, tangents, self._instances)
+        methods = {name: one.method for name, one in known.items()}
+        accuracy = max((one.accuracy for one in known.values()), default=0.0)
+        for name, part in parts.items():
+            if isinstance(part, Continuous) and part.unfit is not None and not self.simulated:
+                raise UsageError(
+                    f"{name} is no linear system in continuous time: {part.unfit}; expected --as-simulated"
+                )
+        return Linear(
+            parts=parts, methods=methods, accuracy=accuracy, objectives=objectives, noise=noise, initial=initial_state
+        )  # fmt: skip
+
+    def radius(self, system: System, *, agree: float) -> float:
+        """The mean-square radius alone, as `solve` has it."""
+        system = changed(system, system.operating_point)
+        linear = self.linear(system)
+
+        def answer(chain: TimingChain) -> tuple[float, Floats]:
+            radius = JumpLinear(*chain.stages()).radius
+            return radius, np.array([radius])
+
+        effects = self._effects(system, linear, ())
+        return self._refined(self._tasks_and_links(system, linear, effects), effects, answer, agree).result
+
+    def solve(self, system: System) -> Solution:
+        """Solve a system by finer and finer rules, until they agree; raises `UsageError` where it is too large."""
+        system = changed(system, system.operating_point)
+        linear = self.linear(system)
+        used = [call for call, mean in linear.objectives.means.items() if np.any(mean.Q)]
+
+        def answer(chain: TimingChain) -> tuple[JumpLinear, Floats]:
+            loop = JumpLinear(*chain.stages())
+            costs = loop.costs() / float(chain.period) if loop.radius < 1.0 else np.full(len(used), math.inf)
+            return loop, np.array([loop.radius, *costs])
+
+        effects = self._effects(system, linear, used)
+        converged = self._refined(self._tasks_and_links(system, linear, effects), effects, answer, AGREE)
+        loop, (_, *costs) = converged.result, converged.numbers
+        means = None
+        if loop.radius < 1.0:
+            means = {call: mean.c for call, mean in linear.objectives.means.items()}
+            means |= {call: means[call] + cost for call, cost in zip(used, costs)}
+        return Solution(
+            linear=linear,
+            loop=loop,
+            period=converged.period,
+            means=means,
+            difference=converged.difference,
+            order=converged.order,
+        )
+
+    def solve_to(self, system: System, horizon: float) -> HorizonMeans:
+        """The means of a system from its initial state to `horizon` [s], as `solve`."""
+        rests = changed(system, system.operating_point)
+        linear = self.linear(rests, initial=system)
+        used = [call for call, mean in linear.objectives.means.items() if np.any(mean.Q) or np.any(mean.g)]
+        effects = self._effects(rests, linear, used, with_means=True)
+        assert linear.initial is not None
+        start, constant = effects.initial_vector(linear.initial), effects.places("constant", "").start
+        end = round(exact_nanoseconds(horizon) * (ATTOSECONDS // NANOSECONDS))
+
+        def answer(chain: TimingChain) -> tuple[None, Floats]:
+            return None, costs_until(chain, start, constant, end) / (end / ATTOSECONDS) if used else np.zeros(0)
+
+        converged = self._refined(self._tasks_and_links(rests, linear, effects, horizon), effects, answer, AGREE)
+        means = {call: mean.c for call, mean in linear.objectives.means.items()}
+        means |= {call: means[call] + cost for call, cost in zip(used, converged.numbers.tolist())}
+        return HorizonMeans(means=means, difference=converged.difference, order=converged.order)
+
+    def _refined(
+        self,
+        timing: tuple[Sequence[SampledTask], Sequence[RandomLink]],
+        effects: LoopEffects,
+        answer: Callable[[TimingChain], tuple[T, Floats]],
+        agree: float,
+    ) -> _Converged[T]:
+        """An answer by the least order of Gauss's rule at which its numbers converge."""
+        tasks, links = timing
+        by_rule = any(x.delay_jitter.is_by_rule for x in links) or any(task.jitter.is_by_rule for task in tasks)
+        found: list[tuple[T, Floats]] = []
+        difference, order, period = 0.0, ORDERS[0], 1.0
+        for next_order in ORDERS if by_rule else ORDERS[:1]:
+            try:
+                chain = TimingChain(tasks, links, effects, order=next_order, grids=effects.grids)
+                one = answer(chain)
+            except UsageError:
+                if len(found) < 2:
+                    raise
+                break
+            order, period = next_order, float(chain.period)
+            found.append(one)
+            if len(found) > 1:
+                difference = _relative_difference(found[-2][1], found[-1][1])
+                if difference <= agree:
+                    break
+        return _Converged(
+            result=found[-1][0], numbers=found[-1][1], period=period, difference=difference,
+            order=order if by_rule else None,
+        )  # fmt: skip
+
+    def _effects(
+        self, system: System, linear: Linear, used: Sequence[Call], *, with_means: bool = False
+    ) -> LoopEffects:
+        """The effects, with these means as costs."""
+        names = Plan(system).sampled
+        effects: LoopEffects
+        if self.simulated:
+            effects = SimulatedEffects(system, linear.parts, names, with_means=with_means)
+        else:
+            effects = ContinuousEffects(system, linear.parts, names, linear.noise, with_means=with_means)
+        effects.charge([linear.objectives.means[call] for call in used])
+        return effects
+
+    def _tasks_and_links(
+        self, system: System, linear: Linear, effects: LoopEffects, horizon: float | None = None
+    ) -> tuple[Sequence[SampledTask], Sequence[RandomLink]]:
+        """The tasks and links, those of a scheduler included: over its period, or up to a `horizon` [s]."""
+        unscheduled = [
+            task.period for task in sampled_tasks(system) if not has_scheduled_instants(_sampling(system, task.name))
+        ]
+        steps = [link.step for link in links_of(system) if link.step is not None]
+        schedule = periodic_schedule(system, horizon=horizon, other_periods=[*unscheduled, *steps, *effects.grids])
+        tasks, links = sampled_tasks(system, schedule), links_of(system, schedule)
+        expect_same_steps(system, tasks, linear.parts, repeating=horizon is None)
+        if self.simulated:
+            expect_rows(system, tasks, links)
+        return tasks, links
+
+
+def expect_same_steps(
+    system: System, tasks: Sequence[SampledTask], parts: Components, *, repeating: bool = True
+) -> None:
+    """Raise `UsageError` for a task with irregular samples that depend on the time to the next one.
+
+    `repeating`: the last sample of a period is followed by the first of the next.
+    """
+    for task in tasks:
+        part = parts[task.name]
+        if not (isinstance(part, SampledSystem) and part.depends_on_step):
+            continue
+        if not task.jitter.is_certain:
+            raise UsageError(
+                f"components.{task.name}.sampling.jitter: the samples of {task.name} depend on the time to the "
+                "next one; expected none"
+            )
+        step = true_period(_sampling(system, task.name)) / NANOSECONDS
+        ends = [*task.offsets, *(task.period + offset for offset in task.offsets[:1] if repeating)]
+        if any(then - now != step for now, then in itertools.pairwise(ends)):
+            raise UsageError(
+                f"components.{task.name}: its samples depend on the time to the next one, which is not always "
+                f"{float(step):g} s; expected no other task or message to delay it"
+            )
+
+
+def _sampling(system: System, name: str) -> Sampling:
+    """The sampling of a sampled component."""
+    sampling = system.components[name].sampling
+    assert sampling is not None
+    return sampling
+
+
+def _without_random_timing(system: System) -> System:
+    """A system without delays, jitter and losses."""
+    return replace(
+        system,
+        components={
+            name: one if one.sampling is None else replace(one, sampling=replace(one.sampling, jitter=0.0))
+            for name, one in system.components.items()
+        },
+        connections=tuple(
+            replace(x, delay=0.0, delay_jitter=0.0, jitter_distribution="uniform", loss=0.0, burst_length=None)
+            for x in system.connections
+        ),
+    )
+
+
+def _white_noise(system: System, *, simulated: bool) -> dict[str, float]:
+    """The intensities of white noise by input; raises `UsageError` for any other random source."""
+    found = {}
+    for name, source in system.sources.items():
+        if source.is_random and source.noise is None:
+            raise UsageError(f"sources.{name}: gusts by name; expected white noise, of which there is an expectation")
+        for end in source.to if source.noise else ():
+            if not simulated and system.components[component_of(end)].sampling is not None:
+                raise UsageError(
+                    f"sources.{name}: white noise into {end}, which samples it: its variance has no limit; "
+                    "expected noise of a connection, or --as-simulated"
+                )
+            found[end] = float(source.noise or 0.0)
+    return found
+
+
+def _relative_difference(one: Floats, other: Floats) -> float:
+    """The largest difference of two rows of numbers, relative."""
+    finite = np.isfinite(one) & np.isfinite(other)
+    one, other = one[finite], other[finite]
+    return float((np.abs(one - other) / np.maximum(np.abs(other), 1e-300)).max(initial=0.0))

@@ -1,0 +1,50 @@
+"""The value of a random quantity at and above which mean squares are infinite."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from orchestration.components.fmi.model import Model
+from orchestration.foundation.basics.bisection import Range, first_failure
+from orchestration.foundation.basics.errors import SimulatorError, UsageError
+from orchestration.simulation.requests.ranges import Varied
+from orchestration.systems.system.model import System
+from orchestration.systems.system.paths import changed
+from orchestration.theory.exact.loops import Loops
+from orchestration.theory.stability.known_loops import rested
+
+FINER = 0.01
+"""of the tolerance of a measured limit"""
+AGREE = 1e-6
+"""of a radius, from order to order"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeanSquareLimit:
+    """The limit; None: there is none, for a reason."""
+
+    limit: float | None = None
+    reason: str = ""
+
+
+def mean_square_limit(varied: Varied, span: Range, models: Mapping[str, Model]) -> MeanSquareLimit:
+    """The first value of a quantity, from below, at which the mean-square radius of the loop is 1."""
+    try:
+        system = rested(varied.request)
+        by_fmu = {component.fmu: models[name] for name, component in system.components.items()}
+        return _crossing(system, varied.paths, span, Loops(by_fmu))
+    except (UsageError, SimulatorError) as error:
+        return MeanSquareLimit(reason=f"no mean-square limit: {error}")
+
+
+def _crossing(system: System, paths: Sequence[str], span: Range, loops: Loops) -> MeanSquareLimit:
+    def fails(value: float) -> bool:
+        return loops.radius(changed(system, dict.fromkeys(paths, value)), agree=AGREE) >= 1.0
+
+    bracket = first_failure(fails, span.values(), FINER * span.tolerance)
+    if bracket is None:
+        return MeanSquareLimit(reason="second moments are bounded throughout the range")
+    if bracket.good is None:
+        return MeanSquareLimit(reason="second moments grow without bound throughout the range")
+    return MeanSquareLimit(limit=0.5 * (bracket.good + bracket.bad))

@@ -1,0 +1,149 @@
+"""Objectives as what can be expected exactly: numbers made of means of quadratic polynomials of signals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.systems.expressions.at_instant import compiled
+from orchestration.systems.expressions.operators import OPERATORS, applied
+from orchestration.systems.expressions.over_run import inlined, reductions
+from orchestration.systems.expressions.recorded import STOP_TIME, TIME
+from orchestration.systems.expressions.syntax import (
+    Call,
+    Name,
+    Node,
+    Number,
+    Operation,
+    Sampled,
+    is_over_run,
+    names,
+    parse,
+    text,
+)
+
+STEP = 1.0
+"""of a signal: second differences of a quadratic polynomial are exact for any step"""
+NOT_QUADRATIC = 1e-9
+"""of a value: what a quadratic polynomial may miss it by"""
+TRIALS = 12
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mean:
+    """The mean over time of c + g'y + y'Q y, y the deviations of some signals from rest."""
+
+    signals: tuple[str, ...]
+    c: float
+    g: Floats
+    Q: Floats
+
+
+def means_of(node: Node) -> list[Call]:
+    """The means in an objective, `rms` included; raises `UsageError` naming any other reduction."""
+    found = list(dict.fromkeys(reductions(node)))
+    for call in found:
+        if call.function not in ("mean", "rms"):
+            raise UsageError(_not_a_mean(f"{call.function}(…)"))
+        if isinstance(call.arguments[0], Sampled):
+            raise UsageError("over arrivals: expected a mean over time")
+        if reductions(call.arguments[0]):
+            raise UsageError("of other numbers of the run: expected a mean of signals")
+    if not found:
+        raise UsageError(_not_a_mean(text(node)))
+    return found
+
+
+def _not_a_mean(written: str) -> str:
+    return f"{written}: expected mean(…) or rms(…), of which there are expectations"
+
+
+def inlined_objectives(objectives: Mapping[str, str]) -> dict[str, Node]:
+    """Objectives by name, with the objectives that they name inlined."""
+    found: dict[str, Node] = {}
+    for name, written in objectives.items():
+        found[name] = inlined(parse(written), found)
+    return found
+
+
+def integrand(call: Call) -> Node:
+    """The expression that a mean averages."""
+    inner = call.arguments[0]
+    return inner if call.function == "mean" else Operation("*", (inner, inner))
+
+
+def evaluated(node: Node, means: Mapping[Call, float], numbers: Mapping[str, float]) -> float:
+    """An objective by the values of its means."""
+    match node:
+        case Number(number):
+            return number
+        case Call() if is_over_run(node):
+            mean = means[node]
+            return math.sqrt(max(mean, 0.0)) if node.function == "rms" else mean
+        case Name(name) if name in numbers:
+            return numbers[name]
+        case Operation(word, operands) | Call(word, operands) if word in OPERATORS:
+            return float(applied(word, *(evaluated(operand, means, numbers) for operand in operands)))
+    raise UsageError(f"{text(node)} has a value at each instant; expected one number of the run")
+
+
+def quadratic(node: Node, rest: Mapping[str, float], numbers: Mapping[str, float]) -> Mean:
+    """An expression about `rest` as a quadratic polynomial, by second differences, which are exact for one.
+
+    Raises `UsageError` for an expression that is none, or depends on time.
+    """
+    used = list(dict.fromkeys(names(node)))
+    for name in (TIME, STOP_TIME):
+        if name in used:
+            raise UsageError(f"depends on {name}: expected signals alone, whose mean is stationary")
+    signals = _signals(used, rest, numbers)
+    fixed = [name for name in used if name in numbers]
+    places = {name: i for i, name in enumerate([*signals, *fixed])}
+    function = compiled(node, places)
+    at, constants = np.array([rest[name] for name in signals]), [numbers[name] for name in fixed]
+
+    def of(y: Floats) -> float:
+        return function([*(at + y).tolist(), *constants])
+
+    n, unit = len(signals), STEP * np.eye(len(signals))
+    c = of(np.zeros(n))
+    g, Q = np.zeros(n), np.zeros((n, n))
+    for i in range(n):
+        up, down = of(unit[i]), of(-unit[i])
+        g[i], Q[i, i] = (up - down) / 2.0, (up + down) / 2.0 - c
+    for i in range(n):
+        for j in range(i):
+            both = of(unit[i] + unit[j])
+            Q[i, j] = Q[j, i] = (both - c - g[i] - g[j] - Q[i, i] - Q[j, j]) / 2.0
+    _expect_quadratic(of, c, g, Q, text(node))
+    return Mean(signals=tuple(signals), c=c, g=g, Q=Q)
+
+
+def _signals(used: Sequence[str], rest: Mapping[str, float], numbers: Mapping[str, float]) -> list[str]:
+    """The signals of an expression, vectors by their components."""
+    found: list[str] = []
+    for name in used:
+        if name in numbers:
+            continue
+        parts = [name] if name in rest else [f"{name}.{axis}" for axis in "xyzw" if f"{name}.{axis}" in rest]
+        if not parts:
+            raise UsageError(f"the linear loop has no {name}")
+        found += parts
+    return list(dict.fromkeys(found))
+
+
+def _expect_quadratic(of: object, c: float, g: Floats, Q: Floats, written: str) -> None:
+    assert callable(of)
+    draw = np.random.default_rng(0)
+    for _ in range(TRIALS):
+        y = draw.uniform(-3.0, 3.0, len(g))
+        expected = c + g @ y + y @ Q @ y
+        size = abs(c) + np.abs(g) @ np.abs(y) + np.abs(y) @ np.abs(Q) @ np.abs(y)
+        found = of(y)
+        if not (math.isfinite(found) and abs(found - expected) <= NOT_QUADRATIC * max(size, 1e-300)):
+            raise UsageError(f"{written}: expected a polynomial of signals of degree two at most")

@@ -1,0 +1,214 @@
+"""The periodic schedule of computers and networks whose timing is deterministic.
+
+The timetable is made as for a run and compared in windows of the hyperperiod of all that shares a processor or a
+network. Equal windows repeat for ever if no backlog grows from one to the next, or only that of a task to which no
+other yields.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.simulator import Integers
+from orchestration.systems.computers.parts import (
+    ABORTED,
+    ARRIVES,
+    FINISHED,
+    FIXED_PRIORITY,
+    FRAME_TRANSMITTED,
+    NONE,
+    QUEUED,
+    RELEASED,
+    RESUMED,
+    SAMPLED,
+    SENT,
+    SKIPPED,
+    STARTED,
+    SWITCHING,
+    WRITTEN,
+)
+from orchestration.systems.system.distribution import highest
+from orchestration.systems.system.model import System
+from orchestration.systems.system.placement import messages_by_connection, placed_messages, placed_tasks, released_by
+from orchestration.systems.system.sampling import has_scheduled_instants
+from orchestration.systems.system.times import NANOSECONDS, exact_nanoseconds, nanoseconds
+from orchestration.theory.exact.links import hyperperiod
+from orchestration.theory.exact.periodic_schedule import NO_SCHEDULE, PeriodicSchedule, ScheduleTrace
+from orchestration.theory.exact.scheduled import expect_certain, is_scheduled
+
+MOST_JOBS = 200_000
+"""of all tasks and messages, that are simulated"""
+WINDOWS, MOST_WINDOWS = 12, 96
+"""that are compared at first, and at most"""
+_WITH_TIMES = (RELEASED, SKIPPED, QUEUED, SAMPLED, ARRIVES)
+"""Kinds of notes whose last number is a time"""
+_WORK = (SWITCHING, STARTED, RESUMED)
+
+
+def periodic_schedule(
+    system: System, *, horizon: float | None = None, other_periods: Sequence[Fraction] = ()
+) -> PeriodicSchedule:
+    """The schedule of the computers and networks of a system.
+
+    With a `horizon` [s] it is the events from 0 to there, as those of a period that is a multiple of `other_periods`
+    [s]. Raises `UsageError` for a random quantity that the scheduler depends on, and for a schedule that does not
+    become periodic.
+    """
+    if not is_scheduled(system):
+        return NO_SCHEDULE
+    expect_certain(system)
+    released = released_by(system)
+    system = replace(
+        system,
+        connections=tuple(
+            x
+            if x.name in released
+            else replace(x, delay=0.0, delay_jitter=0.0, jitter_distribution="uniform", loss=0.0, burst_length=None)
+            for x in system.connections
+        ),
+    )
+    if horizon is not None:
+        end = nanoseconds(horizon)
+        whole = hyperperiod(other_periods) if other_periods else exact_nanoseconds(horizon) / NANOSECONDS
+        period = math.ceil(exact_nanoseconds(horizon) / NANOSECONDS / whole) * whole
+        return ScheduleTrace(system, end).schedule_between(0, end, period) or NO_SCHEDULE
+    begin, length = _begin_and_hyperperiod(_instants(system))
+    count = WINDOWS
+    while True:
+        trace = ScheduleTrace(system, begin + count * length)
+        windows = _Windows(trace, begin, length, count)
+        found = windows.schedule()
+        if found is not None:
+            return found
+        if count >= MOST_WINDOWS or 4 * trace.jobs > MOST_JOBS:
+            raise UsageError(windows.failure_text())
+        count *= 2
+
+
+def _instants(system: System) -> list[tuple[Fraction, Fraction]]:
+    """The offset and the period [ns] of everything periodic that shares a resource."""
+    over, releases = messages_by_connection(system), released_by(system)
+    found = []
+    for task in placed_tasks(system.computers):
+        if task.task.period is not None:
+            found.append((task.task.offset, task.task.period, task.computer.clock_ratio))
+    for message in placed_messages(system.networks):
+        if message.message.period is not None:
+            found.append((message.message.offset, message.message.period, 1.0))
+    for name in {x.sender for x in system.connections if x.name in over or x.name in releases}:
+        sampling = system.components[name].sampling
+        if sampling is not None and not has_scheduled_instants(sampling):
+            found.append((sampling.offset, sampling.period, sampling.clock_ratio))
+    ratios = [Fraction(repr(float(ratio))) for _, _, ratio in found]
+    grids = [(exact_nanoseconds(o) / r, exact_nanoseconds(p) / r) for (o, p, _), r in zip(found, ratios)]
+    cycles = [sum(map(exact_nanoseconds, each.slots), Fraction(0)) for each in system.networks.values() if each.slots]
+    return grids + [(Fraction(0), cycle) for cycle in cycles]
+
+
+def _begin_and_hyperperiod(instants: Sequence[tuple[Fraction, Fraction]]) -> tuple[int, int]:
+    """A multiple of the hyperperiod by which all have begun, and the hyperperiod [ns]."""
+    periods = [period for _, period in instants] or [Fraction(NANOSECONDS)]
+    length = hyperperiod(periods).numerator  # a multiple, where it is no whole number
+    begin = math.ceil(max((offset for offset, _ in instants), default=Fraction(0)) / length) * length
+    jobs = sum((begin + WINDOWS * length) / period for period in periods)
+    if jobs > MOST_JOBS:
+        raise UsageError(
+            f"computers and networks: {int(jobs)} jobs and messages in {WINDOWS} hyperperiods of "
+            f"{length / NANOSECONDS:g} s: more than {MOST_JOBS}; expected periods that have more in common"
+        )
+    return begin, length
+
+
+class _Windows:
+    """A trace, cut into windows of one length from where all have begun."""
+
+    def __init__(self, trace: ScheduleTrace, begin: int, length: int, count: int) -> None:
+        self._trace, self._begin, self._length, self._count = trace, begin, length, count
+        notes = trace.notes[trace.notes[:, 0] >= begin]
+        window = (notes[:, 0] - begin) // length
+        content, are_times = notes[:, [0, 1, 2, 4]], np.isin(notes[:, 1], _WITH_TIMES)
+        content[:, 0] -= window * length
+        content[are_times, 3] -= (window * length)[are_times]
+        content[notes[:, 1] == WRITTEN, 3] = 0
+        ends = np.searchsorted(window, np.arange(count + 1))
+        self._parts = [notes[begin:end] for begin, end in itertools.pairwise(ends.tolist())]
+        self._contents = [content[begin:end].tobytes() for begin, end in itertools.pairwise(ends.tolist())]
+
+    def schedule(self) -> PeriodicSchedule | None:
+        """The schedule that repeats from some window on; None where none is proved to."""
+        for turns in range(1, self._count // 4 + 1):
+            alike = max(3 * turns, turns + 1 + math.ceil(self._longest / self._length))
+            first = self._count - alike
+            if first < 0 or any(
+                self._contents[i] != self._contents[i - turns] for i in range(first + turns, self._count)
+            ):
+                continue
+            if not self._repeats_for_ever(np.concatenate(self._parts[-turns:])):
+                continue
+            begin, length = self._begin + first * self._length, turns * self._length
+            return self._trace.schedule_between(begin, begin + length, Fraction(length, NANOSECONDS))
+        return None
+
+    @property
+    def _longest(self) -> int:
+        """The longest time without a note [ns] of a job, a frame, or a message that will release a task."""
+        arrivals = self._trace.notes[self._trace.notes[:, 1] == ARRIVES]
+        placed = placed_tasks(self._trace.system.computers)
+        jobs = [nanoseconds(highest(each.task.execution) + each.computer.switch) for each in placed]
+        frames = [leg.length + of.pause for of in self._trace.resources.parts.messages for leg in of.legs]
+        return max(int((arrivals[:, 4] - arrivals[:, 0]).max(initial=0)), *jobs, *frames, 0)
+
+    def _repeats_for_ever(self, notes: Integers) -> bool:
+        """Whether the events of some equal windows repeat for ever.
+
+        As many jobs end as are released, so that every queue is as it was before. The jobs of a task may pile up if its
+        priority is fixed and its own alone.
+        """
+        parts, count = self._trace.resources.parts, _counter(notes)
+        for i, task in enumerate(parts.tasks):
+            over, works = count(FINISHED, i) + count(ABORTED, i), any(count(kind, i) for kind in _WORK)
+            more, processor = count(RELEASED, i) - over, parts.processors[task.processor]
+            others = [one for j, one in enumerate(parts.tasks) if one.processor == task.processor and j != i]
+            first = processor.policy == FIXED_PRIORITY and all(one.priority != task.priority for one in others)
+            if more < 0 or (more > 0 and not first) or (works and not over):
+                return False
+        for c, carrier in enumerate(parts.carriers):
+            if carrier.sender != NONE and count(SAMPLED, carrier.sender) != count(SENT, c):
+                return False
+        return all(count(QUEUED, m) == self._received(notes, m) for m in range(len(parts.messages)))
+
+    def _received(self, notes: Integers, message: int) -> int:
+        """How many frames of a message were received."""
+        last = len(self._trace.resources.parts.messages[message].legs) - 1
+        return int(((notes[:, 1] == FRAME_TRANSMITTED) & (notes[:, 2] == message) & (notes[:, 4] == last)).sum())
+
+    def failure_text(self) -> str:
+        """Why no schedule repeats, in one line."""
+        half = np.concatenate(self._parts[-(self._count // 2) :])
+        count, seconds = _counter(half), self._count // 2 * self._length / NANOSECONDS
+        for i, place in enumerate(self._trace.places):
+            more = count(RELEASED, i) - count(FINISHED, i) - count(ABORTED, i)
+            if more > self._count // 4:
+                return (
+                    f"{place}: falls behind by {more} jobs in {seconds:g} s, and makes others late; expected less load"
+                )
+        for m, place in enumerate(self._trace.messages):
+            more = count(QUEUED, m) - self._received(half, m)
+            if more > self._count // 4:
+                return f"{place}: falls behind by {more} messages in {seconds:g} s; expected less load"
+        return (
+            f"computers and networks: their schedule does not repeat after {self._count} hyperperiods of "
+            f"{self._length / NANOSECONDS:g} s"
+        )
+
+
+def _counter(notes: Integers) -> Callable[[int, int], int]:
+    """A function that counts the notes of a kind of a task, message or carrier."""
+    return lambda kind, owner: int(((notes[:, 1] == kind) & (notes[:, 2] == owner)).sum())

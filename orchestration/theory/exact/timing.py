@@ -1,0 +1,119 @@
+"""The tasks and links of a system, with the randomness of its timing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.systems.schedule.plan import Plan
+from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.distribution import Distribution, Varying
+from orchestration.systems.system.model import System
+from orchestration.systems.system.times import NANOSECONDS, exact_nanoseconds
+from orchestration.theory.exact.links import ATTOSECONDS, RandomLink, SampledTask
+from orchestration.theory.exact.periodic_schedule import NO_SCHEDULE, PeriodicSchedule
+from orchestration.theory.exact.random_times import CERTAIN, RandomTime, normal, table, uniform
+
+
+def sampled_tasks(system: System, schedule: PeriodicSchedule = NO_SCHEDULE) -> list[SampledTask]:
+    """The sampled components, in the order of those that are due at once; some sample by a schedule.
+
+    Raises `UsageError` for one that keeps its own clock.
+    """
+    found = []
+    for name in Plan(system).sampled:
+        sampling = system.components[name].sampling
+        assert sampling is not None
+        if name in schedule.samples:
+            found.append(SampledTask(name=name, period=schedule.period, offsets=schedule.samples[name]))
+            continue
+        if sampling.clock == "fmu":
+            raise UsageError(f"components.{name}.sampling.clock: fmu: expected the master's")
+        ratio = Fraction(repr(float(sampling.clock_ratio)))
+        place = f"components.{name}.sampling.jitter"
+        found.append(
+            SampledTask(
+                name=name, period=_seconds(sampling.period) / ratio, offsets=(_seconds(sampling.offset) / ratio,),
+                jitter=_jitter(sampling.jitter, sampling.jitter_distribution, place),
+            )
+        )  # fmt: skip
+    return found
+
+
+def links_of(system: System, schedule: PeriodicSchedule = NO_SCHEDULE) -> list[RandomLink]:
+    """The connections; wires carry no messages, some messages are sent by a schedule."""
+    plan = Plan(system)
+    tasks = list(plan.sampled)
+    links = [_link(x, tasks, system, wire=i in plan.wires) for i, x in enumerate(system.connections)]
+    return [_scheduled_link(link, x, schedule) for link, x in zip(links, system.connections)]
+
+
+def _scheduled_link(link: RandomLink, x: Connection, schedule: PeriodicSchedule) -> RandomLink:
+    if x.sender in schedule.samples:
+        nothing = (0,) * len(schedule.samples[x.sender])
+        link = replace(link, transit_times=schedule.transit_times.get(x.name, nothing))
+    if x.name in schedule.sent:
+        link = replace(
+            link, receiver=None, step=schedule.period, send_offsets=schedule.sent[x.name],
+            transit_times=schedule.transit_times[x.name],
+        )  # fmt: skip
+    if x.name in schedule.with_own_delay:
+        link = replace(link, delay=0, delay_jitter=CERTAIN, loss=0.0, burst_length=None)
+    return link
+
+
+def _link(x: Connection, tasks: list[str], system: System, *, wire: bool) -> RandomLink:
+    sender, receiver = (tasks.index(name) if name in tasks else None for name in (x.sender, x.receiver))
+    step = system.components[x.sender].step if sender is None and receiver is None and not wire else None
+    place = f"connections.{x.name}"
+    jitter = _jitter(x.delay_jitter, x.jitter_distribution, f"{place}.delay_jitter")
+    if isinstance(x.delay, Distribution):
+        random_delay = _random_time(x.delay, f"{place}.delay")
+        delay, jitter = 0, replace(random_delay, added=None if jitter == CERTAIN else jitter)
+    else:
+        delay = round(_seconds(x.delay) * ATTOSECONDS)
+    return RandomLink(
+        name=place, size=len(x.start), sender=sender, receiver=receiver,
+        step=None if step is None else _seconds(step), delay=delay, delay_jitter=jitter, loss=_loss(x, place),
+        burst_length=x.burst_length, jacobi=x.order == "jacobi" and sender is not None, first_order=x.hold == "first",
+    )  # fmt: skip
+
+
+def _loss(x: Connection, place: str) -> float:
+    """The probability of a loss; raises `UsageError` for a trace whose losses come in its order."""
+    if not isinstance(x.loss, Distribution):
+        return x.loss
+    losses = _random_time(x.loss, f"{place}.loss")
+    return float(sum(p for value, p in zip(losses.values, losses.probabilities) if value))
+
+
+def _random_time(of: Distribution, place: str) -> RandomTime:
+    """Raises `UsageError` for a trace whose rows come in its order."""
+    if of.order == "as recorded" and of.lowest < of.highest:
+        raise UsageError(f'{place}: a trace as recorded has no expectation; expected order = "drawn"')
+    if of.uniform is not None:
+        return uniform(*map(_attoseconds, of.uniform))
+    if of.normal is not None and of.range is not None:
+        mean, deviation = (value * ATTOSECONDS for value in of.normal)
+        return normal(mean, deviation, *map(_attoseconds, of.range))
+    values = of.table().tolist()
+    return table([_attoseconds(value) for value in values], of.probabilities or [1.0 / len(values)] * len(values))
+
+
+def _attoseconds(seconds: float) -> int:
+    return round(_seconds(seconds) * ATTOSECONDS)
+
+
+def _seconds(seconds: float) -> Fraction:
+    return exact_nanoseconds(seconds) / NANOSECONDS
+
+
+def _jitter(largest: Varying, spread: str, place: str) -> RandomTime:
+    """A jitter by its largest value, or by its distribution."""
+    if isinstance(largest, Distribution):
+        return _random_time(largest, place)
+    if largest == 0.0:
+        return CERTAIN
+    high = _attoseconds(largest)
+    return normal(high / 2.0, high / 6.0, 0, high) if spread == "normal" else uniform(0, high)

@@ -1,0 +1,68 @@
+"""Linear simulators, which a master steps in place of FMUs."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from orchestration.foundation.basics.simulator import Floats, Transfer
+
+
+class LinearSimulator:
+    """A linear simulator that begins at rest: its state, and its exchange with a master."""
+
+    def __init__(self, inputs: Sequence[str], outputs: Sequence[str], states: int) -> None:
+        self.inputs, self.outputs = tuple(inputs), tuple(outputs)
+        self.state: Floats = np.zeros(states)
+        self.input: Floats = np.zeros(len(inputs))
+        self.output: Floats = np.zeros(len(outputs))
+
+    def reader(self, names: Sequence[str], into: Floats) -> Transfer:
+        """As `Simulator`; variables that are no Reals are not read."""
+        chosen = [(i, self.outputs.index(name)) for i, name in enumerate(names) if name in self.outputs]
+        to, places = [i for i, _ in chosen], [place for _, place in chosen]
+
+        def read() -> None:
+            into[to] = self.output[places]
+
+        return read
+
+    def writer(self, names: Sequence[str], source: Floats) -> Transfer:
+        """As `Simulator`; variables that are no Reals are not written."""
+        chosen = [(i, self.inputs.index(name)) for i, name in enumerate(names) if name in self.inputs]
+        of, places = [i for i, _ in chosen], [place for _, place in chosen]
+
+        def write() -> None:
+            self.input[places] = source[of]
+
+        return write
+
+    def enter_initialization(self, start: float, stop: float) -> None:
+        """It is at rest already."""
+
+    def exit_initialization(self) -> None:
+        """It is at rest already."""
+
+    def step(self, t: float, h: float) -> None:
+        """As `Simulator`."""
+        raise NotImplementedError
+
+    def save(self) -> bytes:
+        """State and inputs."""
+        return np.concatenate([self.state, self.input]).tobytes()
+
+    def restore(self, state: bytes) -> None:
+        """Restore them."""
+        self.state[:], self.input[:] = np.split(np.frombuffer(state), [len(self.state)])
+
+
+class OpenPort(LinearSimulator):
+    """Replaces a component: it outputs `sent`, and keeps in `received` its inputs at its last step."""
+
+    def __init__(self, inputs: Sequence[str], outputs: Sequence[str]) -> None:
+        super().__init__(inputs, outputs, states=0)
+        self.sent: Floats = np.zeros(len(outputs))
+        self.received: Floats = np.zeros(len(inputs))
+
+    def step(self, t: float, h: float) -> None:
+        """As `Simulator`."""
+        self.received[:], self.output[:] = self.input, self.sent

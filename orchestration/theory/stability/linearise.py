@@ -1,0 +1,81 @@
+"""A system about its operating point, cut open at one component: that component, and the rest of the loop."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from orchestration.components.fmi.reuse import Instances
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.simulation.requests.request import RequestLike, request_of
+from orchestration.simulation.runs.replacement import component_named
+from orchestration.systems.system.request import errors_in_own_terms
+from orchestration.systems.system.times import NANOSECONDS
+from orchestration.theory.stability.known_loops import rested
+from orchestration.theory.stability.linear_simulator import OpenPort
+from orchestration.theory.stability.loop_at_rest import AtRest, at_rest
+from orchestration.theory.stability.operating_point import true_period
+from orchestration.theory.stability.period_map import period_map
+from orchestration.theory.stability.state_space import StateSpace, reduced
+
+
+@dataclass(frozen=True, kw_only=True)
+class Linearised:
+    """A loop about its operating point, as two linear systems in feedback."""
+
+    name: str
+    """The component at which it is cut open."""
+    component: StateSpace
+    """That component: inputs are its measurements, outputs its commands."""
+    rest: StateSpace
+    """The rest of the loop, from sample to sample: inputs are the commands, outputs the measurements at the next
+    sample, with holds, delays and the other components in between."""
+
+
+def linearise(request: RequestLike, component: str | None = None) -> Linearised:
+    """The loop of a system, or a scenario, about its operating point, cut open at a sampled component.
+
+    Default `component`: the only sampled one. A system rests at the `[operating_point]` of its file, else at its
+    initial conditions; a scenario hovers. Jitter, loss, noise and quantisation are left out, delays, holds and the
+    order of exchange are included. States are coordinates without physical meaning: those of `rest` are controllable
+    from the command and observable from the measurement.
+
+    Raises `UsageError` for a system that does not rest there, for FMUs that cannot save their state, and for a
+    component that is not sampled, or is sampled more often than another one.
+    """
+    request = request_of(request)
+    instances = Instances()
+    try:
+        with errors_in_own_terms(request):
+            system = rested(request)
+            name = component_named(system, component, "at which to cut the loop open")
+            if system.components[name].sampling is None:
+                raise UsageError(f"component: {name}: expected a sampled component")
+            with at_rest(system, instances) as loop:
+                return _cut_open(loop, name)
+    finally:
+        instances.close()
+
+
+def _cut_open(loop: AtRest, name: str) -> Linearised:
+    sampling, tangent = loop.simulation.system.components[name].sampling, loop.tangents[name]
+    assert sampling is not None
+    if true_period(sampling) != loop.period:
+        raise UsageError(
+            f"component: {name}: expected the only rate of the system, or the slowest, which others divide"
+        )
+    port, dt = OpenPort(tangent.inputs, tangent.outputs), float(loop.period) / NANOSECONDS
+    whole = period_map(loop, {name: port})
+    size = len(whole) - len(port.inputs)
+    A, B, C = reduced(whole[:size, :size], whole[:size, size:], whole[size:, :size])
+    by_state, by_input = tangent.derivatives(sampling.period)
+    cut = len(port.outputs)
+    return Linearised(
+        name=name,
+        component=StateSpace(
+            A=by_state[cut:], B=by_input[cut:], C=by_state[:cut], D=by_input[:cut], dt=dt, inputs=port.inputs,
+            outputs=port.outputs,
+        ),
+        rest=StateSpace(
+            A=A, B=B, C=C, D=np.array(whole[size:, size:]), dt=dt, inputs=port.outputs, outputs=port.inputs
+        ),
+    )  # fmt: skip

@@ -1,0 +1,91 @@
+"""Local limits: where small deviations from an operating point cease to decay."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from orchestration.components.fmi.reuse import Instances
+from orchestration.foundation.basics.bisection import Range, first_failure
+from orchestration.foundation.basics.errors import SimulatorError, UsageError
+from orchestration.simulation.requests.ranges import Varied
+from orchestration.systems.system.model import System
+from orchestration.theory.stability.known_loops import LOOPS, LocalLimit
+from orchestration.theory.stability.linearised_component import PULSE
+from orchestration.theory.stability.monodromy import growth_of_loop
+from orchestration.theory.stability.operating_point import NotAnEquilibriumError
+from orchestration.theory.stability.perturbed_runs import growth_of
+
+LOOP = "spectral radius of the sampled loop about the operating point, by differences through saved states"
+LOOP_FINER, TWINS_FINER = 0.01, 0.2
+"""of the tolerance of the measured limit"""
+TWINS = "growth of the difference of twin runs from the operating point, one of them perturbed by a pulse"
+OTHER_PULSE = 4.0
+"""factor of the second pulse, whose growth is compared"""
+
+Growth = Callable[[float], float]
+"""Growth rate of small deviations by the value of the quantity [1/s]"""
+
+
+def local_limits(varied: Varied, span: Range) -> LocalLimit:
+    """The local limit of a quantity, through saved states where the FMUs have them, else by perturbed twin runs.
+
+    A kind of request in `LOOPS` has its own method.
+    """
+    known = LOOPS.of(varied.request.kind)
+    if known is not None:
+        return known.local_limits(varied, span)
+    if not varied.system.operating_point:
+        return LocalLimit(reason="no local limit: the system file names no operating_point")
+    return about_rest(varied.at, span)
+
+
+def about_rest(at: Callable[[float], System], span: Range) -> LocalLimit:
+    """The local limit of any system; `at` makes the system for a value of the quantity."""
+    instances = Instances()
+    try:
+        return _through_saved_states(at, span, instances)
+    except NotAnEquilibriumError as error:
+        return LocalLimit(reason=f"no local limit: {error}")
+    except (UsageError, SimulatorError) as error:
+        why = str(error)
+    finally:
+        instances.close()
+    instances = Instances()
+    try:
+        found = _by_twins(at, span, instances)
+    except (UsageError, SimulatorError) as error:
+        return LocalLimit(reason=f"no local limit: {error}")
+    finally:
+        instances.close()
+    return replace(found, method=f"{TWINS}, as saved states do not suffice: {why}")
+
+
+def _through_saved_states(at: Callable[[float], System], span: Range, instances: Instances) -> LocalLimit:
+    """Its accuracy includes the effect of another pulse size."""
+    growths: dict[float, float] = {}
+
+    def growth(value: float) -> float:
+        growths[value] = found = growth_of_loop(at(value), instances)
+        return found
+
+    found = _first_growth(growth, span, LOOP_FINER, LOOP)
+    if found.limit is None or found.accuracy is None:
+        return found
+    below, above = (max(v for v in growths if v < found.limit), min(v for v in growths if v > found.limit))
+    slope = (growths[above] - growths[below]) / (above - below)
+    difference = abs(growth_of_loop(at(below), instances, OTHER_PULSE * PULSE) - growths[below])
+    return replace(found, accuracy=found.accuracy + difference / slope)
+
+
+def _by_twins(at: Callable[[float], System], span: Range, instances: Instances) -> LocalLimit:
+    return _first_growth(lambda value: growth_of(at(value), instances).rate, span, TWINS_FINER, TWINS)
+
+
+def _first_growth(growth: Growth, span: Range, finer: float, method: str) -> LocalLimit:
+    """The first value at which small deviations grow, by a scan and bisection."""
+    width = span.tolerance * finer
+    bracket = first_failure(lambda value: growth(value) > 0.0, span.values(), width)
+    if bracket is None or bracket.good is None:
+        return LocalLimit(
+            method=method, reason=f"small deviations {'decay' if bracket is None else 'grow'} throughout the range"
+        )
+    return LocalLimit(limit=0.5 * (bracket.good + bracket.bad), method=method, accuracy=width, reason="")

@@ -1,0 +1,237 @@
+"""A system at rest at its operating point, and its components about it, each as a `Tangent`."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from orchestration.components.fmi.instance import Instance, Loader
+from orchestration.components.fmi.model import Model
+from orchestration.components.fmi.reuse import Instances
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.simulator import Floats, Transfer
+from orchestration.simulation.runs.prepared import PreparedRun, prepared
+from orchestration.simulation.runs.resolved import resolve_with_models
+from orchestration.systems.system.distribution import highest
+from orchestration.systems.system.model import System
+from orchestration.systems.system.placement import expect_fixed_periods
+from orchestration.systems.system.times import NANOSECONDS, exact_nanoseconds
+from orchestration.systems.system.variable_names import component_of, variable_of
+from orchestration.theory.stability.linearised_component import PULSE, Rest, Tangent
+from orchestration.theory.stability.operating_point import (
+    deterministic,
+    exchanged_signals,
+    expect_rest,
+    hyperperiod_of,
+    latest_offset,
+)
+
+SETTLED = 6
+"""periods of the run to rest, after messages in transit have arrived"""
+HELD = 2
+"""messages that a first-order hold remembers"""
+RUNGS, FINEST = 12, 0.25
+"""of the ladder of a component in continuous time: points, each twice the one before; the first by the period"""
+LONGER = (1, 4, 16, 64)
+"""factors of longer steps, tried in turn while they show more states: a fast loop leaves slow states no time"""
+RUNGS_OF_FIXED = 5
+"""where a component takes short steps of one length only"""
+RUNGS_OF_TASK = 32
+"""of a sampled component: samples"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExtraSignals:
+    """Signals of the loop beyond those that connections carry, as COMPONENT.VARIABLE."""
+
+    inputs: Sequence[str] = ()
+    """Real inputs of components"""
+    outputs: Sequence[str] = ()
+    """other Reals"""
+
+
+NO_SIGNALS = ExtraSignals()
+
+
+@dataclass(frozen=True, kw_only=True)
+class AtRest:
+    """A system at rest, and its components about it."""
+
+    simulation: PreparedRun
+    pulse: float
+    extra: ExtraSignals
+    saved_states: Mapping[str, bytes]
+    """of the components at rest"""
+    begin: Fraction
+    """of a period: a sample of the component that begins last [ns]"""
+    period: Fraction
+    """the hyperperiod [ns]"""
+
+    @cached_property
+    def tangents(self) -> dict[str, Tangent]:
+        """The components about rest."""
+        return {name: self.tangent(name, self.pulse) for name in self.simulation.instances}
+
+    def tangent(self, name: str, pulse: float) -> Tangent:
+        """A component about rest, by pulses of a size."""
+        self.simulation.instances[name].restore(self.saved_states[name])
+        return _tangent(self, name, pulse)
+
+    def rest_of(self, name: str) -> Rest:
+        """A component at rest: the last inputs and time, and the variables that belong to the loop."""
+        fmu, system = cast("TracedInstance", self.simulation.instances[name]), self.simulation.system
+        ends = [*(end for x in system.connections for end in x.end), *self.extra.inputs]
+        starts = [*(start for x in system.connections for start in x.start), *self.extra.outputs]
+        fed = dict.fromkeys(variable_of(end) for end in ends if component_of(end) == name)
+        inputs = tuple(end for end in fed if fmu.model.variables[end].kind == "Real")
+        read = dict.fromkeys(variable_of(start) for start in starts if component_of(start) == name)
+        return Rest(
+            fmu=fmu.fmu,
+            inputs=inputs,
+            held=np.array([fmu.written[end] for end in inputs]),
+            outputs=tuple(output for output in read if fmu.model.variables[output].kind == "Real"),
+            time=fmu.time,
+        )
+
+
+@contextmanager
+def at_rest(
+    system: System,
+    instances: Instances,
+    pulse: float = PULSE,
+    extra: ExtraSignals = NO_SIGNALS,
+    models: Mapping[str, Model] | None = None,
+) -> Iterator[AtRest]:
+    """`system` at its operating point, without jitter, loss, noise and quantisation.
+
+    Its FMUs may be given as `models`; default: they are located, and built if need be. Raises `UsageError` where it
+    does not rest there, or has no linear loop, saying why.
+    """
+    calm = deterministic(system)
+    period = _expect_period(calm)
+    delay = max((exact_nanoseconds(highest(x.delay)) for x in calm.connections), default=Fraction(0))
+    begin = latest_offset(calm) + (math.ceil(delay / period) + HELD) * period
+    calm = replace(calm, stop_time=float(begin + (SETTLED + 2) * period) / NANOSECONDS)
+    resolved = None if models is None else resolve_with_models(calm, models)
+    with prepared(calm, load=tracing_loader(instances), resolved=resolved) as simulation:
+        _expect_states(simulation)
+        _settle(simulation, begin, period)
+        yield AtRest(
+            simulation=simulation, saved_states={name: one.save() for name, one in simulation.instances.items()},
+            pulse=pulse, extra=extra, begin=begin, period=period,
+        )  # fmt: skip
+
+
+# -- coming to rest -------------------------------------------------------------------------------------------------
+
+
+def _expect_period(system: System) -> Fraction:
+    expect_fixed_periods(system)
+    for name, component in system.components.items():
+        if component.sampling is not None and component.sampling.clock == "fmu":
+            raise UsageError(f"{name} has its own clock")
+    period = hyperperiod_of(system)
+    if period is None:
+        raise UsageError("the sampled components have no hyperperiod within twenty of the longest period")
+    return period
+
+
+def _expect_states(simulation: PreparedRun) -> None:
+    without = [name for name, instance in simulation.instances.items() if not instance.model.saves_state]
+    if without:
+        raise UsageError(f"the FMU of {', '.join(without)} cannot save its state")
+
+
+def _settle(simulation: PreparedRun, begin: Fraction, period: Fraction) -> None:
+    """Run for some periods, in which no exchanged signal may change."""
+    master, system = simulation.master, simulation.system
+    master.initialise()
+    rows = []
+    for k in range(SETTLED):
+        if master.run(pause_at=math.floor(begin + k * period)):
+            raise UsageError(
+                f"the run leaves the operating point: {master.divergence or master.termination or 'it was interrupted'}"
+            )
+        rows.append([master.board.row[master.board.place[signal]] for signal in exchanged_signals(system)])
+    expect_rest(system, np.array(rows))
+
+
+def _tangent(loop: AtRest, name: str, pulse: float) -> Tangent:
+    fmu, rest, period = loop.simulation.instances[name], loop.rest_of(name), loop.period
+    component = loop.simulation.system.components[name]
+    if component.sampling is not None:
+        return Tangent(rest, [component.sampling.period] * RUNGS_OF_TASK, pulse)
+    first = FINEST * float(period) / NANOSECONDS
+    if fmu.model.varies_step:
+        ladder = np.array([first * 2 ** max(i - 1, 0) for i in range(RUNGS)])
+        return _richest_tangent(rest, [(times * ladder).tolist() for times in LONGER], pulse)
+    assert component.step is not None
+    points = (round(first * 2**i / component.step) for i in range(RUNGS_OF_FIXED))
+    counts = np.diff(sorted({0, *(max(1, point) for point in points)}))
+    return Tangent(rest, [float(count * component.step) for count in counts], pulse, unit=component.step)
+
+
+def _richest_tangent(rest: Rest, ladders: Sequence[Sequence[float]], pulse: float) -> Tangent:
+    """A tangent by the first ladder that the next one does not improve on in states."""
+    saved = rest.fmu.save()
+    best = Tangent(rest, ladders[0], pulse)
+    for ladder in ladders[1:]:
+        rest.fmu.restore(saved)
+        with suppress(UsageError):  # an unstable state has become too large on it
+            other = Tangent(rest, ladder, pulse)
+            if len(other.state) > len(best.state):
+                best = other
+                continue
+        break
+    return best
+
+
+# -- instances that trace what is written to them ----------------------------------------------------------------------
+
+
+class TracedInstance:
+    """An FMU with the values last written to it, and the time of its last step."""
+
+    def __init__(self, fmu: Instance) -> None:
+        self.fmu = fmu
+        self.written: dict[str, float] = {}
+        self.time = 0.0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.fmu, name)
+
+    def writer(self, names: Sequence[str], source: Floats) -> Transfer:
+        """As `Simulator`."""
+        write = self.fmu.writer(names, source)
+
+        def transfer() -> None:
+            write()
+            self.written.update(zip(names, source.tolist()))
+
+        return transfer
+
+    def enter_initialization(self, start: float, stop: float) -> None:
+        """As `Simulator`, without an end: other runs begin where this one has come to rest."""
+        self.fmu.enter_initialization(start, math.inf)
+
+    def step(self, t: float, h: float) -> None:
+        """As `Simulator`."""
+        self.fmu.step(t, h)
+        self.time = t + h
+
+
+def tracing_loader(instances: Instances) -> Loader:
+    """A loader of instances as `TracedInstance`."""
+
+    @contextmanager
+    def load(path: Path, instance_name: str) -> Iterator[Instance]:
+        with instances.load(path, instance_name) as fmu:
+            yield cast(Instance, TracedInstance(fmu))
+
+    return load

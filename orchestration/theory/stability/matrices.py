@@ -1,0 +1,155 @@
+"""A component about rest as matrices, from the derivatives of its FMU."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.systems.system.times import NANOSECONDS, nanoseconds
+from orchestration.theory.stability.linearised_component import Tangent
+
+NEAR, FAR = 0.1, 0.5
+"""of the norm of Φ(h) - I: between them its logarithm is most accurate"""
+HALVINGS = 40
+INEXACT = 1e-7
+"""of Φ(2h): the difference to Φ(h)² allowed, both by small differences; beyond it the component is no linear system in
+continuous time"""
+NO_FEEDTHROUGH = 1e-6
+"""of the largest response of an output to an input in a step: smaller feedthrough is taken for rounding"""
+TERMS = 24
+INDEPENDENT = (0.1, 1e-3, 1e-5, 1e-8)
+"""relative part of a coordinate outside of the span of those before it, at least; tried in turn"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Matrices:
+    """y = C x + D u; ẋ = A x + B u of a component in continuous time, x⁺ = A x + B u of a sampled one."""
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    A: Floats
+    B: Floats
+    C: Floats
+    D: Floats
+
+
+def of_samples(tangent: Tangent, period: float) -> Matrices:
+    """The matrices of a component that is sampled every `period` [s]."""
+    by_state, by_input = tangent.derivatives(period)
+    count = len(tangent.outputs)
+    return Matrices(
+        inputs=tangent.inputs, outputs=tangent.outputs,
+        A=by_state[count:], B=by_input[count:], C=by_state[:count], D=by_input[:count],
+    )  # fmt: skip
+
+
+def in_continuous_time(tangent: Tangent, first: float, differs: float = INEXACT) -> tuple[Matrices, str | None]:
+    """The matrices of a component in continuous time, and why they do not describe it; None: they do.
+
+    `first` is a step [s] that it takes; two steps may differ from one of twice the length by `differs`, relative.
+    """
+    count = len(tangent.outputs)
+    h = first if tangent.unit is not None else _informative_step(tangent, first)
+    by_state, by_input = tangent.derivatives(h)
+    state, moved = by_state[count:], by_input[count:]
+    change = state - np.eye(len(state))
+    if len(change) and np.linalg.norm(change, 2) > 2.0 * FAR:
+        unfit: str | None = f"a step of {h:g} s is too long to show what happens within it"
+        A, B, C, D = np.zeros_like(change), np.zeros_like(moved), by_state[:count], by_input[:count]
+    else:
+        unfit = _misfit(tangent, state, h, differs)
+        A = _logarithm(change) / h
+        B = np.asarray(np.linalg.solve(_mean_exponential(A * h), moved)) / h
+        C = by_state[:count] @ np.linalg.inv(state)
+        D = _feedthrough(by_input[:count], C @ moved)
+    return Matrices(inputs=tangent.inputs, outputs=tangent.outputs, A=A, B=B, C=C, D=D), unfit
+
+
+def depends_on_step(tangent: Tangent, period: float) -> bool:
+    """Whether a sample depends on the time to the next one."""
+    usual, sooner = (np.hstack(tangent.derivatives(h)) for h in (period, 0.9 * period))
+    return bool(np.abs(usual - sooner).max(initial=0.0) > INEXACT * np.abs(usual).max(initial=1.0))
+
+
+def in_output_coordinates(of: Matrices, after: Floats) -> Matrices:
+    """In coordinates that are outputs, now or, by `after`, periods later with inputs at rest: the first independent."""
+    rows, power = [], np.eye(len(of.A))
+    for _ in range(max(len(of.A), 1)):
+        rows += list(of.C @ power)
+        power = after @ power
+    chosen, span = list[Floats](), np.zeros((0, len(of.A)))
+    for ratio in INDEPENDENT:
+        for row in rows:
+            size = float(np.linalg.norm(row))
+            beyond = row - (row @ span.T) @ span
+            beyond -= (beyond @ span.T) @ span
+            norm = float(np.linalg.norm(beyond))
+            if len(chosen) < len(of.A) and norm > ratio * size > 0.0:
+                chosen.append(row)
+                span = np.vstack([span, beyond / norm])
+    if len(chosen) < len(of.A):
+        return of
+    onto = np.array(chosen).reshape(len(of.A), len(of.A))
+    back = np.linalg.inv(onto) if len(onto) else onto
+    return replace(of, A=onto @ of.A @ back, B=onto @ of.B, C=of.C @ back)
+
+
+def _feedthrough(whole: Floats, by_states: Floats) -> Floats:
+    """The direct feedthrough; 0 where it may be rounding."""
+    found: Floats = whole - by_states
+    found[np.abs(found) <= NO_FEEDTHROUGH * np.abs(whole).max(axis=1, keepdims=True, initial=0.0)] = 0.0
+    return found
+
+
+def _misfit(tangent: Tangent, once: Floats, h: float, differs: float) -> str | None:
+    """Why it is no linear system in continuous time; None: it is one."""
+    count = len(tangent.outputs)
+    twice = tangent.derivatives(2.0 * h)[0][count:]
+    difference = float(np.abs(twice - once @ once).max(initial=0.0)) / max(1.0, float(np.abs(twice).max(initial=0.0)))
+    if difference <= differs:
+        return None
+    return f"a step of {2 * h:g} s differs from two of {h:g} s by {difference:.1g}"
+
+
+def _informative_step(tangent: Tangent, first: float) -> float:
+    """A step over which the state changes neither too little nor too much."""
+    count, h = len(tangent.outputs), first
+    for _ in range(HALVINGS):
+        by_state = tangent.derivatives(h)[0][count:]
+        size = float(np.linalg.norm(by_state - np.eye(len(by_state)), 2)) if len(by_state) else NEAR
+        if size > FAR and nanoseconds(h) >= 2:
+            h = whole_nanoseconds(0.5 * h)
+        elif size < NEAR and h < 64.0 * first:
+            h = 2.0 * h
+        else:
+            break
+    return h
+
+
+def whole_nanoseconds(seconds: float) -> float:
+    """A time rounded to whole nanoseconds [s], as for derivatives."""
+    return max(1, nanoseconds(seconds)) / NANOSECONDS
+
+
+def _logarithm(change: Floats) -> Floats:
+    """The logarithm of I + change, by the series of the inverse hyperbolic tangent."""
+    if not len(change):
+        return change
+    x = np.linalg.solve(2.0 * np.eye(len(change)) + change, change)
+    square, power = x @ x, x
+    found: Floats = np.zeros_like(x)
+    for k in range(TERMS):
+        found = found + power / (2 * k + 1)
+        power = power @ square
+    return 2.0 * found
+
+
+def _mean_exponential(A: Floats) -> Floats:
+    """(e^A - I) A⁻¹, by its series."""
+    found, term = np.eye(len(A)), np.eye(len(A))
+    for k in range(1, TERMS + 1):
+        term = term @ A / (k + 1)
+        found = found + term
+    return found

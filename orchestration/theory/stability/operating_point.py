@@ -1,0 +1,118 @@
+"""A system at its operating point, without randomness and quantisation, and whether it rests there."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.systems.system.component import Component
+from orchestration.systems.system.criterion import Criterion
+from orchestration.systems.system.distribution import lowest
+from orchestration.systems.system.model import System
+from orchestration.systems.system.paths import changed
+from orchestration.systems.system.placement import punctual
+from orchestration.systems.system.sampling import Sampling
+from orchestration.systems.system.times import exact_nanoseconds
+
+AT_REST = 1e-6
+"""change allowed in the first periods of the unperturbed run"""
+LONGEST_HYPERPERIOD = 20
+"""of sampled components, in longest periods"""
+
+
+class NotAnEquilibriumError(UsageError):
+    """The operating point is no equilibrium, whatever the method."""
+
+
+def deterministic(system: System) -> System:
+    """`system` at its operating point, without jitter, loss, noise, quantisation and objectives."""
+    chosen = changed(system, system.operating_point)
+    return replace(
+        chosen,
+        components={name: _punctual(component) for name, component in chosen.components.items()},
+        connections=tuple(
+            replace(
+                x,
+                delay=lowest(x.delay),
+                delay_jitter=0.0,
+                jitter_distribution="uniform",
+                loss=0.0,
+                burst_length=None,
+                noise={},
+                quantisation={},
+            )
+            for x in chosen.connections
+        ),
+        sources={
+            name: replace(source, noise=0.0)
+            if source.noise is not None
+            else replace(source, scale=0.0)
+            if source.is_random
+            else source
+            for name, source in chosen.sources.items()
+        },
+        **punctual(chosen),
+        objectives={},
+        criterion=Criterion(diverged=chosen.criterion.diverged),
+    )
+
+
+def _punctual(component: Component) -> Component:
+    if component.sampling is None:
+        return replace(component, record=())
+    return replace(component, record=(), sampling=replace(component.sampling, jitter=0.0))
+
+
+def longest_period(system: System) -> Fraction:
+    """The longest period of sampled components, or the longest step where none is sampled [ns]."""
+    return max(_periods(system))
+
+
+def hyperperiod_of(system: System) -> Fraction | None:
+    """The hyperperiod of all sampled components [ns]; None: none within `LONGEST_HYPERPERIOD`."""
+    periods = _periods(system)
+    denominator = math.lcm(*(period.denominator for period in periods))
+    hyperperiod = Fraction(math.lcm(*(int(period * denominator) for period in periods)), denominator)
+    return hyperperiod if hyperperiod <= LONGEST_HYPERPERIOD * max(periods) else None
+
+
+def _periods(system: System) -> list[Fraction]:
+    return [true_period(one.sampling) for one in system.components.values() if one.sampling is not None] or [
+        exact_nanoseconds(one.step) for one in system.components.values() if one.step is not None
+    ]
+
+
+def true_period(sampling: Sampling) -> Fraction:
+    """The period of a component whose clock may be fast or slow [ns]."""
+    return exact_nanoseconds(sampling.period) / Fraction(repr(float(sampling.clock_ratio)))
+
+
+def latest_offset(system: System) -> Fraction:
+    """True time of the first sample of the component that begins last [ns]."""
+    return max(
+        (
+            exact_nanoseconds(one.sampling.offset) / Fraction(repr(float(one.sampling.clock_ratio)))
+            for one in system.components.values()
+            if one.sampling is not None
+        ),
+        default=Fraction(0),
+    )
+
+
+def exchanged_signals(system: System) -> Sequence[str]:
+    """The signals that connections carry."""
+    return tuple(dict.fromkeys(start for x in system.connections for start in x.start))
+
+
+def expect_rest(system: System, calm: Floats) -> None:
+    """Raise `NotAnEquilibriumError` for an exchanged signal that changes; rows a period apart, shape (n, signals)."""
+    moved = np.abs(calm - calm[0]).max(axis=0) / np.maximum(1.0, np.abs(calm[0]))
+    worst = int(moved.argmax())
+    if moved[worst] > AT_REST:
+        raise NotAnEquilibriumError(
+            f"the operating point is not at rest: {exchanged_signals(system)[worst]} moves by {moved[worst]:.2g}"
+        )

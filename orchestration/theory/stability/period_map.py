@@ -1,0 +1,112 @@
+"""The map of a linear loop over a period, under the clock of the system.
+
+The master exchanges values between tangents. The state of the loop is what components, connections and the row of
+signals hold; its map is found by one period from each of these numbers, and, where a component is replaced by an open
+port, from each of the numbers that the port sends.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.recording.recording import Chunk, InMemory
+from orchestration.simulation.engines.master import Master
+from orchestration.simulation.engines.wiring import fixed_steps
+from orchestration.systems.schedule.streams import Streams
+from orchestration.systems.schedule.timetable import Timetable
+from orchestration.systems.system.component import Component
+from orchestration.systems.system.criterion import Criterion
+from orchestration.systems.system.times import NANOSECONDS, exact_nanoseconds
+from orchestration.theory.stability.linear_simulator import LinearSimulator, OpenPort
+from orchestration.theory.stability.loop_at_rest import AtRest
+
+LARGEST = 400
+"""states of a loop"""
+
+
+def period_map(loop: AtRest, ports: Mapping[str, OpenPort] | None = None) -> Floats:
+    """The derivatives of the state of a loop after a period and, below, of the values received by open `ports` in it.
+
+    By the state before, at the instants of `begin` plus whole periods, and to the right by the values the ports send.
+    """
+    ports = ports or {}
+    simulators = {**loop.tangents, **ports}
+    master = _master(loop, simulators)
+    master.initialise()
+    master.run(pause_at=math.floor(loop.begin))
+    places = [*_state_parts(master, simulators), *(port.sent for port in ports.values())]
+    received = [port.received for port in ports.values()]
+    columns, rows = sum(map(len, places)), sum(map(len, [*_state_parts(master, simulators), *received]))
+    if columns > LARGEST:
+        raise UsageError(f"the loop has {columns} states, more than {LARGEST}")
+    result: Floats = np.zeros((rows, columns))
+    for i, unit in enumerate(np.eye(columns)):
+        _assign(unit, [*_state_parts(master, simulators), *(port.sent for port in ports.values())])
+        master.run(pause_at=math.floor(loop.begin + (i + 1) * loop.period))
+        after = np.concatenate([*_state_parts(master, simulators), *received])
+        if len(after) != rows:
+            raise UsageError("the number of messages in transit changes over a period")
+        result[:, i] = after
+    if not np.isfinite(result).all():
+        raise UsageError("the loop has no finite derivative at the operating point")
+    return result
+
+
+def _master(loop: AtRest, simulators: Mapping[str, LinearSimulator]) -> Master:
+    """A master of linear simulators, under the clock of the system, for a period for each possible state."""
+    simulation = loop.simulation
+    system = replace(
+        simulation.system,
+        stop_time=float(loop.begin + (LARGEST + 2) * loop.period) / NANOSECONDS,
+        components={
+            name: _with_even_steps(component, loop.period)
+            if simulation.instances[name].model.varies_step
+            else component
+            for name, component in simulation.system.components.items()
+        },
+        connections=tuple(replace(x, offset=0.0) for x in simulation.system.connections),
+        sources={},
+        criterion=Criterion(),
+    )
+    streams, models = Streams(system.seed, system.streams), {n: i.model for n, i in simulation.instances.items()}
+    return Master(
+        system,
+        simulators,
+        timetable=Timetable(system, streams, fixed_steps(system, models)),
+        streams=streams,
+        recorded=dict.fromkeys(simulators, ()),
+        recorder=NullRecorder(),
+    )
+
+
+def _with_even_steps(component: Component, period: Fraction) -> Component:
+    """The component with a step that divides the period, no longer than its own: so all periods are alike."""
+    if component.step is None:
+        return component
+    count = math.ceil(period / exact_nanoseconds(component.step))
+    return replace(component, step=float(period / count) / NANOSECONDS)
+
+
+def _state_parts(master: Master, simulators: Mapping[str, LinearSimulator]) -> list[Floats]:
+    """The state at an instant, in place: the row without its time, connections, and components."""
+    parts = [master.board.row[1:]]
+    for channel in master.channels:
+        parts += channel.held()
+    return [*parts, *(part for one in simulators.values() for part in (one.state, one.input))]
+
+
+def _assign(values: Floats, into: Sequence[Floats]) -> None:
+    for part, value in zip(into, np.split(values, np.cumsum([len(part) for part in into])[:-1])):
+        part[:] = value
+
+
+class NullRecorder(InMemory):
+    """A recorder that keeps nothing."""
+
+    def take(self, chunk: Chunk) -> None:
+        """As `Recorder`."""

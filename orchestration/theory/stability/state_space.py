@@ -1,0 +1,85 @@
+"""A linear system in discrete time, and the controllable and observable part of a larger one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from orchestration.foundation.basics.extras import explains_missing
+from orchestration.foundation.basics.simulator import Floats
+
+SAMPLES = (*range(32), 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024)
+"""of impulse responses, as long as they stay small"""
+LARGEST = 1e6
+"""of a response, relative to the first"""
+MINIMAL = 1e-7
+"""of the largest singular value between inputs and outputs, each by its own unit: smaller ones count as 0"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StateSpace:
+    """Deviations from an operating point: x(k+1) = A x(k) + B u(k), y(k) = C x(k) + D u(k), every `dt` seconds."""
+
+    A: Floats
+    """States by the states of the sample before."""
+    B: Floats
+    """States by the inputs of the sample before."""
+    C: Floats
+    """Outputs by the states."""
+    D: Floats
+    """Outputs by the inputs of the same sample."""
+    dt: float
+    """From sample to sample [s]."""
+    inputs: tuple[str, ...]
+    """The entries of u, in the units of the FMU."""
+    outputs: tuple[str, ...]
+    """The entries of y."""
+
+    def __repr__(self) -> str:
+        sizes = f"{len(self.inputs)} inputs, {len(self.A)} states, {len(self.outputs)} outputs"
+        return f"<StateSpace: {sizes}, every {self.dt:g} s>"
+
+    @explains_missing
+    def to_control(self) -> Any:
+        """The same as a `StateSpace` of python-control, whose names have underscores for dots.
+
+        Raises `QuadcosimError` where that is not installed.
+        """
+        import control
+
+        inputs, outputs = ([name.replace(".", "_") for name in names] for names in (self.inputs, self.outputs))
+        return control.ss(self.A, self.B, self.C, self.D, self.dt, inputs=inputs, outputs=outputs)
+
+
+def reduced(A: Floats, B: Floats, C: Floats) -> tuple[Floats, Floats, Floats]:
+    """The controllable and observable part of a system, in balanced coordinates.
+
+    By the singular values of the impulse responses (Ho and Kalman), over a finite time, so that the system need not be
+    stable.
+    """
+    if not (B.any() and C.any()):
+        return np.zeros((0, 0)), np.zeros((0, B.shape[1])), np.zeros((C.shape[0], 0))
+    made, shown = _powers(A, B), _powers(A.T, C.T)
+    responses = np.concatenate([abs(C @ state).max(axis=1, keepdims=True) for state in made], axis=1).max(axis=1)
+    weight = np.tile(np.where(responses > 0.0, responses, 1.0), len(shown))
+    reachable, observable = np.hstack(made), np.hstack(shown).T / weight[:, None]
+    left, values, right = np.linalg.svd(observable @ reachable, full_matrices=False)
+    rank = int((values > MINIMAL * values[0]).sum())
+    root = np.sqrt(values[:rank])
+    back = reachable @ right[:rank].T / root
+    onto = (left[:, :rank] / root).T @ observable
+    return onto @ A @ back, onto @ B, C @ back
+
+
+def _powers(A: Floats, B: Floats) -> list[Floats]:
+    """A^k B for k in `SAMPLES`, while it is small."""
+    found, state, k = [B], B, 0
+    for sample in SAMPLES[1:]:
+        while k < sample:
+            state, k = A @ state, k + 1
+        if np.abs(state).max() > LARGEST * np.abs(B).max():
+            break
+        found.append(state)
+    return found

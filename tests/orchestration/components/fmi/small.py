@@ -1,0 +1,146 @@
+"""FMUs of one C source with one habit each, compiled where the tests run, their descriptions written to fit."""
+
+import functools
+import shutil
+import subprocess
+import tempfile
+import uuid
+import zipfile
+from pathlib import Path
+
+import fmpy
+import platformdirs
+import pytest
+
+from orchestration.components.fmi import repeatability
+
+COMPILER = shutil.which("gcc") or shutil.which("cc")
+needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler")
+
+_SOURCE = Path(__file__).with_name("small.c")
+_KEPT = b"0123456789abcdef" * 2
+
+_FMI2 = """<fmiModelDescription fmiVersion="2.0" modelName="Small" guid="small">
+  <CoSimulation modelIdentifier="Small" {attributes}/>{experiment}
+  <TypeDefinitions><SimpleType name="Mode"><Enumeration>{items}</Enumeration></SimpleType></TypeDefinitions>
+  <ModelVariables>
+    <ScalarVariable name="u" valueReference="0" causality="input"><Real start="0"/></ScalarVariable>
+    <ScalarVariable name="y" valueReference="1" causality="output"><Real/></ScalarVariable>
+    <ScalarVariable name="gain" valueReference="2" causality="parameter" variability="tunable"><Real start="1"/>
+    </ScalarVariable>
+    <ScalarVariable name="on" valueReference="3" causality="input" variability="discrete"><Boolean start="true"/>
+    </ScalarVariable>
+    <ScalarVariable name="high" valueReference="4" causality="output" variability="discrete"><Boolean/></ScalarVariable>
+    <ScalarVariable name="count" valueReference="5" causality="output" variability="discrete"><Integer/>
+    </ScalarVariable>
+    <ScalarVariable name="mode" valueReference="6" causality="parameter" variability="fixed">
+      <Enumeration declaredType="Mode" start="1"/></ScalarVariable>
+    <ScalarVariable name="label" valueReference="7" causality="parameter" variability="fixed"><String start=""/>
+    </ScalarVariable>
+  </ModelVariables>
+  <ModelStructure>
+    <Outputs><Unknown index="2"/><Unknown index="5"/><Unknown index="6"/></Outputs>
+    <InitialUnknowns><Unknown index="2" dependencies=""/></InitialUnknowns>
+  </ModelStructure>
+</fmiModelDescription>"""
+
+_FMI3 = """<fmiModelDescription fmiVersion="3.0" modelName="Small" instantiationToken="small">
+  <CoSimulation modelIdentifier="Small" {attributes}/>{experiment}
+  <TypeDefinitions><EnumerationType name="Mode">{items}</EnumerationType></TypeDefinitions>
+  <ModelVariables>
+    <Float64 name="u" valueReference="0" causality="input" start="0 0"><Dimension start="2"/></Float64>
+    <Float64 name="y" valueReference="1" causality="output"><Dimension start="2"/></Float64>
+    <Float32 name="gain" valueReference="2" causality="parameter" variability="tunable" start="1"/>
+    <Boolean name="on" valueReference="3" causality="input" start="true"/>
+    <Boolean name="high" valueReference="4" causality="output"/>
+    <UInt8 name="count" valueReference="5" causality="output"/>
+    <Enumeration name="mode" valueReference="6" causality="parameter" variability="fixed" declaredType="Mode"
+      start="1"/>
+    {more}
+  </ModelVariables>
+  <ModelStructure>
+    <Output valueReference="1"/><Output valueReference="4"/><Output valueReference="5"/>
+    <InitialUnknown valueReference="1" dependencies=""/>
+  </ModelStructure>
+</fmiModelDescription>"""
+
+_MODE = """<ScalarVariable name="mode" valueReference="6" causality="parameter" variability="fixed">
+      <Enumeration declaredType="Mode" start="1"/></ScalarVariable>"""
+_MODE_AS_INPUT = """<ScalarVariable name="mode" valueReference="6" causality="input" variability="discrete">
+      <Integer start="1"/></ScalarVariable>"""
+_ITEMS = '<Item name="forward" value="1"/><Item name="backward" value="2"/>'
+BINARY = '<Binary name="blob" valueReference="8" causality="input"/>'
+SIZE = '<UInt64 name="size" valueReference="9" causality="structuralParameter" start="2"/>'
+CLOCK = '<Clock name="tick" valueReference="7" causality="input" intervalVariability="constant" intervalDecimal="1"/>'
+
+
+def nothing_known(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A user's cache, from now on, in which nothing is known of any FMU; what is compiled is shared with all tests."""
+    usual, own = (Path(each) / "quadcosim" for each in (platformdirs.user_cache_dir(), folder))
+    own.mkdir(parents=True)
+    for name in ("batch", "lanes", "loader", "loop", "native"):
+        (usual / name).mkdir(parents=True, exist_ok=True)
+        (own / name).symlink_to(usual / name)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
+    return folder
+
+
+def small(
+    folder: Path,
+    *habits: str,
+    fmi: int = 2,
+    fixed_step: bool = False,
+    once: bool = False,
+    saves: bool = True,
+    more: str = "",
+    tolerance: float | None = None,
+    mode_is_input: bool = False,
+) -> Path:
+    """The FMU with these habits (macros of `small.c`) in `folder`, with these flags in its description.
+
+    `mode_is_input`: that of FMI 2.0 has `mode` as an Integer that others may feed, of any value.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    library = _compiled(*habits, *(["FMI3"] if fmi == 3 else [])).replace(_KEPT, uuid.uuid4().hex.encode())
+    state = (
+        ("canGetAndSetFMUState", "canSerializeFMUState")
+        if fmi == 3
+        else ("canGetAndSetFMUstate", "canSerializeFMUstate")
+    )
+    flags = {
+        "canHandleVariableCommunicationStepSize": not fixed_step,
+        "canBeInstantiatedOnlyOncePerProcess": once,
+        **dict.fromkeys(state, saves),
+    }
+    attributes = " ".join(f'{name}="{str(value).lower()}"' for name, value in flags.items())
+    text = _FMI3 if fmi == 3 else _FMI2
+    place = fmpy.platform_tuple if fmi == 3 else fmpy.platform
+    path = folder / "small.fmu"
+    with zipfile.ZipFile(path, "w") as archive:
+        if mode_is_input:
+            assert _MODE in text
+            text = text.replace(_MODE, _MODE_AS_INPUT)
+        experiment = "" if tolerance is None else f'<DefaultExperiment tolerance="{tolerance}"/>'
+        described = text.format(attributes=attributes, items=_ITEMS, more=more, experiment=experiment)
+        archive.writestr("modelDescription.xml", described)
+        archive.writestr(f"binaries/{place}/Small{fmpy.sharedLibraryExtension}", library)
+    return path
+
+
+def known(fmu: Path) -> Path:
+    """The FMU, of which it is known whether its runs repeat: else its first run finds it out, in most of a second."""
+    repeatability.of(fmu)
+    return fmu
+
+
+@functools.cache
+def _compiled(*macros: str) -> bytes:
+    """The library, in which what is kept has a name that each FMU replaces by its own."""
+    defined = [f"-D{macro}" for macro in (*macros, f'KEPT="{_KEPT.decode()}"')]
+    with tempfile.TemporaryDirectory() as folder:
+        library = Path(folder) / "small"
+        options = ("-shared", "-fPIC", "-O1", "-w")
+        subprocess.run([str(COMPILER), *options, *defined, str(_SOURCE), "-o", str(library), "-lm"], check=True)
+        content = library.read_bytes()
+    assert _KEPT in content
+    return content

@@ -1,0 +1,113 @@
+"""What `quadcosim new` writes works as it stands: it is packed, flown, tested, and has a limit."""
+
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from xml.etree.ElementTree import fromstring
+
+import pytest
+
+from orchestration.components.building import builder, fmus
+from orchestration.components.scaffold.folder import Kind, class_name, module_name, write
+from orchestration.experiments.limits import limit
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.simulation.runs.simulation import run
+from orchestration.systems.system.system_file import load_system
+from tests.commands import Main
+
+LIMITS = {
+    "pendulum": ("components.controller.sampling.period", 0.1, 0.3),
+    "low_pass": ("components.filter.parameters.time_constant", 0.05, 0.4),
+}
+KINDS: dict[str, Kind] = {"pendulum": "plant", "low_pass": "filter"}
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_five_commands_lead_to_the_limit_plot_of_ones_own_controller(here: Path, main: Main) -> None:
+    made = main("new", "controller", "hover_pd", "--author", 'Ada "A." Lovelace', "--license", "Apache-2.0")
+    assert made.stdout.split() == [
+        "hover_pd/hover_pd.py", "hover_pd/test_hover_pd.py", "hover_pd/system.toml", "hover_pd/README.md",
+    ]  # fmt: skip
+    built = Path("hover_pd", "native", "HoverPd.fmu")
+    assert main("build", "hover_pd", "--native").stdout.splitlines() == [str(built.resolve())]
+    with zipfile.ZipFile(built) as archive:
+        said = fromstring(archive.read("modelDescription.xml")).attrib
+        page = archive.read("documentation/index.html").decode()
+    assert (said["author"], said["license"]) == ('Ada "A." Lovelace', "Apache-2.0")
+    assert said["description"] == "PD on the position over PD on the attitude: motion in, thrust and torque out"
+    assert "quadcosim authors" not in page
+    assert "good             True" in main("run", "hover_pd/system.toml", "--native").stdout
+    period = ("--of", "components.controller.sampling.period", "--from", "0.05", "--to", "0.2", "--scan", "0.1")
+    found = main("limit", "hover_pd/system.toml", "--native", *period, "--tolerance", "0.05").stdout
+    assert "large_signal_limit   0.1" in found
+    assert "local_limit          0.11" in found
+    drawn = here / "hover_pd" / "limit_components_controller_sampling_period.png"
+    assert drawn.read_bytes().startswith(b"\x89PNG")
+
+
+def test_each_passes_its_own_tests_and_a_mistake_is_reported_with_its_line(here: Path, main: Main) -> None:
+    for name, kind in KINDS.items():
+        write(kind, name, here, author="Ada", license="MIT")
+    law = write("controller", "hover_pd", here, author="", license="")[0]
+    flown_below = "not upright and not the_quadrotor_flies"
+    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-k", flown_below, "."]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+    assert "13 passed, 2 deselected" in done.stdout
+    law.write_text(law.read_text(encoding="utf-8").replace("self.thrust =", "self.trust ="), encoding="utf-8")
+    line = 1 + next(i for i, text in enumerate(law.read_text().splitlines()) if "self.trust" in text)
+    failed = main("run", "hover_pd/system.toml", code=1).stderr.splitlines()[-1]
+    assert "self.trust: no such variable; expected thrust, torque" in failed
+    assert failed.endswith(f"in hover_pd.py, line {line}, at t = 0 s")
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_plant_and_a_filter_run_good_and_have_a_limit(name: str, here: Path) -> None:
+    write(KINDS[name], name, here, author="Ada", license="MIT")
+    builder.build_slaves(
+        builder.slaves_of(here / name), here / name / "native", packing=builder.NATIVE
+    )  # all in one process
+    system = fmus.native_twins(load_system(here / name / "system.toml"))
+    assert run(system).metrics["good"]
+    of, first, last = LIMITS[name]
+    found = limit.find(system, of, first=first, last=last, scan=last - first, tolerance=last)
+    assert found.large_signal_limit == first
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("9lives", "expected a name of letters"),
+        ("a.b", "expected a name of letters"),
+        ("../up", "expected a name of letters"),
+        ("é", "expected a name of letters"),
+        ("json", "json is a module or a keyword of Python"),
+        ("class", "class is a module or a keyword of Python"),
+        ("numpy", "numpy is a module or a keyword of Python"),
+        ("unified_controller", "an FMU of this project has this name"),
+        ("slave", "expected another name, as my_slave"),
+    ],
+)
+def test_names_that_would_not_work_are_refused(name: str, words: str, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=words):
+        write("controller", name, tmp_path, author="", license="")
+    assert not [*tmp_path.iterdir()]
+
+
+def test_what_is_there_is_not_touched(here: Path, main: Main) -> None:
+    (here / "mine").mkdir()
+    assert "mine: exists already" in main("new", "plant", "mine", code=2).stderr
+    assert not [*(here / "mine").iterdir()]
+    assert "new motor: expected controller, plant, filter" in main("new", "motor", "mine", code=2).stderr
+
+
+def test_names_are_in_the_case_that_python_has_them_in() -> None:
+    names = ("hover_pd", "HoverPd", "hover-pd", "PID")
+    assert [class_name(name) for name in names] == ["HoverPd", "HoverPd", "HoverPd", "PID"]
+    assert [module_name(class_name(name)) for name in names] == ["hover_pd", "hover_pd", "hover_pd", "pid"]

@@ -1,0 +1,43 @@
+"""Pictures of a comparison, of cells made up."""
+
+from collections.abc import Sequence
+
+from matplotlib.figure import Figure
+
+from orchestration.experiments.comparison.cells import CellSummary, Share
+from orchestration.experiments.comparison.figures import colors_of, shares
+from orchestration.simulation.results.quantities import Quantity
+
+SURVIVORS = {"soon": (20, 3, 0), "later": (20, 14, 0), "never": (20, 20, 20)}
+
+
+def cells_of(controller: str, survivors: Sequence[int]) -> list[CellSummary]:
+    return [
+        CellSummary(
+            cell=0, vehicle="v", condition="c", controller=controller, value=float(k), count=20,
+            survives=Share.of(count, 20), settles=Share.of(count // 2, 20), diverged=20 - count, diverged_late=0,
+            medians={},
+        )
+        for k, count in enumerate(survivors)
+    ]  # fmt: skip
+
+
+def drawn(*titles: str) -> Figure:
+    found = [cell for name, survivors in SURVIVORS.items() for cell in cells_of(name, survivors)]
+    return shares(dict.fromkeys(titles, found), Quantity(name="axis"), colors_of([*SURVIVORS]))
+
+
+def test_controllers_differ_by_dashes_and_are_named_on_their_lines_the_earlier_they_fall_the_lower() -> None:
+    (panel,) = drawn("one").axes
+    assert len({line.get_linestyle() for line in panel.get_lines()}) == len(SURVIVORS)
+    places = {text.get_text(): text.xy for text in panel.texts}  # type: ignore[attr-defined]
+    assert list(places) == ["soon", "later", "never"]
+    assert 0.0 < places["soon"][1] < places["later"][1] < 1.0
+    assert 0.0 < places["soon"][0] < 1.0 < places["later"][0] < 2.0
+    assert places["never"] == (2.0, 1.0)
+
+
+def test_several_panels_have_their_controllers_in_one_legend() -> None:
+    figure = drawn("one", "other")
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [*SURVIVORS, "survive", "settle"]
+    assert not any(panel.texts for panel in figure.axes)

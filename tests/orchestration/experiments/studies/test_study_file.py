@@ -1,0 +1,231 @@
+"""Study files: their content, and errors for invalid ones."""
+
+from pathlib import Path
+
+import pytest
+
+from orchestration.experiments.studies.study import Study
+from orchestration.experiments.studies.study_file import load_study
+from orchestration.quadrotor.scenarios.timing import TIMING_KEYS
+from orchestration.systems.system.distribution import Distribution
+from orchestration.systems.system.model import System
+from quadcosim import Scenario, UsageError
+from tests.orchestration.experiments.studies.common import GRID, at, one_line, starts
+from tests.places import ROOT
+
+ONE = '[[axes]]\nname = "seed"\nvalues = [1]\n'
+
+
+def load(folder: Path, text: str) -> Study:
+    (folder / "study.toml").write_text(text)
+    return load_study(folder / "study.toml")
+
+
+def refused(folder: Path, text: str) -> str:
+    with pytest.raises(UsageError) as caught:
+        load(folder, text)
+    line = one_line(caught.value)
+    assert line.startswith(f"{folder / 'study.toml'}: ")
+    return line
+
+
+def flown(folder: Path, text: str, index: int = 0) -> System:
+    """The system of one run of a study."""
+    return load(folder, text).system(index, starts())
+
+
+# -- good files -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "studies").glob("*.toml")), ids=lambda path: path.stem)
+def test_every_study_of_the_repository_loads_and_all_its_runs_are_scenarios(path: Path) -> None:
+    study, known = load_study(path), starts()
+    assert study.name == path.stem
+    for index in range(len(study.points)):
+        study.system(index, known)
+
+
+def test_a_grid_is_read_as_it_is_written(tmp_path: Path) -> None:
+    study = load(tmp_path, GRID)
+    assert [tuple(point.values()) for point in study.points] == [
+        (p, d) for p in (0.02, 0.01) for d in (0.0, 0.01, 0.005)
+    ]
+    last = study.system(5, starts())
+    assert [at(last, f"timing.{key}") for key in ("plant_interval", "period", "delay")] == [0.005, 0.01, 0.005]
+    assert last.stop_time == 0.1
+
+
+def test_the_name_is_that_of_the_file_unless_one_is_given(tmp_path: Path) -> None:
+    assert load(tmp_path, ONE).name == "study"
+    assert load(tmp_path, f'name = "mine"\n{ONE}').name == "mine"
+
+
+def test_a_number_of_values_spans_the_range(tmp_path: Path) -> None:
+    text = '[[axes]]\nname = "p"\nsets = ["timing.period"]\nstart = 0.001\nstop = 0.005\nnumber = 5\n'
+    assert [point["p"] for point in load(tmp_path, text).points] == [0.001, 0.002, 0.003, 0.004, 0.005]
+
+
+def test_a_range_without_a_number_is_sampled_by_the_design(tmp_path: Path) -> None:
+    text = '[[axes]]\nname = "plant.mass"\nstart = 0.9\nstop = 1.1\n[design]\nmethod = "latin-hypercube"\nsamples = 7\n'
+    masses = [point["plant.mass"] for point in load(tmp_path, text).points]
+    assert len(set(masses)) == 7
+    assert all(isinstance(mass, float) and 0.9 <= mass <= 1.1 for mass in masses)
+
+
+def test_sets_puts_the_value_into_each_target(tmp_path: Path) -> None:
+    text = '[[axes]]\nname = "i"\nsets = ["plant.inertia.xx", "plant.inertia.yy", "timing.offset"]\nvalues = [0.25]\n'
+    system = flown(tmp_path, text)
+    assert system.components["plant"].parameters == {"inertia.xx": 0.25, "inertia.yy": 0.25}
+    assert at(system, "timing.offset") == 0.25
+
+
+def test_multiplies_scales_the_value_of_the_base_or_else_the_start_value_of_the_fmu(tmp_path: Path) -> None:
+    text = (
+        "[base.timing]\nperiod = 0.03\n[base.controller]\ngain.eta = 4.0\n[[axes]]\nname = 'f'\nvalues = [2]\n"
+        "multiplies = ['controller.gain.eta', 'controller.gain.theta', 'timing.period']\n"
+    )
+    system = flown(tmp_path, text)
+    assert system.components["controller"].parameters == {"gain.eta": 8.0, "gain.theta": 30.0}
+    assert at(system, "timing.period") == 0.06
+
+
+def test_only_numbers_can_be_multiplied(tmp_path: Path) -> None:
+    for target, values in (("timing.order", "[2]"), ("plant.mass", '["heavy"]'), ("plant.nonsense", "[2]")):
+        text = f'[[axes]]\nname = "x"\nmultiplies = ["{target}"]\nvalues = {values}\n'
+        with pytest.raises(UsageError, match=rf"{target}: expected a number"):
+            flown(tmp_path, text)
+
+
+def test_loss_sets_both_losses(tmp_path: Path) -> None:
+    system = flown(tmp_path, '[[axes]]\nname = "loss"\nsets = ["timing.loss"]\nvalues = [0.25]\n')
+    assert [x.loss for x in system.connections] == [0.25, 0.25]
+
+
+def test_an_axis_may_have_distributions_with_their_traces(tmp_path: Path) -> None:
+    (tmp_path / "trace.csv").write_text("delay\n0.001\n0.002\n")
+    tables = '{ uniform = [0, 0.002] }, { file = "trace.csv", column = "delay" }'
+    study = load(tmp_path, f'[[axes]]\nname = "timing.delay"\nvalues = [{tables}]\n')
+    trace = Distribution(file=tmp_path / "trace.csv", column="delay")
+    found = [study.system(index, starts()).connections[1].delay for index in range(2)]
+    assert found == [Distribution(uniform=(0.0, 0.002)), trace]
+    assert study.points[0] == {"timing.delay": "{uniform = [0, 0.002]}"}
+    assert study.files().tables[str(trace.file)] == trace.file
+
+
+def test_noise_of_one_measurement_leaves_that_of_others(tmp_path: Path) -> None:
+    axes = '[[axes]]\nname = "n"\nsets = ["timing.noise.position"]\nvalues = [0.25]\n'
+    text = f"[base.timing.noise]\nvelocity = 0.5\n{axes}"
+    assert flown(tmp_path, text).connections[0].noise == {"velocity": 0.5, "position": 0.25}
+
+
+def test_each_run_has_the_seed_of_the_base_unless_seeds_vary(tmp_path: Path) -> None:
+    text = '[base]\nseed = 7\n[[axes]]\nname = "timing.period"\nvalues = [0.01, 0.02, 0.03]\n'
+    assert [flown(tmp_path, text, i).seed for i in range(3)] == [7, 7, 7]
+    varied = f"{text}[design]\nvary_seed = true\n"
+    seeds = [flown(tmp_path, varied, i).seed for i in range(3)]
+    assert len({7, *seeds}) == 4
+    assert [flown(tmp_path, varied.replace("[0.01, ", "[0.04, 0.01, "), i + 1).seed for i in range(3)] == seeds
+    assert flown(tmp_path, varied.replace("seed = 7", "seed = 8")).seed not in seeds
+
+
+def test_an_axis_of_seeds_overrides_varying_seeds(tmp_path: Path) -> None:
+    text = '[[axes]]\nname = "seed"\nvalues = [5, 5, 9]\n[design]\nvary_seed = true\n'
+    assert [flown(tmp_path, text, i).seed for i in range(3)] == [5, 5, 9]
+
+
+def test_signals_are_kept_of_none_of_some_or_of_all(tmp_path: Path) -> None:
+    text = '[[axes]]\nname = "seed"\nvalues = [1, 2, 3]\n'
+    for given, kept in (("", []), ("keep_signals = true\n", [0, 1, 2]), ("keep_signals = [2, 0]\n", [0, 2])):
+        study = load(tmp_path, given + text)
+        assert [index for index in range(3) if study.keeps_signals(index)] == kept
+
+
+def test_the_base_may_be_the_path_of_a_scenario_from_the_folder_of_the_study(tmp_path: Path) -> None:
+    (tmp_path / "flight.toml").write_text("stop_time = 3.0\n[timing]\nperiod = 0.07\n")
+    base = load(tmp_path, f'scenario = "flight.toml"\n{ONE}').base
+    assert isinstance(base, Scenario)
+    assert (base.stop_time, base.timing.period) == (3.0, 0.07)
+
+
+def test_without_a_base_it_is_the_flight_of_the_paper(tmp_path: Path) -> None:
+    assert load(tmp_path, ONE).base == Scenario()
+
+
+# -- what cannot be ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "valid"),
+    [
+        ("nonsense = 1\n" + ONE, "nonsense", "name, scenario, base, axes, design, keep_signals"),
+        (ONE + "steps = 3\n", "steps", "name, sets, multiplies, values, start, stop, number, scale"),
+        (ONE + "[design]\nsteps = 3\n", "design.steps", "method, samples, seed, vary_seed"),
+        (
+            "[base]\nduration = 3\n" + ONE,
+            "duration",
+            "stop_time, seed, model_mismatch, vehicle, controller, plant, timing, reference, disturbance, record",
+        ),
+        ("[base.timing]\nrate = 3\n" + ONE, "timing.rate", ", ".join(TIMING_KEYS)),
+    ],
+)
+def test_an_unknown_key_is_reported_with_the_known_ones(tmp_path: Path, text: str, place: str, valid: str) -> None:
+    line = refused(tmp_path, text)
+    assert f"{place}: no such key; expected one of {valid}" in line
+
+
+@pytest.mark.parametrize("target", ["timing.rate", "nonsense", "wind.amplitude.x", "timing", "plant", ""])
+def test_an_unknown_target_is_reported_with_the_known_ones(tmp_path: Path, target: str) -> None:
+    line = refused(tmp_path, f'[[axes]]\nname = "x"\nsets = ["{target}"]\nvalues = [1]\n')
+    assert f"{target}: expected controller.NAME, plant.NAME, reference.NAME, disturbance.NAME, seed, " in line
+    assert ", ".join(key for key in TIMING_KEYS if key not in ("noise", "quantisation")) in line
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "axes = : expected at least one axis"),
+        ('[[axes]]\nname = "steps"\nsets = ["timing.period"]\nvalues = [0.1]\n', "axis steps: the table of runs has"),
+        ('[[axes]]\nname = "seed"\nsets = ["timing.period"]\nvalues = [0.1]\n', "axis seed: the table of runs has"),
+        ('[[axes]]\nname = "x"\nsets = ["seed"]\nvalues = [1, true]\n', "axis x: expected values of one kind"),
+        ('name = "../evil"\n' + ONE, "name = '../evil': expected the name of a folder"),
+        (ONE + ONE, "axes = seed, seed: expected at least one axis, each with its own name"),
+        (ONE + "sets = ['seed']\nmultiplies = ['seed']\n", "axis seed: expected sets or multiplies, not both"),
+        (ONE + "start = 1\nstop = 2\n", "axis seed: expected values, or start and stop"),
+        (ONE + "number = 2\n", "axis seed: expected values, or start and stop"),
+        ('[[axes]]\nname = "seed"\nvalues = []\n', "axis seed: expected at least one value"),
+        ('[[axes]]\nname = "seed"\nstart = 1\n', "axis seed: expected values, or start and stop"),
+        ('[[axes]]\nname = "seed"\n', "axis seed: expected values, or start and stop"),
+        ('[[axes]]\nname = "seed"\nstart = 2\nstop = 1\nnumber = 3\n', "axis seed: "),
+        ('[[axes]]\nname = "seed"\nstart = 1\nstop = 2\n', "design.samples = 0: expected at least 1"),
+        (ONE + '[design]\nmethod = "guess"\n', "design.method = 'guess'"),
+        (ONE + '[base]\n[base.timing]\nperiod = -1.0\n', "timing.period = -1.0: expected a positive number"),
+        ('scenario = "flight.toml"\n[base]\nstop_time = 1.0\n' + ONE, "scenario and base: expected one of them"),
+        ('scenario = "nowhere.toml"\n' + ONE, "nowhere.toml: expected a readable system or scenario file"),
+        ("[[axes\n", "expected TOML"),
+    ],
+)  # fmt: skip
+def test_an_invalid_file_is_refused_in_one_line(tmp_path: Path, text: str, said: str) -> None:
+    assert said in refused(tmp_path, text)
+
+
+def test_a_missing_file_is_reported(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"nowhere.toml: expected a readable study file") as caught:
+        load_study(tmp_path / "nowhere.toml")
+    one_line(caught.value)
+
+
+def test_a_file_that_is_no_text_is_reported(tmp_path: Path) -> None:
+    (tmp_path / "study.toml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(UsageError, match="expected a readable study file"):
+        load_study(tmp_path / "study.toml")
+
+
+def test_the_stop_time_may_be_an_axis(tmp_path: Path) -> None:
+    file = tmp_path / "study.toml"
+    file.write_text('[[axes]]\nname = "stop_time"\nvalues = [0.1, 0.2]\n')
+    chosen = load_study(file)
+    assert [chosen.system(i, {}).stop_time for i in range(2)] == [0.1, 0.2]
+
+
+def test_noise_without_a_measurement_is_refused_as_a_target(tmp_path: Path) -> None:
+    assert "timing.noise: expected" in refused(tmp_path, '[[axes]]\nname = "timing.noise"\nvalues = [0.1]\n')

@@ -1,0 +1,97 @@
+"""Tuning by exact expectations: against a separate search with matrices written by hand, and refusals."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from scipy.optimize import minimize
+
+from orchestration.experiments.studies.axes import Axis
+from orchestration.experiments.tuning.exact import ExactTuning, ExactTuningResult, search_exactly
+from orchestration.experiments.tuning.tune import Tuned, tune
+from orchestration.experiments.tuning.tuning_file import load_tuning
+from orchestration.foundation.basics.documents import read_toml
+from orchestration.foundation.basics.errors import UsageError
+from tests.orchestration.theory.exact.common import servo
+from tests.places import EXAMPLES
+
+FILE = EXAMPLES / "distributed_servo" / "tuning.toml"
+GAINS = "components.controller.parameters"
+
+
+def tuning(**changes: object) -> ExactTuning:
+    loaded = load_tuning(FILE)
+    assert isinstance(loaded, ExactTuning)
+    return replace(loaded, **changes)  # type: ignore[arg-type]
+
+
+def tuned(problem: ExactTuning, folder: Path) -> Tuned:
+    return tune(problem, out=folder / "gains", folder=folder / "kept", progress=None, announce=None)
+
+
+def cost(K: float, Td: float) -> float:
+    loop = servo(K=K, Td=Td, delay=0.003)
+    return float(loop.costs()[0]) / 0.006 if loop.radius < 1.0 else math.inf
+
+
+def test_the_tuned_gains_have_the_lowest_cost_by_matrices_and_another_search(tmp_path: Path) -> None:
+    found = tuned(tuning(evaluations=40), tmp_path)
+    (one,) = found.searches
+    K, Td = (one.values[f"{GAINS}.{name}"] for name in ("K", "Td"))
+    least = minimize(lambda x: cost(*x), (1.5, 0.035), method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-9})
+    assert one.cost == pytest.approx(cost(K, Td), rel=1e-9)
+    assert one.cost == pytest.approx(least.fun, rel=1e-3)
+    assert one.cost >= least.fun * (1.0 - 1e-9)
+    (path,) = found.written
+    gains = read_toml(path, "gains")["components"]["controller"]["parameters"]
+    assert gains == {"K": pytest.approx(K, rel=1e-5), "Td": pytest.approx(Td, rel=1e-5)}
+    assert "evaluations of the exact expectation of (J)." in path.read_text()
+    assert tuned(tuning(evaluations=40), tmp_path).searches == found.searches
+
+
+def test_a_search_that_starts_where_no_cost_is_finite_reduces_the_radius() -> None:
+    wide = (
+        Axis(name="K", targets=(f"{GAINS}.K",), low=2.0, high=40.0),
+        Axis(name="Td", targets=(f"{GAINS}.Td",), low=0.02, high=0.3),
+    )
+    short, longer = (search_exactly(tuning(parameters=wide, evaluations=n), 0.006, 1, lambda _: None) for n in (1, 15))
+    assert isinstance(short, ExactTuningResult)
+    assert short.cost == math.inf
+    assert longer.mean_square_radius < short.mean_square_radius
+
+
+def test_a_cost_without_an_expectation_is_refused_by_its_reason() -> None:
+    with pytest.raises(UsageError, match=r"expected mean\(…\) or rms\(…\)"):
+        search_exactly(tuning(cost="J + max(servo.angle)"), 0.006, 1, lambda _: None)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "named"),
+    [
+        ('by = "expect"', 'by = "expect"\nbad = 1.0', 'cost.bad: expected none with cost.by = "expect"'),
+        ("[search]", "[starts]\ncount = 3\n[search]", 'starts: expected none with cost.by = "expect"'),
+        ('by = "expect"', 'by = "runs"', "cost.bad: expected a value"),
+        ('by = "expect"', 'by = "guess"', "cost.by = 'guess': expected 'runs' or 'expect'"),
+        ("parameters.K", "parameter.K", "components.controller.parameter.K: "),
+    ],
+)
+def test_errors_in_a_file_are_reported(before: str, after: str, named: str, tmp_path: Path) -> None:
+    path = tmp_path / "servo.toml"
+    system = (FILE.parent / "system.toml").as_posix()
+    path.write_text(FILE.read_text().replace('system.toml"', f'{system}"').replace(before, after))
+    with pytest.raises(UsageError) as error:
+        load_tuning(path)
+    assert str(error.value).startswith(f"{path}: {named}")
+
+
+def test_engine_and_workers_are_refused_where_there_are_no_runs(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="expected none; a tuning by expect makes no runs"):
+        tune(tuning(), out=tmp_path, engine="batch")
+
+
+def test_periods_are_refused_where_several_components_sample() -> None:
+    base = load_tuning(FILE).origin
+    twice = replace(base, components={**base.components, "other": base.components["controller"]})
+    with pytest.raises(UsageError, match=r"search\.periods: expected a base with one period"):
+        tuning(base=twice)

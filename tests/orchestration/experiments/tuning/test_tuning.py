@@ -1,0 +1,231 @@
+import itertools
+import math
+import re
+from dataclasses import replace
+
+import pytest
+
+from orchestration.experiments.tuning.tune import run_searches, write
+from orchestration.experiments.tuning.tuning import Tuning, TuningResult, search
+from orchestration.experiments.tuning.tuning_file import load_tuning
+from orchestration.experiments.tuning.tuning_problem import best_by_period
+from orchestration.foundation.basics.documents import read_toml
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.quadrotor.scenarios.initial_conditions import Starts
+from orchestration.systems.system.paths import value_at
+
+FILE = """
+[base]
+stop_time = 5.0
+[base.controller]
+fmu = "native/UnifiedController"
+[base.plant]
+fmu = "native/QuadrotorPlant"
+[base.timing]
+plant_interval = 0.005
+[cost]
+of = "position_rmse + 0.01 * total_variation.torque / stop_time"
+bad = 10.0
+[starts]
+count = 3
+judged = 4
+position = 1.0
+[search]
+periods = [0.01, 0.02]
+evaluations = 100
+seeds = [1, 2]
+[[parameters]]
+name = "attitude"
+sets = ["controller.gain.attitude", "controller.gain.theta"]
+start = 1.0
+stop = 100.0
+scale = "logarithmic"
+[[parameters]]
+name = "surface"
+sets = ["controller.gain.surface"]
+start = 0.5
+stop = 20.0
+"""
+GAINS = "components.controller.parameters.gain"
+
+
+def loaded(path) -> Tuning:
+    found = load_tuning(path)
+    assert isinstance(found, Tuning)
+    return found
+
+
+@pytest.fixture
+def tuning(tmp_path) -> Tuning:
+    (tmp_path / "bowl.toml").write_text(FILE)
+    return loaded(tmp_path / "bowl.toml")
+
+
+def bowl(systems):
+    """Metrics as of flights whose cost is lowest at an attitude gain of 10 and a surface gain of 5."""
+    metrics = []
+    for system in systems:
+        attitude, surface = (value_at(system, f"{GAINS}.{name}") for name in ("attitude", "surface"))
+        cost = 1.0 + math.log(attitude / 10.0) ** 2 + (surface - 5.0) ** 2
+        metrics.append({"cost": cost, "good": cost < 50.0, "diverged": cost > 60.0})
+    return metrics
+
+
+def test_a_search_finds_the_bottom_of_a_bowl(tuning):
+    found = search(tuning, 0.01, 1, bowl, bowl, lambda share: None)
+    assert found.values["controller.gain.attitude"] == pytest.approx(10.0, rel=0.02)
+    assert found.values["controller.gain.surface"] == pytest.approx(5.0, rel=0.02)
+    assert found.values["controller.gain.theta"] == found.values["controller.gain.attitude"]
+    assert found.cost == pytest.approx(1.0, abs=1e-3)
+    assert found.evaluations <= tuning.budget + 10
+
+
+def test_searches_are_reproducible_and_depend_on_the_seed(tuning):
+    one, again, other = (search(tuning, 0.01, seed, bowl, bowl, lambda share: None) for seed in (1, 1, 2))
+    assert one == again
+    assert one.values != other.values
+
+
+def run(cost, *, good=True, diverged=False):
+    return {"cost": cost, "good": good, "diverged": diverged}
+
+
+def test_a_run_that_diverges_has_the_stated_cost_which_also_bounds_that_of_others(tuning):
+    assert tuning.mean_cost([run(1.0), run(2.0, good=False)]) == pytest.approx(1.5)
+    assert tuning.mean_cost([run(1.0), run(1.0, good=False, diverged=True)]) == pytest.approx(5.5)
+    assert tuning.mean_cost([run(1.0), run(None), run(99.0)]) == pytest.approx(7.0)
+
+
+def test_survival_is_judged_apart_from_the_cost_of_those_that_survive(tuning):
+    def judge(systems):
+        return [run(1.0), run(2.0, good=False), run(3.0), run(0.5, good=False, diverged=True)]
+
+    found = search(tuning, 0.01, 1, bowl, judge, lambda share: None)
+    assert (found.judged, found.survives, found.good) == (4, 3, 2)
+    assert found.survivors_cost == pytest.approx(2.0)
+    assert found.judgement.startswith("3 of 4 other starts survive (a share of 0.301 to 0.954, Wilson, 95 %)")
+    assert found.judgement.endswith("at a mean cost of 2, 2 are good")
+
+
+def test_where_none_survives_there_is_no_cost(tuning):
+    found = search(tuning, 0.01, 1, bowl, lambda systems: [run(1.0, diverged=True)] * 4, lambda share: None)
+    assert (found.survives, found.survivors_cost) == (0, None)
+    assert "mean cost" not in found.judgement
+
+
+def test_no_initial_condition_is_both_tuned_on_and_judged_on(tuning):
+    seen = []
+
+    def run(systems):
+        seen.append(
+            [tuple(value_at(s, f"components.plant.parameters.initial.velocity.{a}") for a in "xyz") for s in systems]
+        )
+        return bowl(systems)
+
+    search(tuning, 0.01, 1, run, run, lambda share: None)
+    trained, judged = set(itertools.chain(*seen[:-1])), set(seen[-1])
+    assert len(trained) == 3
+    assert len(judged) == 4
+    assert not trained & judged
+
+
+def test_runs_have_the_period_that_is_tuned_for(tuning):
+    systems = tuning.systems(0.02, tuning.values([0.5, 0.5]), tuning.starts)
+    assert {system.components["controller"].sampling.period for system in systems} == {0.02}
+
+
+def test_the_best_search_is_the_one_of_lowest_cost(tuning):
+    one = search(tuning, 0.01, 1, bowl, bowl, lambda share: None)
+    worse = replace(one, seed=2, cost=one.cost + 1.0, survivors_cost=0.0)
+    assert list(best_by_period([worse, one])) == [one]
+
+
+def test_an_interrupted_tuning_continues(tuning, tmp_path):
+    files, count = tuning.files(), 0
+    lines: list[str] = []
+
+    def run(systems):
+        nonlocal count
+        count += len(systems)
+        if count > 2000:
+            raise KeyboardInterrupt
+        return bowl(systems)
+
+    def results_of(run):
+        def find(period, seed, report):
+            return search(tuning, period, seed, run, run, report)
+
+        return run_searches(
+            tuning, files, tmp_path / "kept", find, TuningResult, progress=lambda share: None, announce=lines.append
+        )
+
+    with pytest.raises(KeyboardInterrupt):
+        results_of(run)
+    before = list(lines)
+    assert 0 < len(before) < 4
+    done = results_of(bowl)
+    written = list(write(tuning, done, tmp_path / "gains", "quadcosim tune"))
+    assert len(lines) == 4
+    assert [path.name for path in written] == ["bowl_10ms.toml", "bowl_20ms.toml"]
+
+    def fail(systems):
+        pytest.fail("run again")
+
+    assert results_of(fail) == done
+    gains = read_toml(written[0], "gains")["controller"]
+    assert set(gains) == {"gain.attitude", "gain.theta", "gain.surface"}
+    comments = written[0].read_text()
+    assert re.search(r"# Of 2 searches that of seed [12] is taken", comments)
+    assert comments.count("other starts survive (a share of ") == 2
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "named"),
+    [
+        ('bad = 10.0', 'bad = 10.0\nworse = 1', "cost.worse: no such key; expected one of of, by, bad"),
+        ("stop = 20.0", "", "axis surface: expected values, or start and stop, with number or to be sampled"),
+        ("start = 0.5\nstop = 20.0", "values = [1.0]", "parameters surface: expected start and stop, and what it sets"),
+        ("seeds = [1, 2]", "seeds = []", "seeds: expected at least one"),
+        ("evaluations = 100", "evaluations = 0", "evaluations = 0: expected at least 1"),
+        ("controller.gain.surface", "controler.gain.surface", "controler.gain.surface: expected controller.NAME"),
+        ("count = 3", "count = 0", "starts.count = 0: expected a whole number from 1"),
+    ],
+)  # fmt: skip
+def test_errors_in_a_file_are_reported(tmp_path, before, after, named):
+    path = tmp_path / "bowl.toml"
+    path.write_text(FILE.replace(before, after))
+    with pytest.raises(UsageError) as error:
+        load_tuning(path)
+    assert str(error.value).startswith(f"{path}: {named}")
+
+
+def test_a_single_parameter_is_refused(tuning):
+    with pytest.raises(UsageError, match="expected at least two"):
+        replace(tuning, parameters=tuning.parameters[:1])
+
+
+LOW = '"trajectory.start_z" = -10.0'
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        FILE.replace("[base.plant]", f"{LOW}\n[base.plant]"),
+        FILE.replace("[base]", "[base]\nvehicle = 'low_flier.toml'"),
+    ],
+    ids=["its own", "that of its vehicle"],
+)
+def test_initial_conditions_lie_around_the_trajectory_of_the_base(text, tmp_path):
+    (tmp_path / "low_flier.toml").write_text(f"[controller]\n{LOW}\n")
+    (tmp_path / "low.toml").write_text(text)
+    low = loaded(tmp_path / "low.toml")
+    for starts in (low.starts, low.judging_ensemble()):
+        systems = low.systems(0.01, low.values([0.5, 0.5]), starts)
+        heights = [value_at(system, "components.plant.parameters.initial.position.z") for system in systems]
+        assert len(heights) == starts.count
+        assert all(abs(height + 10.0) <= 1.0 for height in heights)
+
+
+def test_initial_conditions_that_are_judged_on_follow_the_others(tuning):
+    assert tuning.judging_ensemble() == replace(tuning.starts, first=3, count=4)
+    assert isinstance(tuning.starts, Starts)

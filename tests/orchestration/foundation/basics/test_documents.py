@@ -1,0 +1,24 @@
+"""JSON values of documents."""
+
+import numpy as np
+import pytest
+
+from orchestration.foundation.basics.documents import plain
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"), [(np.int64(3), 3), (np.bool_(True), True), (np.float32(0.5), 0.5), (np.array(2), 2)]
+)
+def test_scalars_of_numpy_become_those_of_python(value: object, expected: object) -> None:
+    converted = plain({"a": [value]})["a"][0]
+    assert (converted, type(converted)) == (expected, type(expected))
+
+
+@pytest.mark.parametrize("value", [np.float32("nan"), np.float64("inf")])
+def test_numpy_numbers_that_are_not_finite_become_none(value: object) -> None:
+    assert plain([value]) == [None]
+
+
+def test_values_without_a_json_type_are_refused() -> None:
+    with pytest.raises(TypeError, match="ndarray: no type that JSON has"):
+        plain(np.array([1, 2]))

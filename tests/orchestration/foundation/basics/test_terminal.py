@@ -1,0 +1,70 @@
+"""Progress of long work: a bar on a terminal, occasional lines where none can be drawn."""
+
+import io
+import sys
+import time
+from collections.abc import Callable
+
+import pytest
+
+from orchestration.foundation.basics import terminal
+from orchestration.foundation.basics.terminal import SPARSE, progress_bar, runs_bar
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.fixture
+def wait(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
+    """Advances the clock of the progress lines."""
+    now = [100.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+
+    def passes(seconds: float) -> None:
+        now[0] += seconds
+
+    return passes
+
+
+@pytest.mark.parametrize("kind", ["pipe", "dumb terminal"])
+def test_where_no_bar_can_be_drawn_occasional_lines_show_the_time_left(
+    kind: str, wait: Callable[[float], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    output = io.StringIO() if kind == "pipe" else Terminal()
+    monkeypatch.setattr(sys, "stderr", output)
+    monkeypatch.setenv("TERM", "dumb")
+    with progress_bar("flying") as progress:
+        for percent in range(101):
+            wait(SPARSE / 40)
+            progress(percent / 100)
+    assert output.getvalue().splitlines() == ["flying: 39%, 16 s left", "flying: 79%, 5 s left"]
+
+
+def test_occasional_lines_count_runs_too(
+    wait: Callable[[float], None], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with runs_bar() as progress:
+        for done in range(4):
+            wait(0.6 * SPARSE)
+            progress(done, 50)
+    assert capsys.readouterr().err.splitlines() == ["1 of 50 runs, 10 min left", "3 of 50 runs, 6 min left"]
+
+
+def test_short_work_prints_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    with progress_bar("flying") as progress:
+        progress(0.5)
+        progress(1.0)
+    assert capsys.readouterr().err == ""
+
+
+def test_on_a_terminal_there_is_a_bar_without_colours_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    output = Terminal()
+    monkeypatch.setattr(sys, "stderr", output)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("NO_COLOR", "1")
+    with progress_bar("flying") as progress:
+        progress(0.5)
+    assert "50%" in output.getvalue()
+    assert terminal._draws()

@@ -1,0 +1,384 @@
+"""What happens when in a flight: theorems about which instants there are, in integers and exact rationals."""
+
+import functools
+import itertools
+import math
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+import typer.main
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orchestration.command import cli
+from orchestration.command.flags import FlightFlags
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.quadrotor.scenarios.timing import TIMING_KEYS, Timing
+from orchestration.quadrotor.scenarios.translation import quadrotor
+from orchestration.systems.schedule import cursor
+from orchestration.systems.schedule.cursor import INSTANTS, Cursor
+from orchestration.systems.schedule.streams import Streams
+from orchestration.systems.system.distribution import highest
+from orchestration.systems.system.times import Grid, nanoseconds
+from quadcosim import Scenario
+from tests.orchestration.quadrotor.scenarios import stubs
+from tests.orchestration.quadrotor.scenarios.strategies import Case, cases
+from tests.orchestration.quadrotor.scenarios.stubs import Instant, Sample
+
+SECOND = 10**9
+COMMANDS = typer.main.get_command(cli.app).commands  # type: ignore[attr-defined]
+
+
+def cursor_of(case: Case) -> Cursor:
+    return stubs.cursor_of(case.timing, case.stop_time, case.seed)
+
+
+def instants_of(case: Case) -> list[Instant]:
+    return list(stubs.instants_of(cursor_of(case)))
+
+
+def samples_of(case: Case) -> list[Sample]:
+    return [instant.sample for instant in instants_of(case) if instant.sample is not None]
+
+
+def exact(seconds: float) -> Fraction:
+    """The decimal number that is written for a float, as a user means it."""
+    return Fraction(repr(seconds))
+
+
+def nominal(timing: Timing, k: int) -> int:
+    """Sampling instant k without jitter [ns], from scratch."""
+    own = exact(timing.offset) + k * exact(timing.period)
+    return round(own / exact(timing.clock_ratio) * SECOND)
+
+
+def nominal_before(timing: Timing, stop: int) -> list[int]:
+    return list(itertools.takewhile(lambda time: time < stop, (nominal(timing, k) for k in itertools.count())))
+
+
+def grid_until(timing: Timing, stop: int) -> list[int]:
+    points = (round(k * exact(timing.plant_interval) * SECOND) for k in itertools.count())
+    return list(itertools.takewhile(lambda time: time <= stop, points))
+
+
+def many(timing: dict[str, Any], count: int, seed: int = 1) -> list[Sample]:
+    """`count` samples a millisecond apart, the plant's own points out of the way."""
+    return samples_of(Case(Timing(period=1e-3, plant_interval=100.0, **timing), count * 1e-3, seed))
+
+
+# -- which instants there are -----------------------------------------------------------------------------
+
+
+@given(cases())
+def test_there_is_an_instant_at_each_point_of_the_grid_each_sample_and_each_arrival_and_no_other(case: Case) -> None:
+    instants, stop = instants_of(case), nanoseconds(case.stop_time)
+    times = [instant.time for instant in instants]
+    assert times[0] == 0
+    assert times[-1] == round(exact(case.stop_time) * SECOND)
+    sampled = [instant.sample for instant in instants if instant.sample is not None]
+    arrivals = {sample.arrival for sample in sampled if sample.arrival is not None and sample.arrival <= stop}
+    expected = {*grid_until(case.timing, stop), *(sample.time for sample in sampled), *arrivals, stop}
+    assert times == sorted(expected)
+    assert instants[-1].sample is None, "expected none at the end"
+    due = [(s.arrival, s.k) for s in sampled if s.arrival is not None and s.arrival <= stop]
+    assert [(time, k) for time, _, arrivals in instants for k in arrivals] == due, "expected each not lost, once"
+
+
+@pytest.mark.parametrize("stop_time", [0.01, 0.02, 0.1])
+def test_a_sample_that_falls_on_stop_is_not_taken(stop_time: float) -> None:
+    case = Case(Timing(period=0.01), stop_time, 0)
+    assert len(samples_of(case)) == round(stop_time / 0.01)
+
+
+@given(cases(jitter=0.0))
+def test_samples_without_jitter_are_at_round_o_plus_kT_and_so_is_the_next_beyond_the_end(case: Case) -> None:
+    samples = samples_of(case)
+    assert [s.time for s in samples] == nominal_before(case.timing, nanoseconds(case.stop_time))
+    assert all(sample.next_time == nominal(case.timing, sample.k + 1) for sample in samples)
+
+
+@given(
+    st.builds(Fraction, st.integers(0, 10**15), st.integers(1, 10**6)),
+    st.builds(Fraction, st.integers(1, 10**15), st.integers(1, 10**6)),
+    st.integers(0, 10**15),
+)
+def test_instants_do_not_drift_however_far_they_are(offset: Fraction, period: Fraction, k: int) -> None:
+    assert Grid(offset, period)[k] == round(offset + k * period)
+
+
+@given(st.integers(0, 10**9), st.integers(1, 10**9), st.integers(0, 10**9))
+def test_an_instant_between_two_nanoseconds_is_at_the_even_one(offset: int, period: int, k: int) -> None:
+    doubled = offset + k * period
+    lower = doubled // 2
+    assert Grid(Fraction(offset, 2), Fraction(period, 2))[k] == lower + (doubled % 2 and lower % 2)
+
+
+@given(cases())
+def test_samples_are_numbered_from_zero_late_by_the_jitter_at_most_and_know_the_next(case: Case) -> None:
+    samples = samples_of(case)
+    assert [sample.k for sample in samples] == list(range(len(samples)))
+    assert all(before.next_time == after.time for before, after in itertools.pairwise(samples))
+    for sample in samples:
+        assert 0 <= sample.time - nominal(case.timing, sample.k) <= nanoseconds(highest(case.timing.jitter))
+
+
+@given(cases())
+def test_the_time_that_an_instant_announces_comes_next(case: Case) -> None:
+    instants = list(cursor_of(case).instants())
+    assert all(one.next_time == other.time for one, other in itertools.pairwise(instants))
+    assert instants[-1].next_time > nanoseconds(case.stop_time)
+
+
+def test_an_offset_beyond_the_end_leaves_no_samples() -> None:
+    instants = instants_of(Case(Timing(offset=2.0, plant_interval=0.25), 1.0, 0))
+    assert [instant.time for instant in instants] == [0, SECOND // 4, SECOND // 2, 3 * SECOND // 4, SECOND]
+    assert not any(instant.sample or instant.arrivals for instant in instants)
+
+
+def test_a_fast_clock_samples_by_its_own_time() -> None:
+    times = [sample.time for sample in samples_of(Case(Timing(period=0.01, clock_ratio=1.25), 0.1, 0))]
+    assert times == [k * 8_000_000 for k in range(13)]
+
+
+# -- lateness and order of commands -----------------------------------------------------------------------
+
+
+@given(cases(delay_jitter=0.0, jitter=0.0, order="gauss-seidel"))
+def test_a_gauss_seidel_command_arrives_a_delay_after_its_sample(case: Case) -> None:
+    for sample in samples_of(case):
+        assert sample.arrival in (None, sample.time + nanoseconds(highest(case.timing.delay)))
+
+
+@given(cases(delay_jitter=0.0, order="jacobi"))
+def test_a_jacobi_command_arrives_a_delay_after_the_next_sample(case: Case) -> None:
+    for sample in samples_of(case):
+        assert sample.sent == sample.next_time
+        assert sample.arrival in (None, sample.next_time + nanoseconds(highest(case.timing.delay)))
+
+
+@given(cases())
+def test_a_command_is_late_by_the_delay_and_its_jitter_or_waits_for_the_one_before(case: Case) -> None:
+    delay, jitter, last = nanoseconds(highest(case.timing.delay)), nanoseconds(highest(case.timing.delay_jitter)), 0
+    for sample in samples_of(case):
+        if sample.arrival is not None:
+            own = range(sample.sent + delay, sample.sent + delay + jitter + 1)
+            assert sample.arrival >= last
+            assert sample.arrival in own or sample.arrival == last
+            last = sample.arrival
+
+
+def test_commands_that_would_overtake_arrive_together() -> None:
+    samples = many({"delay_jitter": 0.01}, 500)
+    shared = [s for before, s in itertools.pairwise(samples) if s.arrival == before.arrival]
+    assert len(shared) > 50
+    instants = instants_of(Case(Timing(period=1e-3, delay_jitter=0.01), 0.5, 1))
+    assert max(len(instant.arrivals) for instant in instants) > 2
+
+
+@pytest.mark.parametrize("distribution", ["uniform", "normal"])
+def test_jitter_reaches_all_of_its_range_around_its_middle(distribution: str) -> None:
+    timing = {"jitter": 0.9e-3, "jitter_distribution": distribution}
+    late = np.array([s.time - s.k * 1_000_000 for s in many(timing, 4000)]) / 900_000
+    deviation = 1 / math.sqrt(12) if distribution == "uniform" else 0.1644  # of a normal one cut at three σ
+    assert abs(late.mean() - 0.5) < 5 * deviation / math.sqrt(len(late))
+    assert abs(late.std() - deviation) < 0.01
+    assert late.min() < 0.1
+    assert late.max() > 0.9
+
+
+# -- losses -----------------------------------------------------------------------------------------------
+
+
+def lost_commands(samples: list[Sample]) -> np.ndarray:
+    return np.array([sample.arrival is None for sample in samples])
+
+
+def lost_measurements(samples: list[Sample]) -> np.ndarray:
+    return np.array([sample.measurement_lost for sample in samples])
+
+
+LOSSES = [("measurement_loss", lost_measurements), ("command_loss", lost_commands)]
+Losses = Callable[[list[Sample]], np.ndarray]
+
+
+@functools.cache
+def lossy(probability: float, count: int, burst_length: float | None = None) -> list[Sample]:
+    """Samples of which as many measurements as commands are lost, by draws of their own."""
+    timing = {"measurement_loss": probability, "command_loss": probability, "burst_length": burst_length}
+    return many(timing, count)
+
+
+@pytest.mark.parametrize("probability", [0.02, 0.3, 0.9])
+@pytest.mark.parametrize("lost", [lost_measurements, lost_commands])
+def test_independent_losses_have_their_probability(lost: Losses, probability: float) -> None:
+    flags = lost(lossy(probability, 10_000))
+    assert abs(flags.mean() - probability) < 5 * math.sqrt(probability * (1 - probability) / len(flags))
+
+
+@pytest.mark.parametrize("lost", [lost_measurements, lost_commands])
+def test_independent_losses_do_not_remember(lost: Losses) -> None:
+    flags = lost(lossy(0.3, 10_000))
+    after_a_loss = flags[1:][flags[:-1]]
+    assert abs(after_a_loss.mean() - 0.3) < 5 * math.sqrt(0.21 / len(after_a_loss))
+
+
+@pytest.mark.parametrize(("key", "lost"), LOSSES)
+@pytest.mark.parametrize("burst", [None, 4.0])
+def test_probabilities_zero_and_one_lose_nothing_and_everything(key: str, lost: Losses, burst: float | None) -> None:
+    assert not lost(many({key: 0.0, "burst_length": burst}, 100)).any()
+    assert lost(many({key: 1.0, "burst_length": burst}, 100)).all()
+
+
+@pytest.mark.parametrize(("probability", "length"), [(0.2, 5.0), (0.05, 2.0), (0.6, 3.0)])
+@pytest.mark.parametrize("lost", [lost_measurements, lost_commands])
+def test_bursts_have_their_loss_rate_and_mean_length(lost: Losses, probability: float, length: float) -> None:
+    flags = lost(lossy(probability, 20_000, length))
+    remembered = 1 - 1 / length - probability / (length * (1 - probability))  # correlation of neighbours
+    spread = probability * (1 - probability) / len(flags) * (1 + remembered) / (1 - remembered)
+    assert abs(flags.mean() - probability) < 5 * math.sqrt(spread)
+    bursts = [len(list(group)) for is_lost, group in itertools.groupby(flags) if is_lost]
+    assert abs(np.mean(bursts) - length) < 5 * math.sqrt(length * (length - 1) / len(bursts)) + 0.01
+
+
+def test_bursts_of_length_one_never_lose_two_in_a_row() -> None:
+    flags = lost_commands(many({"command_loss": 0.4, "burst_length": 1.0}, 5000))
+    assert not (flags[1:] & flags[:-1]).any()
+    assert 0.35 < flags.mean() < 0.45
+
+
+def test_the_chain_of_bursts_starts_in_its_stationary_distribution() -> None:
+    timing = Timing(command_loss=0.3, burst_length=10.0)
+    first = [samples_of(Case(timing, 0.005, seed))[0].arrival is None for seed in range(1000)]
+    assert abs(np.mean(first) - 0.3) < 5 * math.sqrt(0.21 / 1000)
+
+
+# -- seeds and streams ------------------------------------------------------------------------------------
+
+CAUSES: dict[str, Any] = {"jitter": 0.4e-3, "delay_jitter": 0.3e-3, "measurement_loss": 0.3, "command_loss": 0.4}
+
+
+def drawn(samples: list[Sample], delay_late: bool = True) -> dict[str, list[Any]]:
+    """What each cause decided; delays are short enough that no command waits for another."""
+    return {
+        "jitter": [sample.time - sample.k * 1_000_000 for sample in samples],
+        "delay_jitter": [None if s.arrival is None else s.arrival - s.sent for s in samples] if delay_late else [],
+        "measurement_loss": [sample.measurement_lost for sample in samples],
+        "command_loss": [sample.arrival is None for sample in samples],
+    }
+
+
+@given(cases())
+def test_the_same_seed_gives_the_same_instants(case: Case) -> None:
+    assert instants_of(case) == instants_of(case)
+
+
+@pytest.mark.parametrize("cause", CAUSES)
+def test_another_seed_gives_others(cause: str) -> None:
+    timing = {cause: CAUSES[cause]}
+    assert drawn(many(timing, 100, seed=1))[cause] != drawn(many(timing, 100, seed=2))[cause]
+
+
+@pytest.mark.parametrize("burst", [None, 3.0])
+@pytest.mark.parametrize("switched", CAUSES)
+def test_switching_one_cause_off_leaves_the_numbers_of_the_others(switched: str, burst: float | None) -> None:
+    with_all = drawn(many({**CAUSES, "burst_length": burst}, 300))
+    without = drawn(many({**CAUSES, "burst_length": burst, switched: 0.0}, 300))
+    for cause in set(CAUSES) - {switched, "delay_jitter"}:
+        assert without[cause] == with_all[cause]
+    if switched != "delay_jitter":
+        both = [
+            (one, other)
+            for one, other in zip(with_all["delay_jitter"], without["delay_jitter"], strict=True)
+            if one is not None and other is not None
+        ]
+        assert len(both) > 100
+        assert all(one == other for one, other in both)
+
+
+def test_streams_of_one_seed_differ_from_each_other() -> None:
+    numbered = quadrotor().streams
+    first = [Streams(0, numbered).of(*place.rsplit(".", 1)).random() for place in numbered]
+    assert len(first) == 5
+    assert len(set(first)) == len(first)
+
+
+@given(cases(), st.data())
+def test_a_timetable_made_again_and_moved_on_continues_identically(case: Case, data: st.DataObject) -> None:
+    whole = instants_of(case)
+    at, size = data.draw(st.integers(0, len(whole))), data.draw(st.sampled_from((1, 3, INSTANTS)))
+    first, again = cursor_of(case), cursor_of(case)
+    before = list(itertools.islice(stubs.instants_of(first), at))
+    assert first.past == at
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(cursor, "INSTANTS", size)
+        passed = list(again.move_to(at))
+        assert again.past == sum(map(len, passed)) == at
+        assert before + list(stubs.instants_of(again)) == whole
+
+
+# -- what is refused --------------------------------------------------------------------------------------
+
+NAN, INF = math.nan, math.inf
+
+BAD: list[tuple[str, dict[str, Any]]] = [
+    *[("period", {"period": value}) for value in (0.0, -0.01, NAN, INF, 1e-10)],
+    *[("plant_interval", {"plant_interval": value}) for value in (0.0, -1e-3, NAN, INF, 4e-10)],
+    *[("clock_ratio", {"clock_ratio": value}) for value in (0.0, -1.0, NAN, INF)],
+    *[(key, {key: value}) for key in ("offset", "delay", "delay_jitter") for value in (-1e-3, NAN, INF)],
+    *[("jitter", {"jitter": value}) for value in (-1e-3, NAN, INF, 0.01, 0.02)],
+    ("jitter", {"jitter": 0.006, "clock_ratio": 2.0}),
+    *[(key, {key: value}) for key in ("measurement_loss", "command_loss") for value in (-0.1, 1.1, NAN, INF)],
+    *[("burst_length", {"burst_length": value}) for value in (0.0, 0.99, -3.0, NAN)],
+    ("command_loss", {"command_loss": 0.8, "burst_length": 3.0}),
+    ("measurement_loss", {"measurement_loss": 0.51, "burst_length": 1.0}),
+    *[("noise", {"noise": {"position": value}}) for value in (-1.0, NAN, INF)],
+    *[("quantisation", {"quantisation": {"position.x": value}}) for value in (-1.0, NAN, INF)],
+    ("jitter", {"clock": "fmu", "jitter": 0.001}),
+    ("clock_ratio", {"clock": "fmu", "clock_ratio": 1.1}),
+    ("period", {"clock": "fmu", "period": 1.23456e-5 / 3}),
+]
+
+
+@pytest.mark.parametrize(("key", "values"), BAD, ids=[f"{key}-{values}" for key, values in BAD])
+def test_a_timing_that_cannot_be_is_refused_in_one_line_that_names_the_key(key: str, values: dict[str, Any]) -> None:
+    with pytest.raises(UsageError) as refused:
+        Timing(**values)
+    text = str(refused.value)
+    assert text.startswith(f"timing.{key}")
+    assert "expected" in text
+    assert "\n" not in text
+
+
+def test_the_defaults_are_those_of_the_contract() -> None:
+    timing = Timing()
+    assert (timing.period, timing.plant_interval) == (0.01, 0.001)
+    assert (timing.order, timing.clock, timing.hold) == ("gauss-seidel", "master", "zero")
+    off = ("offset", "delay", "delay_jitter", "jitter", "measurement_loss", "command_loss")
+    assert all(getattr(timing, key) == 0.0 for key in off)
+    assert timing.burst_length is None
+    assert timing.clock_ratio == 1.0
+    assert (timing.noise, timing.quantisation) == ({}, {})
+
+
+def test_every_key_has_the_name_of_its_flag() -> None:
+    values = {"order": "jacobi", "hold": "first", "clock": "fmu", "jitter_distribution": "normal"}
+    for key in TIMING_KEYS:
+        for command in ("run", "limit", "ssp"):
+            (parameter,) = (p for p in COMMANDS[command].params if f"--{key.replace('_', '-')}" in p.opts)
+            assert parameter.name == key
+        by_name = key in ("noise", "quantisation")
+        given: Any = ["position=0.25"] if by_name else values.get(key, 1.0 if key == "burst_length" else 0.005)
+        timing = FlightFlags(**{key: given}).applied_to(Scenario()).timing
+        expected: dict[str, Any] = {key: {"position": 0.25} if by_name else given}
+        assert timing == Timing(**expected)
+        assert timing != Timing()
+
+
+@given(st.integers(0, 10**12), st.integers(1, 10**6))
+def test_seconds_are_read_as_the_decimal_that_is_written(whole: int, part: int) -> None:
+    text = f"{whole}e-9"
+    assert nanoseconds(float(text)) == whole
+    assert nanoseconds(part / 10**6) == part * 1000

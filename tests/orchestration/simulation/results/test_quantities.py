@@ -1,0 +1,56 @@
+"""One rule for names, units and values of what is varied or set, wherever they are read."""
+
+import pytest
+
+from orchestration.simulation.results.quantities import is_in_seconds, quantity, setting
+
+
+@pytest.mark.parametrize(
+    ("values", "unit", "text"),
+    [
+        ([0.01, 0.999], "ms", "10 ms"),
+        ([0.01, 1.0], "s", "0.01 s"),
+        ([0.01, -1.0], "s", "0.01 s"),
+        ([0.0, 0.01], "ms", "10 ms"),
+        ([], "s", "0.01 s"),
+        ([None, "none", True, 0.01], "ms", "10 ms"),
+    ],
+)
+def test_times_are_in_milliseconds_where_all_of_them_are_below_a_second(
+    values: list[object], unit: str, text: str
+) -> None:
+    found = quantity("period", "s", values)
+    assert (found.title, found.text_of(0.01)) == (f"period [{unit}]", text)
+    assert found.of([0.01, 0.5]).tolist() == ([10.0, 500.0] if unit == "ms" else [0.01, 0.5])
+
+
+def test_nothing_but_a_time_is_in_thousandths() -> None:
+    assert quantity("mass", "kg", [0.01]).text_of(0.01) == "0.01 kg"
+    assert quantity("share", None, [0.01]).title == "share"
+    assert quantity("share", "1", [0.01]).text_of(0.123456789, 3) == "0.123"
+
+
+@pytest.mark.parametrize(
+    ("path", "unit", "title"),
+    [
+        ("timing.period", None, "period [ms]"),
+        ("period", None, "period [ms]"),
+        ("components.pilot.sampling.period", None, "period of pilot [ms]"),
+        ("components.pilot.parameters.kp", None, "kp of pilot"),
+        ("components.pilot.parameters.kp", "N.m", "kp of pilot [N·m]"),
+        ("connections.valve.delay", None, "delay of valve [ms]"),
+        ("connections.valve.offset", None, "offset of valve"),
+        ("controller.delay", None, "delay"),
+        ("plant.mass", None, "mass [kg]"),
+    ],
+)
+def test_a_path_has_a_name_and_the_unit_of_a_store_or_that_which_is_known(
+    path: str, unit: str | None, title: str
+) -> None:
+    assert setting(path, [0.01], unit).title == title
+
+
+def test_what_a_parameter_is_in_its_fmu_says() -> None:
+    assert not is_in_seconds("components.pilot.parameters.delay")
+    assert not is_in_seconds("plant.delay")
+    assert is_in_seconds("components.plant.step")

@@ -1,0 +1,149 @@
+"""Arrays in, arrays out: each run has the numbers and the rows that it has alone."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import quadcosim
+from orchestration.foundation.basics.errors import QuadcosimError
+from orchestration.quadrotor.scenarios.scenario import Scenario
+from orchestration.quadrotor.scenarios.timing import Timing
+from orchestration.simulation.engines.batch import shape
+from orchestration.simulation.runs.many_runs import located
+from orchestration.systems.system.component import Component
+from orchestration.systems.system.model import System
+from tests.native import NATIVE
+from tests.orchestration.components.fmi.small import needs_compiler, small
+
+SHORT = NATIVE.with_changes(stop_time=0.5)
+X, Y = "plant.initial.position.x", "plant.initial.position.y"
+PLACES = {X: np.linspace(-1.0, 1.0, 11), Y: np.linspace(2.0, 3.0, 11)}
+RECORDED = ("plant.position.x", "controller.thrust", "plant.torque.z", "reference.position.z")
+
+
+def assert_as_alone(found: quadcosim.Flights, place: int, alone: quadcosim.Result) -> None:
+    """Sums to 1e-12, signals to the byte, but for those of sources, whose mathematics is that of numpy."""
+    for name, column in found.items():
+        if name in alone.signals:
+            rows, (count,) = column[place], alone.signals[name].shape
+            assert np.isnan(rows[count:]).all()
+            np.testing.assert_allclose(rows[:count], alone.signals[name], rtol=0.0, atol=1e-15 * ("refer" in name))
+        else:
+            value = alone.metrics[name]
+            assert column[place] == pytest.approx(np.nan if value is None else float(value), rel=1e-12, nan_ok=True)
+
+
+@needs_compiler
+def test_each_run_of_arrays_is_the_run_alone() -> None:
+    found = quadcosim.fly(SHORT, PLACES, record=RECORDED)
+    assert (found.engine, found.reason, found.units["position_rmse"]) == ("batch", None, "m")
+    assert {column.dtype for column in found.values()} == {np.dtype(np.float64)}
+    assert found["position_rmse"].shape == (11,)
+    assert found["plant.position.x"].shape == found["time"].shape == (11, 501)
+    for place in (0, 10):
+        own = {name: float(column[place]) for name, column in PLACES.items()}
+        assert_as_alone(found, place, quadcosim.run(SHORT.with_changes(parameters=own)))
+
+
+@needs_compiler
+def test_a_local_that_no_run_records_unasked_can_be_recorded() -> None:
+    found = quadcosim.fly(SHORT, {X: [0.0]}, outputs=["good"], record=["controller.sample_count"])
+    assert found["controller.sample_count"][0, [0, -1]].tolist() == [1.0, 50.0]
+
+
+@needs_compiler
+def test_times_seeds_and_choices_are_arrays_too_and_shorter_runs_end_in_nan() -> None:
+    values: dict[str, Any] = {
+        "timing.period": [0.01, 0.02, 0.01, 0.03], "timing.jitter": 0.002, "seed": np.arange(4),
+        "stop_time": [0.3, 0.2, 0.3, 0.1], X: [0.0, 1.0, 2.0, 3.0],
+        "controller.discretisation": ["explicit", "midpoint", "mean", "explicit"],
+    }  # fmt: skip
+    found = quadcosim.fly(SHORT, values, outputs=["position_max", "horizon"], record=["plant.velocity.x"])
+    assert list(found) == ["position_max", "horizon", "time", "plant.velocity.x"]
+    assert found["horizon"].tolist() == [0.3, 0.2, 0.3, 0.1]
+    for place in range(4):
+        alone = SHORT.with_values({name: np.broadcast_to(each, 4)[place].item() for name, each in values.items()})
+        assert_as_alone(found, place, quadcosim.run(alone))
+
+
+@needs_compiler
+def test_a_run_that_diverges_has_no_objectives_and_others_go_on() -> None:
+    speed = "plant.initial.velocity.x"
+    found = quadcosim.fly(SHORT, {X: [0.0, 90.0], speed: [0.0, 100.0]}, record=["plant.position.x"])
+    assert found["diverged"].tolist() == [0.0, 1.0]
+    assert np.isnan(found["position_rmse"]).tolist() == [False, True]
+    assert np.isfinite(found["divergence_time"]).tolist() == [False, True]
+    assert_as_alone(found, 1, quadcosim.run(SHORT.with_changes(parameters={X: 90.0, speed: 100.0})))
+
+
+@needs_compiler
+def test_where_no_lanes_can_be_had_the_next_engine_flies_the_same_and_it_is_said_why(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    lanes = quadcosim.fly(SHORT, {X: [0.0, 1.0]}, record=RECORDED)
+
+    def none() -> int:
+        raise QuadcosimError("no compiler")
+
+    monkeypatch.setattr(shape, "preferred_lanes", none)
+    found = quadcosim.fly(SHORT, {X: [0.0, 1.0]}, record=RECORDED)
+    assert (found.engine, found.reason) == ("compiled", "no compiler")
+    assert list(found) == list(lanes)
+    for name in found:
+        np.testing.assert_allclose(found[name], lanes[name], rtol=1e-12, atol=1e-15)
+
+
+@needs_compiler
+def test_foreign_fmus_are_flown_alone_and_named(tmp_path: Path) -> None:
+    system = System(stop_time=0.1, components={"one": Component(fmu=str(small(tmp_path)), step=0.01)})
+    found = quadcosim.fly(system, {"stop_time": [0.1, 0.2]})
+    assert found["horizon"].tolist() == [0.1, 0.2]
+    assert found.engine == "compiled"
+    assert "components.one: small.fmu" in str(found.reason)
+
+
+WRONG: list[tuple[dict[str, Any], dict[str, Any], str]] = [
+    ({"plant.initial.position.w": [0.0]}, {}, r"plant.initial.position.w: QuadrotorPlant has no such variable"),
+    ({"plan.mass": [1.0]}, {}, r"plan.mass: expected controller.NAME, plant.NAME"),
+    ({"timing.perod": [0.1]}, {}, r"timing.perod: expected .*timing.KEY with KEY one of period"),
+    ({X: [0.0, 1.0], Y: [0.0]}, {}, rf"^values of {Y}: 1 of them; expected 2, as many as of {X}$"),
+    ({X: [0.0, float("nan")]}, {}, rf"^values of {X}: nan in run 1; expected finite numbers$"),
+    ({X: ["far"]}, {}, rf"^values of {X}: far is no number; expected numbers$"),
+    ({X: [[0.0, 1.0]]}, {}, rf"^values of {X}: expected an array of shape \(runs,\), or one value for all runs$"),
+    ({X: [[0.0], [1.0, 2.0]]}, {}, rf"^values of {X}: expected an array of shape"),
+    ({X: []}, {}, rf"^values of {X}: expected an array of shape"),
+    ({X: 1.0}, {}, r"^values: expected at least one array, with a value for each run$"),
+    ({"plant.mass": [1.0, -1.0]}, {}, r"^plant.mass = -1.0: expected at least 0"),
+    ({"timing.period": [0.1, -1.0]}, {}, r"^timing.period = -1.0: expected a positive number$"),
+    ({"controller.discretisation": ["mean", "meen"]}, {}, r"controller.discretisation = meen: did you mean mean"),
+    ({"controller.fmu": ["A", "B"]}, {}, r"controller.fmu: expected runs of the same FMUs"),
+    ({X: [0.0], f"components.{X.replace('t.', 't.parameters.', 1)}": [1.0]}, {}, r"are given twice"),
+    (
+        {X: [0.0]},
+        {"outputs": ["position_rms"]},
+        r"^outputs: position_rms: did you mean position_rmse\? expected one of",
+    ),
+    ({X: [0.0]}, {"outputs": ["outcome"]}, r"^outputs: outcome: expected one of"),
+    ({X: [0.0]}, {"record": ["plant.positionx"]}, r"record.plant: QuadrotorPlant has no variable positionx"),
+    ({X: [0.0]}, {"record": ["wing.x"]}, r"^record: wing.x: expected COMPONENT.VARIABLE of plant, controller"),
+    ({X: [0.0, 0.0], "plant.initial.quaternion.w": [1.0, 0.0]}, {}, r"^run 1: "),
+]
+
+
+@pytest.mark.parametrize(("values", "more", "message"), WRONG, ids=[message for *_, message in WRONG])
+def test_what_cannot_be_is_refused_in_a_line(values: dict[str, Any], more: dict[str, Any], message: str) -> None:
+    still = {f"plant.initial.quaternion.{axis}": 0.0 for axis in "xyz"}
+    with pytest.raises(QuadcosimError, match=message) as error:
+        quadcosim.fly(SHORT, values | (still if "quaternion" in str(values) else {}), **more)
+    assert "\n" not in str(error.value)
+
+
+def test_runs_share_what_they_do_not_have_of_their_own() -> None:
+    from orchestration.simulation.runs.columns import columns
+
+    system = located(Scenario(timing=Timing(period=0.01)).as_system())
+    models = {name: quadcosim.read_model(component.fmu) for name, component in system.components.items()}
+    runs = columns(Scenario(), system, models, {X: np.zeros(100), "timing.period": [0.01, 0.02] * 50})
+    assert len({id(one) for one in runs.systems}) == 2

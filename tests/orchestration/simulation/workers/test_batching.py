@@ -1,0 +1,147 @@
+"""A sweep in SIMD lanes writes the rows that the FMUs of its runs would have written, and reports their agreement."""
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from orchestration.experiments.studies.store import open_for_reading
+from orchestration.experiments.studies.study import Study
+from orchestration.experiments.studies.study_file import load_study
+from orchestration.experiments.studies.sweep import AGREEMENT
+from orchestration.foundation.basics.errors import QuadcosimError, UsageError
+from orchestration.foundation.processes.child import Died, Ending
+from orchestration.simulation.workers.batching import SAMPLE, LaneAgreement, chunks, sample
+from orchestration.simulation.workers.pool import Inputs, Supervisor
+from orchestration.simulation.workers.task import RunTask, TaskBatch
+from tests.commands import Main
+from tests.orchestration.components.fmi.small import needs_compiler, small
+from tests.orchestration.experiments.studies.common import NOISY, RUNS, STORE, axis, bits, short, study, sweep, swept
+
+pytestmark = needs_compiler
+OWN = ("duration", "machine")
+
+
+def noisy(folder: Path) -> Study:
+    (folder / "study.toml").write_text(NOISY, encoding="utf-8")
+    return load_study(folder / "study.toml")
+
+
+def assert_alike(lanes: list[dict[str, Any]], alone: list[dict[str, Any]]) -> None:
+    """The same rows, numbers to 1e-12, without duration and machine."""
+    assert len(lanes) == len(alone)
+    for one, other in zip(lanes, alone):
+        assert one.keys() == other.keys()
+        for name in one.keys() - {*OWN}:
+            if _is_hex(one[name]) and _is_hex(other[name]):
+                number = float.fromhex(other[name])
+                assert float.fromhex(one[name]) == pytest.approx(number, rel=1e-12, abs=0.0), name
+            else:
+                assert (name, one[name]) == (name, other[name])
+
+
+def _is_hex(value: Any) -> bool:
+    return isinstance(value, str) and value.lstrip("-").startswith("0x")
+
+
+def test_rows_are_those_of_the_fmus_and_the_command_reports_their_agreement(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, main: Main
+) -> None:
+    chosen = noisy(tmp_path)
+    alone = bits(swept(dataclasses.replace(chosen, native=True), tmp_path / "alone"))
+    monkeypatch.chdir(tmp_path)
+    done = main("sweep", "study.toml", "--engine", "batch")
+    assert "8 runs repeated with FMUs: largest relative difference" in done.stdout
+    assert done.stdout.splitlines()[-1] in main("status", "study.toml").stdout
+    lanes = bits(tmp_path / STORE)
+    assert len(lanes) == RUNS
+    assert_alike(lanes, alone)
+    with open_for_reading(tmp_path / STORE) as opened:
+        agreement = LaneAgreement.from_text(opened.about()[AGREEMENT])
+    assert agreement.runs == SAMPLE
+    assert agreement.difference < 1e-12
+    assert agreement.python is not None
+    assert agreement.python.runs == SAMPLE
+    assert agreement.python.difference < 1e-9
+
+
+def test_a_sweep_continues_and_repeats_no_run(tmp_path: Path) -> None:
+    few = study(axis("timing.period", 0.01, 0.02))
+    more = study(axis("timing.period", 0.01, 0.02, 0.03))
+    assert sweep(few, folder=tmp_path, engine="batch").flown == 2
+    summary = sweep(more, folder=tmp_path, engine="batch")
+    assert (summary.flown, summary.total) == (1, 3)
+    assert sweep(more, folder=tmp_path, engine="batch").agreement is None
+
+
+def test_a_run_that_its_fmus_refuse_has_the_same_row_as_outside_of_lanes(tmp_path: Path) -> None:
+    chosen = study(axis("plant.inertia.xy", 0.0, 1.0), axis("plant.mass", 0.9, 1.1))
+    alone = bits(swept(dataclasses.replace(chosen, native=True), tmp_path / "alone"))
+    assert {row["status"] for row in alone} == {"done", "failed"}
+    assert_alike(bits(swept(chosen, tmp_path / "lanes", engine="batch")), alone)
+
+
+def test_a_system_without_lanes_is_refused_before_any_run(tmp_path: Path) -> None:
+    path = small(tmp_path)
+    text = f"""
+    axes = [{{ name = "x", sets = ["components.one.parameters.gain"], values = [1.0, 2.0] }}]
+    [base]
+    stop_time = 0.1
+    [base.components.one]
+    fmu = "{path}"
+    step = 0.01
+    """
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(UsageError, match=r"components.one: small.fmu: expected a native FMU"):
+        sweep(load_study(tmp_path / "study.toml"), folder=tmp_path / "out", engine="batch")
+    assert not (tmp_path / "out" / "study.sqlite").exists()
+
+
+def test_a_difference_names_run_and_metric() -> None:
+    agreement = LaneAgreement.of(
+        [(3, {"a": 1.0, "b": None}, {"a": 1.0, "b": None}), (7, {"a": 2.0}, {"a": 2.0 + 1e-6})]
+    )
+    assert (agreement.runs, agreement.metric, agreement.index) == (2, "a", 7)
+    with pytest.raises(QuadcosimError, match=r"run 7: a in lanes differs by 5e-07"):
+        agreement.expect()
+    with pytest.raises(QuadcosimError, match="run 1: outcome"):
+        LaneAgreement.of([(1, {"outcome": "good"}, {"outcome": "bad"})]).expect()
+    LaneAgreement.of([(3, {"a": 1.0}, {"a": 1.0 + 1e-12})]).expect()
+
+
+def test_a_sample_is_chosen_by_content_alone() -> None:
+    keys = [f"{i:064x}" for i in range(100)]
+    assert sample(keys) == sample(reversed(keys))
+    assert len(sample(keys)) == SAMPLE
+    assert sample(keys) != set(keys[:SAMPLE])
+
+
+def tasks(count: int, keep: tuple[int, ...] = ()) -> list[RunTask]:
+    chosen = study(axis("timing.period", 0.01, 0.02), base=short())
+    return [
+        RunTask(index=i, key=str(i), settings={}, system=chosen.system(i % 2, {}), keep_signals=i in keep)
+        for i in range(count)
+    ]
+
+
+def test_chunks_group_similar_runs_without_those_whose_signals_are_kept() -> None:
+    items = list(chunks(tasks(64, keep=(5,)), 64, 1))
+    assert [each.index for each in items if isinstance(each, RunTask)] == [5]
+    lanes = [each.tasks for each in items if isinstance(each, TaskBatch)]
+    assert sorted(task.index for each in lanes for task in each) == [i for i in range(64) if i != 5]
+    assert [len({task.index % 2 for task in each}) for each in lanes].count(2) <= 1
+
+
+def test_runs_that_end_their_process_together_are_repeated_one_by_one(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    class Dying:
+        def request(self, what: Any) -> Any:
+            raise Died(Ending(code=-6))
+
+    repeated: list[int] = []
+    monkeypatch.setattr(Supervisor, "_ready_worker", lambda self: Dying())
+    monkeypatch.setattr(Supervisor, "run", lambda self, task: repeated.append(task.index))
+    Supervisor(tmp_path, Inputs(contents={}, versions={})).run_chunk(TaskBatch(tasks=tuple(tasks(3))))
+    assert repeated == [0, 1, 2]

@@ -1,0 +1,92 @@
+"""Loops as matrices that are written down here: letters of which stability is known."""
+
+from fractions import Fraction
+
+import numpy as np
+
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.systems.schedule.plan import Plan
+from orchestration.systems.system.component import Component
+from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.model import System
+from orchestration.systems.system.sampling import Sampling
+from orchestration.theory.certificates.certificate import Cells, Certificate
+from orchestration.theory.certificates.family import Factor, Letter, LoopFamily
+from orchestration.theory.certificates.parts import CertifiedLoop
+from orchestration.theory.stability.matrices import Matrices
+
+HOVER_A = np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 19.62, 0.0], [0.0, 0.0, 0.0, 0.5], [0.0, 0.0, 0.0, 0.0]])
+HOVER_B = np.array([[0.0], [0.0], [0.0], [1.0]])
+HOVER_F = np.array([[-280.9746177, -97.0239144, -430.1129600, -25.49]])
+"""A lateral axis of the quadrotor about hover, and its law"""
+
+
+def late_command(A: Floats, B: Floats, F: Floats, period: float, jitter: float) -> LoopFamily:
+    """ẋ = A x + B u under u = F x of each sample, which arrives up to `jitter` later."""
+    n, m = B.shape
+    size = n + 2 * m
+    flow, sample, arrive = np.zeros((size, size)), np.eye(size), np.eye(size)
+    flow[:n, :n], flow[:n, n : n + m] = A, B
+    sample[n + m :], arrive[n : n + m] = 0.0, 0.0
+    sample[n + m :, :n], arrive[n : n + m, n + m :] = F, np.eye(m)
+    product = (
+        Factor(matrix="sample"), Factor(matrix="flow", times=(0.0, 1.0)), Factor(matrix="arrive"),
+        Factor(matrix="flow", times=(period, -1.0)),
+    )  # fmt: skip
+    return LoopFamily(
+        matrices={"flow": flow, "sample": sample, "arrive": arrive},
+        kept=tuple(range(size)),
+        letters=(Letter(name="late", product=product, ranges=((0.0, jitter),)),),
+    ).without_idle()
+
+
+def switched(*matrices: Floats) -> LoopFamily:
+    """Any of some matrices at each step."""
+    return LoopFamily(
+        matrices={f"m{i}": matrix for i, matrix in enumerate(matrices)},
+        kept=tuple(range(len(matrices[0]))),
+        letters=tuple(Letter(name=f"m{i}", product=(Factor(matrix=f"m{i}"),)) for i in range(len(matrices))),
+    )
+
+
+def certificate_of(family: LoopFamily, form: Floats) -> Certificate:
+    """One form for letters without parameters, in the coordinates of the family."""
+    cells = tuple(Cells(edges=(), labels=(i,)) for i in range(len(family.letters)))
+    return Certificate(
+        of=("here",), radius=0.0, family=family, cells=cells,
+        coordinates=np.eye(len(form)), memory=0, forms={(0, ()): form},
+    )  # fmt: skip
+
+
+def through_a_filter() -> CertifiedLoop:
+    """An oscillator under a law that reads what a filter passes on at the same instants, once a second.
+
+    It is stable if the law reads what is passed on at its own instant, and if it reads what was at the one before, but
+    not in turn.
+    """
+
+    def matrices(inputs: str, outputs: str, D: Floats) -> Matrices:
+        nothing = np.zeros((0, 0))
+        B, C = np.zeros((0, len(inputs))), np.zeros((len(outputs), 0))
+        return Matrices(inputs=tuple(inputs), outputs=tuple(outputs), A=nothing, B=B, C=C, D=D)
+
+    plant = Matrices(
+        inputs=("u",), outputs=("p", "v"), A=np.array([[0.0, 1.0], [-2.4, 0.15]]), B=np.array([[0.0], [1.0]]),
+        C=np.eye(2), D=np.zeros((2, 1)),
+    )  # fmt: skip
+    every = Sampling(period=1.0)
+    system = System(
+        stop_time=10.0,
+        components={
+            "plant": Component(fmu="plant.fmu", step=0.1), "filter": Component(fmu="filter.fmu", sampling=every),
+            "law": Component(fmu="law.fmu", sampling=every),
+        },
+        connections=(
+            Connection(name="measurement", start=("plant.p", "plant.v"), end=("filter.p", "filter.v")),
+            Connection(name="between", start=("filter.x", "filter.y"), end=("law.x", "law.y")),
+            Connection(name="command", start=("law.u",), end=("plant.u",)),
+        ),
+    )  # fmt: skip
+    law = matrices("xy", "u", np.array([[0.8, 0.05]]))
+    components = {"plant": plant, "filter": matrices("pv", "xy", np.eye(2)), "law": law}
+    return CertifiedLoop(system=system, components=components, period=Fraction(10**9), order=Plan(system).sampled)

@@ -1,0 +1,249 @@
+"""What is certified of systems and of the quadrotor about hover, what breaks them, and certificates of other loops."""
+
+import functools
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from orchestration.command.cli import main
+from orchestration.foundation.basics.errors import QuadcosimError, UsageError
+from orchestration.systems.system.model import System
+from orchestration.systems.system.paths import changed
+from orchestration.theory.certificates import margin as certificates
+from orchestration.theory.certificates import region as regions
+from orchestration.theory.certificates.breaking import breaking_at
+from orchestration.theory.certificates.certify import find_certificate, parts_of
+from orchestration.theory.certificates.check import check
+from orchestration.theory.certificates.checker import verified
+from orchestration.theory.certificates.margin import Certified, linear_loop_of, margin, small_gain, varying_of
+from orchestration.theory.certificates.parts import CertifiedLoop
+from orchestration.theory.certificates.region import region
+from orchestration.theory.certificates.timeline import LoopTimeline
+from orchestration.theory.stability import delay_bounds
+from orchestration.theory.stability.delay_bounds import breaking_jitter
+from quadcosim import Timing
+from tests.examples.common import example
+from tests.native import native
+from tests.orchestration.experiments.studies.common import one_line
+from tests.orchestration.quadrotor.flight.test_margin import DOUBLE
+from tests.places import EXAMPLES
+
+COMMAND, SAMPLE = "connections.command.delay_jitter", "components.controller.sampling.jitter"
+LOST = "connections.command.loss"
+
+
+@pytest.fixture(scope="module")
+def system() -> System:
+    """A double integrator under u = -x - v, sampled every second."""
+    return changed(example("double_integrator"), {"components.controller.sampling.period": 1.0})
+
+
+@pytest.fixture(scope="module")
+def found(system: System) -> Certified:
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(certificates, "SHARES", (0.95,))
+        return margin(system, COMMAND)
+
+
+def test_nearly_all_that_does_not_break_a_double_integrator_is_certified(found: Certified) -> None:
+    loop = delay_bounds.SampledLoop(**DOUBLE, period=1.0)
+    broken = breaking_jitter(loop, 1.0)
+    assert broken is not None
+    assert found.breaking == pytest.approx(broken[0], rel=1e-3)
+    assert found.certified is not None
+    assert found.certified == pytest.approx(0.95 * broken[0], rel=1e-3)
+    assert found.small_gain == pytest.approx(delay_bounds.certain_jitter(loop), rel=1e-6)
+    assert found.small_gain < found.certified
+    assert found.states == 3
+
+
+def test_the_sequence_that_breaks_a_loop_breaks_it_in_another_description(found: Certified) -> None:
+    loop = delay_bounds.SampledLoop(**DOUBLE, period=1.0)
+    late = [1.001 * value for _, (value,) in found.breaking_sequence]
+    assert delay_bounds._radius(loop, late) > 1.0
+    assert delay_bounds._radius(loop, [0.99 * value for value in late]) < 1.0
+
+
+def test_a_certificate_is_of_its_own_system_and_of_no_other(
+    system: System, found: Certified, tmp_path: Path
+) -> None:  # fmt: skip
+    path = found.save(tmp_path / "certificate.json")
+    assert check(path).of == ()
+    own = check(path, system)
+    assert own.of == (COMMAND,)
+    assert own.ranges == {"late": ((0.0, found.certified),)}
+    slower = changed(system, {"components.controller.sampling.period": 1.01})
+    with pytest.raises(UsageError, match="the events of a period of the system are not those"):
+        check(path, slower)
+    with pytest.raises(UsageError, match="controller samples: the system's matrix is farther"):
+        check(path, changed(system, {"connections.command.scale": 1.00001}))
+
+
+def test_a_valid_proof_of_altered_matrices_is_refused_against_the_system(
+    system: System, found: Certified, tmp_path: Path
+) -> None:
+    assert found.certificate is not None
+    document = json.loads(found.certificate)
+    *held, command = document["matrices"]["controller samples"]
+    document["matrices"]["controller samples"] = [*held, [0.99999 * x for x in command]]
+    path = tmp_path / "altered.json"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    assert check(path).states == 3
+    with pytest.raises(UsageError, match="farther from the certificate's than the proof covers"):
+        check(path, system)
+
+
+def test_a_certificate_of_another_quantity_is_refused(system: System, found: Certified, tmp_path: Path) -> None:
+    assert found.certificate is not None
+    path = tmp_path / "other.json"
+    for of in ([SAMPLE], [LOST], [COMMAND, SAMPLE]):
+        path.write_text(json.dumps(json.loads(found.certificate) | {"of": of}), encoding="utf-8")
+        with pytest.raises(UsageError, match=r"other quantities vary|not those of the certificate"):
+            check(path, system)
+
+
+@pytest.mark.parametrize("path", [LOST, "connections.measurement.loss"])
+def test_runs_of_losses_are_certified_up_to_the_one_that_breaks(system: System, tmp_path: Path, path: str) -> None:
+    faster = changed(system, {"components.controller.sampling.period": 0.8})
+    lost = margin(faster, path)
+    assert (lost.certified, lost.breaking) == (1, 2)
+    assert [name for name, _ in lost.breaking_sequence] == ["lost", "lost", "arrives"]
+    proof = check(lost.save(tmp_path / "lost.json"), faster)
+    assert proof.runs == {"arrives": None, "lost": 1}
+
+
+def test_a_loop_that_is_unstable_by_itself_has_no_margin(system: System) -> None:
+    slow = changed(system, {"components.controller.sampling.period": 2.1})
+    for path in (COMMAND, LOST):
+        none = margin(slow, path)
+        assert (none.certified, none.breaking, none.certificate) == (None, 0, None)
+
+
+def test_two_at_once_leave_less_of_each(system: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(regions, "SHARES", (0.2,))
+    monkeypatch.setattr(regions, "LONGEST", 2)
+    both = region(system, SAMPLE, COMMAND, columns=2)
+    (_, alone), (late, beside) = both.certified
+    assert late > 0.0
+    assert beside < alone
+    assert [good for _, good in both.certified] == pytest.approx([0.2 * bad for _, bad in both.breaking], rel=1e-6)
+    *proofs, figure = both.save(tmp_path)
+    assert check(proofs[1], system).ranges == {"late": ((0.0, late), (0.0, beside))}
+    assert figure.stat().st_size > 1000
+
+
+def test_what_it_is_not_for_is_refused(system: System) -> None:
+    for path in ("connections.command.delay", "stop_time"):
+        with pytest.raises(UsageError, match=r"expected connections\.NAME\.delay_jitter"):
+            margin(system, path)
+    with pytest.raises(UsageError, match="expected two different"):
+        region(system, COMMAND, COMMAND)
+
+
+# -- the quadrotor about hover ---------------------------------------------------------------------------------------
+
+
+@functools.cache
+def hover(period: float) -> CertifiedLoop:
+    return linear_loop_of(native(timing=Timing(period=period)))
+
+
+def command_of(period: float) -> tuple[LoopTimeline, Any]:
+    varying = varying_of(native(), COMMAND)
+    return LoopTimeline(hover(period), [varying]), varying
+
+
+@pytest.mark.parametrize(("period", "breaking", "step"), [(0.04, 0.02823, 1), (0.06, 0.0200, 0)])
+def test_95_percent_of_what_breaks_hover_is_certified_for_all_axes(period: float, breaking: float, step: int) -> None:
+    timeline, varying = command_of(period)
+    most = round(0.95 * breaking, 6)
+    family = timeline.family([most])
+    assert [len(part) for part in parts_of(family)] == [5, 5, 3, 3]
+    proof = find_certificate(family, [COMMAND], step)
+    assert proof is not None
+    assert verified(proof.certificate).ranges == {"late": ((0.0, most),)}
+    assert breaking_at(timeline.family([0.999 * breaking]), 0.0) is None
+    assert breaking_at(timeline.family([1.001 * breaking]), 0.0) is not None
+    assert small_gain(timeline.loop, varying) == pytest.approx({0.04: 0.00935, 0.06: 0.00153}[period], abs=1e-5)
+
+
+def test_two_at_once_about_hover() -> None:
+    """Samples up to 4 ms late and commands up to 23.87 ms, at 40 ms."""
+    both = [varying_of(native(), path) for path in (SAMPLE, COMMAND)]
+    assert find_certificate(LoopTimeline(hover(0.04), both).family([0.004, 0.02387]), [SAMPLE, COMMAND]) is not None
+
+
+def test_losses_about_hover() -> None:
+    timeline = LoopTimeline(hover(0.04), [varying_of(native(), LOST)])
+    assert find_certificate(timeline.family(run=1), [LOST]) is not None
+    broken = breaking_at(timeline.family(run=2), 2)
+    assert broken is not None
+    assert [name for name, _ in broken.sequence] == ["lost", "lost", "arrives"]
+
+
+def test_within_what_is_certified_random_sequences_die_out() -> None:
+    timeline, _ = command_of(0.06)
+    family = timeline.family([0.019])
+    random = np.random.default_rng(2)
+    maps = [family.at(family.letters[0], [0.019 * share]) for share in (0.0, 1.0, *random.uniform(size=6))]
+    for most in (2, 8):
+        late = random.integers(0, most, 800)
+        assert np.linalg.norm(functools.reduce(lambda x, i: maps[i] @ x, late, np.ones(16))) < 1e-4
+
+
+# -- the command -----------------------------------------------------------------------------------------------------
+
+
+def output_of(capsys: pytest.CaptureFixture[str], *arguments: str | Path, code: int = 0) -> str:
+    with pytest.raises(SystemExit) as ended:
+        main([*map(str, arguments)])
+    captured = capsys.readouterr()
+    assert (ended.value.code or 0) == code, captured.err
+    return captured.err if code else captured.out
+
+
+def test_the_command_writes_what_it_checks(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(certificates, "SHARES", (0.95,))
+    file = EXAMPLES / "double_integrator" / "system.toml"
+    slow, other = (("--set", f"components.controller.sampling.period={period}") for period in (1.0, 0.9))
+    path = tmp_path / "certificate.json"
+    document = json.loads(output_of(capsys, "margin", file, *slow, "--of", COMMAND, "--out", path, "--json"))
+    assert document["certified"] == pytest.approx(0.95 * document["breaking"], rel=1e-6)
+    assert document["certificate"] == str(path)
+    text = output_of(capsys, "margin", "--check", path, file, *slow)
+    assert f"late               0 to {document['certified']:.9g} s, any number of times in a row" in text
+    assert "connections.command.delay_jitter of this system" in text
+    assert "no system was given" in output_of(capsys, "margin", "--check", path)
+    assert "not those of the certificate" in one_line(
+        output_of(capsys, "margin", "--check", path, file, *other, code=2)
+    )
+
+
+@pytest.mark.parametrize(
+    ("flags", "expected"),
+    [
+        (["--and", COMMAND], "--and: expected --of PATH beside it"),
+        (["--out", "x.json"], "--out: expected --of PATH beside it"),
+        (["--check", "x.json", "--of", COMMAND], "--check: expected neither --of nor --out"),
+        (["--check", "x.json"], "x.json: expected a readable certificate"),
+        (["--of", "connections.command.delay"], "--of connections.command.delay: expected connections.NAME"),
+    ],
+)
+def test_flags_that_do_not_go_together_are_refused_in_a_line(
+    capsys: pytest.CaptureFixture[str], flags: list[str], expected: str
+) -> None:
+    assert expected in one_line(output_of(capsys, "margin", *flags, code=2))
+
+
+def test_a_missing_package_is_said_with_its_extra(monkeypatch: pytest.MonkeyPatch, system: System) -> None:
+    import importlib.util
+
+    usual = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "flint" else usual(name))
+    with pytest.raises(QuadcosimError, match=r"pip install 'quadcosim\[certificates\]'"):
+        margin(system, COMMAND)

@@ -1,0 +1,222 @@
+"""`expect` of systems with FMUs: known answers, and what is refused by name."""
+
+import dataclasses
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from orchestration.quadrotor.flight.hover_loop import HoverLoop
+from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
+from orchestration.quadrotor.scenarios.scenario import Scenario
+from orchestration.quadrotor.scenarios.timing import Timing
+from orchestration.systems.system.files import files_of
+from orchestration.systems.system.source import Source
+from orchestration.theory.exact.expect import Expected, expect, expected_of
+from orchestration.theory.exact.linear import SampledSystem
+from orchestration.theory.exact.loops import Loops, expect_same_steps
+from orchestration.theory.exact.timing import sampled_tasks
+from quadcosim import UsageError, limit
+from tests.commands import Main
+from tests.examples.common import native_example as example
+from tests.orchestration.components.fmi.small import needs_compiler
+from tests.places import EXAMPLES
+
+
+def expected(name: str, **changes: Any) -> Expected:
+    return expect(example(name, {key.replace("__", "."): value for key, value in changes.items()}))
+
+
+def test_minimum_variance_control_costs_what_theory_says_through_its_fmus() -> None:
+    found = expected("minimum_variance")
+    assert found.objectives["variance"] == pytest.approx((3.0 + math.sqrt(3.0)) / 6.0, abs=1e-9)
+    assert found.objectives["effort"] == pytest.approx(math.sqrt(3.0), abs=1e-9)
+    assert found.accuracy < 1e-9
+    assert not found.reasons
+
+
+def test_of_one_system_after_the_other_only_components_that_change_are_measured_again() -> None:
+    one, other = (example("distributed_servo", {"components.controller.parameters.K": K}) for K in (1.5, 1.0))
+    loops = Loops(files_of(one).models)
+    first, second = loops.linear(one).parts, loops.linear(other).parts
+    assert second["servo"] is first["servo"]
+    assert pytest.approx(first["controller"].D / 1.5, rel=1e-9) == second["controller"].D
+    assert expected_of(other, loops).objectives == pytest.approx(expect(other).objectives, rel=1e-12)
+
+
+def test_with_a_uniform_delay_through_its_fmus_too() -> None:
+    found = expected("minimum_variance", connections__command__delay_jitter=0.5)
+    assert found.objectives["variance"] == pytest.approx(1.2186963044, abs=1e-9)
+
+
+def test_a_mean_that_has_no_finite_expectation_is_none_and_says_why() -> None:
+    found = expected("minimum_variance", connections__command__loss=0.3)
+    assert found.objectives == {"variance": None, "effort": None}
+    assert found.mean_square_radius > 1.0
+    assert found.reasons["variance"].startswith("the mean-square radius is 1.16999")
+
+
+def test_objectives_that_are_no_means_of_squares_are_refused_by_name_and_the_radius_is_there() -> None:
+    found = expected("dc_servo", connections__command__loss=0.0, connections__command__delay_jitter=0.0)
+    assert found.objectives == {"middle": None, "late": None, "cost": None}
+    assert found.reasons["cost"].startswith("integral(…): expected mean(…) or rms(…)")
+    assert found.mean_square_radius == pytest.approx(0.9324**2, abs=1e-4)
+
+
+def test_objectives_may_be_made_of_means_and_of_signals_that_no_connection_carries() -> None:
+    servo = example("dc_servo", {"connections.command.loss": 0.0})
+    noisy = dataclasses.replace(
+        servo, sources={"torque": Source(noise=1e-4, period=0.001, to=("controller.reference",))}, objectives={}
+    )
+    with pytest.raises(UsageError, match=r"sources\.torque: white noise into controller\.reference, which samples it"):
+        expect(noisy)
+    measured = dataclasses.replace(
+        servo,
+        connections=(dataclasses.replace(servo.connections[0], noise={"angle": 0.01}), servo.connections[1]),
+        objectives={
+            "speed": "rms(servo.speed)",
+            "both": "mean(servo.angle ** 2 + 0.1 * servo.speed * servo.angle) + 2 * speed",
+            "inner": "mean(controller.integral ** 2)",
+            "third": "mean(servo.angle ** 3)",
+            "late": "mean(time * servo.angle)",
+        },
+    )
+    found = expect(measured)
+    speed, both = found.objectives["speed"], found.objectives["both"]
+    assert speed is not None
+    assert both is not None
+    assert both > 2.0 * speed > 0.0
+    assert found.objectives["inner"] is not None
+    assert found.reasons == {
+        "third": "servo.angle ** 3: expected a polynomial of signals of degree two at most",
+        "late": "depends on time: expected signals alone, whose mean is stationary",
+    }
+
+
+def test_the_command_prints_what_it_found(main: Main) -> None:
+    path = EXAMPLES / "minimum_variance/system.toml"
+    document = json.loads(main("expect", path, "--set", "connections.command.loss=0.2", "--json").stdout)
+    assert document["objectives"]["variance"] == pytest.approx(5.8867513459, abs=1e-9)
+    assert document["mean_square_radius"] < 1.0 < document["fourth_moment_radius"]
+    lines = main("expect", path, "--set", "connections.command.loss=0.2").stdout
+    assert "variance              5.8867513459" in lines
+    assert "confidence intervals of mean squares over runs are meaningless here" in lines
+
+
+def as_simulated(**changes: Any) -> float:
+    settings = {key.replace("__", "."): value for key, value in changes.items()}
+    found = expect(example("minimum_variance", settings), as_simulated=True).objectives["variance"]
+    assert found is not None
+    return found
+
+
+def test_as_simulated_noise_is_held_and_the_mean_is_over_rows() -> None:
+    assert as_simulated() == pytest.approx(0.791562, abs=5e-7)
+
+
+def test_with_finer_rows_the_mean_as_simulated_becomes_that_over_time_of_noise_that_is_held() -> None:
+    coarse, fine = (as_simulated(components__plant__step=step) for step in (0.01, 0.005))
+    assert (4.0 * fine - coarse) / 3.0 == pytest.approx(0.772008, abs=5e-7)
+
+
+def test_with_finer_noise_and_rows_it_becomes_that_of_white_noise() -> None:
+    coarse, fine = (as_simulated(components__plant__step=step, sources__noise__period=step) for step in (0.01, 0.005))
+    assert (4.0 * fine - coarse) / 3.0 == pytest.approx((3.0 + math.sqrt(3.0)) / 6.0, abs=1e-6)
+
+
+def test_as_simulated_refuses_rows_at_which_the_plant_is_not_stepped() -> None:
+    with pytest.raises(UsageError, match=r"connections\.measurement is measured between the steps of plant"):
+        as_simulated(connections__measurement__delay=0.05)
+
+
+@pytest.mark.parametrize(("burst", "expected"), [(None, 0.2240092377), (2.0, 0.1443375673)])
+def test_the_limit_of_losses_has_the_mean_square_limit_of_theory(burst: float | None, expected: float) -> None:
+    system = example("minimum_variance", {"stop_time": 5.0, "connections.command.burst_length": burst})
+    found = limit(
+        system, "connections.command.loss", first=0.1, last=0.3, scan=0.1, tolerance=1e-4, progress=None, announce=None
+    )
+    assert found.mean_square_limit == pytest.approx(expected, abs=1e-6)
+    assert "means of squares have no finite expectation" in found.note
+
+
+def test_a_limit_of_a_loop_without_chance_has_no_mean_square_limit() -> None:
+    system = example("minimum_variance", {"stop_time": 5.0, "sources.noise.noise": 0.0})
+    found = limit(system, "connections.command.delay", first=0.1, last=0.2, progress=None, announce=None)
+    assert found.mean_square_limit is None
+    assert "square" not in found.note
+
+
+def test_where_noise_alone_is_random_the_mean_square_limit_is_the_local_one() -> None:
+    system = example("minimum_variance", {"stop_time": 5.0})
+    system = dataclasses.replace(
+        system, operating_point={"components.controller.parameters.gain": 3.0 - math.sqrt(3.0)}
+    )
+    found = limit(
+        system, "connections.command.delay", first=0.0, last=0.9, tolerance=1e-4, confidence=0.2, progress=None,
+        announce=None,
+    )  # fmt: skip
+    assert found.mean_square_limit is not None
+    assert found.mean_square_limit == found.local_limit
+    below, above = (
+        expected("minimum_variance", connections__command__delay=found.mean_square_limit + apart).mean_square_radius
+        for apart in (-2e-4, 2e-4)
+    )
+    assert below < 1.0 < above
+
+
+NO_END = "variance, effort: without a finite expectation"
+
+
+def test_a_run_says_that_its_averages_mean_nothing(main: Main) -> None:
+    path, loss = EXAMPLES / "minimum_variance/system.toml", "connections.command.loss"
+    lossy = main("run", path, "--set", "stop_time=20", "--set", f"{loss}=0.3")
+    assert f"{NO_END}, so an average over runs means nothing; the mean-square radius is 1.16999" in lossy.stderr
+    assert NO_END not in main("run", path, "--set", "stop_time=20", "--set", f"{loss}=0.2").stderr
+
+
+def test_a_sweep_says_at_how_many_points(main: Main, tmp_path: Path) -> None:
+    study = tmp_path / "study.toml"
+    study.write_text(
+        f"""
+name = "losses"
+scenario = "{EXAMPLES / "minimum_variance/system.toml"}"
+[[axes]]
+name = "loss"
+sets = ["connections.command.loss"]
+values = [0.1, 0.2, 0.3]
+[[axes]]
+name = "length"
+sets = ["stop_time"]
+values = [5.0]
+"""
+    )
+    assert f"{NO_END} at 1 of 3 points" in main("sweep", study, "--out", tmp_path / "store").stderr
+
+
+@needs_compiler
+def test_what_is_nearly_linear_is_known_by_small_pulses_and_how_far() -> None:
+    """A pulse of 1 turns the quadrotor by a few microradians in a step of 11 ms: it answers nearly as a linear one."""
+    flight = Scenario(
+        controller=FmuChoice(fmu="native/UnifiedController"), plant=FmuChoice(fmu="native/QuadrotorPlant"),
+        timing=Timing(period=0.011, noise={"position": 1e-4}),
+    )  # fmt: skip
+    found = expect(flight)
+    assert found.mean_square_radius == pytest.approx(HoverLoop.of(flight).spectral_radius(0.011, 0.0) ** 2, rel=1e-6)
+    assert "plant, controller known by saved states, by differences" in found.method
+    assert 1e-11 < found.accuracy < 2e-9
+    assert found.objectives["position_rmse"] == pytest.approx(2.8758e-5, rel=1e-4)
+
+
+def test_a_task_that_minds_how_long_its_step_is_has_no_jitter() -> None:
+    system = example("minimum_variance", {"components.controller.sampling.jitter": 0.1})
+    none = np.zeros((0, 0))
+    minding = SampledSystem(inputs=(), outputs=(), A=none, B=none, C=none, D=none, depends_on_step=True)
+    with pytest.raises(
+        UsageError, match=r"components\.controller\.sampling\.jitter: the samples of controller depend on"
+    ):
+        expect_same_steps(system, sampled_tasks(system), {"controller": minding})
+    regular = example("minimum_variance")
+    expect_same_steps(regular, sampled_tasks(regular), {"controller": minding})

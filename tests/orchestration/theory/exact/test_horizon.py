@@ -1,0 +1,155 @@
+"""Expectations from initial conditions to a horizon: formulas by hand, runs without chance, stationary values."""
+
+import dataclasses
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.systems.system.criterion import Criterion
+from orchestration.theory.exact.expect import expect
+from quadcosim import UsageError, run
+from tests.commands import Main
+from tests.examples.common import native_example as example
+from tests.orchestration.theory.exact.common import GAIN
+from tests.places import EXAMPLES
+
+START, LOSS, BURST = (
+    "components.plant.parameters.initial.x",
+    "connections.command.loss",
+    "connections.command.burst_length",
+)
+COMMAND, MEASUREMENT, SAMPLING = "connections.command", "connections.measurement", "components.controller.sampling"
+
+
+def over_hold(V: Floats, h: float) -> float:
+    """The integral of E[x²] over a hold of h s, V the second moments of (x, u) as it begins."""
+    return float(V[0, 0] * h + V[0, 1] * h**2 + V[1, 1] * h**3 / 3.0 + h**2 / 2.0)
+
+
+def by_hand(start: float, periods: int, loss: float = 0.0) -> float:
+    """The mean of x² under commands of which each is lost with a probability, the first one after initialisation."""
+    law, keep, flow = (np.array(rows) for rows in ([[1.0, 0.0], [-GAIN, 0.0]], np.eye(2), [[1.0, 1.0], [0.0, 1.0]]))
+    z = np.array([start, -GAIN * start])
+    V, cost = np.outer(z, z), 0.0
+    for _ in range(periods):
+        V = (1.0 - loss) * law @ V @ law.T + loss * keep @ V @ keep.T
+        cost += over_hold(V, 1.0)
+        V = flow @ V @ flow.T + np.diag([1.0, 0.0])
+    return cost / periods
+
+
+def variance(horizon: float, **changes: Any) -> float:
+    system = example("minimum_variance", {key.replace("__", "."): value for key, value in changes.items()})
+    found = expect(at_zero(system), horizon=horizon).objectives["variance"]
+    assert found is not None
+    return found
+
+
+def at_zero(system: Any) -> Any:
+    return dataclasses.replace(system, operating_point={START: 0.0})
+
+
+@pytest.mark.parametrize("start", [0.0, 3.0])
+@pytest.mark.parametrize("periods", [1, 7])
+def test_minimum_variance_control_costs_from_its_start_what_a_hand_finds(start: float, periods: int) -> None:
+    found = variance(float(periods), **{START: start})
+    assert found == pytest.approx(by_hand(start, periods), rel=1e-9)
+
+
+def test_a_horizon_within_a_period_ends_there() -> None:
+    assert variance(0.5, **{START: 3.0}) == pytest.approx(
+        over_hold(np.outer([3.0, -3.0 * GAIN], [3.0, -3.0 * GAIN]), 0.5) / 0.5, rel=1e-9
+    )
+
+
+def test_it_is_finite_where_the_stationary_cost_is_not() -> None:
+    lossy = at_zero(example("minimum_variance", {LOSS: 0.3, START: 3.0}))
+    found = expect(lossy, horizon=20.0)
+    assert found.mean_square_radius > 1.0
+    assert not found.reasons
+    assert found.objectives["variance"] == pytest.approx(by_hand(3.0, 20, loss=0.3), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{}, {"connections__command__delay_jitter": 0.5}, {LOSS.replace(".", "__"): 0.1, BURST.replace(".", "__"): 1.5}],
+    ids=["prompt", "late", "bursts"],
+)
+def test_far_away_it_comes_to_the_stationary_value(changes: dict[str, Any]) -> None:
+    """The extra cost of the initial state is constant from some horizon on: two horizons determine the limit."""
+    first, second = variance(200.0, **changes), variance(400.0, **changes)
+    stationary = expect(example("minimum_variance", {k.replace("__", "."): v for k, v in changes.items()}))
+    assert 2.0 * second - first == pytest.approx(stationary.objectives["variance"], rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {f"{COMMAND}.delay": 0.7},
+        {f"{COMMAND}.hold": "first", f"{COMMAND}.delay": 0.1},
+        {f"{COMMAND}.order": "jacobi", f"{COMMAND}.delay": 0.05},
+        {f"{MEASUREMENT}.delay": 0.5, f"{COMMAND}.scale": 0.9},
+        {f"{MEASUREMENT}.delay": 0.9, f"{MEASUREMENT}.hold": "first"},
+        {f"{SAMPLING}.offset": 0.2, f"{COMMAND}.delay": 0.1},
+    ],
+    ids=["prompt", "late", "first", "jacobi", "measured", "measured first", "offset"],
+)
+def test_without_chance_it_is_what_a_run_prints(changes: dict[str, Any]) -> None:
+    """Of squares and of signals themselves, from where the example begins, to a time between two samples."""
+    whole = example(
+        "double_integrator", {f"{SAMPLING}.period": 0.4, "components.plant.step": 0.05, "stop_time": 3.3, **changes}
+    )
+    system = dataclasses.replace(
+        whole,
+        criterion=Criterion(),
+        objectives={"square": "mean(plant.x ** 2)", "effort": "rms(plant.u)", "mean": "mean(plant.x) - 2"},
+    )
+    found = expect(system, horizon=3.3, as_simulated=True)
+    printed = run(system, progress=None, announce=None).metrics
+    assert found.objectives == pytest.approx({name: printed[name] for name in system.objectives}, rel=1e-8)
+
+
+def test_over_all_that_may_be_lost_runs_print_on_average_what_is_expected() -> None:
+    """Of three commands, each as likely to be lost as not."""
+    whole = example("double_integrator", {f"{SAMPLING}.period": 0.4, "components.plant.step": 0.05, "stop_time": 1.2})
+    system = dataclasses.replace(
+        whole, criterion=Criterion(), objectives={"square": "mean(plant.x ** 2)"},
+        connections=(whole.connections[0], dataclasses.replace(whole.connections[1], loss=0.5)),
+    )  # fmt: skip
+    found: dict[str, float] = {}
+    for seed in range(60):
+        result = run(dataclasses.replace(system, seed=seed), progress=None, announce=None)
+        found[str([event for event in result.events if event.kind == "lost"])] = float(result.metrics["square"] or 0.0)
+    assert len(found) == 8
+    expected = expect(system, horizon=1.2, as_simulated=True).objectives["square"]
+    assert sum(found.values()) / 8.0 == pytest.approx(expected, rel=1e-8)
+
+
+def test_a_start_at_which_a_component_is_not_linear_is_refused_by_name() -> None:
+    speed, constant = "components.servo.parameters.initial.speed", "components.servo.parameters.time_constant"
+    servo = example("dc_servo", {LOSS: 0.0, speed: 1.0})
+    driven = dataclasses.replace(
+        servo, objectives={"cost": "mean(servo.angle ** 2)"},
+        operating_point={**dict.fromkeys(("components.servo.parameters.initial.angle", speed), 0.0), constant: 2.0},
+    )  # fmt: skip
+    with pytest.raises(UsageError, match=r"servo: its initial state is not linear about its operating point"):
+        expect(driven, horizon=1.0)
+
+
+@pytest.mark.parametrize("horizon", [0.0, -1.0, math.inf, math.nan])
+def test_a_horizon_is_a_finite_time_above_zero(horizon: float) -> None:
+    with pytest.raises(UsageError, match=r"horizon = \S+ s: expected a finite time above 0"):
+        expect(example("minimum_variance"), horizon=horizon)
+
+
+def test_the_command_says_how_far_it_looked(main: Main) -> None:
+    path = EXAMPLES / "minimum_variance/system.toml"
+    document = json.loads(main("expect", path, "--horizon", "7", "--json").stdout)
+    assert document["horizon"] == 7.0
+    assert document["objectives"]["variance"] == pytest.approx(by_hand(0.0, 7), rel=1e-9)
+    assert "from its initial conditions to 7 s" in document["method"]

@@ -1,0 +1,102 @@
+"""Costs and mean-square limits that are known, from hand-made matrices."""
+
+import math
+from typing import Any
+
+import pytest
+
+from orchestration.foundation.basics.bisection import bisected
+from orchestration.systems.system.distribution import Distribution
+from orchestration.theory.exact import random_times
+from tests.orchestration.theory.exact.common import GAIN, SERVO_PERIOD, integrator, servo
+
+
+def test_the_cost_of_minimum_variance_control_is_that_of_theory() -> None:
+    assert integrator().costs()[0] == pytest.approx((3.0 + math.sqrt(3.0)) / 6.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("nodes", [3, 6])
+def test_with_a_uniform_delay_it_is_that_of_three_nodes_of_gauss(nodes: int) -> None:
+    assert integrator(nodes=nodes, delay_jitter=0.5).costs()[0] == pytest.approx(1.2186963044, abs=1e-10)
+
+
+@pytest.mark.parametrize(("delay", "expected"), [(0.0, 65.5234406988), (0.003, 86.2175992472), (0.006, 123.022639193)])
+def test_the_servo_costs_what_jitterbug_says(delay: float, expected: float) -> None:
+    """Of its table, where each of two delays is half of it."""
+    assert servo(delay=delay).costs()[0] / SERVO_PERIOD == pytest.approx(expected, rel=1e-11)
+
+
+@pytest.mark.parametrize(("longest", "expected"), [(10, 74.720524553), (20, 86.5141979439)])
+def test_with_two_delays_out_of_eleven_or_more_values_the_servo_costs_what_jitterbug_says(
+    longest: int, expected: float
+) -> None:
+    """Two independent delays of 0, 0.15, … ms: the controller is static, so their sum may be one delay."""
+    count = longest + 1
+    ways = [min(k, 2 * longest - k) + 1 for k in range(2 * longest + 1)]
+    delay = Distribution(
+        values=tuple(0.00015 * k for k in range(2 * longest + 1)), probabilities=tuple(n / count**2 for n in ways)
+    )
+    assert servo(delay=delay).costs()[0] / SERVO_PERIOD == pytest.approx(expected, rel=1e-10)
+
+
+def test_a_delay_and_a_jitter_on_top_that_are_both_drawn_make_their_sum() -> None:
+    each = Distribution(values=tuple(0.00015 * k for k in range(11)))
+    assert servo(delay=each, delay_jitter=each).costs()[0] / SERVO_PERIOD == pytest.approx(74.720524553, rel=1e-10)
+
+
+def test_a_long_table_costs_what_its_values_do_one_by_one() -> None:
+    """By Gauss's rule of the table, which is exact for powers of the delay up to the nineteenth."""
+    values = tuple(0.0005 + 0.003 * (k / 60.0) ** 2 for k in range(61))
+    by_rule = servo(nodes=10, delay=Distribution(values=values)).costs()[0]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(random_times, "FEW", len(values))
+        one_by_one = servo(delay=Distribution(values=values)).costs()[0]
+    assert by_rule == pytest.approx(one_by_one, rel=1e-11)
+
+
+def test_with_a_fifth_of_the_commands_lost_the_cost_is_the_exact_one_and_fourth_moments_have_no_end() -> None:
+    lossy = integrator(loss=0.2)
+    assert lossy.costs()[0] == pytest.approx(5.887, abs=5e-4)
+    assert lossy.fourth_moment_radius is not None
+    assert lossy.fourth_moment_radius > 1.0
+
+
+def test_fourth_moments_have_no_end_from_eight_percent_of_loss_on() -> None:
+    below, above = (integrator(loss=p).fourth_moment_radius for p in (0.0826, 0.0827))
+    assert below is not None
+    assert above is not None
+    assert below < 1.0 < above
+
+
+def test_radii_of_a_loop_without_chance_are_powers_of_the_spectral_radius() -> None:
+    steady = integrator()
+    assert steady.radius == pytest.approx((1.0 - GAIN) ** 2, abs=1e-14)
+    assert steady.fourth_moment_radius == pytest.approx((1.0 - GAIN) ** 4, abs=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("burst", "limit"), [(None, 0.2240092377), (1.5, 0.1924500897), (2.0, 0.1443375673), (4.0, 0.0721687836)]
+)
+def test_the_mean_square_limit_of_losses_is_that_of_theory(burst: float | None, limit: float) -> None:
+    def fails(loss: float) -> bool:
+        return integrator(loss=loss, burst_length=burst).radius >= 1.0
+
+    found = bisected(fails, 0.02, 0.4, 1e-11)
+    assert 0.5 * (found.good + found.bad) == pytest.approx(limit, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"delay": 0.3, "delay_jitter": 0.9},
+        {"delay": 0.2, "sampling": {"jitter": 0.3}},
+        {"delay": 0.7, "order": "jacobi"},
+        {"delay_jitter": 0.4, "jitter_distribution": "normal"},
+    ],
+    ids=["over a period", "jitter of samples", "the end of the step", "normal"],
+)
+def test_twice_the_order_of_gauss_s_rule_changes_nothing_where_no_message_can_overtake(changes: dict[str, Any]) -> None:
+    low, high = (integrator(nodes=nodes, **changes) for nodes in (10, 20))
+    assert low.radius == pytest.approx(high.radius, rel=1e-10)
+    if low.radius < 1.0:
+        assert low.costs()[0] == pytest.approx(high.costs()[0], rel=1e-10)
