@@ -17,9 +17,9 @@ from orchestration.simulation.figures.style import DOCS, save
 from orchestration.simulation.runs.result import Result
 from orchestration.simulation.runs.scheduling import schedule
 from orchestration.simulation.runs.simulation import run
+from orchestration.systems.system.file import load_system
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.paths import changed
-from orchestration.systems.system.system_file import load_system
 from orchestration.theory.exact.loops import Loops
 
 HERE = Path(__file__).resolve().parent

@@ -56,9 +56,9 @@ if TYPE_CHECKING:
     from orchestration.experiments.tuning.tuning import Tuning
     from orchestration.experiments.tuning.tuning_file import load_tuning
     from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError
+    from orchestration.quadrotor.scenarios.file import load_scenario
     from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice, Record
     from orchestration.quadrotor.scenarios.scenario import Scenario
-    from orchestration.quadrotor.scenarios.scenario_file import load_scenario
     from orchestration.quadrotor.scenarios.signals import DisturbanceChoice, ReferenceChoice
     from orchestration.quadrotor.scenarios.timing import Timing
     from orchestration.quadrotor.scenarios.vehicle import Vehicle, load_vehicle
@@ -77,11 +77,11 @@ if TYPE_CHECKING:
     from orchestration.systems.system.connection import Connection
     from orchestration.systems.system.criterion import Criterion
     from orchestration.systems.system.distribution import Distribution
+    from orchestration.systems.system.file import load_system
     from orchestration.systems.system.model import System
     from orchestration.systems.system.paths import changed
     from orchestration.systems.system.sampling import Sampling, SamplingOnArrival
     from orchestration.systems.system.source import Source
-    from orchestration.systems.system.system_file import load_system
     from orchestration.theory.certificates.basin import Basin, basin
     from orchestration.theory.certificates.check import Checked
     from orchestration.theory.certificates.check import check as check_certificate
@@ -111,7 +111,7 @@ _HOMES = {
     "Record": "orchestration.quadrotor.scenarios.fmu_choice",
     "Vehicle": "orchestration.quadrotor.scenarios.vehicle",
     "load_vehicle": "orchestration.quadrotor.scenarios.vehicle",
-    "load_scenario": "orchestration.quadrotor.scenarios.scenario_file",
+    "load_scenario": "orchestration.quadrotor.scenarios.file",
     # any system
     "System": "orchestration.systems.system.model",
     "Component": "orchestration.systems.system.component",
@@ -126,7 +126,7 @@ _HOMES = {
     "Network": "orchestration.systems.system.computers",
     "Message": "orchestration.systems.system.computers",
     "Arrivals": "orchestration.systems.system.computers",
-    "load_system": "orchestration.systems.system.system_file",
+    "load_system": "orchestration.systems.system.file",
     "changed": "orchestration.systems.system.paths",
     "schedule": "orchestration.simulation.runs.scheduling",
     "Scheduled": "orchestration.simulation.runs.scheduling",

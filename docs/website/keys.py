@@ -12,9 +12,9 @@ from orchestration.experiments.studies.study_file import StudyFile
 from orchestration.experiments.tuning.tuning_file import TuningFile
 from orchestration.foundation.basics.records import Scalar
 from orchestration.foundation.basics.typed_tables import docs_of_keys, fields_of
+from orchestration.quadrotor.scenarios.file import ScenarioFile
 from orchestration.quadrotor.scenarios.initial_conditions import Starts
-from orchestration.quadrotor.scenarios.scenario_file import ScenarioFile
-from orchestration.systems.system.system_file import SystemTable
+from orchestration.systems.system.file import SystemTable
 
 FILES = {
     "System file": (SystemTable, "Any FMUs; [how to write one](systems.md)."),

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 def schema() -> CommandResult:
     """Print the JSON schema of system files, with which editors complete and check them."""
-    from orchestration.systems.system import system_file
+    from orchestration.systems.system import file
 
-    result = CommandResult(document=system_file.schema(), lines=[])
+    result = CommandResult(document=file.schema(), lines=[])
     return replace(result, lines=result.as_json.splitlines())
 
 

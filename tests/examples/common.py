@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from orchestration.components.building import fmus
+from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
-from orchestration.systems.system.system_file import load_system
 from tests.places import EXAMPLES
 
 NAMES = sorted(path.parent.name for path in EXAMPLES.glob("*/system.toml"))

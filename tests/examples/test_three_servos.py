@@ -4,8 +4,8 @@ import pytest
 
 from orchestration.simulation.runs.simulation import run
 from orchestration.systems.schedule.resources import timeline_of
+from orchestration.systems.system.file import load_system
 from orchestration.systems.system.paths import changed
-from orchestration.systems.system.system_file import load_system
 from tests.places import EXAMPLES
 
 SYSTEM = load_system(EXAMPLES / "three_servos" / "system.toml")

@@ -11,8 +11,8 @@ from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.quadrotor.flight.hover import at_hover
 from orchestration.quadrotor.flight.hover_loop import HoverLoop
+from orchestration.quadrotor.scenarios.file import scenario_from_tables
 from orchestration.quadrotor.scenarios.scenario import Scenario
-from orchestration.quadrotor.scenarios.scenario_file import scenario_from_tables
 from orchestration.theory.stability.monodromy import growth_of_loop
 
 MEAN = {"discretisation": "mean", "stages": 3}

@@ -11,10 +11,10 @@ from orchestration.quadrotor.scenarios.timing import TIMING_KEYS
 from orchestration.quadrotor.scenarios.wiring import EXTERNAL_FORCE, POSITION_REFERENCE
 from orchestration.systems.signals.limits import AXES
 from orchestration.systems.signals.table_file import header_of
+from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import TOP
 from orchestration.systems.system.source import Source
-from orchestration.systems.system.system_file import load_system
 
 SYSTEM = Path(__file__).with_name("system.toml")
 """The paper's flight; every scenario is this system with changes"""

@@ -10,9 +10,9 @@ from typing import Any, TypeAlias
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.simulation.requests.kinds import KINDS, RequestKind
+from orchestration.systems.system.file import is_system, system_from_tables
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request
-from orchestration.systems.system.system_file import is_system, system_from_tables
 
 SSP_ENDINGS = (".ssp", ".ssd")
 SSP = "ssp"

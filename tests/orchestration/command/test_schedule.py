@@ -13,8 +13,8 @@ from orchestration.simulation.figures.run import Run, Window
 from orchestration.simulation.figures.style import SCREEN
 from orchestration.simulation.requests.ranges import default_quantity
 from orchestration.systems.computers.results import Timeline
+from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System
-from orchestration.systems.system.system_file import load_system
 from quadcosim import schedule
 from tests.commands import Main
 from tests.places import EXAMPLES

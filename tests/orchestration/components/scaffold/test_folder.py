@@ -13,7 +13,7 @@ from orchestration.components.scaffold.folder import Kind, class_name, module_na
 from orchestration.experiments.limits import limit
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.runs.simulation import run
-from orchestration.systems.system.system_file import load_system
+from orchestration.systems.system.file import load_system
 from tests.commands import Main
 
 LIMITS = {

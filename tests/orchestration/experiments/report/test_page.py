@@ -22,8 +22,8 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.quadrotor.flight.layout import ATTITUDE, DESIRED, PLACE
 from orchestration.quadrotor.scenarios.wiring import POSITION_REFERENCE
 from orchestration.simulation.runs.simulation import run
+from orchestration.systems.system.file import load_system
 from orchestration.systems.system.paths import changed
-from orchestration.systems.system.system_file import load_system
 from quadcosim import Scenario, Timing
 from tests.native import NATIVE
 from tests.orchestration.experiments.studies.common import axis, sweep

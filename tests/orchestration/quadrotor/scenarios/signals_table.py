@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 import quadcosim
+from orchestration.quadrotor.scenarios.file import scenario_from_tables
 from orchestration.quadrotor.scenarios.scenario import Scenario
-from orchestration.quadrotor.scenarios.scenario_file import scenario_from_tables
 from quadcosim import Result
 
 TABLE = Path(__file__).parents[3] / "data" / "quadrotor_signals.json"

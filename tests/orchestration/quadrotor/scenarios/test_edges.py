@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.quadrotor.scenarios.file import load_scenario
 from orchestration.quadrotor.scenarios.scenario import Scenario
-from orchestration.quadrotor.scenarios.scenario_file import load_scenario
 from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.simulation.runs.run_directory import run_folder
 from tests.orchestration.quadrotor.scenarios.stubs import Counting, Plant, Straying, StubRun, cursor_of, instants_of

@@ -15,9 +15,9 @@ from orchestration.simulation.runs.result import Result
 from orchestration.systems.signals.dryden import DRAWS, Dryden
 from orchestration.systems.signals.library import make_signal
 from orchestration.systems.signals.waypoints import read_waypoints
+from orchestration.systems.system.file import system_from_tables
 from orchestration.systems.system.file_tables import tables_of
 from orchestration.systems.system.paths import changed
-from orchestration.systems.system.system_file import system_from_tables
 from quadcosim import DisturbanceChoice, ReferenceChoice, Scenario, UsageError, load_scenario
 from tests.commands import Main
 from tests.orchestration.components.fmi.small import needs_compiler

@@ -38,10 +38,10 @@ from orchestration.systems.schedule import cursor
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.criterion import Criterion
+from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System
 from orchestration.systems.system.sampling import Sampling
 from orchestration.systems.system.source import Source
-from orchestration.systems.system.system_file import load_system
 from orchestration.systems.system.times import Grid, exact_nanoseconds
 from tests.native import assert_the_same
 from tests.orchestration.components.fmi.small import needs_compiler, small

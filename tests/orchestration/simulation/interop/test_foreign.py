@@ -8,8 +8,8 @@ from orchestration.simulation.interop import copies
 from orchestration.simulation.interop.catalogue import chosen
 from orchestration.simulation.interop.compare import agreements
 from orchestration.simulation.interop.table import TOLERANCE
+from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System
-from orchestration.systems.system.system_file import load_system
 from quadcosim import UsageError
 from tests.examples.common import example
 from tests.orchestration.components.fmi.small import needs_compiler, small

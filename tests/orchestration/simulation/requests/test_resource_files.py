@@ -9,8 +9,8 @@ from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.simulation.requests.can_database import bus_of
 from orchestration.simulation.requests.resource_files import resources_of
 from orchestration.simulation.requests.task_table import computers_of
+from orchestration.systems.system.file import load_system
 from orchestration.systems.system.proposal import propose
-from orchestration.systems.system.system_file import load_system
 from quadcosim import schedule
 from tests.commands import Main
 

@@ -8,9 +8,9 @@ from orchestration.components.fmi.model import read_model
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.results import objectives
 from orchestration.systems.system.check import check, recorded_variables
+from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
-from orchestration.systems.system.system_file import load_system
 from tests.orchestration.systems.system.described import described
 
 TANK = """\

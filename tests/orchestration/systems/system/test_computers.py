@@ -10,13 +10,13 @@ from orchestration.experiments.studies.run_key import run_key
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.systems.schedule.schedule_cache import schedule_key
 from orchestration.systems.system.computers import Message, Network
+from orchestration.systems.system.file import is_system, load_system
 from orchestration.systems.system.files import Files
 from orchestration.systems.system.frames import frame_nanoseconds
 from orchestration.systems.system.paths import changed, value_at
 from orchestration.systems.system.placement import SHARED, punctual
 from orchestration.systems.system.randomness import depends_on_seed
 from orchestration.systems.system.sampling import SamplingOnArrival, TaskSampling
-from orchestration.systems.system.system_file import is_system, load_system
 
 FILE = """
 stop_time = 1.0

@@ -13,9 +13,9 @@ from orchestration.systems.schedule.drawing import times_from
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.description import describe_faults, describe_varying
 from orchestration.systems.system.distribution import Distribution, content, highest, is_random, lowest, mean
+from orchestration.systems.system.file import load_system
 from orchestration.systems.system.input_files import input_files
 from orchestration.systems.system.sampling import Sampling
-from orchestration.systems.system.system_file import load_system
 from orchestration.systems.system.times import NANOSECONDS
 
 SYSTEM = """

@@ -7,7 +7,7 @@ import pytest
 
 from orchestration.simulation.figures import diagram
 from orchestration.systems.system.description import as_text, seconds
-from orchestration.systems.system.system_file import load_system
+from orchestration.systems.system.file import load_system
 from tests.commands import Main
 from tests.pictures import expect_picture
 

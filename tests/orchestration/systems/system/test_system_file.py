@@ -11,8 +11,8 @@ from orchestration.simulation.requests.request import load_request
 from orchestration.systems.schedule.cursor import Cursor
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
+from orchestration.systems.system.file import load_system, schema
 from orchestration.systems.system.paths import changed, value_at
-from orchestration.systems.system.system_file import load_system, schema
 
 SHIPPED = Path(translation.__file__).with_name("system.toml")
 

@@ -11,9 +11,9 @@ import pytest
 
 import quadcosim
 from orchestration.components.fmi.reuse import Instances
+from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
-from orchestration.systems.system.system_file import load_system
 from orchestration.theory.stability.monodromy import growth_of_loop
 from orchestration.theory.stability.state_space import reduced
 from quadcosim import Linearised, QuadcosimError, StateSpace, Timing, UsageError, linearise

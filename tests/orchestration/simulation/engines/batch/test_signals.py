@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from orchestration.systems.schedule import schedule_cache
 from orchestration.systems.system.distribution import highest
+from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System
-from orchestration.systems.system.system_file import load_system
 from tests.orchestration.components.fmi.small import needs_compiler
 from tests.orchestration.quadrotor.scenarios.signals_table import flights, scenario_of
 from tests.orchestration.simulation.engines.batch.lanes import assert_the_same_signals, in_lanes, located, shape_of

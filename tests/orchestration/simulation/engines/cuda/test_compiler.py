@@ -10,7 +10,7 @@ from orchestration.simulation.engines.batch.batch import Batch
 from orchestration.simulation.engines.cuda.compiler import KernelResources, image
 from orchestration.simulation.engines.cuda.program import Code, line, program
 from orchestration.systems.schedule.schedule_cache import ScheduleCache
-from orchestration.systems.system.system_file import load_system
+from orchestration.systems.system.file import load_system
 from tests.orchestration.components.fmi.small import needs_compiler
 from tests.orchestration.simulation.engines.batch.lanes import group_of, located, shape_of
 from tests.places import EXAMPLES

@@ -22,9 +22,9 @@ from orchestration.simulation.engines.structures import structures
 from orchestration.systems.schedule import schedule_cache
 from orchestration.systems.schedule.schedule_cache import ScheduleCache
 from orchestration.systems.system.criterion import Criterion
+from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
-from orchestration.systems.system.system_file import load_system
 from tests.orchestration.components.fmi.small import needs_compiler
 from tests.orchestration.simulation.engines.batch.lanes import group_of, located, shape_of
 from tests.orchestration.simulation.engines.batch.test_batches import F
