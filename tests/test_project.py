@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from docs import make_architecture
 from orchestration.foundation.basics.documents import read_toml
 from tests.places import ROOT
 
@@ -49,22 +50,11 @@ def test_every_path_that_is_named_exists(text: str) -> None:
     assert not [path for path in named if not (ROOT / path).exists()]
 
 
-def test_the_floors_of_the_architecture_are_those_that_imports_are_held_to() -> None:
-    contracts = SETTINGS["tool"]["importlinter"]["contracts"]
-    held = {each["containers"][0]: each["layers"] for each in contracts if each.get("exhaustive")}
-    parts = re.split(r"^### `(\w+)/`$", ARCHITECTURE.partition("## Around them")[0], flags=re.M)
-    assert parts[1::2] == held["orchestration"]
-    assert {*parts[1::2]} == {path.parent.name for path in (ROOT / "orchestration").glob("*/__init__.py")}
-    for district, text in zip(parts[1::2], parts[2::2], strict=True):
-        drawn: list[list[str]] = []
-        for floor, room in re.findall(r"^\| (\d*) *\| `(\w+)` \|", text, re.M):
-            if floor:
-                drawn.append([])
-            drawn[-1].append(room)
-        assert drawn == [layer.split(" | ") for layer in held.get(f"orchestration.{district}", ())]
-        if drawn:
-            rooms = {room for floor in drawn for room in floor}
-            assert rooms == {path.parent.name for path in (ROOT / "orchestration" / district).glob("*/__init__.py")}
+def test_the_architecture_shows_the_districts_and_rooms_that_there_are() -> None:
+    assert make_architecture.page(ARCHITECTURE) == ARCHITECTURE
+    for package, floors in make_architecture.layers().items():
+        rooms = {path.parent.name for path in (ROOT / package.replace(".", "/")).glob("*/__init__.py")}
+        assert {name for floor in floors for name in floor} >= rooms
 
 
 @pytest.mark.parametrize("broken", ["a folder that is not listed", "a late import upward"])

@@ -1,1 +1,1 @@
-"""Finds FMUs, and builds those that are out of date."""
+"""Finds FMUs, and builds those that are missing or out of date."""

@@ -1,1 +1,1 @@
-"""The problems of an FMU, and its requirements."""
+"""Checks of FMUs (`validation/`), and what they need to load (`doctor/`)."""

@@ -1,1 +1,1 @@
-"""Creates folders for users' own slaves: a controller, a plant, a filter."""
+"""What `quadcosim new` writes: a folder with a controller, a plant or a filter, its test and its README."""

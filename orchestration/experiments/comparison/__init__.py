@@ -1,1 +1,1 @@
-"""Comparison of controllers from the same initial conditions: survival, settling, limits, error and effort."""
+"""Controllers compared from the same initial conditions: survival, settling, limits, error and effort."""

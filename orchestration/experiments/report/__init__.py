@@ -1,1 +1,1 @@
-"""Reports: runs, a study or a comparison as one self-contained HTML file that needs no network."""
+"""One HTML file of runs, a study or a comparison, which needs no network; its scripts are in `page/`."""

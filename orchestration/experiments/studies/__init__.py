@@ -1,1 +1,1 @@
-"""Many runs of one request, over axes of timing, parameters and initial state."""
+"""Many runs over axes: designs, the store of their rows, sensitivity, figures."""

@@ -1,1 +1,1 @@
-"""Tuning: searches for the parameters of a controller with the lowest cost."""
+"""Searches for the parameters of a controller that cost least."""

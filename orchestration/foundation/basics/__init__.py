@@ -1,1 +1,1 @@
-"""Basics for every package: errors, units, documents, terminal, progress, statistics, the protocol of simulators."""
+"""Errors, units, documents, the terminal, progress, statistics, bisection."""

@@ -1,1 +1,1 @@
-"""Child processes: messages to and from them, their limits, and how they ended."""
+"""Child processes, forked from one that has imported their module: messages, limits, and how they ended."""

@@ -1,1 +1,1 @@
-"""The quadrotor: the first system, its scenario files, flags and presets."""
+"""This vehicle alone: scenario files, its system file, presets, initial conditions, `vehicles/`."""

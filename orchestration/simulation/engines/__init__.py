@@ -1,1 +1,1 @@
-"""Engines step components through the instants of a run: the master in Python and in C, and runs in SIMD lanes."""
+"""Engines step components through the instants of a run: in Python, in C, and many runs in SIMD lanes (`batch/`)."""

@@ -1,1 +1,1 @@
-"""Requests to run: a system, a scenario, an SSP."""
+"""What can be asked to run: a system, a scenario, an SSP (`ssp/`); ranges of a quantity."""

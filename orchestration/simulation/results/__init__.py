@@ -1,1 +1,1 @@
-"""The metrics of a run, their units, and display names."""
+"""Results of rows: objectives, units, display names."""

@@ -1,1 +1,1 @@
-"""Runs of requests, their results, and the directories and figures of results."""
+"""From a request to a result: one run, its directory, its pause, its figures by name."""

@@ -1,1 +1,1 @@
-"""Worker processes that simulate runs: a local pool or dask, and the tasks sent to them."""
+"""Worker processes, here or by dask: their tasks, the engine they take, and what the bits of a run depend on."""

@@ -1,1 +1,1 @@
-"""The timetable of a run, without any FMU: its instants, regular and random."""
+"""What happens when, without any FMU: the timetable, random timing, streams of random numbers."""

@@ -1,1 +1,1 @@
-"""A system as data: components, connections, sources, objectives and a criterion."""
+"""What a system is: components, connections, sources, criterion; its file, its paths, its check against FMUs."""
