@@ -27,9 +27,7 @@ from orchestration.command import (
     studies,
     systems,
 )
-from orchestration.command.build_flag import ask
-from orchestration.command.option_group import option_group
-from orchestration.command.output_options import OutputOptions
+from orchestration.command.registry import OutputOptions, ask, option_group
 from orchestration.components.building import consent
 from orchestration.components.fmi.banners import banners_to_stderr
 from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError, no_utf8, worded_by

@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.command import comparison_text as terminal
-from orchestration.command.command_result import CommandResult
 from orchestration.command.figure_flags import FigureFlags
+from orchestration.command.registry import CommandResult
 from orchestration.experiments.comparison import run
 from orchestration.experiments.comparison.design import Comparison
 from orchestration.experiments.comparison.outcome import as_json as to_json

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from orchestration.command import registry
-from orchestration.command.command_result import CommandResult
 from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
+from orchestration.command.registry import CommandResult
 from orchestration.foundation.basics.terminal import warn
 
 if TYPE_CHECKING:

@@ -6,9 +6,8 @@ from typing import Annotated
 import typer
 
 from orchestration.command import registry
-from orchestration.command.command_result import CommandResult, result_of_files
 from orchestration.command.flags import FlightFlags, flight_options, request_from
-from orchestration.command.option_group import option_group
+from orchestration.command.registry import CommandResult, option_group, result_of_files
 from orchestration.command.variant_flags import VariantFlags
 from orchestration.foundation.basics.terminal import inform, warn
 

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 
 from orchestration.command import completion
-from orchestration.command.build_flag import build_option
-from orchestration.command.option_group import Command, option_group
+from orchestration.command.registry import Command, build_option, option_group
 from orchestration.foundation.basics.attribute_docs import FieldDoc, attribute_docs
 from orchestration.foundation.basics.documents import toml_of
 from orchestration.foundation.basics.errors import UsageError

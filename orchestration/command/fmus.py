@@ -1,18 +1,47 @@
 """The commands that build and check FMUs."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from orchestration.command import completion, registry
-from orchestration.command.command_result import CommandResult, result_of_files
-from orchestration.command.limit_flags import LimitFlags
-from orchestration.command.option_group import option_group
+from orchestration.command.registry import CommandResult, expect_positive, option_group, result_of_files
 from orchestration.command.variant_flags import VariantFlags
 from orchestration.components.building import consent
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import inform, progress_bar
+from orchestration.foundation.processes.limits import Limits
+
+
+@dataclass(frozen=True, kw_only=True)
+class LimitFlags:
+    """The limits of checks; raises `UsageError` for values that are not positive."""
+
+    time_limit: Annotated[
+        float,
+        typer.Option("--time-limit", help="Time limit for all checks of an FMU.", metavar="SECONDS"),
+    ] = Limits.time
+    memory_limit: Annotated[
+        float,
+        typer.Option("--memory-limit", help="Memory of the FMU's process and its children (Linux).", metavar="MB"),
+    ] = Limits.memory
+    size_limit: Annotated[
+        float, typer.Option("--size-limit", help="Size of an unpacked FMU, and of a file that it writes.", metavar="MB")
+    ] = Limits.size
+    output_limit: Annotated[
+        float, typer.Option("--output-limit", help="Output that an FMU may print.", metavar="MB")
+    ] = Limits.output
+
+    def __post_init__(self) -> None:
+        for name in ("time", "memory", "size", "output"):
+            expect_positive(f"--{name}-limit", getattr(self, f"{name}_limit"), "seconds" if name == "time" else "MB")
+
+    @property
+    def limits(self) -> Limits:
+        """The limits for the process."""
+        return Limits(time=self.time_limit, memory=self.memory_limit, size=self.size_limit, output=self.output_limit)
 
 
 @option_group("variant", VariantFlags)

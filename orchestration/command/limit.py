@@ -6,8 +6,8 @@ from typing import Annotated
 import typer
 
 from orchestration.command import completion, registry
-from orchestration.command.command_result import CommandResult
 from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
+from orchestration.command.registry import CommandResult
 from orchestration.foundation.basics.terminal import inform
 
 

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from orchestration.command.command_result import CommandResult
 from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
+from orchestration.command.registry import CommandResult
 
 if TYPE_CHECKING:
     from orchestration.theory.stability.state_space import StateSpace

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from orchestration.command import registry
-from orchestration.command.command_result import CommandResult
 from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
 from orchestration.command.linearise import linearise
+from orchestration.command.registry import CommandResult
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import inform
 

@@ -6,8 +6,7 @@ from typing import Annotated, get_args
 import typer
 
 from orchestration.command import registry
-from orchestration.command.command_result import CommandResult, result_of_files
-from orchestration.command.registry import RUN
+from orchestration.command.registry import RUN, CommandResult, result_of_files
 from orchestration.components.scaffold import examples as shipped
 from orchestration.components.scaffold.folder import Kind, git_author, write
 from orchestration.foundation.basics.errors import UsageError

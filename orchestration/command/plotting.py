@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from orchestration.command import registry
-from orchestration.command.command_result import CommandResult, result_of_files
 from orchestration.command.figure_flags import FigureFlags
-from orchestration.command.option_group import option_group
+from orchestration.command.registry import CommandResult, option_group, result_of_files
 from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.foundation.basics.terminal import Share, progress_bar
 from orchestration.quadrotor.flight.names import FIGURES

@@ -1,16 +1,103 @@
-"""Turns functions into commands: adds the flags of every command and prints their results."""
+"""What every command has: flags declared as fields of dataclasses, those of output and of building, and a result."""
 
+import inspect
+import json
+import logging
 import shlex
-from collections.abc import Callable, Sequence
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, fields
 from functools import wraps
-from typing import Any
+from pathlib import Path, PurePath
+from typing import Annotated, Any
 
 import typer
 
-from orchestration.command.command_result import CommandResult
-from orchestration.command.option_group import option_group
-from orchestration.command.output_options import OutputOptions
 from orchestration.foundation.basics import terminal
+from orchestration.foundation.basics.documents import plain
+from orchestration.foundation.basics.errors import UsageError
+
+
+@dataclass(frozen=True, kw_only=True)
+class CommandResult:
+    """Printed to standard output: with `--json` the document, else the lines."""
+
+    document: object
+    """of numbers, texts, booleans, lists, mappings, paths and dataclasses of them"""
+    lines: Sequence[str]
+    good: bool = True
+    """false: exit code 1"""
+
+    @property
+    def as_json(self) -> str:
+        """The document as JSON; numbers that JSON lacks, such as infinity, are null."""
+        return json.dumps(plain(self.document), indent=2)
+
+
+def result_of_files(paths: Iterable[PurePath]) -> CommandResult:
+    """The paths of files that were written, one per line."""
+    written = list(paths)
+    return CommandResult(document={"files": written}, lines=[str(path) for path in written])
+
+
+def _option(*names: str, text: str, metavar: str = "") -> Any:
+    return typer.Option(*names, help=text, rich_help_panel="Output", show_default=False, metavar=metavar)
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutputOptions:
+    """The output flags; raises `UsageError` for flags that contradict each other."""
+
+    as_json: Annotated[
+        bool, _option("--json", text="Print the result as one JSON document; all else goes to standard error.")
+    ] = False
+    quiet: Annotated[bool, _option("--quiet", "-q", text="Print only the result, warnings and errors.")] = False
+    verbose: Annotated[bool, _option("--verbose", "-v", text="Also report each step.")] = False
+    log: Annotated[
+        Path | None, _option("--log", metavar="FILE", text="Append all output and steps to FILE, with times.")
+    ] = None
+    debug: Annotated[bool, _option("--debug", text="Print the traceback of an error.")] = False
+
+    def __post_init__(self) -> None:
+        if self.quiet and self.verbose:
+            raise UsageError("--quiet --verbose: expected one of them")
+
+    def joined(self, other: "OutputOptions") -> "OutputOptions":
+        """These and those of `other`: the flags before a command and those after it."""
+        return OutputOptions(**{f.name: getattr(other, f.name) or getattr(self, f.name) for f in fields(self)})
+
+    def apply(self) -> None:
+        """Configure messages by these flags; raises `OSError` for a log that cannot be written."""
+        terminal.configure(logging.DEBUG if self.verbose else logging.WARNING if self.quiet else logging.INFO, self.log)
+
+
+Command = Callable[..., Any]
+
+
+def option_group(name: str, declared: type[Any]) -> Callable[[Command], Command]:
+    """Give a command the fields of `declared` as flags; it receives them as one value, its argument `name`.
+
+    The annotation of a field is that of the flag for typer; its default is that of the flag.
+    """
+    shared = [
+        inspect.Parameter(f.name, inspect.Parameter.KEYWORD_ONLY, default=f.default, annotation=f.type)
+        for f in fields(declared)
+    ]
+
+    def decorate(command: Command) -> Command:
+        own = [p for p in inspect.signature(command).parameters.values() if p.name != name]
+
+        @wraps(command)
+        def call(**arguments: Any) -> Any:
+            flags = declared(**{f.name: arguments.pop(f.name) for f in fields(declared)})
+            return command(**{name: flags}, **arguments)
+
+        call.__signature__ = inspect.Signature(own + shared)  # type: ignore[attr-defined]
+        call.__annotations__ = {p.name: p.annotation for p in own + shared}
+        return call
+
+    return decorate
+
 
 RUN, STUDY, FMUS, TOOLS = "Run", "Study", "FMUs", "Other tools"
 """Groups of commands in the help"""
@@ -53,3 +140,46 @@ def print_result(result: CommandResult) -> None:
         terminal.note(text)
     if not result.good:
         raise typer.Exit(1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BuildFlag:
+    """The flag on the command line."""
+
+    build: Annotated[
+        bool,
+        typer.Option(
+            "--build",
+            help="Allow building FMUs from foreign modules beside a system file (it runs them); remembered.",
+            show_default=False,
+        ),
+    ] = False
+
+
+def build_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command the flag, which applies while the command runs."""
+
+    @option_group("flag", BuildFlag)
+    @wraps(command)
+    def call(flag: BuildFlag, **others: Any) -> Any:
+        if flag.build:
+            from orchestration.components.building import consent
+
+            consent.allow()
+        return command(**others)
+
+    return call
+
+
+def ask(question: str) -> bool:
+    """Ask on a terminal; True for yes, False without a terminal."""
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        return False
+    print(f"{question} [y/N] ", end="", file=sys.stderr, flush=True)
+    return sys.stdin.readline().strip().lower() in ("y", "yes")
+
+
+def expect_positive(flag: str, value: float | None, unit: str) -> None:
+    """Raise `UsageError` for a limit that is not positive."""
+    if value is not None and not value > 0.0:
+        raise UsageError(f"{flag} {value:g}: expected a positive number of {unit}")

@@ -6,8 +6,7 @@ from typing import Annotated
 import typer
 
 from orchestration.command import registry
-from orchestration.command.build_flag import build_option
-from orchestration.command.command_result import CommandResult, result_of_files
+from orchestration.command.registry import CommandResult, build_option, result_of_files
 from orchestration.foundation.basics.terminal import progress_bar
 
 

@@ -1,21 +1,45 @@
 """The command `run`."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from orchestration.command import exact, registry
-from orchestration.command.command_result import CommandResult
 from orchestration.command.flags import EngineFlag, FlightFlags, Timing, flight_options, request_from
-from orchestration.command.limit_flags import ProcessFlags
-from orchestration.command.option_group import option_group
+from orchestration.command.registry import CommandResult, expect_positive, option_group
+from orchestration.command.study_flags import TimeLimit
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import inform, progress_bar, warn
 from orchestration.foundation.basics.units import after
+from orchestration.foundation.processes.limits import Limits
 
 if TYPE_CHECKING:
     from orchestration.simulation.runs.result import Result
+    from orchestration.systems.system.request import Request
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProcessFlags:
+    """The limits of a run; raises `UsageError` for values that are not positive."""
+
+    in_process: Annotated[
+        bool,
+        typer.Option(
+            "--in-process",
+            help="Load foreign FMUs into this process: if one crashes, everything ends.",
+            show_default=False,
+        ),
+    ] = False
+    time_limit: TimeLimit = None
+    memory_limit: Annotated[
+        float, typer.Option("--memory-limit", help="Memory of a run's process and its children (Linux).", metavar="MB")
+    ] = Limits.memory
+
+    def __post_init__(self) -> None:
+        expect_positive("--time-limit", self.time_limit, "seconds")
+        expect_positive("--memory-limit", self.memory_limit, "MB")
 
 
 @option_group("process", ProcessFlags)
@@ -45,8 +69,7 @@ def run(
     process: ProcessFlags,
 ) -> CommandResult:
     """Run a scenario or a system and print its metrics. FMUs that are missing or out of date are built first."""
-    from orchestration.simulation.engines.engine import engine_named
-    from orchestration.simulation.runs.simulation import run as simulate  # modules for files are loaded only if needed
+    from orchestration.simulation.engines.engine import engine_named  # modules for runs are loaded only if needed
 
     if resume is not None and (scenario is not None or pause_at is not None or flags != FlightFlags()):
         raise UsageError("--resume: expected no scenario and no flags of the run; the paused run has its own")
@@ -54,22 +77,17 @@ def run(
         raise UsageError("--pause-at: expected --out DIR for the state")
     with progress_bar("running") as progress:
         how: Any = {"progress": progress, "announce": inform, "engine": engine_named(engine), **vars(process)}
+        result: Result | None
         if resume is not None:
-            from orchestration.simulation.runs import pause
-
-            result: Result | None = pause.resume(resume, out, figures=figures, **how)
-        elif pause_at is not None and out is not None:
-            from orchestration.simulation.runs import pause
-
-            chosen = request_from(scenario, flags, timing)
-            result = pause.run_until(chosen, pause_at, out, figures=figures, **how)
-        elif out is not None:
-            from orchestration.simulation.runs.run_directory import keep_run
-
-            chosen = request_from(scenario, flags, timing)
-            result = keep_run(out, lambda to: simulate(chosen, recorder=to, **how), figures=figures)
+            result = _resumed(resume, out, figures, how)
         else:
-            result = simulate(request_from(scenario, flags, timing), **how)
+            chosen = request_from(scenario, flags, timing)
+            if out is None:
+                result = _plain(chosen, how)
+            elif pause_at is None:
+                result = _kept(chosen, out, figures, how)
+            else:
+                result = _paused(chosen, pause_at, out, figures, how)
     if result is None:
         inform(f"paused in {out}; resume with: quadcosim run --resume {out}")
         return CommandResult(document={"paused_in": out}, lines=[])
@@ -83,6 +101,35 @@ def run(
     elif not registry.output_options.as_json:
         inform("add --out DIR to keep the signals and the figures")
     return _metrics(result)
+
+
+def _plain(chosen: "Request", how: Any) -> "Result | None":
+    """The result of a run that stays in memory."""
+    from orchestration.simulation.runs.simulation import simulate
+
+    return simulate(chosen, **how)
+
+
+def _kept(chosen: "Request", out: Path, figures: bool, how: Any) -> "Result | None":
+    """The result of a run whose directory is `out`."""
+    from orchestration.simulation.runs.run_directory import keep_run
+    from orchestration.simulation.runs.simulation import simulate
+
+    return keep_run(out, lambda to: simulate(chosen, recorder=to, **how), figures=figures)
+
+
+def _paused(chosen: "Request", pause_at: float, out: Path, figures: bool, how: Any) -> "Result | None":
+    """None for a run that is paused in `out`; the result of one that ends before."""
+    from orchestration.simulation.runs import pause
+
+    return pause.run_until(chosen, pause_at, out, figures=figures, **how)
+
+
+def _resumed(paused_in: Path, out: Path | None, figures: bool, how: Any) -> "Result":
+    """The result of the run that was paused in a folder."""
+    from orchestration.simulation.runs import pause
+
+    return pause.resume(paused_in, out, figures=figures, **how)
 
 
 def _metrics(result: "Result") -> CommandResult:

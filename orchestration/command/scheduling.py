@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from orchestration.command import registry
-from orchestration.command.command_result import CommandResult
 from orchestration.command.flags import assigned
+from orchestration.command.registry import CommandResult
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import inform
 from orchestration.simulation.figures.names import expect_figure

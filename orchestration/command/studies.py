@@ -6,12 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from orchestration.command import completion, exact, registry
-from orchestration.command.build_flag import build_option
-from orchestration.command.command_result import CommandResult, result_of_files
 from orchestration.command.figure_flags import FigureFlags
-from orchestration.command.limit_flags import TimeLimit
-from orchestration.command.option_group import option_group
-from orchestration.command.study_flags import Out, StudyEngineFlag, Workers
+from orchestration.command.registry import CommandResult, build_option, option_group, result_of_files
+from orchestration.command.study_flags import Out, StudyEngineFlag, TimeLimit, Workers
 from orchestration.foundation.basics.terminal import inform, progress_bar
 
 if TYPE_CHECKING:

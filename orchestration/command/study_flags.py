@@ -1,4 +1,4 @@
-"""Flags that the commands of studies, comparisons and tunings share."""
+"""Flags that the commands of runs, studies, comparisons and tunings share."""
 
 from pathlib import Path
 from typing import Annotated
@@ -19,5 +19,15 @@ StudyEngineFlag = Annotated[
         "auto: the fastest available one except cuda.",
         metavar="auto|python|compiled|batch|cuda",
         autocompletion=completion.among("auto", "python", "compiled", "batch", "cuda"),
+    ),
+]
+
+TimeLimit = Annotated[
+    float | None,
+    typer.Option(
+        "--time-limit",
+        help="Limit on the processor time of a run, idle waiting included; default: none.",
+        metavar="SECONDS",
+        show_default=False,
     ),
 ]

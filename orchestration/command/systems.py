@@ -7,10 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from orchestration.command import registry
-from orchestration.command.build_flag import build_option
-from orchestration.command.command_result import CommandResult
 from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
-from orchestration.command.registry import RUN
+from orchestration.command.registry import RUN, CommandResult, build_option
 from orchestration.foundation.basics.terminal import inform
 
 if TYPE_CHECKING:

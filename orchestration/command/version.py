@@ -4,7 +4,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from orchestration.command.command_result import CommandResult
+    from orchestration.command.registry import CommandResult
 
 BESIDE = ("numpy", "fmpy", "pythonfmu", "pyarrow", "matplotlib", "scipy", "pandas", "dask")
 """Packages that affect numbers, files and figures"""
@@ -17,7 +17,7 @@ def own_version() -> str:
 
 def versions(*, everything: bool) -> "CommandResult":
     """This package's version, or `everything` that an error report should state."""
-    from orchestration.command.command_result import CommandResult  # not before: `own_version` does without
+    from orchestration.command.registry import CommandResult  # not before: `own_version` does without
 
     found = {"quadcosim": _version("quadcosim")}
     lines = [own_version()]

@@ -7,7 +7,6 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.processes.limits import Limits
 from orchestration.foundation.recording.recording import InMemory, Recorder
 from orchestration.simulation.engines.engine import Engine
-from orchestration.simulation.runs import apart
 from orchestration.simulation.runs.outcome import Course, Progress
 from orchestration.simulation.runs.prepared import PreparedRun, prepared
 from orchestration.simulation.runs.resolved import Announce, resolve
@@ -77,9 +76,8 @@ def run(
             ) for each in request
         ]  # fmt: skip
     result = simulate(
-        default_request() if request is None else request_of(request), run_to_end, recorder=recorder,
-        progress=progress, announce=announce, engine=engine, in_process=in_process, time_limit=time_limit,
-        memory_limit=memory_limit,
+        default_request() if request is None else request_of(request), recorder=recorder, progress=progress,
+        announce=announce, engine=engine, in_process=in_process, time_limit=time_limit, memory_limit=memory_limit,
     )  # fmt: skip
     assert result is not None
     return result
@@ -87,7 +85,7 @@ def run(
 
 def simulate(
     request: Request,
-    course: Course,
+    course: Course = run_to_end,
     *,
     recorder: Recorder | None = None,
     progress: Progress | None = None,
@@ -104,6 +102,8 @@ def simulate(
     recorder = InMemory() if recorder is None else recorder
     resolved = resolve(request, announce)
     if not in_process and (resolved.foreign or time_limit is not None):
+        from orchestration.simulation.runs import apart  # not before: loads what starts processes
+
         return apart.simulate(
             resolved, course, recorder, progress=progress, engine=engine, time_limit=time_limit,
             memory_limit=memory_limit, started=started,

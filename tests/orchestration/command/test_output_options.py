@@ -15,7 +15,7 @@ import pytest
 import typer.main
 
 from orchestration.command.cli import app
-from orchestration.command.command_result import CommandResult
+from orchestration.command.registry import CommandResult
 from orchestration.foundation.basics.terminal import configure
 from tests.commands import Main
 from tests.places import ROOT
