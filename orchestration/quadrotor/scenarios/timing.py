@@ -5,6 +5,7 @@ from typing import ClassVar
 
 from orchestration.foundation.basics.errors import shown
 from orchestration.foundation.basics.records import record
+from orchestration.foundation.basics.times import is_at_least
 from orchestration.systems.system.choices import Clock, Hold, Order, Spread
 from orchestration.systems.system.distribution import (
     Varying,
@@ -22,7 +23,6 @@ from orchestration.systems.system.requirements import (
     require_own_clock,
     require_positive,
 )
-from orchestration.systems.system.times import is_at_least
 
 _PLACE = "timing."
 

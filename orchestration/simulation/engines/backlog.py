@@ -5,10 +5,10 @@ from typing import Protocol
 import numpy as np
 
 from orchestration.foundation.basics.simulator import Floats, Integers
+from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.foundation.recording.recording import BYTES, EVENTS, ROWS, Chunk, Recorder
 from orchestration.simulation.engines.running_system import RunningSystem
 from orchestration.systems.schedule.run_events import RunEvents
-from orchestration.systems.system.times import NANOSECONDS
 
 
 class Tables(Protocol):

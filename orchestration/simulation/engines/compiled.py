@@ -17,6 +17,7 @@ from orchestration.components.fmi.native import NativeInstance
 from orchestration.components.fmi.surroundings import ROUNDING
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.basics.simulator import Floats, Integers, Simulator
+from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.foundation.recording.recording import Recorder
 from orchestration.simulation.engines.backlog import Backlog
 from orchestration.simulation.engines.board import Board
@@ -29,7 +30,6 @@ from orchestration.simulation.engines.shared_tables import SharedTables
 from orchestration.simulation.engines.sources import SourceValues
 from orchestration.simulation.engines.structures import address, structures
 from orchestration.systems.schedule.schedule import Schedule
-from orchestration.systems.system.times import NANOSECONDS
 
 c = structures(1)
 """The structures of one run"""

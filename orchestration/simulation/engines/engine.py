@@ -7,11 +7,11 @@ from typing import Any, Literal, cast, get_args
 
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError, expected_name
 from orchestration.foundation.basics.simulator import Simulator
+from orchestration.foundation.basics.times import nanoseconds
 from orchestration.simulation.engines.compiled import CompiledLoop, Condition, reason_unavailable
 from orchestration.simulation.engines.master import Master
 from orchestration.simulation.engines.room import Room
 from orchestration.systems.system.model import System
-from orchestration.systems.system.times import nanoseconds
 
 _NOTES = logging.getLogger("quadcosim")
 

@@ -10,11 +10,11 @@ from collections.abc import Callable, Sequence
 from typing import ClassVar
 
 from orchestration.foundation.basics.errors import SimulatorError
+from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.foundation.recording.recording import ARRIVED, LOST, SAMPLED, SENT, Recorder
 from orchestration.simulation.engines.backlog import Backlog, ListTables, events_of_a_chunk, rows_of_a_chunk
 from orchestration.simulation.engines.running_system import RunningSystem, SampledComponent, Terminated
 from orchestration.systems.schedule.schedule import Message, SampleInstant
-from orchestration.systems.system.times import NANOSECONDS
 
 
 class PythonLoop:

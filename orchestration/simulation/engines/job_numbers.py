@@ -5,6 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError, expected_name
+from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.systems.computers.results import Frames, Jobs, Timeline
 from orchestration.systems.expressions.over_run import evaluate
 from orchestration.systems.expressions.recorded import Recorded
@@ -24,7 +25,6 @@ from orchestration.systems.expressions.syntax import (
 )
 from orchestration.systems.schedule.resources import timeline_of
 from orchestration.systems.system.model import System, expressions
-from orchestration.systems.system.times import NANOSECONDS
 
 _JOBS = "jobs"
 

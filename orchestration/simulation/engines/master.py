@@ -7,6 +7,7 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import SimulatorError, StoppedStepError
 from orchestration.foundation.basics.simulator import Booleans, Floats, Simulator
+from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.foundation.recording.recording import Chunk, Recorder
 from orchestration.simulation.engines import initial
 from orchestration.simulation.engines.backlog import Backlog
@@ -20,7 +21,6 @@ from orchestration.simulation.engines.wires import clock_of
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.model import System
-from orchestration.systems.system.times import NANOSECONDS
 
 ROWS_PENDING = "rows"
 """Key in `Master.saved` beside the names of the components"""

@@ -11,10 +11,10 @@ import numpy as np
 from fmu_kit.scalar import ScalarOps
 from fmu_kit.trajectory import Trajectory
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.times import NANOSECONDS, Grid, exact_nanoseconds
 from orchestration.systems.signals.dryden import DRAWS, Dryden
 from orchestration.systems.signals.motions import Motion
 from orchestration.systems.signals.spline import Spline
-from orchestration.systems.system.times import NANOSECONDS, Grid, exact_nanoseconds
 
 
 class SourceValues(Protocol):

@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.simulation.engines.board import Board
 from orchestration.systems.schedule.plan import Plan
 from orchestration.systems.system.model import System
-from orchestration.systems.system.times import NANOSECONDS
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,6 +10,7 @@ from orchestration.components.fmi.model import NUMERIC, Model
 from orchestration.components.fmi.values import number_of
 from orchestration.foundation.basics.errors import UsageError, at_place
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.times import Grid, exact_nanoseconds
 from orchestration.simulation.engines.job_numbers import job_numbers
 from orchestration.simulation.engines.sources import (
     BuiltIn,
@@ -37,7 +38,6 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.references import connect_references, describe_references
 from orchestration.systems.system.sampling import has_scheduled_instants
 from orchestration.systems.system.source import MOTION, Source
-from orchestration.systems.system.times import Grid, exact_nanoseconds
 from orchestration.systems.system.variable_names import variable_of
 
 

@@ -13,6 +13,7 @@ from orchestration.components.fmi.instance import Instance
 from orchestration.components.fmi.instances import open_instance
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.foundation.basics.simulator import Floats, Transfer
+from orchestration.foundation.basics.times import exact_nanoseconds
 from orchestration.foundation.processes import subprocesses
 from orchestration.foundation.processes.child import Child
 from orchestration.simulation.interop.assignment import AssignedLoop, assigned_loop
@@ -27,7 +28,6 @@ from orchestration.systems.system.component import Parameter
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.systems.system.request import Request, errors_in_own_terms
-from orchestration.systems.system.times import exact_nanoseconds
 
 _TEMPORARY = ("TMPDIR", "TEMP", "TMP")
 """variables with the folder in which a tool unpacks: not all clean up after themselves"""

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from orchestration.foundation.basics import scratch
 from orchestration.foundation.basics.interrupt import deferred_interrupts
+from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.foundation.processes import subprocesses
 from orchestration.foundation.processes.child import Child, Died
 from orchestration.foundation.processes.limits import UNLIMITED
@@ -20,7 +21,6 @@ from orchestration.simulation.runs.result import Result
 from orchestration.systems.schedule.run_events import RunEvents
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.system.request import Request
-from orchestration.systems.system.times import NANOSECONDS
 
 _MESSAGES = logging.getLogger("quadcosim")
 _PATIENCE = 5.0

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.times import nanoseconds
 from orchestration.foundation.processes.limits import Limits
 from orchestration.foundation.recording.recording import InMemory, Recorder
 from orchestration.foundation.recording.tables import InFolder, ToFolder
@@ -22,7 +23,6 @@ from orchestration.simulation.runs.run_directory import METRICS, SCENARIO, STATE
 from orchestration.simulation.runs.simulation import simulate
 from orchestration.systems.system.input_files import input_files
 from orchestration.systems.system.request import system_of
-from orchestration.systems.system.times import nanoseconds
 
 
 def run_until(

@@ -19,6 +19,7 @@ from orchestration.components.fmi.surroundings import FOLDER, sentence
 from orchestration.foundation.basics.errors import SimulatorError
 from orchestration.foundation.basics.interrupt import Interrupt, deferred_interrupts
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.foundation.recording.recording import InMemory, Recorder
 from orchestration.simulation.engines import initial
 from orchestration.simulation.engines.condition import program
@@ -38,7 +39,6 @@ from orchestration.systems.system.check import recorded_variables
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request, errors_in_own_terms
-from orchestration.systems.system.times import NANOSECONDS
 from orchestration.systems.system.variable_names import component_of, variable_of
 
 

@@ -16,6 +16,7 @@ from orchestration.components.fmi.instance import Instance
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.foundation.recording.recording import InMemory
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.runs.outcome import RunOutcome, result_of
@@ -24,7 +25,6 @@ from orchestration.simulation.runs.replacement import replace_component
 from orchestration.simulation.runs.result import Result
 from orchestration.simulation.runs.substitute import Abandoned, Substitute
 from orchestration.systems.schedule.streams import Streams
-from orchestration.systems.system.times import NANOSECONDS
 
 
 class Simulation:

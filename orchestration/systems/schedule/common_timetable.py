@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.times import Grid, exact_nanoseconds, nanoseconds
 from orchestration.systems.schedule.fixed_step import FixedStep, seconds
 from orchestration.systems.schedule.longest import expect_no_longer
 from orchestration.systems.schedule.plan import Plan
@@ -17,7 +18,6 @@ from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import messages_by_connection, placed_tasks, tasks_of
 from orchestration.systems.system.sampling import has_scheduled_instants
-from orchestration.systems.system.times import Grid, exact_nanoseconds, nanoseconds
 
 _KEPT = 8
 """Spans whose regular instants are cached"""

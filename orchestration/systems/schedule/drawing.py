@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from orchestration.foundation.basics.simulator import Floats, Integers
+from orchestration.foundation.basics.times import NANOSECONDS, nanoseconds
 from orchestration.systems.computers.parts import Constant
 from orchestration.systems.system.distribution import Distribution, Varying
-from orchestration.systems.system.times import NANOSECONDS, nanoseconds
 
 Stream = Callable[[], np.random.Generator]
 """Returns the generator; called only if something is drawn"""

@@ -7,7 +7,7 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Integers
-from orchestration.systems.system.times import NANOSECONDS, Grid
+from orchestration.foundation.basics.times import NANOSECONDS, Grid
 
 
 class Misalignment(NamedTuple):

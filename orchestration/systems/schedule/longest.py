@@ -1,13 +1,13 @@
 """The limit of times: beyond it, whole nanoseconds need more than 64 bits."""
 
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.systems.system.computers import require_less
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.frames import ERROR_BITS, frame_nanoseconds
 from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import messages_by_connection, placed_messages, placed_tasks
 from orchestration.systems.system.sampling import Sampling
-from orchestration.systems.system.times import NANOSECONDS
 
 LONGEST = 2**60
 """[ns], 36 years: the sum of a few of them still fits into 64 bits"""

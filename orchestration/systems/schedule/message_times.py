@@ -6,11 +6,11 @@ from collections.abc import Callable
 import numpy as np
 
 from orchestration.foundation.basics.simulator import Booleans
+from orchestration.foundation.basics.times import nanoseconds
 from orchestration.systems.computers.parts import Constant
 from orchestration.systems.schedule.drawing import Lateness, Stream, in_order, index_from, times
 from orchestration.systems.schedule.streams import cut_normal
 from orchestration.systems.system.distribution import Distribution, Varying
-from orchestration.systems.system.times import nanoseconds
 
 Losses = Callable[[int], Booleans]
 """Whether each of the next `count` messages is lost"""

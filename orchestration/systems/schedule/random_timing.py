@@ -7,6 +7,7 @@ from functools import lru_cache, partial
 import numpy as np
 
 from orchestration.foundation.basics.simulator import Integers
+from orchestration.foundation.basics.times import Grid, exact_nanoseconds, nanoseconds
 from orchestration.systems.computers.parts import Constant
 from orchestration.systems.schedule.drawing import times
 from orchestration.systems.schedule.fixed_step import FixedStep, Misalignment, seconds
@@ -16,7 +17,6 @@ from orchestration.systems.schedule.plan import Plan
 from orchestration.systems.schedule.streams import DELAY, DELAY_JITTER, JITTER, LOSS, Streams
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.distribution import highest
-from orchestration.systems.system.times import Grid, exact_nanoseconds, nanoseconds
 
 
 class Link:

@@ -13,6 +13,7 @@ from typing import TypeAlias
 import numpy as np
 
 from orchestration.foundation.basics.simulator import Integers
+from orchestration.foundation.basics.times import Grid, exact_nanoseconds, nanoseconds
 from orchestration.systems.computers.compiled import scheduler
 from orchestration.systems.computers.parts import (
     ABORT,
@@ -63,7 +64,6 @@ from orchestration.systems.system.placement import (
     released_by,
 )
 from orchestration.systems.system.sampling import SamplingOnArrival, TaskSampling
-from orchestration.systems.system.times import Grid, exact_nanoseconds, nanoseconds
 
 _POLICIES = {
     "fixed-priority": FIXED_PRIORITY,

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestration.foundation.basics.simulator import Integers
+from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.systems.computers.results import ABORTED, NEVER, SKIPPED, Frames, Jobs, Timeline
 from orchestration.systems.computers.system_bounds import bounds_of
 from orchestration.systems.system.computers import Message, Task
 from orchestration.systems.system.distribution import mean
 from orchestration.systems.system.frames import frame_nanoseconds
 from orchestration.systems.system.model import System
-from orchestration.systems.system.times import NANOSECONDS
 
 NO_DEADLINE = 2**60
 """[ns]; a deadline this late or later counts as none"""

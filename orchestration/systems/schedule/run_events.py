@@ -3,13 +3,13 @@
 import numpy as np
 
 from orchestration.foundation.basics.simulator import Integers
+from orchestration.foundation.basics.times import nanoseconds
 from orchestration.foundation.recording.recording import Events
 from orchestration.systems.computers.compiled import scheduler
 from orchestration.systems.computers.scheduler_events import NEEDED
 from orchestration.systems.schedule.resources import Resources
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.system.model import System
-from orchestration.systems.system.times import nanoseconds
 
 _AT_ONCE = 1_000_000_000
 """[ns], the time advanced at once over unneeded events"""

@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import field
 
 from orchestration.foundation.basics.records import Scalar, record
+from orchestration.foundation.basics.times import is_at_least
 from orchestration.systems.system.choices import Align
 from orchestration.systems.system.requirements import require, require_positive
 from orchestration.systems.system.sampling import Sampling
-from orchestration.systems.system.times import is_at_least
 
 Parameter = Scalar
 

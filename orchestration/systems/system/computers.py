@@ -5,6 +5,7 @@ from dataclasses import field
 from typing import Any
 
 from orchestration.foundation.basics.records import record
+from orchestration.foundation.basics.times import is_at_least, nanoseconds
 from orchestration.systems.system.choices import NetworkKind, Overrun, Read, Scheduling, Stuffing, Write
 from orchestration.systems.system.distribution import Varying, highest, is_random, reads_file, require_varying, spreads
 from orchestration.systems.system.requirements import (
@@ -13,7 +14,6 @@ from orchestration.systems.system.requirements import (
     require_not_negative,
     require_positive,
 )
-from orchestration.systems.system.times import is_at_least, nanoseconds
 
 
 @record()

@@ -2,8 +2,8 @@
 
 from fractions import Fraction
 
+from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.systems.system.computers import Message, Network
-from orchestration.systems.system.times import NANOSECONDS
 
 ERROR_BITS = 31
 """The bits after a corrupted frame: the error frame, and the pause of CAN after it"""

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 from orchestration.foundation.basics.errors import UsageError, listed
 from orchestration.foundation.basics.records import record
+from orchestration.foundation.basics.times import is_at_least
 from orchestration.systems.expressions.syntax import is_number, parse
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.computers import Computer, Network
@@ -16,7 +17,6 @@ from orchestration.systems.system.file_tables import tables_of
 from orchestration.systems.system.placement import expect_placement, placed_messages, placed_tasks, with_tasks
 from orchestration.systems.system.requirements import require, require_positive
 from orchestration.systems.system.source import Source
-from orchestration.systems.system.times import is_at_least
 from orchestration.systems.system.variable_names import component_of
 
 

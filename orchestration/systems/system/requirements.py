@@ -4,7 +4,7 @@ import math
 from typing import Any, TypeGuard
 
 from orchestration.foundation.basics.errors import UsageError, shown
-from orchestration.systems.system.times import exact_nanoseconds
+from orchestration.foundation.basics.times import exact_nanoseconds
 
 
 def is_number(value: object) -> TypeGuard[float]:

@@ -1,6 +1,7 @@
 """When a digital task runs: at every period of its own clock, as a task of a computer, or when a message arrives."""
 
 from orchestration.foundation.basics.records import record
+from orchestration.foundation.basics.times import is_at_least
 from orchestration.systems.system.choices import Clock, Spread
 from orchestration.systems.system.distribution import (
     Varying,
@@ -11,7 +12,6 @@ from orchestration.systems.system.distribution import (
     spreads,
 )
 from orchestration.systems.system.requirements import require, require_not_negative, require_own_clock, require_positive
-from orchestration.systems.system.times import is_at_least
 
 
 @record()

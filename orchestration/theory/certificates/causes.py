@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 
 from orchestration.foundation.basics.bisection import bisected
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds, floor_to_nanoseconds
 from orchestration.systems.computers.windows import Window, windows_of
 from orchestration.systems.system.distribution import Distribution, lowest
 from orchestration.systems.system.distribution import Varying as Delay
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.systems.system.placement import placed_messages, placed_tasks
-from orchestration.systems.system.times import NANOSECONDS, exact_nanoseconds, floor_to_nanoseconds
 from orchestration.theory.certificates.breaking import FINE
 from orchestration.theory.certificates.events import JITTER, LATENCY, SHIFT, Varying
 from orchestration.theory.certificates.family import LoopFamily

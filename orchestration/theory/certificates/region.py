@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import needs
 from orchestration.foundation.basics.progress import ShareProgress, share_reporter
+from orchestration.foundation.basics.times import floor_to_nanoseconds
 from orchestration.simulation.figures.palette import BLUE, RED
 from orchestration.simulation.figures.style import SCREEN, Style, save
 from orchestration.simulation.requests.request import RequestLike, request_of
-from orchestration.systems.system.times import floor_to_nanoseconds
 from orchestration.theory.certificates.breaking import BreakingSequence, least_breaking, unstable_sequence
 from orchestration.theory.certificates.events import LOSS
 from orchestration.theory.certificates.family import LoopFamily

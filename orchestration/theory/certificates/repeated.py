@@ -15,12 +15,12 @@ from typing import Any
 from orchestration.components.fmi.model import Model
 from orchestration.foundation.basics.bisection import bisected
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.systems.system.computers import Task
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.systems.system.placement import PlacedTask, placed_tasks
-from orchestration.systems.system.times import NANOSECONDS
 from orchestration.theory.certificates.breaking import FINE, SCAN
 from orchestration.theory.certificates.causes import EXECUTION, Cause
 from orchestration.theory.exact.loops import Loops

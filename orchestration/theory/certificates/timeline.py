@@ -13,9 +13,9 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.distribution import lowest
-from orchestration.systems.system.times import NANOSECONDS, exact_nanoseconds
 from orchestration.theory.certificates.events import (
     DELAY,
     JITTER,

@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from orchestration.foundation.basics.errors import SimulatorError, UsageError
-from orchestration.systems.system.times import NANOSECONDS
+from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.theory.exact.linear import Continuous, SampledSystem
 from orchestration.theory.stability.linearised_component import Tangent
 from orchestration.theory.stability.loop_at_rest import AtRest

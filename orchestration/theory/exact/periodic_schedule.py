@@ -9,13 +9,13 @@ from fractions import Fraction
 import numpy as np
 
 from orchestration.foundation.basics.simulator import Integers
+from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.systems.computers.compiled import scheduler
 from orchestration.systems.computers.parts import ARRIVES, LATER, NONE, QUEUED, RELEASED, SAMPLED, SENT
 from orchestration.systems.schedule.resources import Resources
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import placed_messages, placed_tasks
-from orchestration.systems.system.times import NANOSECONDS
 from orchestration.theory.exact.links import ATTOSECONDS
 
 _FROM_NANOSECONDS = ATTOSECONDS // NANOSECONDS

@@ -17,6 +17,7 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Integers
+from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds, nanoseconds
 from orchestration.systems.computers.parts import (
     ABORTED,
     ARRIVES,
@@ -38,7 +39,6 @@ from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import messages_by_connection, placed_messages, placed_tasks, released_by
 from orchestration.systems.system.sampling import has_scheduled_instants
-from orchestration.systems.system.times import NANOSECONDS, exact_nanoseconds, nanoseconds
 from orchestration.theory.exact.links import hyperperiod
 from orchestration.theory.exact.periodic_schedule import NO_SCHEDULE, PeriodicSchedule, ScheduleTrace
 from orchestration.theory.exact.scheduled import expect_certain, is_scheduled

@@ -6,11 +6,11 @@ from dataclasses import replace
 from fractions import Fraction
 
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
 from orchestration.systems.schedule.plan import Plan
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.distribution import Distribution, Varying
 from orchestration.systems.system.model import System
-from orchestration.systems.system.times import NANOSECONDS, exact_nanoseconds
 from orchestration.theory.exact.links import ATTOSECONDS, RandomLink, SampledTask
 from orchestration.theory.exact.periodic_schedule import NO_SCHEDULE, PeriodicSchedule
 from orchestration.theory.exact.random_times import CERTAIN, RandomTime, normal, table, uniform

@@ -6,10 +6,10 @@ import numpy as np
 
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.runs.replacement import component_named
 from orchestration.systems.system.request import errors_in_own_terms
-from orchestration.systems.system.times import NANOSECONDS
 from orchestration.theory.stability.known_loops import rested
 from orchestration.theory.stability.linear_simulator import OpenPort
 from orchestration.theory.stability.loop_at_rest import AtRest, at_rest

@@ -14,7 +14,7 @@ import numpy as np
 from orchestration.components.fmi.instance import Instance
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.systems.system.times import NANOSECONDS
+from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.theory.stability.linear_simulator import LinearSimulator
 
 PULSE = 1e-6

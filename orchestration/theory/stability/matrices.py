@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.systems.system.times import NANOSECONDS, nanoseconds
+from orchestration.foundation.basics.times import NANOSECONDS, nanoseconds
 from orchestration.theory.stability.linearised_component import Tangent
 
 NEAR, FAR = 0.1, 0.5

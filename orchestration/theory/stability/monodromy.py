@@ -5,8 +5,8 @@ import math
 import numpy as np
 
 from orchestration.components.fmi.reuse import Instances
+from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.systems.system.model import System
-from orchestration.systems.system.times import NANOSECONDS
 from orchestration.theory.stability.linearised_component import PULSE
 from orchestration.theory.stability.loop_at_rest import at_rest
 from orchestration.theory.stability.period_map import period_map

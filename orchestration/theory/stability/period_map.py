@@ -14,6 +14,7 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
 from orchestration.foundation.recording.recording import Chunk, InMemory
 from orchestration.simulation.engines.master import Master
 from orchestration.simulation.engines.wiring import fixed_steps
@@ -21,7 +22,6 @@ from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.criterion import Criterion
-from orchestration.systems.system.times import NANOSECONDS, exact_nanoseconds
 from orchestration.theory.stability.linear_simulator import LinearSimulator, OpenPort
 from orchestration.theory.stability.loop_at_rest import AtRest
 

@@ -21,10 +21,10 @@ from orchestration.components.fmi.instance import Instance, Loader
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats, Transfer
+from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System
-from orchestration.systems.system.times import NANOSECONDS, exact_nanoseconds
 from orchestration.theory.stability.linearised_component import PULSE
 from orchestration.theory.stability.operating_point import (
     deterministic,

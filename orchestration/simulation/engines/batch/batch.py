@@ -13,6 +13,7 @@ from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.components.fmi.values import convert_value, number_of
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.basics.simulator import Booleans, Floats, Integers
+from orchestration.foundation.basics.times import NANOSECONDS, nanoseconds
 from orchestration.simulation.engines import initial
 from orchestration.simulation.engines.batch.memory import Memory
 from orchestration.simulation.engines.batch.shape import Ends, Shape, changes_of, ends_of
@@ -27,7 +28,6 @@ from orchestration.systems.schedule.schedule_cache import RunSchedule, ScheduleC
 from orchestration.systems.schedule.spans import Instants, Span
 from orchestration.systems.schedule.streams import NOISE, Streams
 from orchestration.systems.system.model import System
-from orchestration.systems.system.times import NANOSECONDS, nanoseconds
 from orchestration.systems.system.variable_names import component_of, variable_of
 
 MOST_ROWS = 2**20

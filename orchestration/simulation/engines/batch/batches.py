@@ -9,6 +9,7 @@ import numpy as np
 
 from orchestration.components.fmi.model import read_model
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.times import NANOSECONDS, nanoseconds
 from orchestration.simulation.engines.batch.batch import NO_COLUMNS, Batch, BatchResult, Group, ParameterColumns
 from orchestration.simulation.engines.batch.combining import combined
 from orchestration.simulation.engines.batch.kernels import preferred_lanes
@@ -21,7 +22,6 @@ from orchestration.systems.schedule.schedule_cache import ScheduleCache, schedul
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.system.model import System
 from orchestration.systems.system.references import connect_references
-from orchestration.systems.system.times import NANOSECONDS, nanoseconds
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,8 +5,8 @@ from libcosimpy.CosimExecution import CosimExecution
 from libcosimpy.CosimObserver import CosimObserver
 from libcosimpy.CosimSlave import CosimLocalSlave
 
+from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.simulation.interop.job import Job, Rows
-from orchestration.systems.system.times import NANOSECONDS
 
 SPARE = 2
 """steps beyond the expected ones for which the observer has room"""

@@ -23,6 +23,7 @@ from orchestration.experiments.limits.limit_result import ContinuousRun
 from orchestration.foundation.basics.bisection import Range, first_failure
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.statistics import wilson
+from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.quadrotor.flight import local_limit as local
 from orchestration.quadrotor.flight.hover import COORDINATES, hover_of
 from orchestration.quadrotor.flight.hover_loop import HoverLoop
@@ -33,7 +34,6 @@ from orchestration.simulation.requests.ranges import Varied
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.systems.system.distribution import lowest
 from orchestration.systems.system.model import System
-from orchestration.systems.system.times import NANOSECONDS
 from orchestration.theory.exact.mean_square import MeanSquareLimit
 from orchestration.theory.stability.known_loops import LocalLimit
 from orchestration.theory.stability.local_limit import local_limits

@@ -10,13 +10,13 @@ from orchestration.experiments.studies.study_file import DesignTable
 from orchestration.foundation.basics.attribute_docs import attribute_docs
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.records import replaced
+from orchestration.foundation.basics.times import exact_nanoseconds, is_at_least
 from orchestration.foundation.basics.typed_tables import docs_of_keys, fields_of, parsed
 from orchestration.quadrotor.scenarios.timing import TIMING_KEYS
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.file import ConnectionTable, SamplingTable, schema
 from orchestration.systems.system.model import System
 from orchestration.systems.system.sampling import Sampling
-from orchestration.systems.system.times import exact_nanoseconds, is_at_least
 from tests.commands import Main
 
 

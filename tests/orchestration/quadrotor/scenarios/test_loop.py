@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestration.foundation.basics.errors import SimulatorError
+from orchestration.foundation.basics.times import nanoseconds
 from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.quadrotor.scenarios.wiring import MEASUREMENT
 from orchestration.simulation.engines.sources import ConstantValues
 from orchestration.systems.system.choices import Hold
-from orchestration.systems.system.times import nanoseconds
 from tests.orchestration.quadrotor.scenarios.strategies import timings
 from tests.orchestration.quadrotor.scenarios.stubs import Call, Counting, Feedback, Plant, Still, Straying, StubRun
 

@@ -16,13 +16,13 @@ from hypothesis import strategies as st
 from orchestration.command import cli
 from orchestration.command.flags import FlightFlags
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.times import Grid, nanoseconds
 from orchestration.quadrotor.scenarios.timing import TIMING_KEYS, Timing
 from orchestration.quadrotor.scenarios.translation import quadrotor
 from orchestration.systems.schedule import cursor
 from orchestration.systems.schedule.cursor import INSTANTS, Cursor
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.system.distribution import highest
-from orchestration.systems.system.times import Grid, nanoseconds
 from quadcosim import Scenario
 from tests.orchestration.quadrotor.scenarios import stubs
 from tests.orchestration.quadrotor.scenarios.strategies import Case, cases

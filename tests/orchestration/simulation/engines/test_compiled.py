@@ -26,6 +26,7 @@ from orchestration.components.fmi.model import read_model
 from orchestration.components.fmi.native import NativeInstance
 from orchestration.components.fmi.transfers import range_of
 from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError
+from orchestration.foundation.basics.times import Grid, exact_nanoseconds
 from orchestration.foundation.recording.recording import InMemory
 from orchestration.simulation.engines import loop
 from orchestration.simulation.engines.shared_tables import SharedTables
@@ -42,7 +43,6 @@ from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System
 from orchestration.systems.system.sampling import Sampling
 from orchestration.systems.system.source import Source
-from orchestration.systems.system.times import Grid, exact_nanoseconds
 from tests.native import assert_the_same
 from tests.orchestration.components.fmi.small import needs_compiler, small
 from tests.orchestration.quadrotor.scenarios.signals_table import flights, scenario_of

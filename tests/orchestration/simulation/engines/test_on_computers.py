@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.times import nanoseconds
 from orchestration.foundation.recording.recording import KINDS
 from orchestration.simulation.engines.batch.batches import Batches
 from orchestration.simulation.runs.pause import resume, run_until
@@ -25,7 +26,6 @@ from orchestration.systems.system.distribution import Distribution
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.systems.system.sampling import Sampling
-from orchestration.systems.system.times import nanoseconds
 from tests.native import assert_the_same
 from tests.orchestration.components.fmi.small import needs_compiler
 from tests.orchestration.simulation.engines.batch.lanes import assert_the_same_signals, in_lanes, shape_of

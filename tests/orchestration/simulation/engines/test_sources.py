@@ -4,8 +4,8 @@ from fractions import Fraction
 
 import numpy as np
 
+from orchestration.foundation.basics.times import Grid, exact_nanoseconds
 from orchestration.simulation.engines.sources import WhiteNoise
-from orchestration.systems.system.times import Grid, exact_nanoseconds
 
 
 def test_white_noise_changes_where_the_instants_of_its_period_are():

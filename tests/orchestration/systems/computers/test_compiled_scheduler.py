@@ -5,6 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestration.foundation.basics.errors import QuadcosimError
+from orchestration.foundation.basics.times import nanoseconds
 from orchestration.systems.computers import compiled
 from orchestration.systems.computers.compiled import CompiledScheduler, scheduler
 from orchestration.systems.computers.parts import LATER
@@ -12,7 +13,6 @@ from orchestration.systems.computers.scheduler import Scheduler
 from orchestration.systems.schedule.resources import Resources
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.system.model import System
-from orchestration.systems.system.times import nanoseconds
 from tests.orchestration.components.fmi.small import needs_compiler
 from tests.orchestration.simulation.engines.systems_on_computers import systems_on_computers
 from tests.orchestration.systems.computers.described import Described

@@ -14,6 +14,7 @@ from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.times import Grid, exact_nanoseconds
 from orchestration.foundation.recording.recording import InMemory
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.quadrotor.scenarios.timing import Timing
@@ -25,7 +26,6 @@ from orchestration.systems.schedule.fixed_step import FixedStep
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.model import System
-from orchestration.systems.system.times import Grid, exact_nanoseconds
 from orchestration.systems.system.variable_names import variable_of
 from tests.orchestration.quadrotor.scenarios.strategies import Case, cases
 from tests.orchestration.simulation.engines.random_systems import systems, systems_of_fixed_steps

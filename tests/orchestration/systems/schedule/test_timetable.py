@@ -5,6 +5,7 @@ from fractions import Fraction
 import pytest
 
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.times import Grid, exact_nanoseconds
 from orchestration.systems.schedule import cursor
 from orchestration.systems.schedule.cursor import Cursor
 from orchestration.systems.schedule.fixed_step import FixedStep
@@ -13,7 +14,6 @@ from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.paths import changed
 from orchestration.systems.system.source import Source
-from orchestration.systems.system.times import Grid, exact_nanoseconds
 from tests.orchestration.simulation.engines.stubs import continuous, sampled, system, wire
 
 MS = 1_000_000

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.systems.schedule.drawing import times_from
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.description import describe_faults, describe_varying
@@ -16,7 +17,6 @@ from orchestration.systems.system.distribution import Distribution, content, hig
 from orchestration.systems.system.file import load_system
 from orchestration.systems.system.input_files import input_files
 from orchestration.systems.system.sampling import Sampling
-from orchestration.systems.system.times import NANOSECONDS
 
 SYSTEM = """
 stop_time = 1.0

@@ -5,13 +5,23 @@ import itertools
 import math
 from collections.abc import Iterator
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, overload
 
 if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
 NANOSECONDS = 1_000_000_000
+"""Nanoseconds in a second"""
+
+
+@overload
+def seconds(nanoseconds: float) -> float: ...
+@overload
+def seconds(nanoseconds: "npt.NDArray[np.int64] | npt.NDArray[np.float64]") -> "npt.NDArray[np.float64]": ...
+def seconds(nanoseconds: "float | npt.NDArray[np.int64] | npt.NDArray[np.float64]") -> "float | npt.NDArray[np.float64]":
+    """Times [s] of times [ns], each correctly rounded."""
+    return nanoseconds / NANOSECONDS
 
 
 @functools.lru_cache(maxsize=4096)  # most times are common to the runs of a study
@@ -23,6 +33,13 @@ def exact_nanoseconds(seconds: float) -> Fraction:
 def nanoseconds(seconds: float) -> int:
     """`seconds` rounded to the nanosecond, half to even."""
     return round(exact_nanoseconds(seconds))
+
+
+def instants_of(times: "npt.NDArray[np.float64]") -> "npt.NDArray[np.int64]":
+    """The instants [ns] of recorded times [s], each of which is the quotient of one and 10⁹."""
+    import numpy as np  # not needed to read a system
+
+    return np.round(times * NANOSECONDS).astype(np.int64)
 
 
 def floor_to_nanoseconds(seconds: float) -> float:
