@@ -110,10 +110,10 @@ def _table(kind: str, each: "Mapping[str, Responses]") -> Iterator[str]:
 
 
 def _row(of: "Responses") -> Sequence[str]:
-    from orchestration.systems.system.description import seconds
+    from orchestration.systems.system.description import time_text
 
     def text_of(time: float | None) -> str:
-        return "-" if time is None else seconds(float(f"{time:.4g}"))
+        return "-" if time is None else time_text(float(f"{time:.4g}"))
 
     response, latency = of.response, of.latency
     times = (None,) * 4 if response is None else (response.min, response.mean, response.p99, response.max)

@@ -11,6 +11,7 @@ from orchestration.experiments.report.number_format import number
 from orchestration.experiments.report.tracks import Tracks
 from orchestration.foundation.basics.documents import tables_in
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.times import seconds
 from orchestration.simulation.results import display_names as labels
 from orchestration.simulation.results import quantities
 from orchestration.simulation.runs.result import Result
@@ -87,7 +88,9 @@ def _bars(system: System, blobs: Blobs) -> Bars | None:
         places = np.arange(len(rows), len(rows) + len(shared.owners))
         rows += shared.owners
         part = slice(MOST_PIECES)
-        pieces.append(np.column_stack([places[shared.owner[part]], shared.begin[part] / 1e9, shared.end[part] / 1e9]))
+        pieces.append(
+            np.column_stack([places[shared.owner[part]], seconds(shared.begin[part]), seconds(shared.end[part])])
+        )
     row, begin, end = np.vstack(pieces).T
     return Bars(rows=tuple(rows), row=blobs.exact(row), begin=blobs.exact(begin), end=blobs.exact(end))
 

@@ -19,7 +19,9 @@ NANOSECONDS = 1_000_000_000
 def seconds(nanoseconds: float) -> float: ...
 @overload
 def seconds(nanoseconds: "npt.NDArray[np.int64] | npt.NDArray[np.float64]") -> "npt.NDArray[np.float64]": ...
-def seconds(nanoseconds: "float | npt.NDArray[np.int64] | npt.NDArray[np.float64]") -> "float | npt.NDArray[np.float64]":
+def seconds(
+    nanoseconds: "float | npt.NDArray[np.int64] | npt.NDArray[np.float64]",
+) -> "float | npt.NDArray[np.float64]":
     """Times [s] of times [ns], each correctly rounded."""
     return nanoseconds / NANOSECONDS
 

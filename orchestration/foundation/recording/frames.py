@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from orchestration.foundation.basics.times import seconds
 from orchestration.foundation.recording.recording import KINDS, About, Events, Recording
 
 if TYPE_CHECKING:
@@ -39,4 +40,4 @@ def _events(events: Events) -> "pd.DataFrame":
 
     time, kind, what, sample = events.table.T
     words, names = np.array(KINDS, dtype=object), np.array([*events.names], dtype=object)
-    return pd.DataFrame({"time": time / 1e9, "event": words[kind], "what": names[what], "sample": sample})
+    return pd.DataFrame({"time": seconds(time), "event": words[kind], "what": names[what], "sample": sample})

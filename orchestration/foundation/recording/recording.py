@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orchestration.foundation.basics.simulator import Floats, Integers
+from orchestration.foundation.basics.times import instants_of
 
 ROWS, EVENTS = 2**15, 2**18
 """A chunk is complete with this many rows or events, so that what is computed by chunks does not depend on where they
@@ -172,7 +173,7 @@ def thinned(recording: Recording, columns: Collection[str], window: tuple[float,
         keep = (np.arange(len(t)) % stride == 0) | ((t >= window[0]) & (t <= window[1]))
         events = chunk.events
         if stride > 1:
-            kept = np.isin(events.table[:, 0], np.round(t[keep] * 1e9).astype(np.int64))
+            kept = np.isin(events.table[:, 0], instants_of(t[keep]))
             events = Events(events.names, events.table[kept])
         result.begin(chunk.columns)
         result.take(Chunk(columns=chunk.columns, rows=chunk.rows[keep], events=events))

@@ -11,6 +11,7 @@ import pyarrow.parquet as pq
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats, Integers
+from orchestration.foundation.basics.times import instants_of, seconds
 from orchestration.foundation.recording.recording import KINDS, About, Chunk, Events, Recording
 
 SIGNALS, EVENTS = "signals.parquet", "events.parquet"
@@ -164,7 +165,7 @@ def _matrix(table: Any, names: tuple[str, ...]) -> Floats:
 def _events_table(events: Events) -> Any:
     """`time` [s], `event`, `what` and `sample`, in order of time."""
     time, kind, what, sample = events.table.T
-    columns = (_numbers(time / 1e9), _texts(KINDS, kind), _texts(events.names, what), _numbers(sample))
+    columns = (_numbers(seconds(time)), _texts(KINDS, kind), _texts(events.names, what), _numbers(sample))
     return pa.Table.from_arrays(list(columns), schema=_EVENT)
 
 
@@ -188,7 +189,7 @@ def _events(path: Path, table: Any) -> Events:
     if not set(kinds) <= set(KINDS):
         raise UsageError(f"{path}: expected events that are one of {', '.join(KINDS)}")
     names, what = _places(table["what"])
-    time = np.round(_values(table["time"]) * 1e9).astype(np.int64)
+    time = instants_of(_values(table["time"]))
     kind = np.array([KINDS.index(word) for word in kinds], dtype=np.int64)[kind]
     return Events(names, np.column_stack([time, kind, what, _values(table["sample"])]))
 

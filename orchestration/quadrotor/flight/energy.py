@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
+from orchestration.foundation.basics.times import instants_of
 from orchestration.quadrotor.scenarios.wiring import ENERGY
 from orchestration.simulation.figures.lines import TIME, legend_of_runs, logarithmic, positive, quantity, set_time_axis
 from orchestration.simulation.figures.palette import BLUE
@@ -38,4 +39,4 @@ def energy(runs: Sequence[Run], style: Style) -> Figure | None:
 
 def _sampled(run: Run) -> npt.NDArray[np.bool_]:
     """Mask of the visible rows that are sampling instants."""
-    return np.isin(np.round(run.time * 1e9), np.round(run.instants("sampled") * 1e9))
+    return np.isin(instants_of(run.time), instants_of(run.instants("sampled")))

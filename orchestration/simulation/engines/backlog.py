@@ -5,7 +5,7 @@ from typing import Protocol
 import numpy as np
 
 from orchestration.foundation.basics.simulator import Floats, Integers
-from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.foundation.basics.times import seconds
 from orchestration.foundation.recording.recording import BYTES, EVENTS, ROWS, Chunk, Recorder
 from orchestration.simulation.engines.running_system import RunningSystem
 from orchestration.systems.schedule.run_events import RunEvents
@@ -112,7 +112,7 @@ class Backlog:
     def ensure_row(self) -> None:
         """Add a row with the current values for a run that ended before its first row."""
         if not self.has_row():
-            self._running.board.row[0] = self._running.now / NANOSECONDS
+            self._running.board.row[0] = seconds(self._running.now)
             self.tables.replace_rows(self._running.board.row.tobytes())
 
     def rows(self) -> Floats:

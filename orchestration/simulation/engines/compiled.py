@@ -17,7 +17,7 @@ from orchestration.components.fmi.native import NativeInstance
 from orchestration.components.fmi.surroundings import ROUNDING
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.basics.simulator import Floats, Integers, Simulator
-from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.foundation.basics.times import seconds
 from orchestration.foundation.recording.recording import Recorder
 from orchestration.simulation.engines.backlog import Backlog
 from orchestration.simulation.engines.board import Board
@@ -51,7 +51,7 @@ def reason_unavailable(simulators: Mapping[str, Simulator], stop: int) -> str | 
         if type(simulator) not in (Fmi2Instance, Fmi3Instance):
             return f"components.{name} does more than call its FMU"
     if stop >= _EXACT:
-        return f"stop_time is longer than {_EXACT / NANOSECONDS:.0f} s"
+        return f"stop_time is longer than {seconds(_EXACT):.0f} s"
     try:
         library()
     except QuadcosimError as error:
@@ -171,7 +171,7 @@ class CompiledLoop:
                 raise self._structures.instances[index].failure(function, self._loop.failed_status)
             transfer()
         elif code == c.NOT_FINITE:
-            self._running.component(index).expect_finite(self._running.now / NANOSECONDS)
+            self._running.component(index).expect_finite(seconds(self._running.now))
         elif code == c.OVER:
             raise Terminated(self._running.termination)
         elif self._failure is not None:  # of a Python function that C has called
@@ -206,7 +206,7 @@ class CompiledLoop:
         for name, _ in c.Schedule._fields_:
             setattr(track.schedule, name, address(getattr(schedule, name)))
         self._tables.make_room(schedule)
-        self._share_sources(schedule.times[:-1] / NANOSECONDS)
+        self._share_sources(seconds(schedule.times[:-1]))
         for index, component in running.continuous.items():
             self._reached[index] = component.now
         loop.now, loop.steps[0] = running.now, running.steps

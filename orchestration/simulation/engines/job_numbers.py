@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError, expected_name
-from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.foundation.basics.times import seconds
 from orchestration.systems.computers.results import Frames, Jobs, Timeline
 from orchestration.systems.expressions.over_run import evaluate
 from orchestration.systems.expressions.recorded import Recorded
@@ -74,14 +74,14 @@ def _recorded(timeline: Timeline, call: Call) -> Recorded:
     (of,) = quantities
     jobs = _jobs(timeline, of)
     if of.what == "response":
-        times, values = jobs.ended[jobs.done], jobs.responses / NANOSECONDS
+        times, values = jobs.ended[jobs.done], seconds(jobs.responses)
     else:
         times, values = jobs.deadline[jobs.due], jobs.missed[jobs.due].astype(np.float64)
     return Recorded(
-        time=times / NANOSECONDS,
+        time=seconds(times),
         signals={text(of): values},
         arrivals={_JOBS: np.ones(len(times), dtype=np.bool_)},
-        stop_time=timeline.stop / NANOSECONDS,
+        stop_time=seconds(timeline.stop),
     )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import SimulatorError, StoppedStepError
 from orchestration.foundation.basics.simulator import Booleans, Floats, Simulator
-from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.foundation.basics.times import nanoseconds, seconds
 from orchestration.foundation.recording.recording import Chunk, Recorder
 from orchestration.simulation.engines import initial
 from orchestration.simulation.engines.backlog import Backlog
@@ -139,7 +139,7 @@ class Master:
                 return False
         except (Diverged, Terminated, SimulatorError) as error:
             if isinstance(error, SimulatorError) and not isinstance(error, StoppedStepError):
-                error.timed(self.now / NANOSECONDS)
+                error.timed(seconds(self.now))
             self._ended(error)
         if self.interrupted_at is not None:
             self.backlog.drop_later_events()
@@ -187,7 +187,7 @@ class Master:
         elif isinstance(error, SimulatorError) and not error.divergence:
             if self.backlog.has_row():
                 self.failure = error
-                self._running.now = self._running.interrupted_at = round(self.board.row[0] * NANOSECONDS)
+                self._running.now = self._running.interrupted_at = nanoseconds(self.board.row[0])
                 self.backlog.drop_later_events()
                 self.backlog.hand_over_rest()
             raise error
@@ -199,7 +199,7 @@ class Master:
     # -- initialisation ------------------------------------------------------------------------------------------
 
     def _exchange_first(self) -> None:
-        running, stop = self._running, self._running.stop / NANOSECONDS
+        running, stop = self._running, seconds(self._running.stop)
         for name in running.wires.names:
             ratio, first = clock_of(running.system, name, self._first_samples)
             running.simulators[name].enter_initialization(0.0 if name in self._waiting else ratio * first, ratio * stop)

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orchestration.foundation.basics.simulator import Floats, Integers
+from orchestration.foundation.basics.times import nanoseconds
 from orchestration.simulation.engines.structures import structures
 
 c = structures(1)
@@ -60,7 +61,7 @@ def read_unrecorded(folder: Path, columns: Sequence[str]) -> Unrecorded | None:
         return None
     rows = np.frombuffer(content[ROWS], count=loop.row_count * len(columns)).reshape(-1, len(columns))
     events = np.frombuffer(content[EVENTS], np.int64, count=4 * loop.event_count).reshape(-1, 4)
-    until = round(float(rows[-1, 0]) * 1e9) if len(rows) else -1
+    until = nanoseconds(rows[-1, 0]) if len(rows) else -1
     return Unrecorded(
         rows=rows.copy(),
         events=events[events[:, 0] <= until],

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.foundation.basics.times import seconds
 from orchestration.simulation.engines.board import Board
 from orchestration.systems.schedule.plan import Plan
 from orchestration.systems.system.model import System
@@ -80,4 +80,4 @@ def clock_of(system: System, name: str, first_samples: Mapping[str, int]) -> tup
     sampling = system.components[name].sampling
     if sampling is None or sampling.clock == "fmu":
         return 1.0, 0.0
-    return sampling.clock_ratio, first_samples.get(name, 0) / NANOSECONDS
+    return sampling.clock_ratio, seconds(first_samples.get(name, 0))

@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from orchestration.foundation.basics.simulator import Booleans, Integers
+from orchestration.foundation.basics.times import NANOSECONDS, seconds
 from orchestration.simulation.figures.palette import BLACK, BLUE, BROWN, GREEN, GREY, ORANGE, PURPLE, RED, SKY
 from orchestration.simulation.figures.run import Run, Window
 from orchestration.simulation.figures.style import Style
@@ -84,7 +85,7 @@ def default_window(timeline: Timeline) -> Window:
     """From 0 to the time at which the busiest processor or link has had `PIECES` pieces, or to the end [s]."""
     shared = (*timeline.processors.values(), *timeline.links.values())
     ends = [int(each.begin[PIECES]) for each in shared if len(each.begin) > PIECES]
-    return 0.0, min([timeline.stop, *ends]) / 1e9
+    return 0.0, seconds(min([timeline.stop, *ends]))
 
 
 def _panels(timeline: Timeline) -> dict[str, list[_Row]]:
@@ -101,9 +102,9 @@ def _panels(timeline: Timeline) -> dict[str, list[_Row]]:
 
 
 def _draw_row(axes: Axes, row: _Row, place: int, shown: Window, size: float, style: Style) -> None:
-    scale = 1e-9 / size
+    scale = seconds(1) / size
     of, slices = row.of, row.slices
-    first, last = shown[0] * 1e9, shown[1] * 1e9
+    first, last = shown[0] * NANOSECONDS, shown[1] * NANOSECONDS
     waits = _released(of)
     ends = np.where(of.ended == NEVER, last, of.ended)
     here = (waits <= last) & (ends >= first) & ~_are_skipped(of)

@@ -8,6 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.times import seconds
 from orchestration.foundation.recording.recording import Events, Recording
 from orchestration.simulation.figures.palette import CYCLE, DASHES
 from orchestration.simulation.results.column_info import ColumnInfo
@@ -91,7 +92,7 @@ class Run:
 
     def instants(self, kind: str, what: str | None = None) -> Floats:
         """The times of the events of a kind, of one connection if `what` names it [s], shape (n,)."""
-        times: Floats = self.events.table[self.events.are(kind, what), 0] / 1e9
+        times: Floats = seconds(self.events.table[self.events.are(kind, what), 0])
         return times
 
     def __contains__(self, signal: str) -> bool:

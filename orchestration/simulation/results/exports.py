@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestration.foundation.basics.times import seconds
 from orchestration.foundation.recording import mat_file
 from orchestration.foundation.recording.frames import units_of
 from orchestration.foundation.recording.recording import About, Chunk, Recording
@@ -39,7 +40,7 @@ def to_mat(path: Path, recording: Recording, about: About, metrics: Metrics, uni
 def _events(chunks: list[Chunk]) -> dict[str, Any]:
     listed = [event for chunk in chunks for event in chunk.events]
     return {
-        "time": np.array([event.time / 1e9 for event in listed]),
+        "time": np.array([seconds(event.time) for event in listed]),
         "event": [event.kind for event in listed],
         "what": [event.what for event in listed],
         "sample": np.array([event.sample for event in listed], dtype=float),

@@ -7,7 +7,7 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Booleans, Floats
-from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.foundation.basics.times import instants_of
 from orchestration.foundation.recording.recording import Events, Recording
 from orchestration.systems.expressions.over_run import evaluate, expect_names
 from orchestration.systems.expressions.recorded import Recorded, Spans, vectors
@@ -129,7 +129,7 @@ def not_finite(spans: Spans) -> str | None:
 
 def _arrivals(system: System, time: Floats, events: Events) -> dict[str, Booleans]:
     """By connection, the rows at which a message of it arrived, or was measured and not lost."""
-    instants = np.round(time * NANOSECONDS).astype(np.int64)
+    instants = instants_of(time)
     rows = {}
     for x in system.connections:
         arrived = events.table[events.are("arrived", x.name)]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from orchestration.foundation.basics import scratch
 from orchestration.foundation.basics.interrupt import deferred_interrupts
-from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.foundation.basics.times import nanoseconds
 from orchestration.foundation.processes import subprocesses
 from orchestration.foundation.processes.child import Child, Died
 from orchestration.foundation.processes.limits import UNLIMITED
@@ -176,6 +176,6 @@ def _chunk(resolved: ResolvedRequest, receiver: _Receiver, unrecorded: Unrecorde
         rows[:, places] = values.over(rows[:, 0])
     run_events = RunEvents(system)
     if receiver.recorded_until >= 0.0:
-        run_events.discard_until(round(receiver.recorded_until * NANOSECONDS))
-    events = run_events.with_messages(unrecorded.events, round(float(rows[-1, 0]) * NANOSECONDS))
+        run_events.discard_until(nanoseconds(receiver.recorded_until))
+    events = run_events.with_messages(unrecorded.events, nanoseconds(rows[-1, 0]))
     return Chunk(columns=columns, rows=rows, events=events)

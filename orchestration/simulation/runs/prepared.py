@@ -19,7 +19,7 @@ from orchestration.components.fmi.surroundings import FOLDER, sentence
 from orchestration.foundation.basics.errors import SimulatorError
 from orchestration.foundation.basics.interrupt import Interrupt, deferred_interrupts
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.foundation.basics.times import seconds
 from orchestration.foundation.recording.recording import InMemory, Recorder
 from orchestration.simulation.engines import initial
 from orchestration.simulation.engines.condition import program
@@ -180,7 +180,7 @@ def prepared(
 
 
 def _seconds(time: int | None) -> float | None:
-    return None if time is None else time / NANOSECONDS
+    return None if time is None else seconds(time)
 
 
 def provenance(instances: Mapping[str, Instance]) -> Provenance:
@@ -223,7 +223,7 @@ def _set_clock(instance: Instance, component: Component, model: Model, first: in
         instance.set(SAMPLE_OFFSET, sampling.offset)
     elif model.waits:
         instance.set(SAMPLE_PERIOD, 0.0)
-        instance.set(SAMPLE_OFFSET, sampling.clock_ratio * (first / NANOSECONDS))
+        instance.set(SAMPLE_OFFSET, sampling.clock_ratio * seconds(first))
 
 
 def _feeds(system: System, sources: Mapping[str, SourceValues], instances: Mapping[str, Instance]) -> list[Feed]:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.times import instants_of
 from orchestration.foundation.recording import frames
 from orchestration.foundation.recording.recording import About, Event, Recording
 from orchestration.simulation.results import display_names as labels
@@ -191,4 +192,4 @@ class Result:
 def rows_of(time: Floats, events: tuple[Event, ...], kind: str, what: str | None = None) -> npt.NDArray[np.bool_]:
     """At which of the recorded times [s] there is an event of a kind, and of `what` if it is given; shape of `time`."""
     instants = [event.time for event in events if event.kind == kind and what in (None, event.what)]
-    return np.isin(np.round(time * 1e9).astype(np.int64), np.array(instants, dtype=np.int64))
+    return np.isin(instants_of(time), np.array(instants, dtype=np.int64))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.times import seconds
 from orchestration.simulation.requests.request import SSP, SSP_ENDINGS, RequestLike, request_from_tables, request_of
 from orchestration.systems.computers.results import Timeline
 from orchestration.systems.schedule.resources import timeline_of
@@ -57,7 +58,7 @@ def schedule(request: RequestLike, until: float | None = None) -> Scheduled:
     timeline = timeline_of(system)
     responses = responses_of(system, timeline)
     return Scheduled(
-        until=timeline.stop / 1e9,
+        until=seconds(timeline.stop),
         tasks=responses.tasks,
         messages=responses.messages,
         busy=responses.busy,

@@ -16,7 +16,7 @@ from orchestration.components.fmi.instance import Instance
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.foundation.basics.times import seconds
 from orchestration.foundation.recording.recording import InMemory
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.runs.outcome import RunOutcome, result_of
@@ -100,7 +100,7 @@ class Simulation:
     @property
     def time(self) -> float:
         """The time [s] of the last measurement."""
-        return self._under_way.master.now / NANOSECONDS
+        return seconds(self._under_way.master.now)
 
     @property
     def values(self) -> dict[str, float]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds, nanoseconds
+from orchestration.foundation.basics.times import exact_nanoseconds, nanoseconds, seconds
 from orchestration.systems.computers.system_bounds import Bounds, bounds_of
 from orchestration.systems.system.distribution import highest, lowest
 from orchestration.systems.system.frames import frame_nanoseconds
@@ -98,8 +98,8 @@ def _of_task(of: PlacedTask, bounds: Bounds) -> Window:
     if task.overrun == "abort" or task.write == "deadline":
         in_time = min(in_time, Fraction(due))
     if bound > in_time:
-        responds = f"{of.place}: may respond after {bound / NANOSECONDS:g} s"
-        raise UsageError(f"{responds}; expected {float(in_time) / NANOSECONDS:g} s at most")
+        responds = f"{of.place}: may respond after {seconds(bound):g} s"
+        raise UsageError(f"{responds}; expected {seconds(float(in_time)):g} s at most")
     least, most = (nanoseconds(end(task.execution)) for end in (lowest, highest))
     earliest, latest = switch, bound - most
     if task.read == "release":

@@ -9,7 +9,7 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import Grid, exact_nanoseconds, nanoseconds
-from orchestration.systems.schedule.fixed_step import FixedStep, seconds
+from orchestration.systems.schedule.fixed_step import FixedStep, in_seconds
 from orchestration.systems.schedule.longest import expect_no_longer
 from orchestration.systems.schedule.plan import Plan
 from orchestration.systems.schedule.resources import Resources
@@ -106,7 +106,7 @@ def _expect_moves(system: System, fixed: Mapping[str, FixedStep]) -> None:
         for name in (x.sender, x.receiver):
             if places and name in fixed and not fixed[name].moves:
                 raise UsageError(
-                    f"{places[0]}: components.{name} takes steps of {seconds(fixed[name].grid[1])} s only: expected "
+                    f"{places[0]}: components.{name} takes steps of {in_seconds(fixed[name].grid[1])} s only: expected "
                     'align = "next" there'
                 )
 

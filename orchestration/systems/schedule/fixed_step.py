@@ -7,7 +7,7 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Integers
-from orchestration.foundation.basics.times import NANOSECONDS, Grid
+from orchestration.foundation.basics.times import Grid, seconds
 
 
 class Misalignment(NamedTuple):
@@ -36,8 +36,8 @@ class FixedStep:
             misaligned.append(
                 Misalignment(
                     time,
-                    f"{what} at t = {seconds(time)} s falls between two points of components.{self.name}, "
-                    f"{self._steps}: expected {seconds(before)} s or {seconds(point)} s; "
+                    f"{what} at t = {in_seconds(time)} s falls between two points of components.{self.name}, "
+                    f"{self._steps}: expected {in_seconds(before)} s or {in_seconds(point)} s; "
                     'align = "next" moves it there',
                 )
             )
@@ -48,15 +48,15 @@ class FixedStep:
         point = self.grid.from_(stop)
         if point != stop:
             raise UsageError(
-                f"stop_time = {seconds(stop)}: falls between two points of components.{self.name}, {self._steps}: "
-                f"expected {seconds(point - self.grid[1])} or {seconds(point)}"
+                f"stop_time = {in_seconds(stop)}: falls between two points of components.{self.name}, {self._steps}: "
+                f"expected {in_seconds(point - self.grid[1])} or {in_seconds(point)}"
             )
 
     @property
     def _steps(self) -> str:
-        return f"which takes steps of {seconds(self.grid[1])} s only"
+        return f"which takes steps of {in_seconds(self.grid[1])} s only"
 
 
-def seconds(time: int) -> str:
+def in_seconds(time: int) -> str:
     """A time [ns] as text in seconds."""
-    return f"{time / NANOSECONDS:.9g}"
+    return f"{seconds(time):.9g}"

@@ -1,7 +1,7 @@
 """The limit of times: beyond it, whole nanoseconds need more than 64 bits."""
 
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.foundation.basics.times import seconds
 from orchestration.systems.system.computers import require_less
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.frames import ERROR_BITS, frame_nanoseconds
@@ -39,11 +39,11 @@ def expect_no_longer(system: System) -> None:
         if of.message.period is not None:
             require_less(f"{of.place}.jitter", of.message.jitter, of.message.period)
         times |= {f"{of.place}.{key}": getattr(of.message, key) or 0.0 for key in ("period", "offset", "deadline")}
-        times[f"a frame of {of.place}"] = frame_nanoseconds(of.network, of.message, ERROR_BITS) / NANOSECONDS
+        times[f"a frame of {of.place}"] = seconds(frame_nanoseconds(of.network, of.message, ERROR_BITS))
         times[f"networks.{of.network_name}.latency"] = of.network.latency
     for place, time in times.items():
-        if time >= LONGEST / NANOSECONDS:
-            raise UsageError(f"{place} = {time:g} s: expected less than {LONGEST / NANOSECONDS:.4g} s")
+        if time >= seconds(LONGEST):
+            raise UsageError(f"{place} = {time:g} s: expected less than {seconds(LONGEST):.4g} s")
     over = messages_by_connection(system)
     for x in system.connections:
         sampling = system.components[x.receiver].sampling

@@ -10,7 +10,7 @@ from orchestration.foundation.basics.simulator import Integers
 from orchestration.foundation.basics.times import Grid, exact_nanoseconds, nanoseconds
 from orchestration.systems.computers.parts import Constant
 from orchestration.systems.schedule.drawing import times
-from orchestration.systems.schedule.fixed_step import FixedStep, Misalignment, seconds
+from orchestration.systems.schedule.fixed_step import FixedStep, Misalignment, in_seconds
 from orchestration.systems.schedule.lookahead import NEVER, Lookahead
 from orchestration.systems.schedule.message_times import lateness, losses
 from orchestration.systems.schedule.plan import Plan
@@ -147,8 +147,8 @@ class TimedComponent:
             found.append(self._aligned(time))
             if found[-1] == before < self._stop:
                 text = (
-                    f"samples {k - 1} and {k} of {self._name} both move to t = {seconds(before)} s, the next point of "
-                    f"components.{self._fixed[-1].name}: expected a period that leaves one for each"
+                    f"samples {k - 1} and {k} of {self._name} both move to t = {in_seconds(before)} s, the next "
+                    f"point of components.{self._fixed[-1].name}: expected a period that leaves one for each"
                 )
                 self._misaligned.append(Misalignment(before, text))
             before = found[-1]

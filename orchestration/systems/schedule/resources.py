@@ -13,7 +13,7 @@ from typing import TypeAlias
 import numpy as np
 
 from orchestration.foundation.basics.simulator import Integers
-from orchestration.foundation.basics.times import Grid, exact_nanoseconds, nanoseconds
+from orchestration.foundation.basics.times import NANOSECONDS, Grid, exact_nanoseconds, nanoseconds
 from orchestration.systems.computers.compiled import scheduler
 from orchestration.systems.computers.parts import (
     ABORT,
@@ -344,7 +344,7 @@ def _poisson(start: int, rate: float, generator: np.random.Generator) -> Stream:
         nonlocal last
         found = []
         for u in generator.random(count).tolist():
-            gap = -math.log(1.0 - u) * 1e9 / rate
+            gap = -math.log(1.0 - u) * NANOSECONDS / rate
             last = min(last + max(1, math.floor(gap)), LATER)
             found.append(last)
         return np.array(found, dtype=np.int64)

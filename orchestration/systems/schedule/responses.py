@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestration.foundation.basics.simulator import Integers
-from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.foundation.basics.times import seconds
 from orchestration.systems.computers.results import ABORTED, NEVER, SKIPPED, Frames, Jobs, Timeline
 from orchestration.systems.computers.system_bounds import bounds_of
 from orchestration.systems.system.computers import Message, Task
@@ -39,7 +39,7 @@ class Spread:
         ordered = np.sort(times)
         last = ordered[-(-99 * len(ordered) // 100) - 1]
         least, mean, most = int(ordered[0]), float(ordered.mean()), int(ordered[-1])
-        return cls(min=_seconds(least), mean=mean / NANOSECONDS, p99=_seconds(int(last)), max=_seconds(most))
+        return cls(min=seconds(least), mean=seconds(mean), p99=seconds(int(last)), max=seconds(most))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,7 +95,7 @@ def responses_of(system: System, timeline: Timeline) -> SystemResponses:
         for message_name, message in network.messages.items():
             place = f"{name}.{message_name}"
             frames = timeline.frames[place]
-            demand = _seconds(frame_nanoseconds(network, message)) * _rate(message, 1.0, frames)
+            demand = seconds(frame_nanoseconds(network, message)) * _rate(message, 1.0, frames)
             messages[place] = _of_frames(frames, demand, bounds[place])
     shared = {**timeline.processors, **timeline.links}
     busy = {name: float((each.end - each.begin).sum()) / timeline.stop for name, each in shared.items()}
@@ -110,7 +110,7 @@ def _of_jobs(jobs: Jobs, utilisation: float, bound: int | None, read_at_release:
         jobs=len(jobs) - skipped,
         utilisation=utilisation,
         response=Spread.of(jobs.responses),
-        bound=None if bound is None else _seconds(bound),
+        bound=None if bound is None else seconds(bound),
         start_jitter=_range((jobs.started - jobs.nominal)[jobs.started != NEVER]),
         end_jitter=_range(jobs.responses),
         latency=Spread.of((jobs.written - read)[is_written]),
@@ -127,7 +127,7 @@ def _of_frames(frames: Frames, utilisation: float, bound: int | None) -> Respons
         jobs=len(frames),
         utilisation=utilisation,
         response=Spread.of(frames.responses),
-        bound=None if bound is None else _seconds(bound),
+        bound=None if bound is None else seconds(bound),
         start_jitter=_range((frames.started - frames.nominal)[frames.started != NEVER]),
         end_jitter=_range(frames.responses),
         latency=None,
@@ -143,13 +143,13 @@ def _rate(of: Task | Message, clock_ratio: float, timeline: Jobs | Frames) -> fl
     """The rate [1/s]: as declared, else as observed."""
     if of.period is not None:
         return clock_ratio / of.period
-    return of.arrivals.poisson if of.arrivals is not None else len(timeline) / _seconds(timeline.stop)
+    return of.arrivals.poisson if of.arrivals is not None else len(timeline) / seconds(timeline.stop)
 
 
 def _deadline(of: Jobs | Frames) -> float | None:
     """The deadline after the nominal release [s]."""
     after = (of.deadline - of.nominal)[:1]
-    return _seconds(int(after[0])) if len(after) and after[0] < NO_DEADLINE else None
+    return seconds(int(after[0])) if len(after) and after[0] < NO_DEADLINE else None
 
 
 def _missed(of: Jobs | Frames) -> float | None:
@@ -158,8 +158,4 @@ def _missed(of: Jobs | Frames) -> float | None:
 
 
 def _range(times: Integers) -> float | None:
-    return _seconds(int(times.max() - times.min())) if len(times) else None
-
-
-def _seconds(nanoseconds: int) -> float:
-    return nanoseconds / NANOSECONDS
+    return seconds(int(times.max() - times.min())) if len(times) else None

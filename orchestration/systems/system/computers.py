@@ -5,7 +5,7 @@ from dataclasses import field
 from typing import Any
 
 from orchestration.foundation.basics.records import record
-from orchestration.foundation.basics.times import is_at_least, nanoseconds
+from orchestration.foundation.basics.times import NANOSECONDS, is_at_least, nanoseconds, seconds
 from orchestration.systems.system.choices import NetworkKind, Overrun, Read, Scheduling, Stuffing, Write
 from orchestration.systems.system.distribution import Varying, highest, is_random, reads_file, require_varying, spreads
 from orchestration.systems.system.requirements import (
@@ -25,7 +25,7 @@ class Arrivals:
 
     def __post_init__(self) -> None:
         require_positive(self, "poisson")
-        require(self.poisson <= 1e9, "poisson", self.poisson, "at most one a nanosecond")
+        require(self.poisson <= NANOSECONDS, "poisson", self.poisson, "at most one a nanosecond")
 
     @property
     def gap(self) -> float:
@@ -241,7 +241,7 @@ class Network:
             require(length >= 1, f"{place}bytes", message.bytes, "a frame of a nanosecond or longer")
             if self.kind == "tdma" and message.slot is not None:
                 room = nanoseconds(self.slots[message.slot])
-                require(length <= room, f"{place}bytes", message.bytes, f"a frame that fits into {room / 1e9:g} s")
+                require(length <= room, f"{place}bytes", message.bytes, f"a frame that fits into {seconds(room):g} s")
 
 
 def _expect_releases(of: Any, ways: str) -> None:

@@ -55,7 +55,7 @@ def as_text(system: System, units: Mapping[str, str] = {}, follows: str = "") ->
 def describe_rate(component: Component) -> str:
     """How a component is stepped."""
     if component.sampling is None:
-        return f"continuous, step {seconds(component.step or 0.0)}" + (
+        return f"continuous, step {time_text(component.step or 0.0)}" + (
             ", moved to its own grid" if component.align == "next" else ""
         )
     if isinstance(component.sampling, TaskSampling):
@@ -68,7 +68,7 @@ def describe_rate(component: Component) -> str:
 def _task(of: PlacedTask) -> tuple[str, ...]:
     task, computer = of.task, of.computer
     how = [computer.scheduling.replace("-", " "), *([] if computer.preemptive else ["not preemptive"])]
-    how += [f"priority {task.priority}", f"{describe_varying(task.execution)} by {seconds(task.due)}"]
+    how += [f"priority {task.priority}", f"{describe_varying(task.execution)} by {time_text(task.due)}"]
     how += [f"reads at {task.read}"] if task.read != "start" else []
     how += [f"writes at {task.write}"] if task.write != "end" else []
     how += [f"overruns {task.overrun}"] if task.overrun != "queue" else []
@@ -89,16 +89,16 @@ def _message(of: PlacedMessage) -> tuple[str, ...]:
 def _released(of: Task | Message) -> str:
     if of.arrivals is not None:
         return f"{of.arrivals.poisson:g} a second at random"
-    parts = [f"every {seconds(of.period or 0.0)}"]
-    parts += [f"from {seconds(of.offset)}"] if of.offset else []
+    parts = [f"every {time_text(of.period or 0.0)}"]
+    parts += [f"from {time_text(of.offset)}"] if of.offset else []
     parts += [f"jitter {describe_varying(of.jitter)}"] if of.jitter else []
     return ", ".join(parts)
 
 
 def describe_sampling(sampling: Sampling) -> str:
     """When a digital task runs."""
-    parts = [f"every {seconds(sampling.period)}"]
-    parts += [f"from {seconds(sampling.offset)}"] if sampling.offset else []
+    parts = [f"every {time_text(sampling.period)}"]
+    parts += [f"from {time_text(sampling.offset)}"] if sampling.offset else []
     parts += [f"jitter {_largest(sampling.jitter, sampling.jitter_distribution)}"] if sampling.jitter else []
     parts += [f"clock {sampling.clock_ratio:g} times true time"] if sampling.clock_ratio != 1.0 else []
     parts += ["by its own clock"] if sampling.clock == "fmu" else []
@@ -138,7 +138,7 @@ def describe_source(source: Source) -> str:
     if source.constant is not None:
         return f"constant {source.constant:g}"
     if source.noise is not None:
-        return f"white noise of intensity {source.noise:g}, held {seconds(source.period or 0.0)}"
+        return f"white noise of intensity {source.noise:g}, held {time_text(source.period or 0.0)}"
     if source.file is not None:
         return f"{'way-points of' if source.is_motion else 'file'} {source.file.name}"
     return source.signal or f"trajectory of {source.trajectory}"
@@ -146,7 +146,7 @@ def describe_source(source: Source) -> str:
 
 def describe_varying(of: Varying, formatted: Callable[[float], str] | None = None) -> str:
     """A number, or its distribution; default of `formatted`: as times."""
-    formatted = formatted or seconds
+    formatted = formatted or time_text
     if not isinstance(of, Distribution):
         return formatted(of)
     if of.uniform is not None:
@@ -163,10 +163,10 @@ def describe_varying(of: Varying, formatted: Callable[[float], str] | None = Non
 
 
 def _largest(jitter: Varying, spread: str) -> str:
-    return describe_varying(jitter) if isinstance(jitter, Distribution) else f"{seconds(jitter)} {spread}"
+    return describe_varying(jitter) if isinstance(jitter, Distribution) else f"{time_text(jitter)} {spread}"
 
 
-def seconds(value: float) -> str:
+def time_text(value: float) -> str:
     """A time with a readable unit."""
     for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
         if value >= size or value == 0.0:

@@ -13,7 +13,7 @@ from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.components.fmi.values import convert_value, number_of
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.basics.simulator import Booleans, Floats, Integers
-from orchestration.foundation.basics.times import NANOSECONDS, nanoseconds
+from orchestration.foundation.basics.times import nanoseconds, seconds
 from orchestration.simulation.engines import initial
 from orchestration.simulation.engines.batch.memory import Memory
 from orchestration.simulation.engines.batch.shape import Ends, Shape, changes_of, ends_of
@@ -245,7 +245,7 @@ class Batch:
 
     def _result(self, systems: Sequence[System], recorded: Sequence[Floats]) -> BatchResult:
         batch, count = self._batch, len(systems)
-        end = np.array([nanoseconds(system.stop_time) / NANOSECONDS for system in systems])
+        end = np.array([seconds(nanoseconds(system.stop_time)) for system in systems])
         states = self._state[:, :count]
         values = {call: self._expressions.folds.values[own](states, end) for call, own in self._shape.calls.items()}
         for call, own in self._shape.calls.items():
@@ -302,7 +302,7 @@ class Batch:
             name: np.array([self._number(lane, system, name) for lane, system in enumerate(systems)])
             for name in self._shape.numbers
         }
-        return {**numbers, STOP_TIME: np.array([nanoseconds(system.stop_time) / NANOSECONDS for system in systems])}
+        return {**numbers, STOP_TIME: np.array([seconds(nanoseconds(system.stop_time)) for system in systems])}
 
     def parameters(self, lane: int, system: System) -> dict[str, float]:
         """The parameters that the divergence monitor and the sources of a run use."""
@@ -366,7 +366,7 @@ class Batch:
             for i, name in enumerate(shape.numbers):
                 self._numbers[i, lane] = self._number(lane, system, name)
             self._begin(lane, system, first_samples[lane])
-            self._numbers[len(shape.numbers), lane] = nanoseconds(system.stop_time) / NANOSECONDS
+            self._numbers[len(shape.numbers), lane] = seconds(nanoseconds(system.stop_time))
             for i, call in enumerate(shape.inner):
                 self._numbers[len(shape.numbers) + 1 + i, lane] = known[call][lane] if known else 0.0
 
@@ -498,7 +498,7 @@ class Batch:
         """The values of sources at some instants; those that runs have in common are computed once."""
         key = instants, run.source_key
         if key not in self._source_values:
-            t = instants.times / NANOSECONDS
+            t = seconds(instants.times)
             self._source_values[key] = (
                 np.ascontiguousarray(np.column_stack([values.over(t) for values in run.seen] or [t[:, None]])),
                 np.ascontiguousarray(np.column_stack([values.each(t) for values in run.given] or [t[:, None]])),

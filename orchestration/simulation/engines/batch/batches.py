@@ -9,7 +9,7 @@ import numpy as np
 
 from orchestration.components.fmi.model import read_model
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.foundation.basics.times import NANOSECONDS, nanoseconds
+from orchestration.foundation.basics.times import nanoseconds, seconds
 from orchestration.simulation.engines.batch.batch import NO_COLUMNS, Batch, BatchResult, Group, ParameterColumns
 from orchestration.simulation.engines.batch.combining import combined
 from orchestration.simulation.engines.batch.kernels import preferred_lanes
@@ -124,7 +124,7 @@ def _summaries(
     for lane, system in enumerate(systems):
         steps = int(result.steps[lane])
         if result.outcome[lane] == c.RUNNING and not result.doubtful[lane]:
-            end = nanoseconds(system.stop_time) / NANOSECONDS
+            end = seconds(nanoseconds(system.stop_time))
             metrics = {name: value[lane] if valid[lane] else None for name, (valid, value) in metric_values.items()}
             yield RunSummary(
                 metrics=metrics_of(
@@ -133,7 +133,7 @@ def _summaries(
                 message=None,
             )
         elif result.outcome[lane] == c.DIVERGED:
-            time = int(result.time[lane]) / NANOSECONDS
+            time = seconds(int(result.time[lane]))
             message = _divergence_message(shape, batch, system, lane, time)
             metrics = metrics_of(
                 shape.system, None, end=time, stop_time=system.stop_time, divergence_time=time, steps=steps

@@ -5,7 +5,7 @@ from libcosimpy.CosimExecution import CosimExecution
 from libcosimpy.CosimObserver import CosimObserver
 from libcosimpy.CosimSlave import CosimLocalSlave
 
-from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.foundation.basics.times import nanoseconds, seconds
 from orchestration.simulation.interop.job import Job, Rows
 
 SPARE = 2
@@ -14,7 +14,7 @@ SPARE = 2
 
 def run(job: Job) -> Rows:
     """With connections made one by one, and initial values."""
-    execution = CosimExecution.from_step_size(round(job.step * NANOSECONDS))
+    execution = CosimExecution.from_step_size(nanoseconds(job.step))
     for name, path in job.fmus.items():
         execution.add_local_slave(CosimLocalSlave(str(path), name))
     variables = _Variables(execution)
@@ -62,10 +62,10 @@ def _record(execution: CosimExecution, variables: _Variables, job: Job) -> Rows:
     places = [variables.at(*signal.split(".", 1)) for signal in job.signals]
     for place in places:
         observer.start_time_series(*place, CosimVariableType.REAL)
-    if not execution.simulate_until(round(job.stop * NANOSECONDS)):
-        raise RuntimeError(f"libcosim stopped at t = {execution.status().current_time / NANOSECONDS} s")
+    if not execution.simulate_until(nanoseconds(job.stop)):
+        raise RuntimeError(f"libcosim stopped at t = {seconds(execution.status().current_time)} s")
     columns = []
     for place in places:
         times, _, values = observer.time_series_real_samples(*place, from_step=1, sample_count=job.steps + SPARE)
         columns.append(list(values))
-    return [[time / NANOSECONDS, *values] for time, *values in zip(times, *columns, strict=True)]
+    return [[seconds(time), *values] for time, *values in zip(times, *columns, strict=True)]

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from orchestration.simulation.figures import diagram
-from orchestration.systems.system.description import as_text, seconds
+from orchestration.systems.system.description import as_text, time_text
 from orchestration.systems.system.file import load_system
 from tests.commands import Main
 from tests.pictures import expect_picture
@@ -102,7 +102,7 @@ def test_noise_of_a_signal_outside_the_message_is_rejected_in_terms_of_the_reque
 
 def test_times_have_a_readable_unit() -> None:
     values = [0.0, 2.0, 0.25, 1e-3, 2.5e-6, 3e-9]
-    assert [seconds(value) for value in values] == ["0 s", "2 s", "250 ms", "1 ms", "2.5 µs", "3 ns"]
+    assert [time_text(value) for value in values] == ["0 s", "2 s", "250 ms", "1 ms", "2.5 µs", "3 ns"]
 
 
 def test_the_figure_has_a_box_for_each_component_and_source_and_a_label_for_each_message(file: Path) -> None:
