@@ -189,7 +189,7 @@ def test_halves_are_the_whole() -> None:
 
 
 def test_the_page_says_how_far_what_is_kept_goes() -> None:
-    page = (ROOT / "docs" / "certificates.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "how_far.md").read_text(encoding="utf-8")
     for period in PERIODS:
         y, vy, phi, p, z, vz = extents(read_ellipsoid(period))
         row = f"| {1e3 * period:g} ms | {1e2 * y:.1f} cm | {vy:.2f} m/s | {np.degrees(phi):.1f}° | {p:.1f} rad/s | "
