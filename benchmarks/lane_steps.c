@@ -8,7 +8,7 @@
 #include <string.h>
 #include <time.h>
 
-enum { MOST = 64 };
+enum { MAX_LANES = 64 };
 
 static void find(void *library, const char *name, void *function)
 {
@@ -20,9 +20,9 @@ static void find(void *library, const char *name, void *function)
 
 int main(int count, char **given)
 {
-    static double t[MOST], h[MOST];
-    static uint64_t active[MOST];
-    static int32_t status[MOST];
+    static double t[MAX_LANES], h[MAX_LANES];
+    static uint64_t active[MAX_LANES];
+    static int32_t status[MAX_LANES];
     int (*lanes_of)(void), (*places_of)(void);
     void (*begin)(double *), (*initialise)(double *, const uint64_t *, const double *, int32_t *);
     void (*do_step)(double *, const uint64_t *, const double *, const double *, int32_t *, const uint8_t *);

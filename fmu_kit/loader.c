@@ -18,7 +18,7 @@
 
 #define EXPORT __attribute__((visibility("default")))
 
-enum { OLDEST_MINOR = 10, NEWEST_MINOR = 30, LONGEST = 4096 }; /* Python 3.10; future versions; length of a path */
+enum { OLDEST_MINOR = 10, NEWEST_MINOR = 30, PATH_SIZE = 4096 }; /* Python 3.10; future versions; length of a path */
 enum { ERROR = 3 };
 
 #define VARIABLE "QUADCOSIM_LIBPYTHON"
@@ -112,7 +112,7 @@ void finalizePythonInterpreter(void)
 
 /* -- finding a Python ------------------------------------------------------------------------------------------- */
 
-static char problem[LONGEST + 512]; /* why none was found; written under the lock */
+static char problem[PATH_SIZE + 512]; /* why none was found; written under the lock */
 
 static void *failed(Text format, ...)
 {
@@ -151,7 +151,7 @@ static int home_is_valid(int minor)
 {
     static const Text places[] = {"lib/python3.%d/os.py", "lib64/python3.%d/os.py", "lib/python3%d.zip"};
     const Text home = getenv("PYTHONHOME");
-    char name[32], path[LONGEST + 32];
+    char name[32], path[PATH_SIZE + 32];
     if (!home || !*home)
         return 1;
     for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
@@ -199,7 +199,7 @@ static int is_python(struct dl_phdr_info *info, size_t size, void *path)
 {
     (void)size;
     const Text slash = strrchr(info->dlpi_name, '/'), name = slash ? slash + 1 : info->dlpi_name;
-    if (strncmp(name, "libpython3.", 11) != 0 || strlen(info->dlpi_name) >= LONGEST)
+    if (strncmp(name, "libpython3.", 11) != 0 || strlen(info->dlpi_name) >= PATH_SIZE)
         return 0;
     strcpy(path, info->dlpi_name);
     return 1;
@@ -237,14 +237,14 @@ static void query_python(char *answer, size_t size)
 
 static void *python_on_path(void)
 {
-    static wchar_t home[LONGEST];
-    char answer[4 * LONGEST], *rest, *library;
+    static wchar_t home[PATH_SIZE];
+    char answer[4 * PATH_SIZE], *rest, *library;
     void *python = NULL, (*set_home)(const wchar_t *);
     query_python(answer, sizeof answer);
     const Text prefix = strtok_r(answer, "\n", &rest);
     while (prefix && !python && (library = strtok_r(NULL, "\n", &rest)))
         python = open_globally(library);
-    if (python && !getenv("PYTHONHOME") && mbstowcs(home, prefix, LONGEST) < LONGEST) {
+    if (python && !getenv("PYTHONHOME") && mbstowcs(home, prefix, PATH_SIZE) < PATH_SIZE) {
         find(python, "Py_SetPythonHome", &set_home); /* a python3 on PATH that is a shim would mislead it */
         if (set_home)
             set_home(home);
@@ -266,7 +266,7 @@ static void *python_of_the_system(void)
 /* Ensure a Python: that of this process, or else one that is configured, on PATH or known to the system's loader. */
 static int ensure_python(void)
 {
-    char path[LONGEST];
+    char path[PATH_SIZE];
     const Text configured = getenv(VARIABLE);
     if (dlsym(RTLD_DEFAULT, "Py_GetVersion"))
         return version_of(RTLD_DEFAULT, "this process") != 0;
@@ -284,12 +284,12 @@ static int ensure_python(void)
 
 /* -- pythonfmu's library ---------------------------------------------------------------------------------------- */
 
-static char folder[LONGEST]; /* of this library, with a slash at its end */
+static char folder[PATH_SIZE]; /* of this library, with a slash at its end */
 
 __attribute__((constructor)) static void store_folder(void)
 {
     Dl_info own;
-    char path[LONGEST];
+    char path[PATH_SIZE];
     if (dladdr(folder, &own) && realpath(own.dli_fname, path) && strrchr(path, '/')) {
         strrchr(path, '/')[1] = '\0'; /* now: the host may change its folder before it calls */
         strcpy(folder, path);
@@ -310,7 +310,7 @@ __attribute__((destructor)) static void close_pythonfmu(void)
 
 static int open_pythonfmu(void)
 {
-    char path[LONGEST + sizeof BESIDE];
+    char path[PATH_SIZE + sizeof BESIDE];
     if (opened.Instantiate)
         return 1;
     const int in_python = in_python_program();
@@ -373,7 +373,7 @@ static void unescape(char *text)
 /* Open a file in the folder of the resources. */
 static FILE *resource(Text resources, Text name)
 {
-    char path[LONGEST + 32];
+    char path[PATH_SIZE + 32];
     snprintf(path, sizeof path, "%s/%s", resources, name);
     return fopen(path, "re");
 }
@@ -390,10 +390,10 @@ static int find_resources(Text location, char *path)
     Text start = location;
     if (strncmp(location, "file:", 5) == 0) {
         start += strncmp(location, "file://localhost/", 17) == 0 ? 16 : strncmp(location, "file://", 7) == 0 ? 7 : 5;
-        snprintf(path, LONGEST, "%s", start);
+        snprintf(path, PATH_SIZE, "%s", start);
         unescape(path);
     } else {
-        snprintf(path, LONGEST, "%s", start);
+        snprintf(path, PATH_SIZE, "%s", start);
         if (!has_fmu_resources(path)) /* some hosts remove file:// but not the escapes */
             unescape(path);
     }
@@ -434,7 +434,7 @@ EXPORT void *fmi2Instantiate(Text, int, Text, Text, const Callbacks *, int, int)
 void *fmi2Instantiate(Text name, int kind, Text guid, Text location, const Callbacks *callbacks, int visible, int logs)
 {
     static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
-    char path[LONGEST], expected[64], why[sizeof problem];
+    char path[PATH_SIZE], expected[64], why[sizeof problem];
     if (!name || !guid || !location || !callbacks)
         return refuse(callbacks, name, "fmi2Instantiate: expected instanceName, GUID, resource location and callbacks");
     if (!is_utf8(name))

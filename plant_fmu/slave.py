@@ -17,7 +17,7 @@ from plant_fmu.interface import PlantInterface
 from plant_fmu.payload import Payload
 from plant_fmu.wind import Wind
 
-MOST_INTERNAL_STEPS = 100_000
+MAX_INTERNAL_STEPS = 100_000
 """Limit for one communication step: some seconds of work, which a master cannot interrupt"""
 _MOTION = tuple(each.name for each in PlantInterface.variables if each.causality == "output")
 
@@ -65,10 +65,10 @@ class QuadrotorPlant(PlantInterface):
         start, target = self._channels, actuators.limited(self._command())
         external = self.external_force
         require(
-            h <= MOST_INTERNAL_STEPS * largest,
+            h <= MAX_INTERNAL_STEPS * largest,
             "communicationStepSize",
             h,
-            f"at most {MOST_INTERNAL_STEPS} times max_internal_step = {largest} s",
+            f"at most {MAX_INTERNAL_STEPS} times max_internal_step = {largest} s",
         )
         carried = self._payload.until_drop(t, h)
         loaded, bare, drop = self._mass_at(t), self._mass_at(t + carried), t + carried

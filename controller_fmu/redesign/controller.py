@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 from controller_fmu.redesign.interface import Discretisation, RedesignInterface
 from controller_fmu.redesign.matching import matched_command
 from controller_fmu.redesign.nominal import closed_loop, under_command
-from controller_fmu.redesign.prediction import MOST_PENDING, SentCommand, all_sent, predicted_state, with_command
+from controller_fmu.redesign.prediction import MAX_PENDING, SentCommand, all_sent, predicted_state, with_command
 from controller_fmu.sampled import SHORTEST_PERIOD, SampledController
 from controller_fmu.vehicle import Measurement
 from fmu_kit.algebra import Vec3
@@ -76,7 +76,7 @@ class RedesignedController(SampledController, RedesignInterface):
         super().restore(state)
         pending = [[float(number) for number in sent] for sent in state["pending"]]
         self._pending = tuple(SentCommand(t, Wrench(thrust, Vec3(x, y, z))) for t, thrust, x, y, z in pending)
-        if len(self._pending) != MOST_PENDING:
+        if len(self._pending) != MAX_PENDING:
             raise ValueError(len(self._pending))
 
     def sample(self, t: float, h: float) -> None:
@@ -138,7 +138,7 @@ class RedesignedController(SampledController, RedesignInterface):
             oldest + delay <= t + 1e-6 * delay,
             "prediction",
             delay,
-            f"at most {t - oldest:g} s: {MOST_PENDING} commands can be pending",
+            f"at most {t - oldest:g} s: {MAX_PENDING} commands can be pending",
         )
         longest = hold / self.stages
 

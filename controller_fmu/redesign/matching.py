@@ -13,7 +13,7 @@ ITERATIONS = 4
 DIFFERENCE, ROUNDINGS = 1e-5, 200.0
 """[m/s²], [rad/s²]: difference of the commands for the Jacobian; in coarser numbers it is this many times the root of
 their resolution, so that the states after a period of milliseconds still differ."""
-TINY = 1e-150
+COUNTS_AS_ZERO = 1e-150
 """[1]: below this, the vector part of a quaternion counts as zero."""
 
 
@@ -77,7 +77,7 @@ def rotation_vector(Q: Quaternion, ops: ScalarOps = FLOAT) -> Vec3:
     """The rotation vector [rad] of the unit quaternion `Q`, the shorter way."""
     size = Q.vector.norm(ops)
     angle = 2.0 * ops.atan2(size, abs(Q.scalar))
-    vector: Vec3 = (ops.where(Q.scalar < 0.0, -angle, angle) / ops.maximum(size, TINY)) * Q.vector
+    vector: Vec3 = (ops.where(Q.scalar < 0.0, -angle, angle) / ops.maximum(size, COUNTS_AS_ZERO)) * Q.vector
     return vector
 
 

@@ -7,7 +7,7 @@ from fmu_kit.algebra import Vec3
 from fmu_kit.rigid_body import RigidState, Wrench
 from fmu_kit.scalar import Scalar, repeat
 
-MOST_PENDING = 32
+MAX_PENDING = 32
 """Number of commands that are recorded; in C, each round of the loop below moves all of them."""
 
 
@@ -25,7 +25,7 @@ Pending = tuple[SentCommand, ...]
 
 def all_sent(t: Scalar, command: Wrench) -> Pending:
     """The pending commands if all of them are `command`, sent at `t` [s]."""
-    return tuple(SentCommand(t, Wrench(command.thrust, Vec3(*command.torque))) for _ in range(MOST_PENDING))
+    return tuple(SentCommand(t, Wrench(command.thrust, Vec3(*command.torque))) for _ in range(MAX_PENDING))
 
 
 def with_command(pending: Pending, t: Scalar, command: Wrench) -> Pending:

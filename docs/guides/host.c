@@ -28,7 +28,7 @@ typedef int (*SetReal)(void *, const unsigned *, size_t, const double *);
 typedef int (*GetReal)(void *, const unsigned *, size_t, double *);
 typedef int (*DoStep)(void *, double, double, int);
 
-enum { WARNING = 1, CO_SIMULATION = 1, MOST_OUTPUTS = 16 };
+enum { WARNING = 1, CO_SIMULATION = 1, MAX_OUTPUTS = 16 };
 
 static void print_message(void *environment, const char *instance, int status, const char *category,
                           const char *message, ...)
@@ -114,10 +114,10 @@ int main(int count, char **arguments)
     for (int k = 0; k < steps; k++)
         check(do_step(controller, k * h, h, 1), "fmi2DoStep");
 
-    unsigned outputs[MOST_OUTPUTS];
-    double values[MOST_OUTPUTS];
+    unsigned outputs[MAX_OUTPUTS];
+    double values[MAX_OUTPUTS];
     size_t n = 0;
-    for (char *text = strtok(arguments[7], ","); text && n < MOST_OUTPUTS; text = strtok(NULL, ","))
+    for (char *text = strtok(arguments[7], ","); text && n < MAX_OUTPUTS; text = strtok(NULL, ","))
         outputs[n++] = (unsigned)strtoul(text, NULL, 10);
     check(get_real(controller, outputs, n, values), "fmi2GetReal");
     for (size_t i = 0; i < n; i++)

@@ -21,11 +21,11 @@ from orchestration.foundation.basics.simulator import Floats
 
 SHARES = (0.75, 0.6, 0.45)
 """shares of the ellipsoid found that are tried"""
-MOST = 10_000_000
+MAX_BOXES = 10_000_000
 """boxes"""
 EVALUATIONS = 120
 """shapes evaluated by the search"""
-FARTHEST = {"y": 40.0, "vy": 40.0, "φ": 3.1, "p": 80.0, "z": 40.0, "vz": 40.0}
+MAX_INITIAL = {"y": 40.0, "vy": 40.0, "φ": 3.1, "p": 80.0, "z": 40.0, "vz": 40.0}
 """largest initial value of each coordinate"""
 STARTS = 400
 """initial values along each coordinate"""
@@ -50,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         return
     began = time.process_time()
     R = search_and_prove(loop) if options.search else read_ellipsoid(options.period)
-    boxes = prove(loop, R, MOST)
+    boxes = prove(loop, R, MAX_BOXES)
     if options.search:
         write_ellipsoid(options.period, R)
     print(_row(options.period, extents(R)))
@@ -69,7 +69,7 @@ def search_and_prove(loop: Loop) -> Floats:
     largest = largest_ellipsoid(loop, EVALUATIONS)
     for share in SHARES:
         try:
-            prove(loop, largest / share, MOST)
+            prove(loop, largest / share, MAX_BOXES)
         except NotProven as error:
             print(f"{share:g} of what was found: {error}")
         else:
@@ -80,15 +80,15 @@ def search_and_prove(loop: Loop) -> Floats:
 def first_losses(loop: Loop) -> Floats:
     """The least value of each coordinate from which a flight does not come to rest; nan: there is none."""
     shares = np.arange(1, STARTS + 1) / STARTS
-    states = np.concatenate([np.outer(row, shares) for row in np.diag([*FARTHEST.values()])], axis=1)
+    states = np.concatenate([np.outer(row, shares) for row in np.diag([*MAX_INITIAL.values()])], axis=1)
     lost = np.zeros(states.shape[1], bool)
     for _ in range(round(FLIGHT / loop.period)):
         states = loop.after(states)
         lost |= ~(np.abs(states) < LOST).all(axis=0)
         states[:, lost] = 0.0
-    lost = (lost | ~(np.abs(states) < RESTS).all(axis=0)).reshape(len(FARTHEST), STARTS)
+    lost = (lost | ~(np.abs(states) < RESTS).all(axis=0)).reshape(len(MAX_INITIAL), STARTS)
     first = np.where(lost.any(axis=1), shares[lost.argmax(axis=1)], np.nan)
-    limits: Floats = first * np.array([*FARTHEST.values()])
+    limits: Floats = first * np.array([*MAX_INITIAL.values()])
     return limits
 
 

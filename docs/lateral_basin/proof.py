@@ -30,7 +30,7 @@ HALVINGS = 9
 """of the box around the ellipsoid, before the inner box is given up"""
 FALL = 1e-9
 """least decrease of V in a period: more than the rounding of all constants of the equations"""
-SMALLEST = 1e-5
+MIN_RADIUS = 1e-5
 """of y: smaller boxes are not halved"""
 AT_ONCE = 2048
 """boxes in one evaluation"""
@@ -144,8 +144,8 @@ def _open(fall: Decrease, boxes: Boxes) -> Sequence[Boxes]:
     _expect_no_rise(fall, boxes, change)
     wide = change.anywhere.high >= -FALL
     boxes = boxes[wide]
-    if (boxes.radius.min(axis=0, initial=1.0) < SMALLEST).any():
-        raise NotProven(f"boxes of {SMALLEST:g} do not show that the form falls")
+    if (boxes.radius.min(axis=0, initial=1.0) < MIN_RADIUS).any():
+        raise NotProven(f"boxes of {MIN_RADIUS:g} do not show that the form falls")
     return boxes.halved(_longest(change.slopes[:, wide], change.values[1][wide], boxes, fall.edges))
 
 

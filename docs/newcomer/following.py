@@ -12,7 +12,7 @@ from typing import IO
 
 from docs.newcomer.blocks import OUTPUT, Block
 
-LONGEST = 1800.0
+TIMEOUT = 1800.0
 """[s], timeout of a line"""
 SHOWN = 3000
 """Number of characters shown of the output of a failed block"""
@@ -101,7 +101,7 @@ class Newcomer:
         done = subprocess.run(
             ["bash", "-c", f'{line}\nended=$?; pwd > "{where}"; exit $ended'], cwd=self._here, env=self.environment,
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, encoding="utf-8",
-            errors="replace", timeout=LONGEST, check=False,
+            errors="replace", timeout=TIMEOUT, check=False,
         )  # fmt: skip
         self._report(f"{block.place}: {line}  [{time.monotonic() - began:.1f} s]")
         self._printed = done.stdout

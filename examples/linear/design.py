@@ -23,9 +23,9 @@ HERE = Path(__file__).resolve().parent
 PERIOD = 0.01
 """[s] of the design, the default of scenarios"""
 GRAVITY = 9.81
-LARGEST = {"position": 0.5, "velocity": 1.0, "quaternion": 0.1, "angular_velocity": 2.0}
+ACCEPTABLE_ERRORS = {"position": 0.5, "velocity": 1.0, "quaternion": 0.1, "angular_velocity": 2.0}
 """Acceptable sizes, by which errors are weighed against commands (Bryson's rule)"""
-COMMANDS = {"thrust": 4.0, "torque": 6.0}
+ACCEPTABLE_COMMANDS = {"thrust": 4.0, "torque": 6.0}
 INTEGRAL = 0.5
 """[m.s], acceptable size of the integral"""
 ATTITUDE, POSITION = (12.0, 60.0), (2.5, 45.0)
@@ -115,8 +115,8 @@ def _crossing(parts: Callable[[complex], tuple[complex, complex]], frequency: fl
 
 def _weights(plant: StateSpace) -> tuple[Matrix, Matrix]:
     """The weights of states and commands."""
-    errors = np.array([1.0 / LARGEST[name.partition(".")[0]] for name in plant.outputs])
-    commands = np.array([1.0 / COMMANDS[name.partition(".")[0]] for name in plant.inputs])
+    errors = np.array([1.0 / ACCEPTABLE_ERRORS[name.partition(".")[0]] for name in plant.outputs])
+    commands = np.array([1.0 / ACCEPTABLE_COMMANDS[name.partition(".")[0]] for name in plant.inputs])
     return plant.C.T @ np.diag(errors**2) @ plant.C, np.diag(commands**2)
 
 

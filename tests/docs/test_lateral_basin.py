@@ -26,7 +26,7 @@ from tests.places import ROOT
 PERIODS = (0.01, 0.04)
 """[s], of which the page has a proof"""
 SIZES = np.array([0.2, 0.5, 0.5, 8.0, 0.2, 0.5])[:, None]
-STEP, LEAST = 1e-3, 1e-11
+STEP, MIN_MARGIN = 1e-3, 1e-11
 """Runge-Kutta steps, which the enclosures are held against, and what they may be wrong by"""
 
 
@@ -63,7 +63,7 @@ def test_what_a_period_does_is_within_its_enclosure(period: float, share: float)
     loop, these = Loop(period=period), boxes(300, share)
     changes = loop.change(over(these))
     for at in points(these, 5):
-        expect_held(changes, these, at, loop.after(at, STEP) - at, LEAST)
+        expect_held(changes, these, at, loop.after(at, STEP) - at, MIN_MARGIN)
 
 
 def test_small_boxes_have_narrow_enclosures() -> None:

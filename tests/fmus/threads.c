@@ -20,7 +20,7 @@ typedef struct {
     int status;
 } Fmu;
 
-enum { MOST_FMUS = 8 };
+enum { MAX_FMUS = 8 };
 
 static void start(Fmu *fmu, const char *resources, const char *guid)
 {
@@ -50,7 +50,7 @@ static void *step(void *argument)
 
 static void fly(Fmu *fmus, int count, int first, int last, double h)
 {
-    pthread_t threads[MOST_FMUS];
+    pthread_t threads[MAX_FMUS];
     for (int k = first; k < last; k++) {
         for (int i = 0; i < count; i++) {
             fmus[i].t = k * h;
@@ -71,10 +71,10 @@ static void print_and_free(Fmu *fmu)
     void (*free_instance)(void *);
     find(fmu->library, "fmi2GetReal", &get_real);
     find(fmu->library, "fmi2FreeInstance", &free_instance);
-    unsigned outputs[MOST_OUTPUTS];
-    double values[MOST_OUTPUTS];
+    unsigned outputs[MAX_OUTPUTS];
+    double values[MAX_OUTPUTS];
     size_t n = 0;
-    for (char *text = strtok(fmu->outputs, ","); text && n < MOST_OUTPUTS; text = strtok(NULL, ","))
+    for (char *text = strtok(fmu->outputs, ","); text && n < MAX_OUTPUTS; text = strtok(NULL, ","))
         outputs[n++] = (unsigned)strtoul(text, NULL, 10);
     check(get_real(fmu->component, outputs, n, values), "fmi2GetReal");
     for (size_t i = 0; i < n; i++)
@@ -86,13 +86,13 @@ static void print_and_free(Fmu *fmu)
 int main(int count, char **arguments)
 {
     const int fmu_count = (count - 4) / 4;
-    if (fmu_count < 1 || fmu_count > MOST_FMUS)
+    if (fmu_count < 1 || fmu_count > MAX_FMUS)
         return 2;
     const int steps = atoi(arguments[2]);
     const double h = strtod(arguments[3], NULL);
     open_library(arguments[1], RTLD_GLOBAL); /* the FMUs find Python's symbols in the global scope */
 
-    Fmu fmus[MOST_FMUS];
+    Fmu fmus[MAX_FMUS];
     for (int i = 0; i < fmu_count; i++) {
         char **of_this = arguments + 4 + 4 * i;
         fmus[i].library = open_library(of_this[0], RTLD_LOCAL);

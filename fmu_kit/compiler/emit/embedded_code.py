@@ -18,7 +18,7 @@ from fmu_kit.variables import Variable
 
 GROUPS = {"input": "in", "output": "out", "parameter": "par", "local": "local", None: "kept"}
 """The part of the struct for variables of a causality; None: for what the model keeps beside them."""
-_LARGEST, _SMALLEST = 3.4028234663852886e38, 1.1754943508222875e-38
+_MAX_FLOAT, _MIN_FLOAT = 3.4028234663852886e38, 1.1754943508222875e-38
 
 
 @dataclass(kw_only=True)
@@ -73,7 +73,7 @@ def in_single(text: str) -> str:
 
 def single_number(value: float) -> str:
     """The nearest number in single precision, as a literal of C with the fewest digits."""
-    size = min(max(abs(value), _SMALLEST), _LARGEST) if value else 0.0
+    size = min(max(abs(value), _MIN_FLOAT), _MAX_FLOAT) if value else 0.0
     nearest = c_float(size).value
     digits = next(text for n in range(1, 10) if c_float(float(text := f"{nearest:.{n}g}")).value == nearest)
     shown = digits if re.search(r"[.e]", digits) else f"{digits}.0"

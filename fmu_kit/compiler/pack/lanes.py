@@ -15,7 +15,7 @@ from fmu_kit.compiler.pack.c_compiler import FOR_THIS_PROCESSOR, Mathematics, co
 
 MAIN = "lanes.c"
 """The file to compile among the sources of an FMU."""
-MOST_LANES = 64
+MAX_LANES = 64
 _REGISTERS = {"__AVX512DQ__": 8, "__AVX__": 4}
 """Doubles in a vector register, by predefined macro of the compiler; without these, 2."""
 
@@ -44,7 +44,7 @@ def compiled_lanes(
         raise PackagingError(f"sources of the FMU: expected {MAIN}, as in those of quadcosim build --native")
     count = preferred_lanes() if lanes is None else lanes
     if count not in (2**k for k in range(7)):
-        raise PackagingError(f"lanes = {lanes}: expected 1 or a power of two up to {MOST_LANES}")
+        raise PackagingError(f"lanes = {lanes}: expected 1 or a power of two up to {MAX_LANES}")
     options = (*FOR_THIS_PROCESSOR, f"-DQUADCOSIM_LANES={count}", "-Wno-psabi")
     return compiled_here(dict(sources), MAIN, mathematics=mathematics, options=options)
 

@@ -31,7 +31,7 @@ from fmu_kit.compiler.trace.tracing import Program
 
 LEAVES = "leaves the straight line"
 """The error that the function raises where a guard holds"""
-MOST_ROUNDS = 4
+MAX_ROUNDS = 4
 """Largest number of rounds of an unrolled loop"""
 
 
@@ -218,7 +218,7 @@ class _Frame:
         states = [self.value(symbol) for symbol in starts]
         times = self.value(count)
         least = min((value for value in self.line.values.of(times) if value >= 1.0), default=0.0)
-        if not 1.0 <= least <= MOST_ROUNDS:
+        if not 1.0 <= least <= MAX_ROUNDS:
             raise _NoLineError
         if times.op != "constant":
             self.line.expect_not(node("ne", (times, constant(least)), "bool"), under)

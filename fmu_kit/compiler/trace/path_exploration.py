@@ -162,7 +162,7 @@ class Explorer:
             if runs:
                 restore()
             runs += 1
-            if runs > MOST_PATHS:
+            if runs > MAX_PATHS:
                 raise TraceError(_TOO_MANY)
             path = self._path = _Path(script, dict(outer.known) if outer else {})
             leaf = None
@@ -352,23 +352,23 @@ class Explorer:
         return block, [lifted(leaf) for _, leaf in leaves(leaf.value) if is_number(leaf)]
 
 
-MOST_PATHS = 2000
+MAX_PATHS = 2000
 """Limit of the paths through one function; more would take minutes."""
-MOST_ROUNDS = 200
+MAX_ROUNDS = 200
 """Limit of the rounds of a `while` with a computed condition: such a loop does not end while it is traced."""
-_TOO_MANY = f"more than {MOST_PATHS} paths: expected fewer conditions that depend on each other"
+_TOO_MANY = f"more than {MAX_PATHS} paths: expected fewer conditions that depend on each other"
 
 
 def _expect_termination(forks: int) -> None:
     """Raise `TraceError` on a path with so many forks that it is unlikely to end."""
-    if forks >= MOST_PATHS:
+    if forks >= MAX_PATHS:
         raise TraceError(_TOO_MANY)
-    if forks and forks % MOST_ROUNDS == 0:
+    if forks and forks % MAX_ROUNDS == 0:
         frame = inspect.currentframe()
         while frame is not None and not is_model_code(frame.f_code.co_filename):
             frame = frame.f_back
         if frame is not None and any(frame.f_lineno in loop for loop in _loops_in(frame.f_code.co_filename)):
-            rounds = f"more than {MOST_ROUNDS} rounds by a computed condition"
+            rounds = f"more than {MAX_ROUNDS} rounds by a computed condition"
             raise TraceError(f"while: {rounds}, expected fmu_kit.scalar.repeat for a loop")
 
 

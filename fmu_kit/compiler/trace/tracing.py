@@ -34,7 +34,7 @@ _BASE_METHODS = ("_take_parameters", "_check_parameters")
 _UNTRACED = ("internal_state", "restore", "to_xml")
 _OPEN = frozenset({"__init__", "read_parameters", "initialise", "step", "internal_state", "restore", "to_xml"})
 """The methods of the base class that a slave may override."""
-MOST_WARNINGS = 32
+MAX_WARNINGS = 32
 """Limit of the warnings of a slave; each key is a bit of its state."""
 
 
@@ -119,8 +119,8 @@ def _traced(slave: type[Slave], modules: list[types.ModuleType], memory: Memory)
     def warn_once(self: Slave, key: str, text: str) -> None:
         if key not in warnings:
             warnings.append(key)
-        if len(warnings) > MOST_WARNINGS:
-            raise TraceError(f"more than {MOST_WARNINGS} keys of warnings")
+        if len(warnings) > MAX_WARNINGS:
+            raise TraceError(f"more than {MAX_WARNINGS} keys of warnings")
         explorer.warn(key, text)
 
     _expect_no_override(slave)

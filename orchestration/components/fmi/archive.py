@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 
 DESCRIPTION = "modelDescription.xml"
-LARGEST, DENSEST = 1000.0, 20.0
+MAX_UNPACKED_MB, MAX_COMPRESSION = 1000.0, 20.0
 """An FMU that unpacks to more MB than this, and to more than this many times its size, is not run"""
 
 
@@ -89,10 +89,10 @@ def expect_honest_size(path: Path) -> None:
     with zipfile.ZipFile(path) as archive:
         unpacked = sum(entry.file_size for entry in archive.infolist())  # zipfile unpacks no more than that
     times = unpacked / path.stat().st_size
-    if unpacked > LARGEST * 1e6 and times > DENSEST:
+    if unpacked > MAX_UNPACKED_MB * 1e6 and times > MAX_COMPRESSION:
         raise UsageError(
-            f"{path}: unpacks to {unpacked / 1e6:.0f} MB, {times:.0f} times its size: expected at most {LARGEST:g} MB, "
-            f"or {DENSEST:g} times its size"
+            f"{path}: unpacks to {unpacked / 1e6:.0f} MB, {times:.0f} times its size: expected at most "
+            f"{MAX_UNPACKED_MB:g} MB, or {MAX_COMPRESSION:g} times its size"
         )
 
 

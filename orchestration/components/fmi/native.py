@@ -39,7 +39,7 @@ DIVERGENCE_CATEGORY = b"divergence"
 _AT_END = 1e-9
 """Relative and in [s]: the rounding error at the end of a step of an FMU that sums its steps"""
 
-_MOST_WARNINGS = 100
+_MAX_WARNINGS = 100
 """Of one instance; some FMUs log one in every step"""
 
 _NOT_USED = ("documentation/", "sources/")
@@ -369,9 +369,9 @@ class NativeInstance(Instance):
         self._messages.clear()
 
     def _keep_warning(self, text: str) -> None:
-        if len(self.warnings) < _MOST_WARNINGS:
+        if len(self.warnings) < _MAX_WARNINGS:
             self.warnings.append(f"{self.name}: {text}")
-        elif len(self.warnings) == _MOST_WARNINGS:
+        elif len(self.warnings) == _MAX_WARNINGS:
             self.warnings.append(f"{self.name} ({self.model.name}): further warnings of this FMU are not kept")
 
     def failure(self, function: str, status: int, otherwise: str | None = None) -> SimulatorError:

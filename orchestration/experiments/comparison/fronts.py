@@ -12,7 +12,7 @@ from orchestration.experiments.studies.axes import Value
 if TYPE_CHECKING:
     import pandas as pd
 
-LEAST = 0.5
+MIN_SURVIVING_SHARE = 0.5
 """Share of the initial conditions that a controller has to survive to be included"""
 
 
@@ -39,7 +39,7 @@ def points(comparison: Comparison, table: "pd.DataFrame") -> Iterator[Point]:
     for (vehicle, condition, value), rows in done.groupby([VEHICLE, CONDITION, comparison.axis.name], sort=False):
         alive = rows[survived(rows)]
         counts = alive[CONTROLLER].value_counts()
-        enough = LEAST * len(comparison.initial_conditions)
+        enough = MIN_SURVIVING_SHARE * len(comparison.initial_conditions)
         names = [one.name for one in comparison.controllers if counts.get(one.name, 0) >= enough]
         alive = alive[alive[CONTROLLER].isin(names)]
         by_all = alive[START].value_counts() == len(names)

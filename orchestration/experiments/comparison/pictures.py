@@ -26,7 +26,7 @@ from orchestration.simulation.results.quantities import is_in_seconds
 if TYPE_CHECKING:
     import pandas as pd
 
-MOST_PANELS = 6
+MAX_PANELS = 6
 
 
 def draw(
@@ -76,7 +76,7 @@ def _of_one(
     yield from save(partial(shares, {title: summaries}, axis, colors), folder / f"shares_{end}", style)
     if points:
         values = [*dict.fromkeys(point.value for point in points)]
-        shown = [values[round(i)] for i in np.linspace(0, len(values) - 1, min(len(values), MOST_PANELS))]
+        shown = [values[round(i)] for i in np.linspace(0, len(values) - 1, min(len(values), MAX_PANELS))]
         front = comparison.front
         names = tuple(labels.metric_with_unit(metric, units.get(metric)) for metric in (front.effort, front.error))
         yield from save(partial(fronts_of, points, shown, axis, names, colors, title), folder / f"front_{end}", style)

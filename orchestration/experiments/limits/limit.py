@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 GAP = 0.1
 """of the local limit: a larger difference to the large-signal limit is noted"""
-FINER = 5
+PARTS_OF_STEP = 5
 """parts of the step of the scan within the bracket"""
 BEYOND = 4
 """values of the scan that are evaluated beyond the first that fails"""
@@ -136,7 +136,7 @@ def find(
             trials.fails,
             values,
             span.tolerance,
-            parts=FINER,
+            parts=PARTS_OF_STEP,
             remaining=lambda most: trials.expect_remaining(most + BEYOND),
         )
         above = [value for value in values if bracket is not None and value >= bracket.bad]

@@ -18,7 +18,9 @@ SCRIPTS = (
 FIGURES = {
     "CYCLE": palette.CYCLE,
     "NOT_GOOD": {"bad": palette.NOT_GOOD, "diverged": palette.DIVERGED},
-    "SHADES": {name: getattr(shades, name) for name in ("OUTER", "MOST", "LEAST", "WIDE")},
+    "SHADES": {
+        name: getattr(shades, name) for name in ("OUTER_SHARE", "OUTLIER_RATIO", "MIN_RANGE", "LOGARITHMIC_RATIO")
+    },
     "PEAKS": {name: getattr(shades, name) for name in ("OUTSIDE", "CLIPPED")},
 }
 """What the page shows as figures do: colours, and what ranges leave out"""

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from orchestration.experiments.report.known_layouts import layout_for
 from orchestration.experiments.report.model import Line, Panel, ReportLayout
-from orchestration.simulation.figures.palette import MOST_LINES, MOST_PANELS
+from orchestration.simulation.figures.palette import MAX_LINES, MAX_PANELS
 from orchestration.simulation.results import display_names as labels
 from orchestration.simulation.results.column_info import ColumnInfo
 from orchestration.systems.system.model import System
@@ -20,7 +20,7 @@ def layout_of(system: System | None, columns: Collection[str], about: About) -> 
     known = layout_for(columns)
     if known is None:
         every = enumerate(_of_connections(system, columns, about))
-        first = [replace(panel, shown=panel.shown and place < MOST_PANELS) for place, panel in every]
+        first = [replace(panel, shown=panel.shown and place < MAX_PANELS) for place, panel in every]
         return ReportLayout(columns=tuple(columns), panels=(*first,), scene=None)
     panels, scene = known.panels(columns), known.scene(columns, system)
     if scene is None:  # then the page computes no columns from it
@@ -64,9 +64,9 @@ def _split(
     for name in names:
         by_unit.setdefault(labels.unit(about[name].unit) if name in about else None, []).append(name)
     for unit, of_unit in by_unit.items():
-        for first in range(0, len(of_unit), MOST_LINES):
+        for first in range(0, len(of_unit), MAX_LINES):
             lines = [
                 Line(column=name, label=labels.signal(name, about), held=held)
-                for name in of_unit[first : first + MOST_LINES]
+                for name in of_unit[first : first + MAX_LINES]
             ]
             yield Panel(title=title, unit=unit, lines=(*lines,), shown=shown)

@@ -20,10 +20,10 @@ from orchestration.systems.system.model import System
 
 BYTES = 9_000_000
 """Characters that the signals of all runs may take"""
-MOST_ROWS, LEAST_ROWS = 6000, 200
+MAX_ROWS, MIN_ROWS = 6000, 200
 """of a run"""
-MOST_RUNS = 200
-MOST_PIECES = 20_000
+MAX_RUNS = 200
+MAX_PIECES = 20_000
 """of the timeline of a computer or a network"""
 SETTLING = "settling_time"
 """The objective that is the time at which a run settles, in systems that have it"""
@@ -32,13 +32,13 @@ _CODED = 4.0 * 4.0 / 3.0
 
 
 def runs_report(results: Mapping[str, Result], command: str) -> Report:
-    """The report of runs by name; raises `UsageError` for more than `MOST_RUNS`."""
-    if len(results) > MOST_RUNS:
-        raise UsageError(f"{len(results)} runs: expected at most {MOST_RUNS}; a study holds more")
+    """The report of runs by name; raises `UsageError` for more than `MAX_RUNS`."""
+    if len(results) > MAX_RUNS:
+        raise UsageError(f"{len(results)} runs: expected at most {MAX_RUNS}; a study holds more")
     blobs = Blobs()
     tracks = Tracks(blobs)
     columns = sum(len(result.columns) for result in results.values())
-    rows = int(min(MOST_ROWS, max(LEAST_ROWS, BYTES / _CODED / columns)))
+    rows = int(min(MAX_ROWS, max(MIN_ROWS, BYTES / _CODED / columns)))
     runs = [_run(name, result, tracks, blobs, rows) for name, result in results.items()]
     first = next(iter(results.values()))
     summaries = [_summary(name, result) for name, result in results.items()]
@@ -78,7 +78,7 @@ def _run(name: str, result: Result, tracks: Tracks, blobs: Blobs, rows: int) -> 
 
 
 def _bars(system: System, blobs: Blobs) -> Bars | None:
-    """The timeline of its computers and networks; at most `MOST_PIECES` pieces of each."""
+    """The timeline of its computers and networks; at most `MAX_PIECES` pieces of each."""
     if not (system.computers or system.networks):
         return None
     timeline = timeline_of(system)
@@ -87,7 +87,7 @@ def _bars(system: System, blobs: Blobs) -> Bars | None:
     for shared in (*timeline.processors.values(), *timeline.links.values()):
         places = np.arange(len(rows), len(rows) + len(shared.owners))
         rows += shared.owners
-        part = slice(MOST_PIECES)
+        part = slice(MAX_PIECES)
         pieces.append(
             np.column_stack([places[shared.owner[part]], seconds(shared.begin[part]), seconds(shared.end[part])])
         )

@@ -13,7 +13,7 @@ from orchestration.experiments.report.blobs import Blobs
 from orchestration.experiments.report.model import Report, ReportRun, ReportShare, Setting
 from orchestration.experiments.report.number_format import percent
 from orchestration.experiments.report.reruns import Progress, Rerun, fastest, rerun
-from orchestration.experiments.report.subset import MOST_IN_BATCHES, MOST_SINGLY, points_for, select
+from orchestration.experiments.report.subset import MAX_IN_BATCHES, MAX_SINGLY, points_for, select
 from orchestration.experiments.report.tables import ColumnAxis, Row, is_good, report_table, share_of, shares_along
 from orchestration.experiments.report.tracks import Tracks
 from orchestration.experiments.studies.axis_labels import quantity_of
@@ -31,7 +31,7 @@ from orchestration.simulation.results.quantities import quantity
 from orchestration.simulation.workers.batching import LaneAgreement
 from orchestration.systems.system.criterion import DIVERGED, TERMINATED
 
-AGREES = 1e-6
+RERUN_TOLERANCE = 1e-6
 """Relative difference of the metric that is drawn first up to which a rerun equals the run in the store"""
 
 Choose = Callable[[int], Sequence[int]]
@@ -218,7 +218,7 @@ def embed(
             contents=["This file has no signals: a store has none. Make the report from the study file to see some."],
         )  # fmt: skip
     variant, files, lanes = fastest(study)
-    limit = (MOST_IN_BATCHES if lanes else MOST_SINGLY) if most is None else most
+    limit = (MAX_IN_BATCHES if lanes else MAX_SINGLY) if most is None else most
     selected = select(indices, required, limit) if choose is None else sorted({*required, *choose(limit)})
     runs: list[ReportRun] = []
     places: dict[int, int] = {}
@@ -248,7 +248,7 @@ def _difference(again: Rerun, row: Row, metric: str) -> str | None:
     if new is None or old is None:
         has, lacks = ("the store", "the rerun") if new is None else ("the rerun", "the store")
         return None if new is old else f"{has} has a value of {labels.metric(metric)}, {lacks} has none"
-    if abs(float(new) - float(old)) > AGREES * max(abs(float(new)), abs(float(old))):
+    if abs(float(new) - float(old)) > RERUN_TOLERANCE * max(abs(float(new)), abs(float(old))):
         return f"in the rerun {labels.metric(metric)} is {float(new):.6g}; the store has {float(old):.6g}"
     return None
 

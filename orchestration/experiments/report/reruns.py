@@ -21,7 +21,7 @@ from orchestration.systems.system.references import connect_references
 
 BATCH = 64
 """Runs at once, which limits the memory for their signals"""
-MOST_COLUMNS = 24
+MAX_COLUMNS = 24
 """of a system other than a quadrotor"""
 Progress = Callable[[float], None]
 """Receives the share of the reruns that is done"""
@@ -111,7 +111,7 @@ def _columns(systems: Sequence[System], files: Files) -> list[str]:
     if known is not None:
         sources = [name for name in common if name.partition(".")[0] in systems[0].sources]
         return [name for name in (*known.compact, *sources) if name in common]
-    return common[:MOST_COLUMNS]
+    return common[:MAX_COLUMNS]
 
 
 def _recorded(system: System, models: Mapping[str, Model]) -> list[str]:

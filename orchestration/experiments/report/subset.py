@@ -3,13 +3,13 @@
 import math
 from collections.abc import Iterator, Sequence
 
-MOST_IN_BATCHES = 1000
+MAX_IN_BATCHES = 1000
 """default number of runs whose signals are in a report"""
-MOST_SINGLY = 60
+MAX_SINGLY = 60
 """likewise if runs cannot be simulated in SIMD batches"""
 BYTES = 8_000_000
 """Limit on the characters of all signals"""
-MOST_POINTS, LEAST_POINTS = 400, 40
+MAX_POINTS, MIN_POINTS = 400, 40
 """of a run"""
 _CODED = 2.0 * 4.0 / 3.0
 """Characters of a number"""
@@ -45,4 +45,4 @@ def select(indices: Sequence[int], required: Sequence[int], most: int) -> list[i
 
 def points_for(runs: int, columns: int) -> int:
     """The number of points that each of `runs` tracks may have."""
-    return int(min(MOST_POINTS, max(LEAST_POINTS, BYTES / _CODED / max(1, runs * columns))))
+    return int(min(MAX_POINTS, max(MIN_POINTS, BYTES / _CODED / max(1, runs * columns))))

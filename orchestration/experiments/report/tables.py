@@ -16,9 +16,9 @@ from orchestration.foundation.basics.statistics import wilson
 from orchestration.simulation.results import display_names as labels
 from orchestration.simulation.results.quantities import Quantity
 
-MOST_ROWS = 50_000
+MAX_ROWS = 50_000
 """of a table; a larger study is thinned evenly"""
-MOST_VALUES = 40
+MAX_VALUES = 40
 """of an axis with a share for each value; other axes are divided into parts"""
 PARTS = 8
 OUTCOME = "outcome"
@@ -49,7 +49,7 @@ def report_table(
     is_grid: bool,
 ) -> ReportTable:
     """The table of the rows of a store; `tracks` and `messages` are by index in the design."""
-    kept = rows if len(rows) <= MOST_ROWS else [rows[i] for i in sorted(evenly(len(rows), MOST_ROWS))]
+    kept = rows if len(rows) <= MAX_ROWS else [rows[i] for i in sorted(evenly(len(rows), MAX_ROWS))]
     places = {row["design_index"]: place for place, row in enumerate(kept)}
     columns = [
         Column(
@@ -119,7 +119,7 @@ def shares_along(rows: Sequence[Row], axis: ColumnAxis, *, by_chance: bool) -> S
     distinct = list(dict.fromkeys(values))
     if len(distinct) < 2:
         return None
-    if len(distinct) <= MOST_VALUES:
+    if len(distinct) <= MAX_VALUES:
         groups: dict[Any, list[Row]] = {value: [] for value in _ordered(distinct)}
         for row, value in zip(rows, values):
             groups[value].append(row)

@@ -15,7 +15,7 @@ Value = Scalar
 Scale = Literal["linear", "logarithmic"]
 Method = Literal["random", "latin-hypercube", "sobol", "morris", "saltelli"]
 """Sampling methods: the last two are for sensitivity (Morris screening, Sobol indices)"""
-MOST_POINTS = 1_000_000
+MAX_POINTS = 1_000_000
 """Largest number of runs of a study"""
 
 
@@ -68,8 +68,8 @@ def span(name: str, low: float, high: float, number: int, scale: Scale) -> tuple
     _check_range(name, low, high, scale)
     if number < 2:
         raise UsageError(f"axis {name}: number = {number}, expected at least 2")
-    if number > MOST_POINTS:
-        raise UsageError(f"axis {name}: number = {number}, expected at most {MOST_POINTS}")
+    if number > MAX_POINTS:
+        raise UsageError(f"axis {name}: number = {number}, expected at most {MAX_POINTS}")
     axis = Axis(name=name, targets=(), low=low, high=high, scale=scale)
     # Twelve digits keep the steps of a decimal range decimal: 0.003 instead of 0.0030000000000000005.
     inner = [float(f"{axis.at(i / (number - 1)):.12g}") for i in range(1, number - 1)]
@@ -80,7 +80,7 @@ class Points(Sequence[dict[str, Value]]):
     """The design: every combination of the listed values, each with every sampled point, in that order.
 
     Each point is a dictionary of values by axis name, computed on access; the last listed axis varies fastest, but for
-    the samples. Raises `UsageError` for a design of more than `MOST_POINTS`, before it is expanded.
+    the samples. Raises `UsageError` for a design of more than `MAX_POINTS`, before it is expanded.
     """
 
     def __init__(self, axes: Sequence[Axis], method: Method, samples: int, seed: int) -> None:
@@ -93,9 +93,9 @@ class Points(Sequence[dict[str, Value]]):
                 raise UsageError(f"design.samples = {samples}: expected at least 1 for sampled axes")
             self._draws = samples * sensitivity.runs_a_sample(method, len(self._sampled))
         self._number = math.prod(sizes) * self._draws
-        if self._number > MOST_POINTS:
+        if self._number > MAX_POINTS:
             factors = " x ".join(map(str, [*sizes, *([self._draws] if self._sampled else [])]))
-            raise UsageError(f"{factors} = {self._number} runs: expected at most {MOST_POINTS}")
+            raise UsageError(f"{factors} = {self._number} runs: expected at most {MAX_POINTS}")
         if self._sampled:
             self._shares = unit_points(method, len(self._sampled), samples, seed)
 

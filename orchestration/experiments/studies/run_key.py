@@ -186,15 +186,15 @@ def place_parts(study: Study, files: Files) -> dict[str, str]:
 def difference(before: Mapping[str, str], now: Mapping[str, str]) -> str:
     """The changes in a few words; empty if there are none."""
     differing = [name for name in sorted({*before, *now}) if before.get(name) != now.get(name)]
-    changes = [f"{n} was {_short(before.get(n))}, is {_short(now.get(n))}" for n in differing[:_MOST]]
-    more = f"; and {len(differing) - _MOST} more" if len(differing) > _MOST else ""
+    changes = [f"{n} was {_short(before.get(n))}, is {_short(now.get(n))}" for n in differing[:_MAX_SETTINGS]]
+    more = f"; and {len(differing) - _MAX_SETTINGS} more" if len(differing) > _MAX_SETTINGS else ""
     return "; ".join(changes) + more
 
 
-_MOST, _LONGEST = 3, 60
+_MAX_SETTINGS, _MAX_LENGTH = 3, 60
 
 
 def _short(text: str | None) -> str:
     if text is None:
         return "absent"
-    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
+    return text if len(text) <= _MAX_LENGTH else f"{text[: _MAX_LENGTH - 3]}..."

@@ -8,7 +8,7 @@ FIXED = ("outcome", "good", "horizon", "diverged", "divergence_time", "steps")
 """Metrics of every system, besides its objectives; the wall-clock time of a run is its duration"""
 TEXTS = ("outcome",)
 """Metrics that are texts; all others are numbers"""
-MOST_OBJECTIVES = 1000
+MAX_OBJECTIVES = 1000
 """Largest number of columns, a limit of SQLite"""
 
 RUN = ("key", "status", "message", "seed", "duration", "machine")
@@ -64,5 +64,5 @@ def expect_columns(objectives: Iterable[str]) -> None:
         if not name or "\0" in name or lower in map(str.lower, taken) or lower.startswith(_ORIGINS):
             raise UsageError(f"objectives.{name}: the table of runs has a column of that name, expected another")
         taken.append(name)
-    if len(taken) > MOST_OBJECTIVES:
-        raise UsageError(f"objectives: {len(taken)} columns, expected at most {MOST_OBJECTIVES}")
+    if len(taken) > MAX_OBJECTIVES:
+        raise UsageError(f"objectives: {len(taken)} columns, expected at most {MAX_OBJECTIVES}")

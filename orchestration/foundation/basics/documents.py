@@ -21,9 +21,9 @@ else:
 
 _NOTES = logging.getLogger("quadcosim")
 
-LARGEST = 2**20
+MAX_FILE_LENGTH = 2**20
 """Largest number of characters in a TOML or JSON file"""
-LONGEST_NAME = 200
+MAX_NAME_LENGTH = 200
 DEEPEST = 20
 """Largest nesting depth of tables and lists"""
 
@@ -45,7 +45,7 @@ def readable(path: Path, what: str) -> Iterator[None]:
         raise UsageError(f"{path}: expected a readable {what}: its text is not in UTF-8 ({error.reason})") from error
 
 
-def read_text(path: Path, what: str, largest: int = LARGEST) -> str:
+def read_text(path: Path, what: str, largest: int = MAX_FILE_LENGTH) -> str:
     """The text of a UTF-8 file of at most `largest` characters; raises `UsageError`, naming `what` it should be."""
     if "\0" in str(path):
         raise UsageError(f"{path}: expected a path without NUL characters")
@@ -91,7 +91,7 @@ def tables_in(text: str) -> dict[str, Any]:
     return tables
 
 
-def read_json(path: Path, largest: int = LARGEST) -> Any:
+def read_json(path: Path, largest: int = MAX_FILE_LENGTH) -> Any:
     """The value of a JSON file of at most `largest` characters.
 
     Raises `UsageError` if it is not JSON, which has no `NaN` and `Infinity`.
@@ -147,7 +147,7 @@ def _expect_plain(value: Any, place: str) -> None:
         if depth == DEEPEST:
             raise UsageError(f"{place}: expected at most {DEEPEST} tables and lists in each other")
         for key, item in items:
-            if "\0" in key or len(key) > LONGEST_NAME:
-                expected = f"a name without NUL characters, of at most {LONGEST_NAME} characters"
+            if "\0" in key or len(key) > MAX_NAME_LENGTH:
+                expected = f"a name without NUL characters, of at most {MAX_NAME_LENGTH} characters"
                 raise UsageError(f"{place}: {shown(repr(key))}: expected {expected}")
             waiting.append((f"{place}: {key}" if depth == 0 else f"{place}.{key}", depth + 1, item))

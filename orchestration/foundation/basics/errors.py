@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-LONGEST = 4000
+MAX_MESSAGE_LENGTH = 4000
 """Largest number of characters in a message: names in it may come from a file and have any length"""
 
 
@@ -63,12 +63,12 @@ def no_utf8(error: UnicodeEncodeError) -> UsageError:
 
 
 def one_line(text: str) -> str:
-    """`text` in one line of printable characters, cut to `LONGEST`."""
+    """`text` in one line of printable characters, cut to `MAX_MESSAGE_LENGTH`."""
     if not text.isprintable():
         text = "".join(
             c if c.isprintable() else c.encode("unicode_escape").decode() for c in " ".join(text.split("\n"))
         )
-    return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"
+    return text if len(text) <= MAX_MESSAGE_LENGTH else f"{text[: MAX_MESSAGE_LENGTH - 1]}…"
 
 
 def expected_name(name: str, known: Sequence[str]) -> str:

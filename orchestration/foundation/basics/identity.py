@@ -4,7 +4,7 @@ from collections.abc import Callable, Hashable
 from typing import Any, Generic, TypeVar
 
 Result = TypeVar("Result")
-MOST = 256
+MAX_CACHED = 256
 """Largest number of cached results"""
 
 
@@ -23,7 +23,7 @@ class IdentityCache(Generic[Result]):
         """The result of the function for these objects."""
         key = tuple(map(id, objects))  # ids stay unique: the cache keeps its arguments alive
         if key not in self._cached:
-            if len(self._cached) >= MOST:
+            if len(self._cached) >= MAX_CACHED:
                 self._cached.clear()
             self._cached[key] = objects, self._function(*objects)
         return self._cached[key][1]

@@ -24,7 +24,7 @@ from orchestration.foundation.processes.watch import Watch
 
 _KEPT = 16_384
 """Bytes kept of the end of the process's output"""
-_LONGEST = 64.0
+_MAX_MESSAGE_MB = 64.0
 """[MB] of one message from a process whose output is limited, at most"""
 _OUT_OF_PROCESSOR = "it uses more processor time than the system allows (ulimit -t)"
 _PATIENCE = 60.0
@@ -91,7 +91,7 @@ class Child:
         self.pid = process.pid
         self._is_limited = math.isfinite(limits.time)
         self._output = None if process.stderr is None else _Output(process.stderr)
-        self._longest_message = math.inf if math.isinf(limits.output) else _LONGEST * 1e6
+        self._longest_message = math.inf if math.isinf(limits.output) else _MAX_MESSAGE_MB * 1e6
         self._watch = Watch(process, family, limits, self._output)
         self._end = weakref.finalize(self, _terminate, process, family, self._watch)
 
@@ -125,7 +125,7 @@ class Child:
             return read_frame(self._process.stdout, self._longest_message)
         except LongError:
             self.close()
-            self._watch.reached = self._watch.reached or f"it sends more than {_LONGEST:g} MB at once"
+            self._watch.reached = self._watch.reached or f"it sends more than {_MAX_MESSAGE_MB:g} MB at once"
             raise Died(self._ending_now()) from None
         except EOFError:
             raise Died(self._ending_now()) from None

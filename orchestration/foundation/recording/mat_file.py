@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-LONGEST = 63
+MAX_NAME_LENGTH = 63
 """characters of a name in MATLAB"""
 _KEYWORDS = {
     "break", "case", "catch", "classdef", "continue", "else", "elseif", "end", "for", "function", "global", "if",
@@ -60,7 +60,7 @@ def valid(name: str) -> str:
     word = re.sub(r"\W", "_", name, flags=re.ASCII)
     if not re.match(r"[A-Za-z]", word) or word in _KEYWORDS:
         word = f"x{word}"
-    return word[:LONGEST]
+    return word[:MAX_NAME_LENGTH]
 
 
 def _free(name: str, taken: Mapping[str, Any]) -> str:
@@ -68,7 +68,7 @@ def _free(name: str, taken: Mapping[str, Any]) -> str:
     free, number = name, 1
     while free in taken:
         number += 1
-        free = f"{name[: LONGEST - 4]}_{number}"
+        free = f"{name[: MAX_NAME_LENGTH - 4]}_{number}"
     return free
 
 

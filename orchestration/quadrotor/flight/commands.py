@@ -17,7 +17,7 @@ from orchestration.simulation.figures.style import Style
 NAMES = dict(zip(COMMAND, ("thrust", "torque x", "torque y", "torque z"), strict=True))
 UNITS = dict(zip(COMMAND, ("N", "N.m", "N.m", "N.m"), strict=True))
 COLUMNS = tuple(f"plant.{name}" for name in COMMAND)
-MOST_MARKS = 150
+MAX_MARKS = 150
 """of one kind that can be told apart in a window"""
 AT_LIMIT = "a limit of the plant is active"
 
@@ -100,7 +100,7 @@ def mark_events(axes: Axes, run: Run, span: Window) -> None:
     ):
         times = run.instants(kind, what)
         times = times[(times >= span[0]) & (times <= span[1])]
-        if len(times) and (kind == "lost" or len(times) <= MOST_MARKS):
+        if len(times) and (kind == "lost" or len(times) <= MAX_MARKS):
             axes.plot(
                 times, [height] * len(times), linestyle="", marker=marker, color=color, markersize=4,
                 markeredgewidth=0.8,

@@ -19,7 +19,7 @@ from orchestration.simulation.figures.style import Style
 
 RATE = 20
 """[pictures/s]"""
-MOST = 240
+MAX_PICTURES = 240
 """pictures: a longer flight is shown faster"""
 DPI = 100.0
 TRAIL = 2.0
@@ -57,7 +57,7 @@ def film(runs: Sequence[Run], path: Path, style: Style, progress: Share = lambda
     """Write an animation of runs, each with its trail; its path. Raises `UsageError` as `writer` does."""
     movie = writer(path)
     start, end = min(run.span[0] for run in runs), max(run.span[1] for run in runs)
-    count = max(2, min(MOST, round(RATE * (end - start))))
+    count = max(2, min(MAX_PICTURES, round(RATE * (end - start))))
     times = np.linspace(start, end, count)
     pace = (end - start) * RATE / (count - 1)
     style = replace(style, dpi=DPI)

@@ -22,7 +22,7 @@ from orchestration.simulation.figures.style import Style
 
 ROUNDS = 4
 """iterations of the layout, after which changes are invisible"""
-LEAST = 0.45
+MIN_SIDE = 0.45
 """shortest side of the box as a share of the longest"""
 
 
@@ -118,7 +118,7 @@ def _equal(axes: Any, points: Floats, *, is_enu: bool, is_wide: bool) -> None:
     points = points[np.isfinite(points).all(axis=1)]
     low, high = points.min(axis=0), points.max(axis=0)
     middle, size = 0.5 * (low + high), 1.08 * (high - low)
-    size = np.maximum(size, max(LEAST * float(size.max()), 1e-6))
+    size = np.maximum(size, max(MIN_SIDE * float(size.max()), 1e-6))
     starts, ends = middle - 0.5 * size, middle + 0.5 * size
     axes.set(xlim=(starts[0], ends[0]), ylim=(starts[1], ends[1]), zlim=(starts[2], ends[2]))
     if not is_enu:

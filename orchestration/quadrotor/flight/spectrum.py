@@ -18,12 +18,12 @@ SEGMENTS = 8
 """of the run, before they overlap by half"""
 ROUNDING = 1e-18
 """of the largest density: below it is rounding, not signal"""
-FEWEST = 64
+MIN_SEGMENT = 64
 """values in a segment"""
 
 
 def spectrum(runs: Sequence[Run], style: Style) -> Figure | None:
-    """Power spectral densities of thrust and torques as applied; None for less than `FEWEST` steps of the plant."""
+    """Power spectral densities of thrust and torques as applied; None for less than `MIN_SEGMENT` plant steps."""
     with_command = [(run, *of) for run in runs if (of := _command(run)) is not None]
     if not with_command:
         return None
@@ -65,7 +65,7 @@ def welch(values: Floats, step: float) -> tuple[Floats, Floats]:
     `values` are of shape (n, signals), `step` apart [s]. Returns frequencies [Hz], shape (m,), and densities
     [unit²/Hz], shape (m, signals).
     """
-    length = min(len(values), max(FEWEST, len(values) // SEGMENTS))
+    length = min(len(values), max(MIN_SEGMENT, len(values) // SEGMENTS))
     starts = range(0, len(values) - length + 1, max(1, length // 2))
     window = np.hanning(length + 1)[:-1, None]
     power = np.zeros((length // 2 + 1, values.shape[1]))
@@ -89,7 +89,7 @@ def _command(run: Run) -> tuple[float, Floats] | None:
     rows = np.concatenate([[chunk.signals[name] for name in ("time", *COLUMNS)] for chunk in chunks], axis=1).T
     start, end = run.window or (0.0, float(rows[-1, 0]))
     count = int((min(end, rows[-1, 0]) - start) / step + 1e-9)
-    if count < FEWEST or not np.isfinite(rows).all():
+    if count < MIN_SEGMENT or not np.isfinite(rows).all():
         return None
     grid = start + step * (np.arange(count) + 0.5)  # between the instants, so that none is missed by rounding
     held = np.searchsorted(rows[:, 0], grid, side="right") - 1

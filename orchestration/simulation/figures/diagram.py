@@ -17,7 +17,7 @@ from orchestration.systems.system.description import describe_faults, describe_r
 from orchestration.systems.system.model import System
 from orchestration.systems.system.variable_names import component_of, variable_of
 
-MOST = 40
+MAX_BOXES = 40
 """Boxes in a row that are still legible"""
 PITCH, WIDTH, HEIGHT, LANE = 4.2, 2.6, 1.5, 0.75
 """Between boxes, of a box, between lanes [inch]"""
@@ -57,8 +57,8 @@ def write(system: System, path: Path) -> Path:
 def draw(system: System) -> Figure:
     """Boxes with their rates, arrows with their variables; dashed where messages may be late or lost."""
     boxes = _boxes(system)
-    if len(boxes) > MOST:
-        raise UsageError(f"--out: {len(boxes)} components and sources; expected at most {MOST} in a figure")
+    if len(boxes) > MAX_BOXES:
+        raise UsageError(f"--out: {len(boxes)} components and sources; expected at most {MAX_BOXES} in a figure")
     places = {name: i for i, name in enumerate(boxes)}
     arrows = _arrows(system, places)
     ahead = _lanes([a for a in arrows if a.start < a.end])

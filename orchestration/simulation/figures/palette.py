@@ -7,9 +7,9 @@ UMBER, SAND, CHARCOAL, SILVER = "#6f4f28", "#c9a66b", "#3a3a3a", "#b0b0b0"
 
 CYCLE = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY, BROWN, GREY)
 """For lines of one kind in turn: neighbours differ in brightness too"""
-MOST_LINES = len(CYCLE)
+MAX_LINES = len(CYCLE)
 """In one panel; more get further panels"""
-MOST_PANELS = 24
+MAX_PANELS = 24
 """Of signals, at first sight: a page or figure of more takes long and says little"""
 DASHES = ("-", "--", "-.", ":")
 """Of overlaid lines, so that they differ in grey print too"""

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from orchestration.simulation.figures.lines import TIME, abreast, legend_of_runs, quantity, set_time_axis, wrapped
-from orchestration.simulation.figures.palette import CYCLE, DASHES, MOST_LINES, MOST_PANELS
+from orchestration.simulation.figures.palette import CYCLE, DASHES, MAX_LINES, MAX_PANELS
 from orchestration.simulation.figures.run import Run, title
 from orchestration.simulation.figures.style import Style
 from orchestration.simulation.results import display_names as labels
@@ -21,11 +21,11 @@ Panel = tuple[str, str | None, list[str]]
 def signals(runs: Sequence[Run], style: Style) -> Figure:
     """A panel for each connection and unit, its signals as the receiver has them.
 
-    Without connections, the recorded outputs of each component. Of more than `MOST_PANELS` the first are drawn,
+    Without connections, the recorded outputs of each component. Of more than `MAX_PANELS` the first are drawn,
     and the number of signals of the others is stated.
     """
     available = [*_panels(runs[0].system, runs[0].described)]
-    contents = available[:MOST_PANELS]
+    contents = available[:MAX_PANELS]
     figure = style.figure(3.0 + 10.5 * max(1, len(contents)))
     panels = figure.subplots(max(1, len(contents)), 1, sharex=True, squeeze=False)[:, 0]
     for panel, (name, unit, columns) in zip(panels, contents):
@@ -38,7 +38,7 @@ def signals(runs: Sequence[Run], style: Style) -> Figure:
     if style.has_titles and title(runs):
         figure.suptitle(title(runs))
     panels[-1].set_xlabel(TIME)
-    if left_out := sum(len(columns) for _, _, columns in available[MOST_PANELS:]):
+    if left_out := sum(len(columns) for _, _, columns in available[MAX_PANELS:]):
         figure.supxlabel(f"and {left_out} more signals")
     legend_of_runs(figure, runs, style)
     return figure
@@ -46,7 +46,7 @@ def signals(runs: Sequence[Run], style: Style) -> Figure:
 
 def drawn(system: System, described: Mapping[str, ColumnInfo]) -> set[str]:
     """The columns that the figure of a run reads, of all that are `described`."""
-    shown = [*_panels(system, described)][:MOST_PANELS]
+    shown = [*_panels(system, described)][:MAX_PANELS]
     return {"time", *(column for _, _, columns in shown for column in columns)}
 
 
@@ -63,8 +63,8 @@ def _panels(system: System, described: Mapping[str, ColumnInfo]) -> Iterator[Pan
             if column in described:
                 by_unit.setdefault(described[column].unit, []).append(column)
         for unit, of_unit in by_unit.items():
-            for first in range(0, len(of_unit), MOST_LINES):
-                yield name, unit, of_unit[first : first + MOST_LINES]
+            for first in range(0, len(of_unit), MAX_LINES):
+                yield name, unit, of_unit[first : first + MAX_LINES]
 
 
 def _draw(panel: Axes, run: Run, columns: Sequence[str], *, alone: bool) -> None:

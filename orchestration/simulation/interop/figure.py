@@ -12,7 +12,7 @@ from orchestration.simulation.interop.compare import Agreement
 from orchestration.simulation.interop.table import TOLERANCE
 from orchestration.systems.system.variable_names import component_of
 
-SMALLEST = 1e-17
+ZERO_DRAWN_AT = 1e-17
 """at which a difference of zero is drawn"""
 
 _KINDS = {
@@ -44,7 +44,7 @@ def agreement_chart(agreements: Sequence[Agreement]) -> Figure:
                 values = [value for signal, value in differences.items() if signal.startswith(prefix)]
                 if values:
                     panel.plot(
-                        max(max(values), SMALLEST), y, marker, color=color, markersize=5,
+                        max(max(values), ZERO_DRAWN_AT), y, marker, color=color, markersize=5,
                         markerfacecolor=color if filled else "none", linestyle="none",
                         label=name if filled else None,
                     )  # fmt: skip

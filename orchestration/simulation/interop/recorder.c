@@ -22,7 +22,7 @@
     CALL(GetBooleanStatus) CALL(GetStringStatus)
 #define WATCHED(CALL) CALL(Instantiate) CALL(ExitInitializationMode) CALL(DoStep) CALL(SetReal) CALL(SetInteger) CALL(SetBoolean)
 
-enum { ERROR = 3, LONGEST = 4096 };
+enum { ERROR = 3, LINE_SIZE = 4096 };
 enum { REAL, INTEGER, BOOLEAN };
 typedef const unsigned *References;
 typedef struct {
@@ -33,7 +33,7 @@ typedef struct {
 
 static void *own;
 static FILE *record;
-static char guid[LONGEST];
+static char guid[LINE_SIZE];
 static Port *inputs, *outputs;
 static int input_count, output_count;
 
@@ -63,7 +63,7 @@ static Port *ports(FILE *file, int count)
 __attribute__((constructor)) static void open_own(void)
 {
     Dl_info here;
-    char path[3 * LONGEST], line[LONGEST];
+    char path[3 * LINE_SIZE], line[LINE_SIZE];
     if (!dladdr((void *)missing, &here))
         abort();
     snprintf(path, sizeof path, "%.*s.record", (int)(strlen(here.dli_fname) - strlen(".so")), here.dli_fname);

@@ -13,7 +13,7 @@ from orchestration.simulation.figures.views import VIEWS, view_of
 from orchestration.simulation.runs.run_labels import labels_of_runs
 from orchestration.simulation.runs.run_like import RunLike
 
-MOST = 2**16
+MAX_ROWS_OUTSIDE = 2**16
 """The most rows that are drawn of the whole of a run, beside all in the window"""
 
 
@@ -61,7 +61,7 @@ def figures_of(
 def runs_of(
     results: Sequence[RunLike], names: Sequence[str], columns: Collection[str] | None, window: Window | None
 ) -> list[Run]:
-    """Runs ready to be drawn: of more than `MOST` rows every n-th and all in the window; default: all columns."""
+    """Runs ready to be drawn: at most `MAX_ROWS_OUTSIDE` rows, and all in the window; default: all columns."""
     return [
         Run(
             name=name,
@@ -72,7 +72,7 @@ def runs_of(
                 result.recording,
                 set(result.recording.columns if columns is None else columns),
                 window or (0.0, 1.0),
-                MOST,
+                MAX_ROWS_OUTSIDE,
             ),
             whole=result.recording,
             described=result.described,

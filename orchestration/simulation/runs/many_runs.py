@@ -12,7 +12,7 @@ from orchestration.components.building import fmus
 from orchestration.components.fmi.model import Model, read_model
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError, expected_name
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.simulation.engines.batch.batch import MOST_ROWS
+from orchestration.simulation.engines.batch.batch import MAX_ROWS
 from orchestration.simulation.engines.batch.batches import Batches
 from orchestration.simulation.engines.batch.shape import expect_lanes
 from orchestration.simulation.engines.wiring import check_against_fmus, columns_of, source_signals
@@ -137,8 +137,8 @@ def _in_lanes(runs: Columns, parameters: Mapping[str, float], record: Sequence[s
     """All runs, in lanes but for those that must run alone; `parameters` are those of all components."""
     places = {name: i for i, name in enumerate(_of_components(runs.system, record), 1)}
     for place, summary, rows in Batches().each(runs.systems, list(places) if record else None, runs.parameters):
-        if len(rows) == MOST_ROWS:
-            raise UsageError(f"record: run {place} has more than {MOST_ROWS} rows; expected runs of fewer")
+        if len(rows) == MAX_ROWS:
+            raise UsageError(f"record: run {place} has more than {MAX_ROWS} rows; expected runs of fewer")
         if summary is None:
             yield from _one_by_one(runs, [place], record)
             continue

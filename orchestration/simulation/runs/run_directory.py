@@ -26,7 +26,7 @@ METRICS, SCENARIO, PROVENANCE = "metrics.json", "scenario.toml", "provenance.jso
 CHECKSUMS = "checksums"
 """in the provenance, of all files of a run"""
 _CHECKED = (SIGNALS, EVENTS, METRICS, SCENARIO)
-LARGEST = 2**26
+MAX_JSON_LENGTH = 2**26
 """Largest number of characters of its JSON files: the provenance describes each column"""
 MAT = "run.mat"
 """of a run that has been exported to it"""
@@ -131,7 +131,7 @@ _TEXT, _NUMBER = (str, type(None)), (int, float, type(None))
 
 def _object(path: Path, **types: tuple[type, ...]) -> dict[str, Any]:
     """The object in a JSON file; raises `UsageError` unless the values by these names have one of these types."""
-    content = read_json(path, LARGEST)
+    content = read_json(path, MAX_JSON_LENGTH)
     if not isinstance(content, dict):
         raise UsageError(f"{path}: expected an object")
     for name, kinds in types.items():

@@ -14,7 +14,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-MOST = 3
+MAX_SETTINGS_IN_LABEL = 3
 """settings in a label"""
 _ABSENT = object()
 
@@ -25,7 +25,7 @@ def labels_of_runs(results: Sequence[RunLike], otherwise: Sequence[str]) -> list
     paths = [path for path in dict.fromkeys(path for one in settings for path in one) if _differs(path, settings)]
     named = {path: quantities.setting(path, [one.get(path) for one in settings]) for path in paths}
     names = [", ".join(_one(path, each, one.get(path)) for path, each in named.items()) for one in settings]
-    if 0 < len(paths) <= MOST and len(set(names)) == len(names):
+    if 0 < len(paths) <= MAX_SETTINGS_IN_LABEL and len(set(names)) == len(names):
         return names
     return list(otherwise)
 

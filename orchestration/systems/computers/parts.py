@@ -23,7 +23,7 @@ AT_ONCE = 1024
 IS_CONSTANT = -1
 """In place of the used numbers of a stream: it is constant"""
 
-MOST_WAITING = 2**20
+MAX_WAITING = 2**20
 """The most jobs of a task, or frames of a message on a link, that may wait: 100 MB or less"""
 
 FIXED_PRIORITY, EARLIEST_DEADLINE, FIRST_COME = range(3)
@@ -135,8 +135,8 @@ class Parts:
         place = self.places[owner] if owner < len(self.places) else str(owner)
         if owner < len(self.tasks):
             expected = "that it gets its processor as often, or overrun skip or abort"
-            return UsageError(f"{place}: more than {MOST_WAITING} of its jobs wait: expected {expected}")
-        return UsageError(f"{place}: more than {MOST_WAITING} of its frames wait: expected a network that carries them")
+            return UsageError(f"{place}: more than {MAX_WAITING} of its jobs wait: expected {expected}")
+        return UsageError(f"{place}: more than {MAX_WAITING} of its frames wait: expected a network that carries them")
 
 
 # Kinds of notes; a note is a row of time, kind, owner, index of its job or frame, and one more value.

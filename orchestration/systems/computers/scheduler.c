@@ -103,7 +103,7 @@ static void grow(Scheduler *s, Queue *q) {
     } while (0)
 
 static int has_room(Scheduler *s, const Queue *q, int64_t owner) {
-    if (q->count < MOST_WAITING) return 1;
+    if (q->count < MAX_WAITING) return 1;
     s->queue_overflow = owner, s->no_memory = 1;
     return 0;
 }

@@ -26,7 +26,7 @@ from orchestration.systems.computers.parts import (
     FRAME_TRANSMITTED,
     INTERRUPTED,
     LATER,
-    MOST_WAITING,
+    MAX_WAITING,
     NONE,
     PREEMPTED,
     QUEUED,
@@ -316,7 +316,7 @@ class Scheduler:
             self._note(now, SKIPPED, i, number, nominal)
             return
         job = _Job(number, nominal, now, nominal + task.part.deadline, execution)
-        if len(task.jobs) == MOST_WAITING:
+        if len(task.jobs) == MAX_WAITING:
             raise self._parts.queue_overflow(i)
         task.jobs.append(job)
         self._note(now, RELEASED, i, number, nominal)
@@ -492,7 +492,7 @@ class Scheduler:
     def _queue(self, j: int, frame: _Frame, now: int) -> None:
         leg = self._legs[j]
         frame.queued = now
-        if len(leg.frames) == MOST_WAITING:
+        if len(leg.frames) == MAX_WAITING:
             raise self._parts.queue_overflow(len(self._tasks) + leg.message)
         leg.frames.append(frame)
         self._links[leg.part.link].changed = True

@@ -13,7 +13,7 @@ from fmu_kit.syntax_trees import parse_expression
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.systems.expressions.operators import OPERATORS
 
-LONGEST, DEEPEST = 10_000, 60
+MAX_EXPRESSION_LENGTH, MAX_NESTING = 10_000, 60
 """The most characters, and the deepest nesting, of an expression"""
 
 OVER_RUN = {
@@ -115,8 +115,8 @@ def parse(text: str) -> Node:
 @functools.lru_cache(maxsize=1024)
 def parse_job_measures(text: str) -> Node:
     """As `parse`, with measures of jobs as nodes."""
-    if not isinstance(text, str) or len(text) > LONGEST:
-        raise UsageError(f"expected an expression of at most {LONGEST} characters")
+    if not isinstance(text, str) or len(text) > MAX_EXPRESSION_LENGTH:
+        raise UsageError(f"expected an expression of at most {MAX_EXPRESSION_LENGTH} characters")
     try:
         tree = parse_expression(text.strip())
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
@@ -223,8 +223,8 @@ _SIGNS = {operator.tree: word for word, operator in OPERATORS.items() if operato
 
 
 def _node(tree: ast.expr, text: str, depth: int) -> Node:
-    if depth > DEEPEST:
-        raise UsageError(f"{_short(text)}: expected an expression nested at most {DEEPEST} deep")
+    if depth > MAX_NESTING:
+        raise UsageError(f"{_short(text)}: expected an expression nested at most {MAX_NESTING} deep")
     build: Callable[[ast.expr], Node] = lambda child: _node(child, text, depth + 1)  # noqa: E731
     match tree:
         case ast.Constant(value=bool(value)):

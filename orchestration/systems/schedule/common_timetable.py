@@ -29,7 +29,7 @@ class CommonTimetable:
     def __init__(self, system: System, fixed: Mapping[str, FixedStep]) -> None:
         """`fixed` has the components of fixed step.
 
-        Raises `UsageError` if the end is between two points of one of them, or for times beyond `LONGEST`.
+        Raises `UsageError` if the end is between two points of one of them, or for times beyond `MAX_TIME`.
         """
         expect_no_longer(system)
         self.system, self.fixed, self.plan = system, fixed, Plan(system)

@@ -9,14 +9,14 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import messages_by_connection, placed_messages, placed_tasks
 from orchestration.systems.system.sampling import Sampling
 
-LONGEST = 2**60
+MAX_TIME = 2**60
 """[ns], 36 years: the sum of a few of them still fits into 64 bits"""
-MOST_AHEAD = 10**6
+MAX_AHEAD = 10**6
 """The largest delay of a measurement in samples: all of them are drawn before the first one"""
 
 
 def expect_no_longer(system: System) -> None:
-    """Raise `UsageError` for a time beyond `LONGEST`."""
+    """Raise `UsageError` for a time beyond `MAX_TIME`."""
     times = {"stop_time": system.stop_time}
     times |= {f"components.{name}.step": component.step or 0.0 for name, component in system.components.items()}
     times |= {f"sources.{name}.period": source.period or 0.0 for name, source in system.sources.items()}
@@ -42,8 +42,8 @@ def expect_no_longer(system: System) -> None:
         times[f"a frame of {of.place}"] = seconds(frame_nanoseconds(of.network, of.message, ERROR_BITS))
         times[f"networks.{of.network_name}.latency"] = of.network.latency
     for place, time in times.items():
-        if time >= seconds(LONGEST):
-            raise UsageError(f"{place} = {time:g} s: expected less than {seconds(LONGEST):.4g} s")
+        if time >= seconds(MAX_TIME):
+            raise UsageError(f"{place} = {time:g} s: expected less than {seconds(MAX_TIME):.4g} s")
     over = messages_by_connection(system)
     for x in system.connections:
         sampling = system.components[x.receiver].sampling
@@ -52,10 +52,10 @@ def expect_no_longer(system: System) -> None:
         period, late = sampling.period / sampling.clock_ratio, highest(x.delay) + highest(x.delay_jitter)
         if x.name in over:
             continue
-        if late > MOST_AHEAD * period:
+        if late > MAX_AHEAD * period:
             raise UsageError(
                 f"connections.{x.name}.delay: is measured {late:g} s before a sample of "
-                f"{x.receiver}, every {period:g} s: expected at most {MOST_AHEAD} samples"
+                f"{x.receiver}, every {period:g} s: expected at most {MAX_AHEAD} samples"
             )
 
 

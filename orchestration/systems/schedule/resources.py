@@ -353,6 +353,6 @@ def _poisson(start: int, rate: float, generator: np.random.Generator) -> Stream:
 
 
 def timeline_of(system: System) -> Timeline:
-    """The timeline of a system up to its end; raises `UsageError` for times beyond `LONGEST`."""
+    """The timeline of a system up to its end; raises `UsageError` for times beyond `MAX_TIME`."""
     expect_no_longer(system)
     return Resources(system, nanoseconds(system.stop_time)).timeline(Streams(system.seed, system.streams))

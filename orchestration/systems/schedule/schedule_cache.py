@@ -16,7 +16,7 @@ from orchestration.systems.system.randomness import has_random_timing
 
 INSTANTS = 2**15
 """Approximate number of a span"""
-MOST = 2**17
+MAX_CACHED_INSTANTS = 2**17
 """The most instants of a cached schedule"""
 _KEPT = 8
 
@@ -87,10 +87,10 @@ class ScheduleCache:
         count = 0
         for span in table.spans(INSTANTS):
             count += len(span.regular) + len(span.own)
-            if count <= MOST:
+            if count <= MAX_CACHED_INSTANTS:
                 found.append(span)
             yield span
-        if count <= MOST:
+        if count <= MAX_CACHED_INSTANTS:
             _keep(self._kept, key, (table.first_samples, found))
 
 

@@ -13,7 +13,7 @@ from orchestration.systems.signals.spline import DEGREE, Spline, through
 from orchestration.systems.signals.table_file import TIME, TableRows, read_rows
 
 HOLD, SPEED = "hold", "speed"
-_SAMPLES, _FINER = 32, 3
+_SAMPLES, _REFINEMENTS = 32, 3
 """Samples of a piece, and of the neighbourhood of the largest in each refinement; the number of refinements"""
 
 
@@ -76,7 +76,7 @@ def _peak(curve: Spline, order: int, limits: Floats) -> float:
     """The largest ratio of a derivative of the curve to the limit of its piece."""
     begins, ends = curve.knots[:-1], curve.knots[1:]
     shares = np.linspace(0.0, 1.0, _SAMPLES + 1)
-    for _ in range(_FINER):
+    for _ in range(_REFINEMENTS):
         t = begins[:, None] + (ends - begins)[:, None] * shares
         size = np.linalg.norm(curve.at(t.ravel())[:, order], axis=1).reshape(t.shape)
         best = size.argmax(axis=1)

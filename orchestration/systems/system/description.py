@@ -15,7 +15,7 @@ from orchestration.systems.system.sampling import Sampling, SamplingOnArrival, T
 from orchestration.systems.system.source import Source
 from orchestration.systems.system.variable_names import variable_of
 
-MOST = 6
+MAX_NAMES_IN_CELL = 6
 """names in a cell; more are counted"""
 
 
@@ -159,7 +159,7 @@ def describe_varying(of: Varying, formatted: Callable[[float], str] | None = Non
     values = [formatted(value) for value in of.values or ()]
     if of.probabilities is not None:
         values = [f"{value} ({share:g})" for value, share in zip(values, of.probabilities, strict=True)]
-    return f"one of {listed(values, MOST)}"
+    return f"one of {listed(values, MAX_NAMES_IN_CELL)}"
 
 
 def _largest(jitter: Varying, spread: str) -> str:
@@ -183,7 +183,7 @@ def _parameters(component: Component) -> str:
 
 
 def _shortened(names: Sequence[str]) -> str:
-    """Scalars of a vector under its name, as `position.{x,y,z}`; at most `MOST` names."""
+    """Scalars of a vector under its name, as `position.{x,y,z}`; at most `MAX_NAMES_IN_CELL` names."""
     groups: dict[str, list[str]] = {}
     for name in names:
         stem, dot, last = name.rpartition(".")
@@ -192,7 +192,7 @@ def _shortened(names: Sequence[str]) -> str:
         f"{stem}{parts[0]}" if len(parts) == 1 else f"{stem}.{{{','.join(part[1:] for part in parts)}}}"
         for stem, parts in groups.items()
     ]
-    return listed(named, MOST)
+    return listed(named, MAX_NAMES_IN_CELL)
 
 
 def _table(rows: Sequence[Sequence[str]]) -> list[str]:

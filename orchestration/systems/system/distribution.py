@@ -14,7 +14,7 @@ from orchestration.systems.system.requirements import is_finite, require, requir
 if TYPE_CHECKING:
     from orchestration.foundation.basics.simulator import Floats
 
-LEAST_INSIDE = 1e-6
+MIN_INSIDE = 1e-6
 """The least share of a normal distribution within its range: with less, digits are lost"""
 
 
@@ -115,9 +115,7 @@ class Distribution:
         assert self.range is not None
         _require_span("range", self.range)
         inside = self.share(self.range[1]) - self.share(self.range[0])
-        require(
-            inside >= LEAST_INSIDE, "range", list(self.range), f"one that has {LEAST_INSIDE:g} of it or more inside"
-        )
+        require(inside >= MIN_INSIDE, "range", list(self.range), f"one that has {MIN_INSIDE:g} of it or more inside")
 
     def _expect_values(self) -> None:
         assert self.values is not None

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from controller_fmu.redesign.matching import matched_command, residuals, rotation_vector, solve
 from controller_fmu.redesign.nominal import closed_loop, under_command
-from controller_fmu.redesign.prediction import MOST_PENDING, all_sent, predicted_state, with_command
+from controller_fmu.redesign.prediction import MAX_PENDING, all_sent, predicted_state, with_command
 from controller_fmu.sliding_mode.law import Gains, evaluate, implicit_sliding
 from controller_fmu.vehicle import Measurement, Model
 from fmu_kit.algebra import Inertia, Quaternion, Vec3
@@ -152,4 +152,4 @@ def test_predictor_flies_the_commands_in_the_order_in_which_they_act() -> None:
     legs = [leg for leg in simulated if leg[1] > 1e-12]
     assert [thrust for thrust, _ in legs] == [11.0, 12.0, 13.0]  # that of t = 0 acts from 0.2 on
     assert [time for _, time in legs] == pytest.approx([0.05, 0.1, 0.05])
-    assert len(pending) == MOST_PENDING
+    assert len(pending) == MAX_PENDING

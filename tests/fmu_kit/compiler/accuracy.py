@@ -11,7 +11,7 @@ from mpmath import mp, mpf
 from tests.fmu_kit.compiler.compiled import Floats, results
 
 Arguments = tuple[Floats, ...]
-MANTISSA, LEAST = 53, -1074  # bits of a double; the exponent of the smallest one
+MANTISSA, MIN_EXPONENT = 53, -1074  # bits of a double; the exponent of the smallest one
 SEED = 11
 
 STATED: dict[str, float] = {
@@ -104,7 +104,7 @@ def arguments(name: str, count: int) -> Iterator[Arguments]:
 
 def last_place(exact: mpf) -> mpf:
     """The distance of the doubles about an exact number."""
-    return mpf(2) ** max(mp.frexp(exact)[1] - MANTISSA, LEAST) if exact else mpf(2) ** LEAST
+    return mpf(2) ** max(mp.frexp(exact)[1] - MANTISSA, MIN_EXPONENT) if exact else mpf(2) ** MIN_EXPONENT
 
 
 def largest_error(loops: ctypes.CDLL, name: str, count: int) -> tuple[float, tuple[float, ...]]:

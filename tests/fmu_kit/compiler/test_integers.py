@@ -35,7 +35,7 @@ OPERATIONS: dict[str, Callable[[int, int], int]] = {
     "bit_or": operator.or_,
     "bit_xor": operator.xor,
 }
-MOST = 2**integers.BITS - 1
+MAX_INTEGER = 2**integers.BITS - 1
 EDGES = [sign * (2**k + d) for k in (0, 31, 32, 53, 63, 64, 96, 126) for d in (-1, 0, 1) for sign in (-1, 1)]
 SPANS = list(itertools.combinations_with_replacement((-17, -16, -9, -3, -1, 0, 1, 2, 7, 8, 15), 2))
 SLAVE = """\
@@ -91,7 +91,7 @@ def test_the_arithmetic_of_128_bits_is_that_of_python(tmp_path: Path) -> None:
         if b == 0 and name in ("floordiv", "mod"):
             continue
         expected = OPERATIONS[name](a, b)
-        if abs(expected) > MOST:
+        if abs(expected) > MAX_INTEGER:
             continue
         found = Number()
         getattr(by, name)(*map(ctypes.byref, (Number.of(a), Number.of(b), found)))

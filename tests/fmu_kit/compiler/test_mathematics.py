@@ -21,11 +21,11 @@ from tests.fmu_kit.compiler.compiled import HEADERS, Floats, compiled, compiler,
 SAMPLES = 700  # of each set of arguments
 HASH = "e55b276ac5433a03"  # of all results of hash.c
 FROM_LIBM = ["exp", "expm1", "log", "tanh", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "pow"]
-TINY, LEAST, HUGE = 5e-324, 2.2250738585072014e-308, 1.7976931348623157e308
+MIN_DENORMAL, MIN_NORMAL, MAX_DOUBLE = 5e-324, 2.2250738585072014e-308, 1.7976931348623157e308
 SPECIAL = [
     0.0,
-    TINY,
-    LEAST,
+    MIN_DENORMAL,
+    MIN_NORMAL,
     1e-20,
     0.5,
     1.0,
@@ -37,7 +37,7 @@ SPECIAL = [
     37.0,
     1e10,
     2.0**53,
-    HUGE,
+    MAX_DOUBLE,
     math.inf,
 ]
 SPECIAL += [2.0**52 + 1.0, 0.9999999999999999, 710.0, 746.0, 1e300]

@@ -19,7 +19,7 @@ from fmpy.fmi1 import FMICallException
 
 from tests.fmus.instance import Instance
 
-CALLS, MOST_INSTANCES = 2000, 4
+CALLS, MAX_INSTANCES = 2000, 4
 VALUES = (0.0, 1.0, -1.0, 0.5, 1e200, 1e308, math.nan)
 GARBAGE = (b"", b"{}", b"[]", b'{"model": 1, "reals": 3}', b'{"model": "QuadrotorPlant", "reals": []}')
 
@@ -84,7 +84,7 @@ class Caller:
         """Another takes its place, perhaps two."""
         self.instances.remove(instance)
         instance.free()
-        while len(self.instances) < self.random.randint(1, MOST_INSTANCES):
+        while len(self.instances) < self.random.randint(1, MAX_INSTANCES):
             self.instances.append(self.make())
 
     def revive(self, instance: Instance) -> None:

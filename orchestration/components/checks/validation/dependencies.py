@@ -12,11 +12,11 @@ from orchestration.components.checks.validation.fmu import Fmu
 from orchestration.components.checks.validation.instance import CheckedInstance, RefusedError, Row, Value, Values, same
 from orchestration.components.checks.validation.probe import Probe
 
-MOST_SWITCHES = 16
+MAX_SWITCHES = 16
 """Boolean parameters that are inverted, each with all inputs moved"""
-MOST_PARAMETERS = 200
+MAX_PARAMETERS = 200
 """parameters that are moved, of an FMU with more"""
-MOST_REFUSED = 10
+MAX_REFUSED = 10
 """moves that may be refused before the others are left out: each costs an instance"""
 _POINTS = (0, 3)
 """communication points, in steps, at which the inputs are moved"""
@@ -72,7 +72,7 @@ def _modes(probe: Probe) -> Iterator[Mode]:
         with contextlib.suppress(RefusedError):  # a refused configuration shows nothing
             _move(probe, probe.inputs, values, None, initial.moved)
             parameters = [v for v in _parameters(probe) if v.name not in values]
-            _move(probe, parameters, values, None, initial.moved, most_refused=MOST_REFUSED)
+            _move(probe, parameters, values, None, initial.moved, most_refused=MAX_REFUSED)
             for steps in _POINTS if probe.fmu.is_ours else ():
                 _move(probe, probe.inputs, values, steps, later.moved)
     yield initial
@@ -85,14 +85,14 @@ def _configurations(probe: Probe) -> Iterator[dict[str, Value]]:
     inputs = probe.inputs_at(0)
     yield inputs
     switches = [v for v in probe.elements_of("parameter") if v.kind == "Boolean"]
-    for v in switches[:MOST_SWITCHES]:
+    for v in switches[:MAX_SWITCHES]:
         yield {**inputs, v.name: not v.start_value}
 
 
 def _parameters(probe: Probe) -> list[Variable]:
     """Parameters that may be set in initialisation mode and moved a little; a text may be a path, which cannot."""
     found = [v for v in probe.elements_of("parameter") if v.initial == "exact" and v.kind not in ("String", "Binary")]
-    return found[:MOST_PARAMETERS]
+    return found[:MAX_PARAMETERS]
 
 
 def _move(

@@ -23,11 +23,11 @@ from orchestration.components.checks.validation.run_comparison import deviations
 from orchestration.components.fmi.messages import Message
 from orchestration.foundation.processes.waiting import own_clock
 
-FEWEST = 3
+MIN_STEPS = 3
 """steps of a run of an FMU, however slow it is"""
 SHARE = 0.02
 """of the time for an FMU that one run may take; a slow FMU gets fewer steps"""
-MOST_WATCHED = 1000
+MAX_WATCHED = 1000
 """variables that are compared between runs, of an FMU with more"""
 
 
@@ -130,10 +130,10 @@ class Probe:
     def watched(self) -> tuple[Variable, ...]:
         """Variables that are compared between runs: all, or of very many the outputs and some of the others."""
         every = self.fmu.elements
-        if len(every) <= MOST_WATCHED or self.fmu.is_ours:
+        if len(every) <= MAX_WATCHED or self.fmu.is_ours:
             return every
-        some = every[:: math.ceil(len(every) / MOST_WATCHED)]
-        return tuple({v.name: v for v in (*self.outputs[:MOST_WATCHED], *some)}.values())
+        some = every[:: math.ceil(len(every) / MAX_WATCHED)]
+        return tuple({v.name: v for v in (*self.outputs[:MAX_WATCHED], *some)}.values())
 
     # -- runs -----------------------------------------------------------------------------------------------
 
@@ -146,7 +146,7 @@ class Probe:
             self.begin(instance, PLAIN)
             done, goes_on = 0, True
             for t, h in points:
-                if done >= FEWEST and own_clock() - started > SHARE * self.budget:
+                if done >= MIN_STEPS and own_clock() - started > SHARE * self.budget:
                     break
                 goes_on = instance.step(t, h)
                 done += 1

@@ -8,9 +8,9 @@ from typing import Any
 from orchestration.components.checks.validation.finding import Finding, Note, Rule, Subject, name_of
 from orchestration.foundation.basics.errors import QuadcosimError
 
-MOST = 100
+MAX_FINDINGS = 100
 """Findings of one rule that are listed"""
-LONGEST = 1000
+MAX_FINDING_LENGTH = 1000
 """Characters of the text of a finding"""
 _BEAT = 0.02
 """[s] between two beats, at least"""
@@ -38,7 +38,7 @@ class Reporter:
 
     def finding(self, text: str) -> None:
         """The rule has a finding."""
-        whole = text if len(text) <= LONGEST else f"{text[:LONGEST]} ..."
+        whole = text if len(text) <= MAX_FINDING_LENGTH else f"{text[:MAX_FINDING_LENGTH]} ..."
         self._send(("finding", whole, isinstance(text, Note)))
 
     def failed(self, error: Exception) -> None:
@@ -61,11 +61,11 @@ class Reporter:
         count = 0
         try:
             texts = iter(rule(subject))
-            for text in islice(texts, MOST):
+            for text in islice(texts, MAX_FINDINGS):
                 self.finding(text)
                 count += not isinstance(text, Note)
             if next(texts, None) is not None:
-                self.finding(Note(f"there are more; {MOST} are listed"))
+                self.finding(Note(f"there are more; {MAX_FINDINGS} are listed"))
         except refusal as error:
             self.finding(str(error))
             count += 1

@@ -9,7 +9,7 @@ from orchestration.components.checks.validation.declared import Variable
 from orchestration.components.checks.validation.excitation import PLAIN, ExcitationPlan
 from orchestration.components.checks.validation.finding import Note
 from orchestration.components.checks.validation.instance import RefusedError, Row, Value, same
-from orchestration.components.checks.validation.probe import FEWEST, Probe
+from orchestration.components.checks.validation.probe import MIN_STEPS, Probe
 from orchestration.components.fmi.messages import WARNING
 
 _DIGITS = 5e-15
@@ -199,7 +199,7 @@ def serialised_state(probe: Probe) -> Iterator[str]:
 
 def stop_time(probe: Probe) -> Iterator[str]:
     """A step past the stop time is an error, or ends the run (FMI 2.0.4, section 2.1.6)."""
-    *allowed, (t, h) = probe.points(ExcitationPlan(steps=FEWEST))
+    *allowed, (t, h) = probe.points(ExcitationPlan(steps=MIN_STEPS))
     if not allowed:
         return
     with probe.instance() as instance:

@@ -1,8 +1,8 @@
 // A study over its axes: cells of a grid, or points of a sample, each of which opens its run.
 
-const { NOT_GOOD, SHADES: { OUTER, MOST, LEAST, WIDE } } = FIGURES;
+const { NOT_GOOD, SHADES: { OUTER_SHARE, OUTLIER_RATIO, MIN_RANGE, LOGARITHMIC_RATIO } } = FIGURES;
 const MARKS = { good: "circle", bad: "x-thin-open", diverged: "triangle-down-open" };
-const MOST_SYMBOLS = 2500;
+const MAX_SYMBOLS = 2500;
 const VALUE = "value";
 
 const map = { x: null, y: null, metric: null, fixed: {}, row: null, rows: [], isGrid: false, shades: null };
@@ -119,7 +119,7 @@ function lineOf(axis, row) {
 function isWide(values) {
   const known = values.filter(Number.isFinite);
   const [low, high] = known.reduce(([a, b], value) => [Math.min(a, value), Math.max(b, value)], [Infinity, -Infinity]);
-  return low > 0 && high > WIDE * low;
+  return low > 0 && high > LOGARITHMIC_RATIO * low;
 }
 
 /** The values of the first and the last colour, as logarithms if the range is wide. */
@@ -129,11 +129,11 @@ function shadesOf(values) {
   const isLogarithmic = isWide(known);
   const scaled = isLogarithmic ? known.map(Math.log10) : known;
   const at = (share) => scaled[Math.round(share * (scaled.length - 1))];
-  const within = at(1 - OUTER) - at(OUTER);
-  const hasOutliers = scaled.length >= 20 && within > 0 && scaled.at(-1) - scaled[0] > MOST * within;
-  const ends = hasOutliers ? [at(OUTER), at(1 - OUTER)] : [scaled[0], scaled.at(-1)];
+  const within = at(1 - OUTER_SHARE) - at(OUTER_SHARE);
+  const hasOutliers = scaled.length >= 20 && within > 0 && scaled.at(-1) - scaled[0] > OUTLIER_RATIO * within;
+  const ends = hasOutliers ? [at(OUTER_SHARE), at(1 - OUTER_SHARE)] : [scaled[0], scaled.at(-1)];
   const middle = (ends[0] + ends[1]) / 2;
-  const half = (LEAST / 2) * (isLogarithmic ? Math.LOG10E : Math.max(Math.abs(known[0]), Math.abs(known.at(-1))));
+  const half = (MIN_RANGE / 2) * (isLogarithmic ? Math.LOG10E : Math.max(Math.abs(known[0]), Math.abs(known.at(-1))));
   const [low, high] = [Math.min(ends[0], middle - half), Math.max(ends[1], middle + half)];
   return { low, high, isLogarithmic, isClipped: scaled[0] < low || scaled.at(-1) > high };
 }
@@ -194,7 +194,7 @@ function gridTraces() {
 
 /** Signs on what is not good, where there is room for them. */
 function symbolTraces(kinds, across, up) {
-  if (across.length * up.length > MOST_SYMBOLS) return [];
+  if (across.length * up.length > MAX_SYMBOLS) return [];
   return ["bad", "diverged"].map((kind) => {
     const found = { x: [], y: [] };
     kinds.forEach((line, i) => line.forEach((each, j) => {

@@ -30,7 +30,7 @@ from orchestration.systems.schedule.streams import NOISE, Streams
 from orchestration.systems.system.model import System
 from orchestration.systems.system.variable_names import component_of, variable_of
 
-MOST_ROWS = 2**20
+MAX_ROWS = 2**20
 """Largest number of rows of a run that are recorded"""
 ParameterColumns = Mapping[str, Floats]
 """Real parameters by COMPONENT.NAME, a value for each run"""
@@ -518,7 +518,7 @@ class Batch:
     def _record(self, columns: Sequence[str] | None, tracks: Sequence[Track]) -> list[Floats]:
         """Memory for the rows of some columns; None: no rows are recorded."""
         batch = self._batch
-        batch.recorded_count, batch.record_limit = len(columns or ()), 0 if columns is None else MOST_ROWS
+        batch.recorded_count, batch.record_limit = len(columns or ()), 0 if columns is None else MAX_ROWS
         places = [self._shape.place(column) for column in columns or ()]
         for wanted, read in zip(self._wanted, self._read):
             wanted[:] = read
@@ -531,7 +531,7 @@ class Batch:
         )
         batch.recorded = self._memory.temporary_address(self._recorded)
         if self._rows is None or self._rows.shape[2] != len(columns) + 1:
-            self._rows = self._memory.numbers(self._lanes, MOST_ROWS, len(columns) + 1)
+            self._rows = self._memory.numbers(self._lanes, MAX_ROWS, len(columns) + 1)
         rows = self._rows[: sum(len(track.lanes) for track in tracks)]
         for lane, table in enumerate(rows):
             batch.records[lane] = address(table)

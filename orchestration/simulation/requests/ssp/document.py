@@ -25,7 +25,7 @@ SCHEMAS = {
     "ssm": "SystemStructureParameterMapping.xsd",
 }
 """The schemas in fmpy, by the prefix of the root"""
-LARGEST = 2**24
+MAX_DOCUMENT_BYTES = 2**24
 """Bytes of a document"""
 
 Read = Any
@@ -58,9 +58,9 @@ def read(path: Path, kind: str) -> Read:
     """The root of a document that is valid by the schema of its `kind`, ssd, ssv or ssm; raises `UsageError`."""
     what = f"{kind.upper()} document of SSP 1.0"
     with readable(path, what), path.open("rb") as file:
-        text = file.read(LARGEST + 1)
-    if len(text) > LARGEST:
-        raise UsageError(f"{path}: expected a readable {what}: it has more than {LARGEST} bytes")
+        text = file.read(MAX_DOCUMENT_BYTES + 1)
+    if len(text) > MAX_DOCUMENT_BYTES:
+        raise UsageError(f"{path}: expected a readable {what}: it has more than {MAX_DOCUMENT_BYTES} bytes")
     try:
         root = etree.fromstring(text, etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False))
     except etree.XMLSyntaxError as error:

@@ -13,7 +13,7 @@ from orchestration.foundation.basics.documents import readable
 from orchestration.foundation.basics.errors import UsageError
 
 STRUCTURE = "SystemStructure.ssd"
-LARGEST = 2**32
+MAX_UNPACKED_BYTES = 2**32
 """Bytes of an archive's files together"""
 
 
@@ -68,8 +68,8 @@ def _unpack(path: Path, folder: Path) -> None:
     try:
         with zipfile.ZipFile(path) as archive:
             size = sum(info.file_size for info in archive.infolist())
-            if size > LARGEST:
-                raise UsageError(f"{path}: expected an SSP archive of at most {LARGEST} bytes, unpacked")
+            if size > MAX_UNPACKED_BYTES:
+                raise UsageError(f"{path}: expected an SSP archive of at most {MAX_UNPACKED_BYTES} bytes, unpacked")
             archive.extractall(partial)
         if not folder.is_dir():
             partial.rename(folder)

@@ -10,7 +10,7 @@ import pytest
 from orchestration.experiments.report.blobs import Blobs
 from orchestration.experiments.report.of_study import Stored, _difference, is_sample
 from orchestration.experiments.report.reruns import Rerun
-from orchestration.experiments.report.subset import LEAST_POINTS, MOST_POINTS, evenly, points_for, select
+from orchestration.experiments.report.subset import MAX_POINTS, MIN_POINTS, evenly, points_for, select
 from orchestration.experiments.report.tables import ColumnAxis, report_table, share_of, shares_along
 from orchestration.experiments.studies.axes import Axis
 from orchestration.experiments.studies.study import Study
@@ -123,6 +123,6 @@ def test_runs_that_are_asked_for_are_chosen_first() -> None:
 
 
 def test_more_runs_have_fewer_points_each() -> None:
-    assert points_for(1, 20) == MOST_POINTS
+    assert points_for(1, 20) == MAX_POINTS
     assert points_for(1000, 20) == 150
-    assert points_for(100_000, 20) == LEAST_POINTS
+    assert points_for(100_000, 20) == MIN_POINTS

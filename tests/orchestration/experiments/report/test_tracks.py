@@ -14,7 +14,7 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.quadrotor.flight.layout import POSITION_ERROR, FlightLayout
 from orchestration.quadrotor.scenarios.translation import quadrotor
 from orchestration.quadrotor.scenarios.wiring import POSITION_REFERENCE
-from orchestration.simulation.figures.palette import MOST_LINES, MOST_PANELS
+from orchestration.simulation.figures.palette import MAX_LINES, MAX_PANELS
 from orchestration.simulation.results.column_info import ColumnInfo
 from orchestration.systems.system.paths import changed
 from tests.orchestration.experiments.report.test_blobs import read
@@ -85,8 +85,8 @@ def test_any_other_system_has_panels_by_unit_and_no_scene() -> None:
 
 
 def test_a_page_of_many_signals_opens_with_the_first_of_their_panels() -> None:
-    panels = layout_of(None, [f"it.x{i}" for i in range(MOST_LINES * MOST_PANELS + 1)], {}).panels
-    assert [panel.shown for panel in panels] == [True] * MOST_PANELS + [False]
+    panels = layout_of(None, [f"it.x{i}" for i in range(MAX_LINES * MAX_PANELS + 1)], {}).panels
+    assert [panel.shown for panel in panels] == [True] * MAX_PANELS + [False]
 
 
 def test_runs_that_are_alike_share_a_layout() -> None:

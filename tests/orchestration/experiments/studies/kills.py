@@ -28,7 +28,7 @@ from tests.orchestration.experiments.studies.common import (
 from tests.patience import PATIENCE
 
 TEMPORARY = "temporary"
-LONGEST = 1.5
+MAX_PAUSE = 1.5
 """[s] from one kill to the next: during the start of workers, their runs and the end"""
 
 
@@ -86,7 +86,7 @@ def one_start(folder: Path, workers: int, kills: int, draw: random.Random, tally
     """Start the sweep and kill parts of it until it ends."""
     with sweep_in(folder, workers) as coordinator:
         while coordinator.poll() is None:
-            time.sleep(draw.uniform(0.0, LONGEST))
+            time.sleep(draw.uniform(0.0, MAX_PAUSE))
             mates = workers_of(coordinator.pid)
             if coordinator.poll() is not None or tally.kills == kills:
                 break

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestration.experiments.studies.axes import MOST_POINTS, Axis, Method, Points, span, unit_points
+from orchestration.experiments.studies.axes import MAX_POINTS, Axis, Method, Points, span, unit_points
 from quadcosim import UsageError
 
 LISTED = Axis(name="period", targets=("timing.period",), values=(0.02, 0.01))
@@ -48,9 +48,9 @@ def test_values_of_several_kinds_are_refused(values: tuple[Any, ...]) -> None:
 
 def test_a_design_is_counted_before_it_is_expanded() -> None:
     axes = [Axis(name=f"x{i}", targets=("seed",), values=tuple(range(100))) for i in range(6)]
-    with pytest.raises(UsageError, match=rf"100 x 100 x .* = {100**6} runs: expected at most {MOST_POINTS}"):
+    with pytest.raises(UsageError, match=rf"100 x 100 x .* = {100**6} runs: expected at most {MAX_POINTS}"):
         Points(axes, "sobol", 0, 0)
-    with pytest.raises(UsageError, match=rf"number = 100000000, expected at most {MOST_POINTS}"):
+    with pytest.raises(UsageError, match=rf"number = 100000000, expected at most {MAX_POINTS}"):
         span("x", 0.0, 1.0, 100_000_000, "linear")
     with pytest.raises(UsageError, match=rf"2 x {2**40 * 3} = .* runs: expected at most"):
         Points([LISTED, MASS], "saltelli", 2**40, 0)
@@ -59,11 +59,11 @@ def test_a_design_is_counted_before_it_is_expanded() -> None:
 def test_points_of_the_largest_design_are_computed_on_access() -> None:
     axes = [Axis(name=f"x{i}", targets=("seed",), values=tuple(range(100))) for i in range(3)]
     found = Points(axes, "sobol", 0, 0)
-    assert len(found) == MOST_POINTS
+    assert len(found) == MAX_POINTS
     assert found[987654] == {"x0": 98, "x1": 76, "x2": 54}
     assert found[-1] == {"x0": 99, "x1": 99, "x2": 99}
     with pytest.raises(IndexError):
-        found[MOST_POINTS]
+        found[MAX_POINTS]
 
 
 @pytest.mark.parametrize("method", ["random", "sobol"])

@@ -22,7 +22,7 @@ def test_deleted_objects_are_never_mistaken_for_new_ones_at_their_address() -> N
     def content(of: list[int]) -> int:
         return of[0]
 
-    assert [content([i]) for i in range(3 * identity.MOST)] == [*range(3 * identity.MOST)]
+    assert [content([i]) for i in range(3 * identity.MAX_CACHED)] == [*range(3 * identity.MAX_CACHED)]
 
 
 def test_no_more_objects_are_kept_alive_than_the_limit() -> None:
@@ -39,6 +39,6 @@ def test_no_more_objects_are_kept_alive_than_the_limit() -> None:
     def nothing(of: Held) -> None:
         pass
 
-    for _ in range(3 * identity.MOST):
+    for _ in range(3 * identity.MAX_CACHED):
         nothing(Held())
-    assert Held.alive <= identity.MOST
+    assert Held.alive <= identity.MAX_CACHED

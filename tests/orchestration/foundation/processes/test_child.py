@@ -256,7 +256,7 @@ def test_a_message_that_cannot_be_pickled_does_not_end_the_child(child: Callable
 def test_a_child_whose_output_is_limited_is_ended_before_too_long_a_message_is_read(
     child: Callable[..., Child], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("orchestration.foundation.processes.child._LONGEST", 0.001)
+    monkeypatch.setattr("orchestration.foundation.processes.child._MAX_MESSAGE_MB", 0.001)
     for limits in ({}, {"output": 1.0}):
         one = child("parent.send(bytes(2000)); parent.receive()", **limits)
         if not limits:

@@ -121,5 +121,5 @@ def test_a_long_run_is_drawn_with_fewer_rows_but_all_of_the_window(tmp_path: Pat
 
 
 def test_figures_of_a_long_run_are_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(drawn, "MOST", 100)
+    monkeypatch.setattr(drawn, "MAX_ROWS_OUTSIDE", 100)
     assert set(draw(quadcosim.run(SCENARIO))) == set(FLIGHT)

@@ -138,7 +138,7 @@ def test_signals_of_any_system_share_a_panel_by_unit_and_none_is_left_out_up_to_
         assert len(legend.get_texts()) == len(axes.get_lines())
         assert legend.get_window_extent().y0 >= axes.get_window_extent().y1 - 1.0
     left_out = sum(len(axes.get_lines()) for axes in figure.axes[2:])
-    monkeypatch.setattr(signals, "MOST_PANELS", 2)
+    monkeypatch.setattr(signals, "MAX_PANELS", 2)
     figure = draw(result)["signals"]
     assert [axes.get_ylabel().replace("\u00a0", " ") for axes in figure.axes] == labels[:2]
     assert figure.get_supxlabel() == f"and {left_out} more signals"

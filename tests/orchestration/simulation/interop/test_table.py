@@ -140,11 +140,11 @@ def test_the_legend_names_what_any_tool_has_and_the_aim() -> None:
 
 def test_a_difference_of_zero_is_drawn_at_the_left_of_a_logarithmic_axis(tmp_path: Path) -> None:
     found = [agreement("libcosim", same_first_inputs=0.0, as_it_comes=0.0)]
-    assert {line.get_xdata()[0] for line in markers(found)} == {figure.SMALLEST}
+    assert {line.get_xdata()[0] for line in markers(found)} == {figure.ZERO_DRAWN_AT}
     (panel,) = figure.agreement_chart(found).axes
     assert panel.get_xscale() == "log"
     low, high = panel.get_xlim()
-    assert 0.0 < low < figure.SMALLEST < table.TOLERANCE < high
+    assert 0.0 < low < figure.ZERO_DRAWN_AT < table.TOLERANCE < high
 
 
 def test_the_chart_is_written_into_a_folder_that_need_not_be_there(tmp_path: Path) -> None:

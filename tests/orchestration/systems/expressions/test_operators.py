@@ -12,7 +12,7 @@ from orchestration.systems.expressions.at_instant import compiled
 from orchestration.systems.expressions.operators import OPERATORS
 from orchestration.systems.expressions.over_span import SpanValues
 from orchestration.systems.expressions.recorded import Recorded
-from orchestration.systems.expressions.syntax import DEEPEST, Call, Name, Node, Number, Operation, parse
+from orchestration.systems.expressions.syntax import MAX_NESTING, Call, Name, Node, Number, Operation, parse
 
 PLACES = {"a": 0, "b": 1}
 SIGNS = [word for word, made in OPERATORS.items() if made.tree is not None]
@@ -66,7 +66,7 @@ def test_nested_operators_have_the_same_bits(tree: Node, a: float, b: float) -> 
 
 @pytest.mark.parametrize("inner", ["-", "norm(", "(a < a < ", "max(b, ", "1 / ("])
 def test_the_deepest_expression_has_a_value_at_an_instant(inner: str) -> None:
-    depth = DEEPEST - 1
+    depth = MAX_NESTING - 1
     node = parse(inner * depth + "a" + ")" * inner.count("(") * depth)
     at_once, over_rows = both(node, 0.5, 0.25)
     assert at_once == over_rows

@@ -120,6 +120,6 @@ def test_queues_that_grow_without_end_are_reported_before_they_take_all_memory(
 ) -> None:
     if not in_c:
         monkeypatch.setattr("orchestration.systems.schedule.resources.scheduler", Scheduler)
-        monkeypatch.setattr("orchestration.systems.computers.scheduler.MOST_WAITING", 100)
+        monkeypatch.setattr("orchestration.systems.computers.scheduler.MAX_WAITING", 100)
     with pytest.raises(UsageError, match=f"^{re.escape(line)}"):
         timeline_of(system)

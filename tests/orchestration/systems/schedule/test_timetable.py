@@ -9,7 +9,7 @@ from orchestration.foundation.basics.times import Grid, exact_nanoseconds
 from orchestration.systems.schedule import cursor
 from orchestration.systems.schedule.cursor import Cursor
 from orchestration.systems.schedule.fixed_step import FixedStep
-from orchestration.systems.schedule.longest import LONGEST
+from orchestration.systems.schedule.longest import MAX_TIME
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.paths import changed
@@ -148,7 +148,7 @@ def test_a_sample_in_millions_of_years_is_rejected(key):
 
 
 def test_times_up_to_the_longest_are_exact():
-    longest = (LONGEST - 10**6) / 10**9
+    longest = (MAX_TIME - 10**6) / 10**9
     found = instants(loop(sampled(longest, offset=longest), command={"delay": longest, "delay_jitter": longest}))
     assert len(found) == 11
     with pytest.raises(UsageError, match=r"connections\.command\.delay = 2e\+09 s: expected less than 1.153e\+09 s"):
