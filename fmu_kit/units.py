@@ -1,22 +1,18 @@
-"""Units by name, in SI: `N.m`, `kg.m2`, `1/s2`, `V.s/rad`, `W/(m2.K)`, resolved to base units for `UnitDefinitions`.
+"""Names of units, such as `N.m`, `kg.m2`, `1/s2`, `V.s/rad`, `W/(m2.K)`, and their meaning in SI base units.
 
-Used when an FMU is built. A name is a product of symbols with whole exponents, divided by one symbol or by a product
-in parentheses.
+A name is a product of symbols with whole exponents, divided by one symbol or by a product in parentheses.
 """
 
 import math
 import re
+from collections.abc import Mapping
+
+BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+"""Base units by their names in FMI, in its order."""
 
 SYMBOLS: dict[str, dict[str, int]] = {
     "1": {},
-    "kg": {"kg": 1},
-    "m": {"m": 1},
-    "s": {"s": 1},
-    "A": {"A": 1},
-    "K": {"K": 1},
-    "mol": {"mol": 1},
-    "cd": {"cd": 1},
-    "rad": {"rad": 1},
+    **{symbol: {symbol: 1} for symbol in BASE},
     "N": {"kg": 1, "m": 1, "s": -2},
     "Pa": {"kg": 1, "m": -1, "s": -2},
     "J": {"kg": 1, "m": 2, "s": -2},
@@ -75,19 +71,34 @@ DISPLAYED = {"rad": ("deg", _DEGREES), "rad/s": ("deg/s", _DEGREES), "rad/s2": (
 """The display unit of a unit, and its factor: how many of it make one of that unit."""
 
 
-def base_unit_exponents(name: str) -> dict[str, int]:
-    """The non-zero exponents of the SI base units; raises `ValueError` for a name that is not a unit."""
+def factors(name: str) -> dict[str, int]:
+    """The symbols in a name, whatever they mean, with their non-zero exponents; also of one with `*` and `^`.
+
+    Raises `ValueError` for a name that is no such product.
+    """
     above, slash, below = name.partition("/")
     if below.startswith("(") and below.endswith(")"):
         below = below[1:-1]
     elif "." in below:
         raise ValueError(f"unit {name}: expected parentheses around what is divided by")
-    total: dict[str, int] = {}
+    exponents: dict[str, int] = {}
     for sign, product in ((1, above), (-1, below)) if slash else ((1, above),):
-        for factor in product.split("."):
-            found = re.fullmatch(r"([A-Za-z]+|1)(-?\d+)?", factor)
-            if found is None or found[1] not in SYMBOLS:
-                raise ValueError(f"unit {name}: expected powers of {', '.join(SYMBOLS)} as in N.m, kg.m2 or W/(m2.K)")
-            for base, exponent in SYMBOLS[found[1]].items():
-                total[base] = total.get(base, 0) + sign * exponent * int(found[2] or 1)
+        for factor in re.split(r"[.*]", product):
+            parts = re.fullmatch(r"([^\W\d_]+|%|°|1)\^?(-?\d+)?", factor)
+            if parts is None:
+                raise ValueError(f"unit {name}: expected powers of symbols as in N.m, kg.m2 or W/(m2.K)")
+            if parts[1] != "1":
+                exponents[parts[1]] = exponents.get(parts[1], 0) + sign * int(parts[2] or 1)
+    return {symbol: exponent for symbol, exponent in exponents.items() if exponent}
+
+
+def base_unit_exponents(name: str, symbols: Mapping[str, Mapping[str, int]] = SYMBOLS) -> dict[str, int]:
+    """The non-zero exponents of the SI base units; raises `ValueError` for a name that is not made of `symbols`."""
+    named = factors(name)
+    if not named.keys() <= symbols.keys() or re.search(r"[*^]", name):
+        raise ValueError(f"unit {name}: expected powers of {', '.join(symbols)} as in N.m, kg.m2 or W/(m2.K)")
+    total = dict.fromkeys(BASE, 0)
+    for symbol, exponent in named.items():
+        for base, power in symbols[symbol].items():
+            total[base] += exponent * power
     return {base: exponent for base, exponent in total.items() if exponent}

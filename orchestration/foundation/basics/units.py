@@ -1,12 +1,11 @@
 """Units as FMI defines them (exponents of SI base units, factor and offset) and their products and powers."""
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+from fmu_kit.units import BASE, factors
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,7 +100,11 @@ def named(name: str, base: BaseUnits | None) -> Unit:
     """A unit by its name in an FMU; a name that is not a plain product stays whole."""
     if name == "1":
         return ONE
-    return Unit(symbols=tuple(_factors(name).items()), base=base)
+    try:
+        exponents = factors(name)
+    except ValueError:
+        exponents = {name: 1}
+    return Unit(symbols=tuple((symbol, Fraction(exponent)) for symbol, exponent in exponents.items()), base=base)
 
 
 def common(units: Sequence[Unit]) -> Unit | None:
@@ -116,21 +119,6 @@ def common(units: Sequence[Unit]) -> Unit | None:
 
 def _is_same(one: BaseUnits, other: BaseUnits) -> bool:
     return math.isclose(one.factor, other.factor, rel_tol=1e-9) and one.exponents[:-1] == other.exponents[:-1]
-
-
-def _factors(name: str) -> dict[str, Fraction]:
-    """Symbols and exponents in a name such as N.m, kg.m2, m/s^2 or W/(m2.K)."""
-    above, slash, below = name.partition("/")
-    below = below[1:-1] if below.startswith("(") and below.endswith(")") else below
-    exponents: dict[str, Fraction] = {}
-    for sign, product in ((1, above), (-1, below)) if slash else ((1, above),):
-        for factor in re.split(r"[.*]", product):
-            parts = re.fullmatch(r"([^\W\d_]+|%|°|1)\^?(-?\d+)?", factor)
-            if parts is None or ("." in below and not name.endswith(")")):
-                return {name: Fraction(1)}
-            if parts[1] != "1":
-                exponents[parts[1]] = exponents.get(parts[1], Fraction(0)) + sign * int(parts[2] or 1)
-    return {symbol: exponent for symbol, exponent in exponents.items() if exponent}
 
 
 def _power(name: str, exponent: Fraction) -> str:

@@ -1,37 +1,21 @@
 """Rules on units: their base units correspond to their names."""
 
-import re
-from collections import Counter
 from collections.abc import Iterator, Mapping
 from xml.etree.ElementTree import Element
 
+from fmu_kit.units import BASE, SYMBOLS, base_unit_exponents
 from orchestration.components.checks.validation.fmu import Fmu
 
-BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
-_SYMBOLS: dict[str, dict[str, int]] = {
-    "1": {},
-    **{symbol: {symbol: 1} for symbol in BASE},
-    "N": {"kg": 1, "m": 1, "s": -2},
-    "Pa": {"kg": 1, "m": -1, "s": -2},
-    "J": {"kg": 1, "m": 2, "s": -2},
-    "W": {"kg": 1, "m": 2, "s": -3},
-    "V": {"kg": 1, "m": 2, "s": -3, "A": -1},
-}
-"""Coherent symbols with one meaning only; `Hz`, with or without a turn, and `C` have two"""
+COHERENT = {symbol: SYMBOLS[symbol] for symbol in ("1", *BASE, "N", "Pa", "J", "W", "V")}
+"""Symbols with one meaning only, whoever writes them; `Hz`, with or without a turn, and `C` have two."""
 
 
-def dimensions(name: str) -> Counter[str] | None:
-    """Exponents of the base units, read from the name: `N.m.s`, `m/s3`, `J/(kg.K)`; None if it cannot be read."""
-    above, _, below = name.partition("/")
-    total: Counter[str] = Counter()
-    for sign, part in ((1, above), (-1, re.sub(r"^\((.*)\)$", r"\1", below) or "1")):
-        for factor in part.split("."):
-            match = re.fullmatch(r"([A-Za-z]+|1)(-?\d+)?", factor)
-            if match is None or match[1] not in _SYMBOLS:
-                return None
-            for base, exponent in _SYMBOLS[match[1]].items():
-                total[base] += sign * exponent * int(match[2] or 1)
-    return total
+def dimensions(name: str) -> dict[str, int] | None:
+    """Exponents of the base units of a name made of `COHERENT` symbols; None for any other."""
+    try:
+        return base_unit_exponents(name, COHERENT)
+    except ValueError:
+        return None
 
 
 def base_units(fmu: Fmu) -> dict[str, Element | None]:
@@ -46,7 +30,7 @@ def unit_meaning(fmu: Fmu) -> Iterator[str]:
         if base is None or expected is None:
             continue
         found = {symbol: int(base.get(symbol, "0")) for symbol in BASE}
-        wrong = [symbol for symbol in BASE if found[symbol] != expected[symbol]]
+        wrong = [symbol for symbol in BASE if found[symbol] != expected.get(symbol, 0)]
         if wrong == ["rad"] and found["rad"] == 0 and not fmu.is_ours:
             wrong = []  # FMI allows a tool to take the radian for 1
         if wrong:
@@ -57,7 +41,7 @@ def unit_meaning(fmu: Fmu) -> Iterator[str]:
 
 
 def _listed(exponents: Mapping[str, int]) -> str:
-    return " ".join(f"{symbol}={exponents[symbol]}" for symbol in BASE if exponents[symbol]) or "none"
+    return " ".join(f"{symbol}={exponents[symbol]}" for symbol in BASE if exponents.get(symbol)) or "none"
 
 
 RULES = (unit_meaning,)

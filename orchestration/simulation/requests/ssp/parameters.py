@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
+from fmu_kit.units import BASE
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.units import BASE, BaseUnits
+from orchestration.foundation.basics.units import BaseUnits
 from orchestration.simulation.requests.ssp.document import Read, all_of, read
 from orchestration.simulation.requests.ssp.package import Package
 from orchestration.systems.system.component import Parameter

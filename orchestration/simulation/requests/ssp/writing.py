@@ -13,10 +13,10 @@ from xml.etree.ElementTree import Element
 
 from fmu_kit.archive import write_archive
 from fmu_kit.model_description import generation_date
+from fmu_kit.units import BASE
 from fmu_kit.versions import generation_tool
 from orchestration.components.fmi.model import Kind, Variable
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.units import BASE
 from orchestration.simulation.requests.ssp import timing
 from orchestration.simulation.requests.ssp.document import add, document, element
 from orchestration.simulation.requests.ssp.export import Export, Part, export_of

@@ -4,8 +4,9 @@ from fractions import Fraction
 
 import pytest
 
+from fmu_kit.units import BASE
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.units import BASE, BaseUnits, Unit, named
+from orchestration.foundation.basics.units import BaseUnits, Unit, named
 from orchestration.systems.expressions.syntax import parse
 from orchestration.systems.expressions.units import unit_of
 
