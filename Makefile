@@ -68,7 +68,6 @@ bench: .venv/.test
 	$(BIN)/python -m benchmarks.native
 	$(BIN)/python -m benchmarks.engines
 	$(BIN)/python -m benchmarks.batch
-	$(BIN)/python -m benchmarks.cuda
 	$(BIN)/python -m benchmarks.cold
 	$(BIN)/python -m benchmarks.stores
 	$(BIN)/python -m benchmarks.cluster

@@ -15,10 +15,10 @@ StudyEngineFlag = Annotated[
     str,
     typer.Option(
         "--engine",
-        help="Simulation loop; batch: native FMUs, several runs at once in a SIMD batch; cuda: the same on a GPU; "
-        "auto: the fastest available one except cuda.",
-        metavar="auto|python|compiled|batch|cuda",
-        autocompletion=completion.among("auto", "python", "compiled", "batch", "cuda"),
+        help="Simulation loop; batch: native FMUs, several runs at once in a SIMD batch; "
+        "auto: the fastest available one.",
+        metavar="auto|python|compiled|batch",
+        autocompletion=completion.among("auto", "python", "compiled", "batch"),
     ),
 ]
 

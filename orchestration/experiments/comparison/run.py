@@ -133,7 +133,7 @@ def rerun_cells(
     starts = files.start_values_of(study.origin)
     systems = [study.system(i, starts) for i in chain(*runs)]
     with RunEvaluator(files, workers, how.engine) as pool:
-        flights = pool.run_all(systems, in_lanes=how.in_lanes, on_gpu=how.on_gpu)
+        flights = pool.run_all(systems, in_lanes=how.in_lanes)
     return cell_summaries(comparison, table_of_runs(comparison, zip(chain(*runs), flights)))
 
 

@@ -69,10 +69,9 @@ def sweep(
     The store is in `folder`, default `results/NAME`; runs in it are not repeated, so that a sweep may be stopped and
     called again. Runs are executed by `workers` processes of this machine, which need no guard of the main module and
     work from a notebook, or by those of the `dask` scheduler at this address. The engine `batch` runs native FMUs in
-    SIMD lanes, `cuda` in threads of a GPU, and repeats some runs with the FMUs to compare; `auto` uses lanes if
-    available, else native FMUs one at a time, else the FMUs as they are. A run that takes more than `time_limit` [s] of
-    processor time fails. `progress` is called with the number of runs done and the total, `announce` with the engine
-    and failed runs; None for silence.
+    SIMD lanes, and repeats some runs with the FMUs to compare; `auto` uses lanes if available, else native FMUs one at
+    a time, else the FMUs as they are. A run that takes more than `time_limit` [s] of processor time fails. `progress`
+    is called with the number of runs done and the total, `announce` with the engine and failed runs; None for silence.
 
     Raises `UsageError`, before any run, for a design with an invalid run, or if the store holds another study, stating
     the difference; `QuadcosimError` for failures not caused by a run, without a row; `KeyboardInterrupt`, stating how
@@ -100,7 +99,7 @@ def sweep(
             lanes: dict[str, Row] = {}
             try:
                 with _workers(Inputs.of(all_files), workers, dask) as run:
-                    parts = chunks(tasks, len(missing), workers, execution.on_gpu) if execution.in_lanes else tasks
+                    parts = chunks(tasks, len(missing), workers) if execution.in_lanes else tasks
                     with contextlib.closing(run(parts)) as results:
                         for outcomes in results:
                             _keep(outcomes, opened)

@@ -130,7 +130,7 @@ def _search_by_runs(
     if follows := describe_references(tuning.origin, files.models_of(tuning.origin)):
         announce(f"follows {follows}")
     with share_reporter(progress, "searching") as report, RunEvaluator(files, workers, execution.engine) as pool:
-        run = functools.partial(pool.run_all, in_lanes=execution.in_lanes, on_gpu=execution.on_gpu)
+        run = functools.partial(pool.run_all, in_lanes=execution.in_lanes)
 
         def find(period: float, seed: int, report: Callable[[float], None]) -> TuningResult:
             return search(tuning, period, seed, run, pool.run_all, report)

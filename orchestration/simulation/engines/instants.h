@@ -3,17 +3,10 @@
 
    It is compiled for FMUs that are called (loop.c, one lane) and for kernels (batch.c). These define how values are
    set, stepped and read, what is noted, and the divergence monitor: the functions that are only declared here. A lane
-   whose run has ended is not alive, and takes part in nothing.
-
-   Kernels run in lanes of vector registers, or in threads: with QUADCOSIM_THREADS each thread is one lane, LANE, of
-   memory for L of them, and computes with single numbers. */
+   whose run has ended is not alive, and takes part in nothing. */
 
 #define NANOSECONDS 1e9
-#ifdef QUADCOSIM_THREADS
-#define EVERY ((Lanes)1 << LANE)
-#else
 #define EVERY (L == 64 ? ~(uint64_t)0 : (((uint64_t)1 << (L & 63)) - 1))
-#endif
 
 typedef struct { /* of the tracks that have any, rows of a table, which begin with an index */
     Lanes tracks;
@@ -49,11 +42,7 @@ static void note(Loop *l, int kind, const Messages *m, const Instant *now);
 
 /* -- lanes --------------------------------------------------------------------------------------------------------- */
 
-#ifdef QUADCOSIM_THREADS
-Q_ONE q_mask mask_of(Lanes lanes) { return lanes != 0; }
-Q_ONE Lanes lanes_of(q_mask mask) { return (Lanes)(mask != 0) << LANE; }
-#define EACH(lane, lanes) for (int lane = LANE, once_ = (lanes) != 0; once_; once_ = 0)
-#elif L == 1
+#if L == 1
 Q_ONE q_bits bits_of(Lanes lanes) { return -lanes; }
 Q_ONE q_mask mask_of(Lanes lanes) { return (q_mask)lanes; }
 Q_ONE Lanes lanes_of(q_mask mask) { return (Lanes)(mask != 0); }
@@ -81,7 +70,7 @@ Q_ONE Lanes lanes_of(q_mask mask) {
         for (int lane = __builtin_ctzll(left_), once_ = 1; once_; once_ = 0)
 #endif
 
-#if defined(QUADCOSIM_THREADS) || L == 1
+#if L == 1
 #define TRACKS(track, some) for (Track *track = (some) ? l->tracks : NULL; track; track = NULL)
 #else
 #define TRACKS(track, some) \
@@ -90,14 +79,9 @@ Q_ONE Lanes lanes_of(q_mask mask) {
 #endif
 
 /* The numbers of the lanes at a place of a memory. */
-#ifdef QUADCOSIM_THREADS
-#define AT(memory, place) ((memory)[(place) * L + LANE])
-#define READ(memory, place) AT(memory, place)
-#else
 typedef q_real Place __attribute__((may_alias));
 #define AT(memory, place) (*(Place *)((memory) + (place) * L))
 #define READ(memory, place) (*(const Place *)((memory) + (place) * L))
-#endif
 
 static void end_some(Loop *l, Lanes lanes, int64_t outcome, int64_t component, const Instant *now) {
     EACH(lane, lanes & l->alive)
@@ -370,14 +354,10 @@ INLINED const int64_t *turn_of(Rows *rows, int64_t track, int64_t index, int64_t
 }
 
 INLINED void count_steps(Loop *l, Lanes lanes) {
-#ifdef QUADCOSIM_THREADS
-    EACH(lane, lanes) l->steps[lane]++;
-#else
     q_bits steps;
     memcpy(&steps, l->steps, sizeof steps);
     steps -= bits_of(lanes); /* all bits are -1 */
     memcpy(l->steps, &steps, sizeof steps);
-#endif
 }
 
 /* Step a component in continuous time to the instant; the lanes in which it has reached it. */

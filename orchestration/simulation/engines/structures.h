@@ -210,7 +210,6 @@ typedef struct {
     const double **recorded;
     double *records[L];
     int64_t record_counts[L];
-    int64_t returned[L]; /* of threads: why each has returned */
 } Loop;
 
 /* -- sizes, which Python compares ---------------------------------------------------------------------------------- */
@@ -225,6 +224,4 @@ typedef struct {
     SIZE_OF(Message), SIZE_OF(SampleInstant), SIZE_OF(Schedule), SIZE_OF(Instants), SIZE_OF(Span), SIZE_OF(Part), SIZE_OF(Transfer), SIZE_OF(Feed), \
     SIZE_OF(Inputs), SIZE_OF(Fed), SIZE_OF(Kept), SIZE_OF(List), SIZE_OF(Component), SIZE_OF(Channel), SIZE_OF(Track), SIZE_OF(Loop), \
     SIZE_OF(Size)
-#ifndef EXPORT
 #define EXPORT __attribute__((visibility("default")))
-#endif

@@ -20,16 +20,13 @@ TOLERATED = 1e-9
 """largest relative difference of a metric"""
 CHUNK, SORTED = 256, 4096
 """Largest number of runs in a chunk, and number of runs sorted at a time so that those of a chunk are alike"""
-ON_GPU = 2**15
-"""Largest number of runs in a chunk on a GPU, enough to fill its threads"""
 
 
-def chunks(tasks: Iterable[RunTask], total: int, workers: int, on_gpu: bool = False) -> Iterator[RunTask | TaskBatch]:
+def chunks(tasks: Iterable[RunTask], total: int, workers: int) -> Iterator[RunTask | TaskBatch]:
     """Tasks in chunks, several for each worker; tasks whose signals are kept remain single."""
     size = max(preferred_lanes(), min(CHUNK, total // (4 * workers) // preferred_lanes() * preferred_lanes()))
-    size, order = (ON_GPU, ON_GPU) if on_gpu else (size, SORTED)
     waiting = iter(tasks)
-    while window := list(islice(waiting, order)):
+    while window := list(islice(waiting, SORTED)):
         yield from (task for task in window if task.keep_signals)
         places: dict[Any, int] = {}
         rest = [(task, (outline(task.system), schedule_key(task.system))) for task in window if not task.keep_signals]
@@ -37,7 +34,7 @@ def chunks(tasks: Iterable[RunTask], total: int, workers: int, on_gpu: bool = Fa
             places.setdefault(key, len(places))
         ordered = [task for task, _ in sorted(rest, key=lambda pair: places[pair[1]])]
         for first in range(0, len(ordered), size):
-            yield TaskBatch(tasks=tuple(ordered[first : first + size]), on_gpu=on_gpu)
+            yield TaskBatch(tasks=tuple(ordered[first : first + size]))
 
 
 def sample(keys: Iterable[str]) -> set[str]:

@@ -13,7 +13,7 @@ from orchestration.systems.system.files import Files, files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Twin, system_of
 
-EngineChoice = Literal["auto", "python", "compiled", "batch", "cuda"]
+EngineChoice = Literal["auto", "python", "compiled", "batch"]
 """`auto`: `batch` if available, else native FMUs one at a time, else the FMUs as they are"""
 
 
@@ -29,15 +29,11 @@ class Execution:
     """for runs one at a time; None: the fastest that each can use"""
     reason: str | None = None
     """why `auto` did not choose the fastest"""
-    on_gpu: bool = False
-    """whether the lanes are threads of a GPU"""
 
     @property
     def name(self) -> str:
         """The name as in `--engine`."""
-        if self.in_lanes:
-            return "cuda" if self.on_gpu else "batch"
-        return self.engine or "compiled"
+        return "batch" if self.in_lanes else self.engine or "compiled"
 
     def __str__(self) -> str:
         if self.in_lanes:
@@ -60,20 +56,15 @@ def choose_execution(
     """How runs are executed by an engine, with native twins if `native` is requested.
 
     `first` returns the first run, checked, and its files, with native twins or not; `no_lanes` is a reason that rules
-    out lanes. Raises `UsageError`, naming the obstacle, if requested lanes are impossible, and `QuadcosimError` if
-    there is no GPU for `cuda`.
+    out lanes. Raises `UsageError`, naming the obstacle, if requested lanes are impossible.
     """
     if engine in ("python", "compiled"):
         return Execution(native=native, in_lanes=False, engine=engine)
-    if engine in ("batch", "cuda"):
+    if engine == "batch":
         if no_lanes is not None:
             raise UsageError(f"--engine {engine}: {no_lanes}")
-        if engine == "cuda":
-            from orchestration.simulation.engines.cuda.fleet import expect_gpu  # deferred: slow to load
-
-            expect_gpu()
         _expect_lanes(*first(True))
-        return Execution(native=True, in_lanes=True, engine=None, on_gpu=engine == "cuda")
+        return Execution(native=True, in_lanes=True, engine=None)
     try:
         system, files = first(True)
     except QuadcosimError as error:  # an invalid request is reported when it is run

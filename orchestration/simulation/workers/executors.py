@@ -46,8 +46,8 @@ class RunEvaluator:
     def __exit__(self, *exception: object) -> None:
         self._stack.close()
 
-    def run_all(self, systems: Sequence[System], *, in_lanes: bool = False, on_gpu: bool = False) -> list[Any]:
-        """The metrics of all runs in their order; `in_lanes`: with native FMUs, many at once, `on_gpu` or not.
+    def run_all(self, systems: Sequence[System], *, in_lanes: bool = False) -> list[Any]:
+        """The metrics of all runs in their order; `in_lanes`: with native FMUs, many at once.
 
         Raises `QuadcosimError` if a run fails.
         """
@@ -55,7 +55,7 @@ class RunEvaluator:
             return self.run_until(systems, stop=lambda metrics: False)
         tasks = (self._task(i, system) for i, system in enumerate(systems))
         metrics: list[Any] = [None] * len(systems)
-        for future in [self._submit(part) for part in chunks(tasks, len(systems), self._workers, on_gpu)]:
+        for future in [self._submit(part) for part in chunks(tasks, len(systems), self._workers)]:
             for outcome in future.result():
                 metrics[outcome.row.index] = _metrics(outcome)
         return metrics

@@ -46,8 +46,6 @@ class TaskBatch:
     """Runs of a study that are simulated in SIMD lanes, all with native FMUs and without keeping signals."""
 
     tasks: tuple[RunTask, ...]
-    on_gpu: bool = False
-    """whether the lanes are threads of a GPU"""
 
     @property
     def time_limit(self) -> float | None:
@@ -93,8 +91,7 @@ class Runner:
     def __init__(self, machine: str | None = None) -> None:
         self._instances = Instances()
         self._machine = machine
-        self._batches: dict[bool, Batches] = {}
-        """by `on_gpu`; loaded when runs are first simulated in lanes"""
+        self._batches: Batches | None = None
 
     def run(self, task: RunTask) -> TaskOutcome:
         """Simulate one run; its own failure becomes its row.
@@ -130,9 +127,11 @@ class Runner:
         started = time.perf_counter()
         _expect_files(chunk.tasks[0].system)
         try:
-            if chunk.on_gpu not in self._batches:
-                self._batches[chunk.on_gpu] = _batches(on_gpu=chunk.on_gpu)
-            outcomes = self._batches[chunk.on_gpu].run([task.system for task in chunk.tasks])
+            if self._batches is None:
+                from orchestration.simulation.engines.batch.batches import Batches  # deferred: slow to load
+
+                self._batches = Batches()
+            outcomes = self._batches.run([task.system for task in chunk.tasks])
         except (QuadcosimError, OSError, MemoryError) as error:
             raise WorkerEnvironmentError(str(error) or type(error).__name__) from error
         duration = (time.perf_counter() - started) / len(chunk.tasks)
@@ -156,16 +155,6 @@ class Runner:
     def close(self) -> None:
         """Free the FMUs."""
         self._instances.close()
-
-
-def _batches(*, on_gpu: bool) -> "Batches":
-    if on_gpu:
-        from orchestration.simulation.engines.cuda import fleet
-
-        return fleet.batches()
-    from orchestration.simulation.engines.batch.batches import Batches
-
-    return Batches()
 
 
 def _expect_files(system: System) -> None:

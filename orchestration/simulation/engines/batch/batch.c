@@ -1,24 +1,27 @@
 /* The loop of runs of kernels in SIMD lanes: the reductions of a run are updated row by row by expressions.h, which is
-   generated for the system. The processing of an instant is in instants.h.
-
-   The lanes are those of vector registers, or threads with QUADCOSIM_THREADS: then this is C++ too, functions that are
-   only declared here are in flights.cu, and nothing can be allocated. */
+   generated for the system. The processing of an instant is in instants.h. */
 
 #include "lanes.h"
 #include "mathematics.h"
 
-#ifndef QUADCOSIM_THREADS
 #include <stdlib.h>
-#endif
 
 #include "sizes.h"
 #include "structures.h"
 
 #include "instants.h"
 
-typedef Loop Batch; /* its name in expressions.h */
+EXPORT const Size sizes[] = {SIZES, {0}};
 
-static int make_room_to_keep(Kept *kept);
+static int make_room_to_keep(Kept *kept) {
+    int64_t capacity = kept->capacity ? 2 * kept->capacity : 1024;
+    double *values = aligned_alloc(64, (size_t)capacity * sizeof(q_real));
+    if (!values) return 0;
+    if (kept->values) memcpy(values, kept->values, (size_t)kept->count * sizeof(q_real));
+    free(kept->values);
+    kept->values = values, kept->capacity = capacity;
+    return 1;
+}
 
 static int keep(Kept *kept, q_real value) {
     if (kept->count == kept->capacity && !make_room_to_keep(kept)) return 0;
@@ -60,11 +63,20 @@ static void set(Loop *l, Channel *c, Lanes lanes, const double *value, const Ins
     if (q_any(wrong)) end_some(l, lanes_of(wrong), REFUSED, 0, now);
 }
 
-static Lanes failed_steps(Loop *l, int64_t index, Lanes lanes, q_real begin, q_real length);
+typedef void Step(double *, const uint64_t *, const double *, const double *, int32_t *, const bool *);
 
 static void step(Loop *l, int64_t index, Lanes lanes, q_real begin, q_real length, int64_t until, const Instant *now) {
-    Lanes failed = failed_steps(l, index, lanes, begin, length);
-    if (failed) end_some(l, failed, FAILED, index, now);
+    const Component *c = &l->components[index];
+    q_bits active = bits_of(lanes);
+    int32_t any = 0;
+    ((Step *)c->step)(
+        c->memory, (const uint64_t *)&active, (const double *)&begin, (const double *)&length, l->status, c->wanted);
+    for (int lane = 0; lane < L; lane++) any |= l->status[lane];
+    if (!any) return;
+    Lanes failed = 0;
+    EACH(lane, lanes) failed |= (Lanes)(l->status[lane] != 0) << lane;
+    memset(l->status, 0, L * sizeof *l->status);
+    end_some(l, failed, FAILED, index, now);
 }
 
 /* End the lanes in which a connected output is not finite. */
@@ -96,6 +108,21 @@ static void look(Loop *l, Lanes lanes, const Instant *now) {
     if (!HAS_CONDITION) return;
     q_mask over = holds(l, now->t) & mask_of(lanes);
     if (q_any(over)) end_some(l, lanes_of(over), DIVERGED, 0, now);
+}
+
+static int make_room(Channel *c, int lane) {
+    int64_t capacity = c->capacity ? 2 * c->capacity : 4;
+    size_t bytes = (size_t)(capacity * c->size) * sizeof(q_real);
+    double *flight = aligned_alloc(64, bytes);
+    if (!flight) return 0;
+    for (int each = 0; each < L; each++)
+        for (int64_t k = c->first[each]; k < c->last[each]; k++)
+            for (int64_t i = 0; i < c->size; i++)
+                flight[((k & (capacity - 1)) * c->size + i) * L + each] =
+                    c->flight[((k & (c->capacity - 1)) * c->size + i) * L + each];
+    free(c->flight);
+    c->flight = flight, c->capacity = capacity;
+    return 1;
 }
 
 /* Mark the lanes whose row has values of a message: the row at which they were sampled, or at which they arrive. */
@@ -242,8 +269,6 @@ static void reach_and_pass(Loop *l, Instant *now, Lanes tracks, int first) {
     pass(l, now);
 }
 
-static Lanes in_turn(Lanes ready, Lanes sampling);
-
 /* Process the windows of the tracks. Tracks at their first instant process it together; those that sample next wait for
    one another, since the cost of a sample does not grow with the number of its lanes. */
 EXPORT int run(Loop *l) {
@@ -269,8 +294,7 @@ EXPORT int run(Loop *l) {
             setting_out |= (Lanes)((track->kind & START) != 0) << number;
         }
         if (!ready) return AT_END;
-        due = setting_out ? setting_out : in_turn(ready, sampling);
-        if (!due) continue;
+        due = setting_out ? setting_out : ready & ~sampling ? ready & ~sampling : ready;
         memset(marks, 0, sizeof marks);
         if (due & with_more) {
             lay_out_step(l, due & ~with_more);
@@ -286,55 +310,6 @@ EXPORT int run(Loop *l) {
         if (l->no_memory) return NO_MEMORY;
         TRACKS(track, due) track->count = 0;
     }
-}
-
-#ifndef QUADCOSIM_THREADS
-
-/* -- in lanes of vector registers ---------------------------------------------------------------------------------- */
-
-EXPORT const Size sizes[] = {SIZES, {0}};
-
-typedef void Step(double *, const uint64_t *, const double *, const double *, int32_t *, const bool *);
-
-static Lanes failed_steps(Loop *l, int64_t index, Lanes lanes, q_real begin, q_real length) {
-    const Component *c = &l->components[index];
-    q_bits active = bits_of(lanes);
-    int32_t any = 0;
-    ((Step *)c->step)(
-        c->memory, (const uint64_t *)&active, (const double *)&begin, (const double *)&length, l->status, c->wanted);
-    for (int lane = 0; lane < L; lane++) any |= l->status[lane];
-    if (!any) return 0;
-    Lanes failed = 0;
-    EACH(lane, lanes) failed |= (Lanes)(l->status[lane] != 0) << lane;
-    memset(l->status, 0, L * sizeof *l->status);
-    return failed;
-}
-
-static Lanes in_turn(Lanes ready, Lanes sampling) { return ready & ~sampling ? ready & ~sampling : ready; }
-
-static int make_room_to_keep(Kept *kept) {
-    int64_t capacity = kept->capacity ? 2 * kept->capacity : 1024;
-    double *values = aligned_alloc(64, (size_t)capacity * sizeof(q_real));
-    if (!values) return 0;
-    if (kept->values) memcpy(values, kept->values, (size_t)kept->count * sizeof(q_real));
-    free(kept->values);
-    kept->values = values, kept->capacity = capacity;
-    return 1;
-}
-
-static int make_room(Channel *c, int lane) {
-    int64_t capacity = c->capacity ? 2 * c->capacity : 4;
-    size_t bytes = (size_t)(capacity * c->size) * sizeof(q_real);
-    double *flight = aligned_alloc(64, bytes);
-    if (!flight) return 0;
-    for (int each = 0; each < L; each++)
-        for (int64_t k = c->first[each]; k < c->last[each]; k++)
-            for (int64_t i = 0; i < c->size; i++)
-                flight[((k & (capacity - 1)) * c->size + i) * L + each] =
-                    c->flight[((k & (c->capacity - 1)) * c->size + i) * L + each];
-    free(c->flight);
-    c->flight = flight, c->capacity = capacity;
-    return 1;
 }
 
 /* The number of steps in which a kept value grows, and ends above a floor. */
@@ -360,5 +335,3 @@ EXPORT void free_all(Loop *l) {
     for (int64_t i = 0; i < KEPT; i++) free(l->kept[i].values);
     for (int64_t i = 0; i < l->channel_count; i++) free(l->channels[i].flight);
 }
-
-#endif

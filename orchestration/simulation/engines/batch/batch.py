@@ -2,7 +2,7 @@
 
 import ctypes
 from collections import OrderedDict
-from collections.abc import Generator, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
@@ -64,10 +64,6 @@ class Group:
     timings: Sequence[ScheduleKey]
     parameters: ParameterColumns = field(default_factory=lambda: NO_COLUMNS)
     """of each run, overriding those of its system"""
-
-
-Stepwise = Generator[None, Sequence[int], BatchResult]
-"""Runs whose windows the caller processes, as `Batch.stepwise` describes"""
 
 
 @dataclass(kw_only=True)
@@ -159,44 +155,22 @@ class Batch:
             status=address(self._status),
         )])  # fmt: skip
 
+        self._address = ctypes.addressof(self._batch)
+
     def __del__(self) -> None:
-        if hasattr(self, "_batch"):
-            self._library.free_all(self.address)
+        if hasattr(self, "_address"):
+            self._library.free_all(self._address)
 
     # -- a group of runs -------------------------------------------------------------------------------------------
 
-    def each(self, groups: Iterable[Group], record: Sequence[str] | None) -> Iterator[tuple["Batch", BatchResult]]:
-        """Run groups one after another; with each result the batch that has run it, which is this one."""
-        for group in groups:
-            yield self, self.run(group, record)
-
     def run(self, group: Group, record: Sequence[str] | None = None) -> BatchResult:
         """Simulate a group of runs; `record` are the columns that are recorded, besides the time."""
-        stepwise = self.stepwise(group, record)
-        next(stepwise)
-        while True:
-            code = self._library.run(self.address)
-            if code == self._c.NO_MEMORY:
-                raise QuadcosimError("a batch of runs: expected memory for the messages that are on their way")
-            try:
-                stepwise.send([self._batch.track] if code == self._c.NEXT_WINDOW else [])
-            except StopIteration as end:
-                result: BatchResult = end.value
-                return result
-
-    def stepwise(self, group: Group, record: Sequence[str] | None = None) -> Stepwise:
-        """The same in steps: at each yield the caller processes windows, then sends the tracks that need another."""
         self._parameters = group.parameters
-        reductions: dict[Call, Floats] = {}
+        reductions: Mapping[Call, Floats] = {}
         for _ in range(self._shape.passes):
-            result = yield from self._run_once(group.systems, group.timings, reductions, record)
-            reductions = dict(result.reductions)
+            result = self._run_once(group.systems, group.timings, reductions, record)
+            reductions = result.reductions
         return result
-
-    @property
-    def address(self) -> int:
-        """The address of the C structure of the loop."""
-        return ctypes.addressof(self._batch)
 
     def _run_once(
         self,
@@ -204,7 +178,7 @@ class Batch:
         timings: Sequence[ScheduleKey],
         known: Mapping[Call, Floats],
         record: Sequence[str] | None,
-    ) -> Stepwise:
+    ) -> BatchResult:
         batch, count = self._batch, len(systems)
         runs = [self._run(lane, system) for lane, system in enumerate(systems)]
         self._clear()
@@ -220,18 +194,18 @@ class Batch:
             batch.alive &= ~(1 << lane)
         tracks = self._tracks_of(runs, timings, schedules)
         recorded = self._record(record, tracks)
-        yield from self._pass(runs, tracks)
+        self._pass(runs, tracks)
         return self._result(systems, recorded)
 
     def _clear(self) -> None:
         """Reset the state to that before the first instant."""
-        self._library.clear(self.address)
+        self._library.clear(self._address)
         self._state[:] = np.array(self._expressions.states)[:, None]
         self._batch.doubtful = 0
         for name in ("outcome", "outcome_component", "outcome_time", "steps", "record_counts"):
             getattr(self._batch, name)[:] = [0] * self._lanes
 
-    def _pass(self, runs: Sequence[LaneRun], tracks: Sequence[Track]) -> Generator[None, Sequence[int], None]:
+    def _pass(self, runs: Sequence[LaneRun], tracks: Sequence[Track]) -> None:
         batch = self._batch
         batch.track_count = len(tracks)
         for i, track in enumerate(tracks):
@@ -239,9 +213,10 @@ class Batch:
             into.now, into.lanes = self._memory.temporary_address(track.now), sum(1 << lane for lane in track.lanes)
             into.stop, into.one_for_all = nanoseconds(runs[track.lanes[0]].system.stop_time), track.same_sources
             self._next_span(i, track, runs)
-        while waiting := (yield):
-            for i in waiting:
-                self._next_span(i, tracks[i], runs)
+        while (code := self._library.run(self._address)) == self._c.NEXT_WINDOW:
+            self._next_span(batch.track, tracks[batch.track], runs)
+        if code == self._c.NO_MEMORY:
+            raise QuadcosimError("a batch of runs: expected memory for the messages that are on their way")
 
     def _result(self, systems: Sequence[System], recorded: Sequence[Floats]) -> BatchResult:
         batch, count = self._batch, len(systems)
@@ -270,7 +245,7 @@ class Batch:
         numbers = dict(zip((*self._shape.numbers, STOP_TIME), self._numbers[:, :count]))
         ((floor, none),) = combined([call.arguments[1]], values, numbers, count)
         self._floor[0, :count] = np.where(none, np.nan, floor)
-        self._library.grown(self.address, folds.kept[own], address(self._floor), address(self._grown))
+        self._library.grown(self._address, folds.kept[own], address(self._floor), address(self._grown))
         steps = self._state[folds.steps[own], :count]
         share: Floats = np.where(
             (steps > 0) & ~none, self._grown[0, :count] / np.where(steps > 0, steps, np.nan), np.nan

@@ -1,9 +1,8 @@
 """Runs many systems in SIMD lanes; the result of each is a summary, or that the run must be done alone."""
 
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -38,21 +37,13 @@ BatchOutcome = tuple[int, RunSummary | None, Floats]
 _NO_ROWS: Floats = np.zeros((0, 0))
 
 
-class BatchRunner(Protocol):
-    """Runs groups of runs of a shape, one after another or many at once."""
-
-    def each(self, groups: Sequence[Group], record: Sequence[str] | None) -> Iterator[tuple[Batch, BatchResult]]:
-        """The results of groups in their order, each with the batch that has run it."""
-
-
 class Batches:
     """The batches of this process by the shape of their systems, whose FMUs are files."""
 
-    def __init__(self, runner: Callable[[Shape, ScheduleCache], BatchRunner] = Batch) -> None:
+    def __init__(self) -> None:
         self._schedules = ScheduleCache()
         self._lanes = preferred_lanes()
-        self._new_runner = runner
-        self._shapes: dict[Hashable, tuple[Shape, BatchRunner]] = {}
+        self._shapes: dict[Hashable, tuple[Shape, Batch]] = {}
 
     def run(self, systems: Sequence[System]) -> list[RunSummary | None]:
         """The summaries of runs, in their order; None for one that must be run alone. Raises as `each`."""
@@ -75,27 +66,24 @@ class Batches:
         for place, system in enumerate(systems):
             shapes.setdefault(known[id(system)][0], []).append(place)
         for key, places in shapes.items():
-            shape, runner = self._runner_of(key, systems[places[0]])
+            shape, batch = self._batch_of(key, systems[places[0]])
             timings = {place: known[id(systems[place])][1] for place in places}
             several = {id(systems[place]): systems[place] for place in places}
             connected = {key: connect_references(system, shape.models) for key, system in several.items()}
-            groups = [*_groups(places, timings, self._lanes)]
-            group_runs = [
-                Group(
+            for group in _groups(places, timings, self._lanes):
+                runs = Group(
                     systems=[connected[id(systems[i])] for i in group], timings=[timings[i] for i in group],
                     parameters={name: values[group] for name, values in parameters.items()},
-                )
-                for group in groups
-            ]  # fmt: skip
-            for group, runs, (batch, result) in zip(groups, group_runs, runner.each(group_runs, record)):
+                )  # fmt: skip
+                result = batch.run(runs, record)
                 rows = result.signals or [_NO_ROWS] * len(group)
                 yield from zip(group, [*_summaries(shape, batch, result, runs.systems)], rows)
 
-    def _runner_of(self, key: Hashable, system: System) -> tuple[Shape, BatchRunner]:
+    def _batch_of(self, key: Hashable, system: System) -> tuple[Shape, Batch]:
         if key not in self._shapes:
             models = {name: read_model(Path(component.fmu)) for name, component in system.components.items()}
             shape = Shape(system=check_against_fmus(system, models).system, models=models, lanes=self._lanes)
-            self._shapes[key] = shape, self._new_runner(shape, self._schedules)
+            self._shapes[key] = shape, Batch(shape, self._schedules)
         return self._shapes[key]
 
 

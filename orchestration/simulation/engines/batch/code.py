@@ -66,8 +66,8 @@ def expression_code(
     step = [f"const q_real dt = q_select(m, t - {time}, q_all(0.0));"]
     return ExpressionCode(
         text="\n".join([
-            *_function("void constants(Batch *b)", [*writer.once.lines, *constants]),
-            *_function("q_mask holds(const Batch *b, q_real t)", [*known, *unused, *watched.lines, f"return {over};"]),
+            *_function("void constants(Loop *b)", [*writer.once.lines, *constants]),
+            *_function("q_mask holds(const Loop *b, q_real t)", [*known, *unused, *watched.lines, f"return {over};"]),
             *_row("begin_row", [
                 *here, *rows.section.lines, *rows.first, *rows.always, *changed, *folds.held.first, *held, *sampled,
                 *after.first, *done,
@@ -99,7 +99,7 @@ class _Slopes:
 
 
 def _row(name: str, lines: Sequence[str]) -> list[str]:
-    return _function(f"int {name}(Batch *b, const Instant *now, q_mask m)", lines)
+    return _function(f"int {name}(Loop *b, const Instant *now, q_mask m)", lines)
 
 
 def _function(head: str, lines: Sequence[str]) -> list[str]:

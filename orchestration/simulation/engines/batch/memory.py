@@ -1,4 +1,4 @@
-"""Memory for the numbers of runs: of this process, unless a GPU computes them."""
+"""Memory for the numbers of runs, aligned for vector registers."""
 
 import ctypes
 import math
