@@ -21,7 +21,7 @@ FILES = {
     "Scenario file": (ScenarioFile, "A flight of the quadrotor; what it leaves out is the paper's flight."),
     "Study file": (StudyFile, "Many runs of a system or a scenario; [how to write one](studies.md)."),
     "Comparison file": (ComparisonFile, "Controllers against each other; [how to write one](compare.md)."),
-    "Tuning file": (TuningFile, "What `quadcosim tune` searches; [how to write one](tuning.md)."),
+    "Tuning file": (TuningFile, "What `quadcosim tune` searches; [how to write one](compare.md#tuning)."),
 }
 OF_THE_BASE = {"Comparison file": {"[starts]": Starts}, "Tuning file": {"[starts]": Starts}}
 """Tables read by the base of a file, here a scenario"""
