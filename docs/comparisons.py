@@ -31,7 +31,6 @@ from orchestration.experiments.comparison.survival import FATES, RESIDUAL, SETTL
 from orchestration.experiments.studies.axis_labels import quantity_of
 from orchestration.experiments.studies.sweep import sweep
 from orchestration.foundation.basics.statistics import first_end, wilson
-from orchestration.quadrotor.scenarios.initial_conditions import Starts
 from orchestration.simulation.figures.palette import (
     BLUE,
     BROWN,
@@ -50,6 +49,7 @@ from orchestration.simulation.figures.palette import (
 from orchestration.simulation.figures.style import DOCS
 from orchestration.simulation.results import display_names as labels
 from orchestration.simulation.results.quantities import Quantity
+from orchestration.systems.system.starts import Starts
 
 ROOT = Path(__file__).parent.parent
 FILES = ROOT / "studies" / "comparisons"

@@ -42,7 +42,6 @@ from orchestration.foundation.basics.statistics import wilson
 from orchestration.quadrotor.flight.hover_loop import HoverLoop
 from orchestration.quadrotor.flight.local_limit import about_hover
 from orchestration.quadrotor.flight.margin import margin_of
-from orchestration.quadrotor.scenarios.initial_conditions import Starts
 from orchestration.simulation.figures.style import DOCS, save
 from orchestration.simulation.workers.batching import LaneAgreement
 
@@ -98,7 +97,6 @@ def last_bits() -> list[str]:
     lines = []
     for name in ("mismatches", "vehicles"):
         known, kept = comparisons.load(name), comparisons.read_data(name)["cells"]
-        assert isinstance(known.starts, Starts)
         sizes = {
             size: getattr(known.starts, size) * (1.0 + 1e-15) for size in ("position", "velocity", "angle", "rate")
         }

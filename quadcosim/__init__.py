@@ -61,7 +61,7 @@ if TYPE_CHECKING:
     from orchestration.quadrotor.scenarios.scenario import Scenario
     from orchestration.quadrotor.scenarios.signals import DisturbanceChoice, ReferenceChoice
     from orchestration.quadrotor.scenarios.timing import Timing
-    from orchestration.quadrotor.scenarios.vehicle import Vehicle, load_vehicle
+    from orchestration.quadrotor.scenarios.vehicle import load_vehicle
     from orchestration.simulation.runs.many_runs import Flights
     from orchestration.simulation.runs.many_runs import run_many as fly
     from orchestration.simulation.runs.outcome import RunInterrupted, RunLost
@@ -82,6 +82,7 @@ if TYPE_CHECKING:
     from orchestration.systems.system.paths import changed
     from orchestration.systems.system.sampling import Sampling, SamplingOnArrival
     from orchestration.systems.system.source import Source
+    from orchestration.systems.system.vehicle import Vehicle
     from orchestration.theory.certificates.basin import Basin, basin
     from orchestration.theory.certificates.check import Checked
     from orchestration.theory.certificates.check import check as check_certificate
@@ -109,7 +110,7 @@ _HOMES = {
     "ReferenceChoice": "orchestration.quadrotor.scenarios.signals",
     "DisturbanceChoice": "orchestration.quadrotor.scenarios.signals",
     "Record": "orchestration.quadrotor.scenarios.fmu_choice",
-    "Vehicle": "orchestration.quadrotor.scenarios.vehicle",
+    "Vehicle": "orchestration.systems.system.vehicle",
     "load_vehicle": "orchestration.quadrotor.scenarios.vehicle",
     "load_scenario": "orchestration.quadrotor.scenarios.file",
     # any system

@@ -13,7 +13,6 @@ from orchestration.experiments.tuning.tuning_file import TuningFile
 from orchestration.foundation.basics.records import Scalar
 from orchestration.foundation.basics.typed_tables import docs_of_keys, fields_of
 from orchestration.quadrotor.scenarios.file import ScenarioFile
-from orchestration.quadrotor.scenarios.initial_conditions import Starts
 from orchestration.systems.system.file import SystemTable
 
 FILES = {
@@ -23,8 +22,6 @@ FILES = {
     "Comparison file": (ComparisonFile, "Controllers against each other; [how to write one](compare.md)."),
     "Tuning file": (TuningFile, "What `quadcosim tune` searches; [how to write one](compare.md#tuning)."),
 }
-OF_THE_BASE = {"Comparison file": {"[starts]": Starts}, "Tuning file": {"[starts]": Starts}}
-"""Tables read by the base of a file, here a scenario"""
 INTRODUCTION = """\
 # Keys of files
 
@@ -56,7 +53,7 @@ def page() -> str:
 
 
 def _file(title: str, shape: Any, description: str) -> str:
-    tables = {"": shape, **dict(_tables_in(shape, "")), **OF_THE_BASE.get(title, {})}
+    tables = {"": shape, **dict(_tables_in(shape, ""))}
     places: dict[Any, list[str]] = {}
     for place, each in tables.items():
         places.setdefault(each, []).append(place)

@@ -7,3 +7,5 @@ MODELS = {
     "QuadrotorPlant": "plant_fmu.slave:QuadrotorPlant",
 }
 """FMUs of this project by name, and the slave that each is built from."""
+CONTROLLERS = tuple(name for name, slave in MODELS.items() if slave.startswith("controller_fmu."))
+"""Those that control a vehicle"""

@@ -10,9 +10,11 @@ from orchestration.experiments.studies.linked_settings import Key, LinkedSetting
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.records import record
+from orchestration.systems.system.parameters import Values
 from orchestration.systems.system.paths import value_at
-from orchestration.systems.system.request import ControlLoop, Ensemble, InitialConditions, Values
-from orchestration.systems.system.request import Craft as Vehicle
+from orchestration.systems.system.request import ControlLoop
+from orchestration.systems.system.starts import InitialConditions, Starts
+from orchestration.systems.system.vehicle import Vehicle
 
 VEHICLE, CONDITION, CONTROLLER, START = "vehicle", "condition", "controller", "start"
 FMU = "controller.fmu"
@@ -88,7 +90,7 @@ class Comparison:
     """Deviations from the controllers' model, and faults."""
     axis: Axis
     """The quantity that is varied, with increasing values."""
-    starts: Ensemble
+    starts: Starts
     """The initial conditions, the same for every controller."""
     front: Front = field(default_factory=Front)
     """The two objectives of the trade-off."""
@@ -121,7 +123,7 @@ class Comparison:
     @cached_property
     def initial_conditions(self) -> tuple[InitialConditions, ...]:
         """The initial conditions, about the start of the base's reference."""
-        return tuple(self.starts.initial_conditions(self.base))
+        return tuple(self.base.initial_conditions(self.starts))
 
     @cached_property
     def study(self) -> Study:

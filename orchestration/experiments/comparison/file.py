@@ -18,6 +18,7 @@ from orchestration.systems.expressions.at_instant import compiled
 from orchestration.systems.expressions.syntax import is_truth, names, parse
 from orchestration.systems.system.parameters import parameters_in
 from orchestration.systems.system.request import ControlLoop
+from orchestration.systems.system.starts import Starts
 
 
 @record()
@@ -70,7 +71,7 @@ class ComparisonFile:
     """The vehicles; default: that of the base."""
     conditions: list[ConditionTable] = field(default_factory=lambda: [ConditionTable(name="nominal")])
     """The conditions under which each is run; default: the base unchanged."""
-    starts: dict[str, Any] = field(default_factory=dict)
+    starts: Starts = field(default_factory=Starts)
     """The initial conditions, the same for every controller."""
     front: Front = field(default_factory=Front)
     """The two objectives of the trade-off."""
@@ -103,7 +104,7 @@ def _comparison(file: ComparisonFile, path: Path) -> Comparison:
         vehicles=vehicles,
         conditions=tuple(_condition(table) for table in file.conditions),
         axis=axis,
-        starts=base.ensemble(file.starts),
+        starts=file.starts,
         front=file.front,
     )
 
@@ -178,7 +179,7 @@ def _substituted(name: str, vehicle: str, value: Value) -> str:
 def _vehicle(table: VehicleTable, base: ControlLoop, folder: Path) -> VehicleEntry:
     place = f"vehicles.{table.name}"
     plant, own = parameters_in(table.plant, f"{place}.plant"), parameters_in(table.controller, f"{place}.controller")
-    return VehicleEntry(name=table.name, vehicle=base.craft(table.vehicle, folder, plant=plant, controller=own))
+    return VehicleEntry(name=table.name, vehicle=base.vehicle_of(table.vehicle, folder, plant=plant, controller=own))
 
 
 def _condition(table: ConditionTable) -> Condition:

@@ -1,7 +1,6 @@
 """The report of single runs, from their directories or from results."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from orchestration.simulation.results import quantities
 from orchestration.simulation.runs.result import Result
 from orchestration.systems.schedule.resources import timeline_of
 from orchestration.systems.system.model import System
+from orchestration.systems.system.parameters import flattened
 
 BYTES = 9_000_000
 """Characters that the signals of all runs may take"""
@@ -98,13 +98,9 @@ def _bars(system: System, blobs: Blobs) -> Bars | None:
 def _settings(result: Result) -> dict[str, Setting]:
     """The values of its file, by display name."""
     settings: dict[str, Setting] = {}
-    waiting: list[tuple[str, Any]] = [("", tables_in(result.request.to_toml()))]
-    while waiting:
-        place, value = waiting.pop(0)
-        if isinstance(value, Mapping):
-            waiting = [(f"{place}.{key}".lstrip("."), each) for key, each in value.items()] + waiting
-        elif isinstance(value, float | int | bool | str):
-            named = quantities.setting(place, [value])
+    for path, value in flattened(tables_in(result.request.to_toml())):
+        if isinstance(value, float | int | bool | str):
+            named = quantities.setting(path, [value])
             settings[named.title] = value if isinstance(value, int | str) else named.factor * value
     return settings
 

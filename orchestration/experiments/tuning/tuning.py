@@ -1,7 +1,7 @@
 """Tuning by runs: parameters of lowest mean cost over an ensemble of initial conditions, judged on others."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -15,7 +15,8 @@ from orchestration.foundation.basics.statistics import wilson
 from orchestration.systems.system.files import Files
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
-from orchestration.systems.system.request import ControlLoop, Ensemble, errors_in_own_terms, system_of
+from orchestration.systems.system.request import ControlLoop, errors_in_own_terms, system_of
+from orchestration.systems.system.starts import Starts
 
 RunSystems = Callable[[Sequence[System]], Sequence[dict[str, Any]]]
 """The metrics of runs, in their order"""
@@ -29,7 +30,7 @@ class Tuning(TuningProblem):
     """The scenario whose controller is tuned."""
     bad: float
     """The cost of a run that diverges, or whose cost has no value; no run costs more."""
-    starts: Ensemble
+    starts: Starts
     """The initial conditions that it is tuned on; those that it is judged on follow them."""
     judged: int
     """The number of initial conditions that it is judged on."""
@@ -50,20 +51,20 @@ class Tuning(TuningProblem):
     def first_run(self) -> tuple[System, Files]:
         """The system of one of the runs, and the files of all."""
         middle = self.values([0.5] * len(self.parameters))
-        return self.systems(self.periods[0], middle, self.starts.subset(self.starts.first, 1))[0], self.files()
+        return self.systems(self.periods[0], middle, replace(self.starts, count=1))[0], self.files()
 
-    def systems(self, period: float, values: Mapping[str, float], starts: Ensemble) -> list[System]:
+    def systems(self, period: float, values: Mapping[str, float], starts: Starts) -> list[System]:
         """The systems from an ensemble of initial conditions; raises `UsageError` for an invalid value."""
         system = self.system(period, values)
         with errors_in_own_terms(self.base):
             return [
                 changed(system, {path: v for target, v in start.values.items() for path in self.base.paths_of(target)})
-                for start in starts.initial_conditions(self.base)
+                for start in self.base.initial_conditions(starts)
             ]
 
-    def judging_ensemble(self) -> Ensemble:
+    def judging_ensemble(self) -> Starts:
         """The initial conditions that the result is judged on."""
-        return self.starts.subset(self.starts.first + self.starts.count, self.judged)
+        return replace(self.starts, first=self.starts.first + self.starts.count, count=self.judged)
 
     def mean_cost(self, runs: Sequence[dict[str, Any]]) -> float:
         """The mean cost of runs by their metrics, `bad` for each that diverges: what a search minimises."""

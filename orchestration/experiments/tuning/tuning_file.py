@@ -13,6 +13,7 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.records import record
 from orchestration.foundation.basics.typed_tables import table_of
 from orchestration.systems.system.model import System
+from orchestration.systems.system.starts import Starts
 
 By = Literal["runs", "expect"]
 
@@ -26,9 +27,11 @@ class CostTable(table_of(TuningProblem, only=["cost"], called={"cost": "of"})): 
     """The cost of a run that diverges, or whose cost has no value; no run costs more."""
 
 
-JUDGED = "judged"
-"""Key of `[starts]`: the number of further initial conditions that the result is judged on"""
-DEFAULT_JUDGED = 200
+class StartsTable(table_of(Starts)):  # type: ignore[misc]
+    """`[starts]`: the initial conditions."""
+
+    judged: int = 200
+    """The number of further initial conditions that the result is judged on."""
 
 
 class SearchTable(table_of(TuningProblem, only=["periods", "evaluations", "seeds"])):  # type: ignore[misc]
@@ -45,8 +48,8 @@ class TuningFile:
     """The effort of the search."""
     parameters: list[AxisTable]
     """The parameters to tune, each in a range: at least two."""
-    starts: dict[str, Any] = field(default_factory=dict)
-    """The initial conditions; and `judged`: the number of further ones that the result is judged on (200)."""
+    starts: StartsTable | None = None
+    """The initial conditions, and how many others the result is judged on."""
     name: str | None = None
     """The beginning of the names of the written files; default: the name of this file."""
     scenario: str | None = None
@@ -72,18 +75,16 @@ def _tuning(file: TuningFile, path: Path) -> Tuning | ExactTuning:
         "name": file.name or path.stem, "parameters": parameters, "cost": file.cost.cost, **file.search.model_dump()
     }  # fmt: skip
     if file.cost.by == "expect":
-        for key, present in (("cost.bad", file.cost.bad is not None), ("starts", bool(file.starts))):
+        for key, present in (("cost.bad", file.cost.bad is not None), ("starts", file.starts is not None)):
             if present:
                 raise UsageError(f'{key}: expected none with cost.by = "expect", which makes no runs')
         return ExactTuning(base=base_of(file, path.parent), **common)
     if file.cost.bad is None:
         raise UsageError("cost.bad: expected a value")
-    base, starts = control_loop_of(file, path.parent), dict(file.starts)
-    judged = starts.pop(JUDGED, DEFAULT_JUDGED)
-    if isinstance(judged, bool) or not isinstance(judged, int):
-        raise UsageError(f"starts.{JUDGED} = {judged!r}: expected a valid integer")
-    ensemble = base.ensemble(starts, beside=(JUDGED,))
-    return Tuning(base=base, **common, bad=file.cost.bad, starts=ensemble, judged=judged)
+    starts = file.starts or StartsTable()
+    ensemble = Starts(**starts.model_dump(exclude={"judged"}))
+    base = control_loop_of(file, path.parent)
+    return Tuning(base=base, **common, bad=file.cost.bad, starts=ensemble, judged=starts.judged)
 
 
 def gains_text(tuning: TuningProblem, best: SearchResult, all_results: Sequence[SearchResult], command: str) -> str:

@@ -2,7 +2,7 @@
 
 import dataclasses
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
@@ -14,7 +14,7 @@ from orchestration.foundation.basics.bisection import Range
 from orchestration.foundation.basics.errors import UsageError, no_such_key, shown
 from orchestration.foundation.basics.records import record
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice, Record
-from orchestration.quadrotor.scenarios.initial_conditions import Starts, starts_in
+from orchestration.quadrotor.scenarios.initial_conditions import initial_conditions
 from orchestration.quadrotor.scenarios.nominal_model import axis_mismatch, model_mismatch
 from orchestration.quadrotor.scenarios.quantities import range_of
 from orchestration.quadrotor.scenarios.scenario_text import text_of
@@ -29,7 +29,7 @@ from orchestration.quadrotor.scenarios.translation import (
     quadrotor,
     reference_source,
 )
-from orchestration.quadrotor.scenarios.vehicle import Vehicle, load_vehicle
+from orchestration.quadrotor.scenarios.vehicle import load_vehicle
 from orchestration.quadrotor.scenarios.wiring import (
     DEFAULT_CONTROLLER,
     DEFAULT_PLANT,
@@ -43,6 +43,8 @@ from orchestration.systems.system.distribution_table import parsed_fields
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.systems.system.requirements import is_finite
+from orchestration.systems.system.starts import InitialConditions, Starts
+from orchestration.systems.system.vehicle import Vehicle
 
 
 def _loaded_vehicle(value: Any) -> Any:
@@ -250,16 +252,16 @@ class Scenario:
         """The same without a vehicle, for a caller that sets the parameters itself."""
         return dataclasses.replace(self, vehicle=None)
 
-    def craft(
+    def vehicle_of(
         self, name: str | None, folder: Path, *, plant: Mapping[str, Parameter], controller: Mapping[str, Parameter]
     ) -> Vehicle:
         """A vehicle by name, or by a path relative to `folder`, with these parameters on top; None: those alone."""
         vehicle = Vehicle(name="base") if name is None else load_vehicle(name, folder)
         return vehicle.with_parameters(plant=plant, controller=controller)
 
-    def ensemble(self, table: Mapping[str, Any], beside: Sequence[str] = ()) -> Starts:
-        """The ensemble that a table of a file describes, which may have keys `beside`; raises `UsageError`."""
-        return starts_in(table, beside)
+    def initial_conditions(self, starts: Starts) -> tuple[InitialConditions, ...]:
+        """The initial conditions about the start of its reference, in the order of their indices."""
+        return initial_conditions(starts, self.as_system())
 
     def to_toml(self) -> str:
         """The scenario file that loads as this scenario, with the parameters of its vehicle written out."""

@@ -1,70 +1,20 @@
-"""Vehicles: parameters of a plant and of its controllers, from vehicle files."""
+"""Reads vehicle files; those that are shipped have names."""
 
 from collections.abc import Mapping
-from dataclasses import field
-from pathlib import Path, PurePath
+from pathlib import Path
 from typing import Any
 
-from orchestration.components.building.models import MODELS
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError, did_you_mean, expected_name
-from orchestration.foundation.basics.records import record
-from orchestration.quadrotor.scenarios.wiring import DEFAULT_PLANT
 from orchestration.systems.system.component import Parameter
 from orchestration.systems.system.parameters import parameters_in
+from orchestration.systems.system.vehicle import Vehicle
 
 SHIPPED = Path(__file__).with_name("vehicles")
 """The folder of the vehicles that have names"""
 ENDING = ".toml"
-CONTROLLERS = tuple(name for name in MODELS if name != DEFAULT_PLANT)
-"""The FMUs of this project that control a vehicle"""
 TABLES = ("plant", "controller", "controllers")
 """of a vehicle file"""
-
-
-@record()
-class Vehicle:
-    """Parameters of the plant, of every controller, and of single controllers by the names of their FMUs.
-
-    Raises `UsageError` for an unknown controller.
-    """
-
-    name: str
-    """The name of the vehicle."""
-    plant: Mapping[str, Parameter] = field(default_factory=dict)
-    """Parameters of the plant by their names in the FMU, in its units."""
-    controller: Mapping[str, Parameter] = field(default_factory=dict)
-    """Parameters of every controller, likewise."""
-    controllers: Mapping[str, Mapping[str, Parameter]] = field(default_factory=dict)
-    """Further parameters of single controllers, by the name of an FMU of this project or the path of an .fmu file."""
-
-    def __post_init__(self) -> None:
-        for fmu in self.controllers:
-            if fmu not in CONTROLLERS and not fmu.endswith(".fmu"):
-                expected = f"{expected_name(fmu, CONTROLLERS)}, or the path of an .fmu file"
-                raise UsageError(f"controllers.{fmu}: no controller of this project; {expected}")
-
-    def with_parameters(self, *, plant: Mapping[str, Parameter], controller: Mapping[str, Parameter]) -> "Vehicle":
-        """The same with other values for the plant and for every controller."""
-        return Vehicle(
-            name=self.name,
-            plant={**self.plant, **plant},
-            controller={**self.controller, **controller},
-            controllers={fmu: {**parameters, **controller} for fmu, parameters in self.controllers.items()},
-        )
-
-    def parameters_for(self, controller: str) -> dict[str, Parameter]:
-        """The parameters of the plant and of the controller whose FMU has this name or path, by target."""
-        sides = {"plant": self.plant, "controller": self.for_controller(controller)}
-        return {f"{side}.{name}": value for side, table in sides.items() for name, value in table.items()}
-
-    def for_controller(self, fmu: str) -> dict[str, Parameter]:
-        """The parameters of the controller whose FMU has this name or path, packed in any way."""
-        values = dict(self.controller)
-        for name, parameters in self.controllers.items():
-            if PurePath(name).stem == PurePath(fmu).stem:
-                values |= parameters
-        return values
 
 
 def names() -> list[str]:

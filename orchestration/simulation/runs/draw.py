@@ -10,15 +10,15 @@ from orchestration.simulation.figures.gallery import Figures
 from orchestration.simulation.figures.run import Run, Window
 from orchestration.simulation.figures.style import SCREEN, Style, style_named
 from orchestration.simulation.figures.views import VIEWS, view_of
+from orchestration.simulation.runs.result import Result
 from orchestration.simulation.runs.run_labels import labels_of_runs
-from orchestration.simulation.runs.run_like import RunLike
 
 MAX_ROWS_OUTSIDE = 2**16
 """The most rows that are drawn of the whole of a run, beside all in the window"""
 
 
 def draw(
-    results: RunLike | Sequence[RunLike],
+    results: Result | Sequence[Result],
     which: Collection[str] | None = None,
     *,
     names: Sequence[str] | None = None,
@@ -50,7 +50,7 @@ def draw(
 
 
 def figures_of(
-    results: Sequence[RunLike], which: Collection[str] | None, *, window: Window | None, style: str
+    results: Sequence[Result], which: Collection[str] | None, *, window: Window | None, style: str
 ) -> Figures:
     """The figures of runs overlaid; raises `UsageError` for an unknown figure or style."""
     chosen = style_named(style)
@@ -59,7 +59,7 @@ def figures_of(
 
 
 def runs_of(
-    results: Sequence[RunLike], names: Sequence[str], columns: Collection[str] | None, window: Window | None
+    results: Sequence[Result], names: Sequence[str], columns: Collection[str] | None, window: Window | None
 ) -> list[Run]:
     """Runs ready to be drawn: at most `MAX_ROWS_OUTSIDE` rows, and all in the window; default: all columns."""
     return [
@@ -83,7 +83,7 @@ def runs_of(
     ]
 
 
-def _title(result: RunLike) -> str:
+def _title(result: Result) -> str:
     parts = [headline] if (headline := result.request.headline()) else []
     if result.divergence is not None:
         parts.append(f"diverged at {result.metrics['divergence_time']:g} s")

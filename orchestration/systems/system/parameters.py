@@ -6,6 +6,9 @@ from typing import Any
 from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.systems.system.component import Parameter
 
+Values = Mapping[str, Parameter]
+"""Parameters by target, as axes of studies name them"""
+
 
 def parameters_in(table: Mapping[str, Any], place: str) -> dict[str, Parameter]:
     """The values of a table by dotted names; raises `UsageError`, naming the `place`, for an invalid value."""

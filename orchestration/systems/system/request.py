@@ -2,20 +2,19 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, TypeVar, runtime_checkable
 
 from orchestration.foundation.basics.bisection import Range
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.records import described_as
-from orchestration.systems.system.component import Parameter
 from orchestration.systems.system.model import System
+from orchestration.systems.system.parameters import Values
+from orchestration.systems.system.starts import InitialConditions, Starts
+from orchestration.systems.system.vehicle import Vehicle
 
 Self = TypeVar("Self", bound="ControlLoop")
 Twin = TypeVar("Twin", bound="Request")
-Values = Mapping[str, Parameter]
-"""Parameters by target, as axes of studies name them"""
 
 
 @described_as("a System or a Scenario")
@@ -80,55 +79,13 @@ def system_of(request: Request) -> System:
         return request.as_system()
 
 
-@dataclass(frozen=True, kw_only=True)
-class InitialConditions:
-    """The initial conditions of one run of an ensemble."""
-
-    size: float
-    """of the initial error, in (0, 1], as a share of the largest of each kind"""
-    values: Values
-
-
-@described_as("an ensemble of starts")
-@runtime_checkable
-class Ensemble(Protocol):
-    """Initial conditions in an order that does not depend on their number."""
-
-    @property
-    def count(self) -> int:
-        """The number of initial conditions."""
-
-    @property
-    def first(self) -> int:
-        """The index of the first; those of an index are the same in every ensemble that has it."""
-
-    def subset(self, first: int, count: int) -> "Ensemble":
-        """The same ensemble with `count` members from index `first` on."""
-
-    def initial_conditions(self, request: Any) -> Sequence[InitialConditions]:
-        """The initial conditions for a request, in the order of their indices."""
-
-
-@described_as("a Vehicle")
-@runtime_checkable
-class Craft(Protocol):
-    """A plant, with the parameters that its controllers need of it."""
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-
-    def parameters_for(self, controller: str) -> Mapping[str, Parameter]:
-        """The parameters of the plant and of the controller of this name or path, by target."""
-
-
 @described_as("a Scenario")
 @runtime_checkable
 class ControlLoop(Request, Protocol):
     """A request with a plant and a controller, on which controllers can be compared and tuned."""
 
     @property
-    def vehicle(self) -> Craft | None:
+    def vehicle(self) -> Vehicle | None:
         """Its plant, where that is given as a whole."""
 
     def with_values(self: Self, values: Mapping[str, Any]) -> Self:
@@ -137,8 +94,8 @@ class ControlLoop(Request, Protocol):
     def without_vehicle(self: Self) -> Self:
         """The same request without its vehicle, which is then given elsewhere."""
 
-    def craft(self, name_or_path: str | None, folder: Path, *, plant: Values, controller: Values) -> Craft:
+    def vehicle_of(self, name_or_path: str | None, folder: Path, *, plant: Values, controller: Values) -> Vehicle:
         """A vehicle by name, or by a path that starts at `folder`, with these parameters on top; None: only those."""
 
-    def ensemble(self, table: Mapping[str, Any], beside: Sequence[str] = ()) -> Ensemble:
-        """The ensemble of a table of a file, which may have other keys `beside`; raises `UsageError`."""
+    def initial_conditions(self, starts: Starts) -> Sequence[InitialConditions]:
+        """The initial conditions about the start of its reference, in the order of their indices."""

@@ -17,7 +17,7 @@ from orchestration.experiments.comparison.outcome import as_json, outcome_of
 from orchestration.experiments.comparison.pairs import pairs
 from orchestration.experiments.comparison.survival import survived
 from orchestration.experiments.studies.axes import Axis
-from orchestration.quadrotor.scenarios.initial_conditions import Starts
+from orchestration.systems.system.starts import Starts
 from quadcosim import Scenario
 
 PERIODS = (0.01, 0.02, 0.03, 0.04)

@@ -11,7 +11,6 @@ from orchestration.experiments.tuning.tuning_file import load_tuning
 from orchestration.experiments.tuning.tuning_problem import best_by_period
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.quadrotor.scenarios.initial_conditions import Starts
 from orchestration.systems.system.paths import value_at
 
 FILE = """
@@ -228,4 +227,3 @@ def test_initial_conditions_lie_around_the_trajectory_of_the_base(text, tmp_path
 
 def test_initial_conditions_that_are_judged_on_follow_the_others(tuning):
     assert tuning.judging_ensemble() == replace(tuning.starts, first=3, count=4)
-    assert isinstance(tuning.starts, Starts)

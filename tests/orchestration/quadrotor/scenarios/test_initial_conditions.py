@@ -6,10 +6,10 @@ import pytest
 
 from fmu_kit.trajectory import Trajectory
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.quadrotor.scenarios.initial_conditions import Starts
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.quadrotor.scenarios.signals import ReferenceChoice
 from orchestration.quadrotor.scenarios.wiring import REFERENCE
+from orchestration.systems.system.starts import Starts
 
 TRAJECTORY = Trajectory()
 PAPER = Scenario()
@@ -21,13 +21,13 @@ def vector(start, name, axes="xyz"):
 
 
 def test_sizes_are_spread_evenly():
-    sizes = sorted(start.size for start in STARTS.initial_conditions(PAPER))
+    sizes = sorted(start.size for start in PAPER.initial_conditions(STARTS))
     assert sizes == pytest.approx([(i + 1) / 64 for i in range(64)])
 
 
 def test_every_error_is_its_share_of_the_largest():
     reference = TRAJECTORY.at(0.0)
-    for start in STARTS.initial_conditions(PAPER):
+    for start in PAPER.initial_conditions(STARTS):
         assert np.linalg.norm(vector(start, "position") - [*reference.position]) == pytest.approx(4.0 * start.size)
         assert np.linalg.norm(vector(start, "velocity") - [*reference.velocity]) == pytest.approx(2.0 * start.size)
         assert np.linalg.norm(vector(start, "angular_velocity")) == pytest.approx(3.0 * start.size)
@@ -57,26 +57,26 @@ def test_starts_lie_around_the_beginning_of_what_is_followed(reference, position
     rows = [[0.0, *TABLE, *[0.0] * 9], [30.0, *[0.0] * 15]]
     lines = [",".join(["time", *REFERENCE]), *(",".join(map(str, row)) for row in rows)]
     (tmp_path / "table.csv").write_text("\n".join(lines))
-    for start in Starts(count=8, position=4.0, velocity=2.0).initial_conditions(Scenario(reference=reference)):
+    for start in Scenario(reference=reference).initial_conditions(Starts(count=8, position=4.0, velocity=2.0)):
         assert np.linalg.norm(vector(start, "position") - position) == pytest.approx(4.0 * start.size)
         assert np.linalg.norm(vector(start, "velocity") - [*velocity]) == pytest.approx(2.0 * start.size)
 
 
 def test_directions_are_those_of_a_sphere():
     directions = np.array(
-        [vector(s, "angular_velocity") / (3.0 * s.size) for s in Starts(count=2000, rate=3.0).initial_conditions(PAPER)]
+        [vector(s, "angular_velocity") / (3.0 * s.size) for s in PAPER.initial_conditions(Starts(count=2000, rate=3.0))]
     )
     assert np.abs(directions.mean(axis=0)).max() < 0.05
     assert np.abs(directions.T @ directions / 2000 - np.eye(3) / 3).max() < 0.03
 
 
 def test_more_starts_leave_the_first_ones_as_they_are():
-    assert Starts(count=100).initial_conditions(PAPER)[:10] == Starts(count=10).initial_conditions(PAPER)
-    assert Starts(count=100).initial_conditions(PAPER)[50:60] == Starts(count=10, first=50).initial_conditions(PAPER)
+    assert PAPER.initial_conditions(Starts(count=100))[:10] == PAPER.initial_conditions(Starts(count=10))
+    assert PAPER.initial_conditions(Starts(count=100))[50:60] == PAPER.initial_conditions(Starts(count=10, first=50))
 
 
 def test_another_seed_gives_other_directions():
-    one, other = (Starts(count=1, seed=seed).initial_conditions(PAPER)[0] for seed in (0, 1))
+    one, other = (PAPER.initial_conditions(Starts(count=1, seed=seed))[0] for seed in (0, 1))
     assert one.size == other.size
     assert one.values != other.values
 

@@ -12,8 +12,9 @@ import quadcosim
 from orchestration.command.cli import main
 from orchestration.command.flags import FlightFlags, request_from
 from orchestration.components.building.fmus import locate
-from orchestration.quadrotor.scenarios.vehicle import Vehicle, load_vehicle, names
+from orchestration.quadrotor.scenarios.vehicle import load_vehicle, names
 from orchestration.quadrotor.scenarios.wiring import RIGID_BODY
+from orchestration.systems.system.vehicle import Vehicle
 from quadcosim import Scenario, Timing, UsageError, load_scenario
 
 HEAVY = """
