@@ -1,7 +1,6 @@
 """The command `quadcosim`."""
 
 import copy
-import difflib
 import functools
 import sys
 import traceback
@@ -30,7 +29,14 @@ from orchestration.command import (
 from orchestration.command.registry import OutputOptions, ask, option_group
 from orchestration.components.building import consent
 from orchestration.components.fmi.banners import banners_to_stderr
-from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError, no_utf8, worded_by
+from orchestration.foundation.basics.errors import (
+    QuadcosimError,
+    SimulatorError,
+    UsageError,
+    did_you_mean,
+    no_utf8,
+    worded_by,
+)
 from orchestration.foundation.basics.extras import lack_of
 from orchestration.foundation.basics.terminal import inform, report_error
 from orchestration.foundation.processes.subprocesses import misleading_variables
@@ -165,7 +171,7 @@ def _usage_message(error: Exception) -> str | None:
     flag, known = getattr(error, "option_name", None), getattr(error, "possibilities", None)
     if not (flag and known):
         return str(describe())
-    return f"No such option: {flag}. Did you mean {difflib.get_close_matches(flag, known, n=1, cutoff=0.0)[0]}?"
+    return f"No such option: {flag}{did_you_mean(flag, known)}"
 
 
 if __name__ == "__main__":

@@ -1,6 +1,5 @@
 """The model of an FMU: its description, in one form for FMI 2.0 and FMI 3.0."""
 
-import difflib
 import functools
 import itertools
 import math
@@ -28,7 +27,7 @@ from orchestration.components.fmi.archive import (
 )
 from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.foundation.basics.documents import readable
-from orchestration.foundation.basics.errors import UsageError, listed, no_utf8
+from orchestration.foundation.basics.errors import UsageError, did_you_mean, listed, no_utf8
 from orchestration.foundation.basics.units import BaseUnits, Unit, named
 
 Kind = Literal["Real", "Integer", "Boolean", "Enumeration", "String", "Binary", "Clock"]
@@ -140,11 +139,10 @@ class Model:
         """A variable by name; raises `UsageError` naming the place and similar variables."""
         if name in self.variables:
             return self.variables[name]
-        near = difflib.get_close_matches(name, list(self.variables), n=3)
-        hint = f"did you mean {' or '.join(near)}? " if near else ""
+        hint = did_you_mean(name, self.variables, most=3) or ";"
         settable = [v.name for v in self.variables.values() if v.causality == "parameter"]
         raise UsageError(
-            f"{place}: {self.name} has no such variable; {hint}its parameters are {listed(settable, most=20)}"
+            f"{place}: {self.name} has no such variable{hint} its parameters are {listed(settable, most=20)}"
         )
 
     def base_units(self, unit: str | None) -> BaseUnits | None:

@@ -73,9 +73,7 @@ def one_line(text: str) -> str:
 
 def expected_name(name: str, known: Sequence[str]) -> str:
     """The end of a message about an unknown name: the closest of the known names, and all of them."""
-    close = _closest(name, known)
-    hint = "" if close is None else f"did you mean {close}? "
-    return f"{hint}expected one of {', '.join(known)}"
+    return f"{did_you_mean(name, known)} expected one of {', '.join(known)}".lstrip("; ")
 
 
 def listed(names: Iterable[str], most: int = 12) -> str:
@@ -90,14 +88,10 @@ def no_such_key(table: str, key: str, known: Sequence[str], beside: str = "") ->
     return f"{table}{key}: no such key; expected one of {', '.join(known)}{beside}{did_you_mean(key, known)}"
 
 
-def did_you_mean(name: str, known: Sequence[str]) -> str:
-    """The end of a message that lists the known names: the closest to an unknown `name`, if any is close."""
-    close = _closest(name, known)
-    return "" if close is None else f"; did you mean {close}?"
-
-
-def _closest(name: str, known: Sequence[str]) -> str | None:
-    return next(iter(difflib.get_close_matches(name, known, n=1)), None)
+def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
+    """The end of a message about an unknown `name`: the `most` known names that are closest to it, if any is close."""
+    close = difflib.get_close_matches(name, list(known), n=most, cutoff=0.5)
+    return f"; did you mean {' or '.join(close)}?" if close else ""
 
 
 def shown(value: object) -> str:

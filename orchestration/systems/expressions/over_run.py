@@ -1,6 +1,5 @@
 """Evaluates expressions over a whole run."""
 
-import difflib
 import functools
 import math
 from collections.abc import Iterator, Mapping
@@ -8,7 +7,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, did_you_mean
 from orchestration.systems.expressions.over_span import SpanValues
 from orchestration.systems.expressions.recorded import Recorded, Spans
 from orchestration.systems.expressions.reductions import FOLDS
@@ -106,6 +105,4 @@ def expect_names(node: Node, valid: set[str], place: str) -> None:
     """Raise `UsageError` for the first name of an expression that is not valid, with those nearest to it."""
     for name in names(node):
         if name not in valid:
-            near = difflib.get_close_matches(name, sorted(valid), n=3, cutoff=0.5)
-            hint = f"; did you mean {' or '.join(near)}?" if near else ""
-            raise UsageError(f"{place}: there is no {name}{hint}")
+            raise UsageError(f"{place}: there is no {name}{did_you_mean(name, valid, most=3)}")

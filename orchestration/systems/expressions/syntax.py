@@ -1,7 +1,6 @@
 """The grammar of expressions: Python's, cut down to arithmetic, comparisons, logic, names and known functions."""
 
 import ast
-import difflib
 import functools
 import math
 import re
@@ -10,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from fmu_kit.syntax_trees import parse_expression
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, did_you_mean
 from orchestration.systems.expressions.operators import OPERATORS
 
 MAX_EXPRESSION_LENGTH, MAX_NESTING = 10_000, 60
@@ -285,9 +284,8 @@ def _checked_name(function: str, count: int, text: str) -> str:
     at_instant = {word: operator.arguments for word, operator in OPERATORS.items() if operator.tree is None}
     functions = {**at_instant, **OVER_RUN, SAMPLED: (2, 2), **dict.fromkeys(JOB_MEASURES, (1, 1))}
     if function not in functions:
-        near = difflib.get_close_matches(function, functions, n=1)
-        hint = f"; did you mean {near[0]}?" if near else ""
-        raise UsageError(f"{_short(text)}: no function {function}; expected one of {', '.join(functions)}{hint}")
+        expected = f"expected one of {', '.join(functions)}{did_you_mean(function, functions)}"
+        raise UsageError(f"{_short(text)}: no function {function}; {expected}")
     fewest, most = functions[function]
     if not fewest <= count <= most:
         expected = str(fewest) if fewest == most else f"{fewest} or more"

@@ -1,11 +1,10 @@
 """Checks a system against the model descriptions of its FMUs, before any of them is loaded."""
 
-import difflib
 from collections.abc import Iterable, Mapping
 
 from orchestration.components.fmi.model import NUMERIC, Model, Variable
 from orchestration.components.fmi.values import convert_value
-from orchestration.foundation.basics.errors import UsageError, expected_name, listed
+from orchestration.foundation.basics.errors import UsageError, did_you_mean, expected_name, listed
 from orchestration.systems.expressions.syntax import Name, names, parse, parts
 from orchestration.systems.system.component import Parameter
 from orchestration.systems.system.connection import Connection
@@ -24,22 +23,22 @@ def check(system: System, models: Mapping[str, Model]) -> None:
         for recorded in component.record or ():
             variable = models[name].variables.get(recorded)
             if variable is None:
-                names = [v.name for v in models[name].variables.values() if v.causality in ("output", "local")]
+                recordable = [v.name for v in models[name].variables.values() if v.causality in ("output", "local")]
                 has_no = f"{place}.record: {models[name].name} has no variable {recorded}"
-                raise UsageError(f"{has_no}; {expected_name(recorded, names)}")
+                raise UsageError(f"{has_no}; {expected_name(recorded, recordable)}")
             if variable.kind not in NUMERIC:
                 raise UsageError(f"{place}.record: {recorded} is a {variable.kind}; expected one of {listed(NUMERIC)}")
             if variable.causality not in ("output", "local"):
-                what = f"{recorded} is {_with_article(variable)}"
-                raise UsageError(f"{place}.record: {what}; expected an output or a local")
+                is_other = f"{recorded} is {_with_article(variable)}"
+                raise UsageError(f"{place}.record: {is_other}; expected an output or a local")
     for x in system.connections:
-        for what, ends, causality in (("from", x.start, "output"), ("to", x.end, "input")):
+        for end_key, ends, causality in (("from", x.start, "output"), ("to", x.end, "input")):
             model = models[component_of(ends[0])]
             missing = [variable_of(end) for end in ends if variable_of(end) not in model.variables]
             unfit = [variable_of(end) for end in ends if not _has_causality(model, variable_of(end), causality)]
             if missing or len(unfit) == len(ends) > 1:
                 missing = missing or unfit
-                raise UsageError(f"connections.{x.name}.{what}: {_missing_variables(model, causality, missing)}")
+                raise UsageError(f"connections.{x.name}.{end_key}: {_missing_variables(model, causality, missing)}")
         for start, end in zip(x.start, x.end):
             _check_pair(f"connections.{x.name}", x, _end(models, start), _end(models, end))
     for name, source in system.sources.items():
@@ -156,9 +155,8 @@ def _expect_input(place: str, end: str, found: End) -> Variable:
 def _missing_variables(model: Model, causality: str, missing: list[str]) -> str:
     """The variables that a model lacks as ends of a connection, with those that it has."""
     names = model.names(causality)
-    near = difflib.get_close_matches(missing[0], names, n=1)
-    hint = f"; did you mean {near[0]}?" if near else ""
-    return f"{model.name} has no {causality} {', '.join(missing)}; its {causality}s are {listed(names)}{hint}"
+    listing = f"its {causality}s are {listed(names)}{did_you_mean(missing[0], names)}"
+    return f"{model.name} has no {causality} {', '.join(missing)}; {listing}"
 
 
 def _wrong_causality(end: End, expected: str, valid: Iterable[str]) -> str:
