@@ -1,4 +1,4 @@
-"""The page of the command line: every command and every flag with its help, from the program."""
+"""The commands on the page of the command line: each with its help and its flags, from the program."""
 
 from html import escape
 from typing import Any
@@ -8,19 +8,12 @@ import typer.main
 from docs.website.tables import inline_html, table
 from orchestration.command.cli import app
 
-INTRODUCTION = """\
-# Command line
 
-What is here is what `quadcosim COMMAND --help` says on a terminal; every command has `--help`.
-
-"""
-
-
-def page() -> str:
-    """The Markdown of the page."""
+def section() -> str:
+    """The Markdown that follows the text of `docs/commands.md` on the site."""
     group: Any = typer.main.get_command(app)
     listed = [(f'<a href="#{name}"><code>{name}</code></a>', _first(each.help)) for name, each in _commands(group)]
-    return INTRODUCTION + table(listed) + "".join(_section(name, each) for name, each in _commands(group))
+    return "\n## Every command\n\n" + table(listed) + "".join(_section(name, each) for name, each in _commands(group))
 
 
 def _commands(group: Any) -> list[tuple[str, Any]]:
@@ -39,7 +32,7 @@ def _section(name: str, command: Any) -> str:
         panel = panels.setdefault(getattr(parameter, "rich_help_panel", None) or kind, [])
         panel.append((f"<code>{escape(names)}</code>", inline_html(text)))
     tables = "".join(table(rows, heading=title) for title, rows in panels.items() if rows)
-    return f"\n## {name}\n\n```text\n{usage}\n```\n\n{escape(command.help or '', quote=False)}\n\n{tables}"
+    return f"\n### {name}\n\n```text\n{usage}\n```\n\n{escape(command.help or '', quote=False)}\n\n{tables}"
 
 
 def _first(text: str | None) -> str:

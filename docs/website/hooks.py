@@ -11,11 +11,12 @@ from docs.website.links import ROOT, Links, pages_elsewhere
 from docs.website.markdown import for_the_site
 
 GENERATED: dict[str, Callable[[], str]] = {
-    "commands.md": commands.page,
     "keys.md": keys.page,
     **{f"fmus/{slave.__name__}.md": partial(fmus.page, slave) for slave in fmus.SLAVES},
 }
 """Pages generated from the code, by address."""
+CONTINUED: dict[str, Callable[[], str]] = {"commands.md": commands.section}
+"""What is generated from the code at the end of pages in `docs/`, by address."""
 BEHIND = 1e-6
 """Search weight of sources relative to pages, so that pages are found first even if the title of a source matches"""
 
@@ -40,7 +41,10 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
     if page.file.inclusion.is_not_in_nav():
         page.meta["search"] = {"boost": BEHIND}
     shows_source = page.file.inclusion.is_not_in_nav() or address.endswith(".ipynb")
-    return markdown if shows_source else for_the_site(Links(repo_url=config.repo_url).rewritten(markdown, address))
+    if shows_source:
+        return markdown
+    continued = CONTINUED[address]() if address in CONTINUED else ""
+    return for_the_site(Links(repo_url=config.repo_url).rewritten(markdown + continued, address))
 
 
 def on_page_content(html: str, page: Any, config: Any, files: Files) -> str:

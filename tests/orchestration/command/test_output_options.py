@@ -53,7 +53,7 @@ def test_every_command_has_the_same_manners_and_a_group_in_the_help(command: str
 
 def test_help_and_the_page_explain_the_same_exit_codes(main: Main) -> None:
     helped = " ".join(main("--help").stdout.split()).partition("Exit codes: ")[2].rstrip(".").split(", ")
-    rows = re.findall(r"^\| (\d+) \| (.*) \|$", (ROOT / "docs/terminal.md").read_text(encoding="utf-8"), re.MULTILINE)
+    rows = re.findall(r"^\| (\d+) \| (.*) \|$", (ROOT / "docs/commands.md").read_text(encoding="utf-8"), re.MULTILINE)
     assert [code for code, _ in rows] == ["0", "1", "2", "130", "141"]
     for (code, meaning), text in zip(rows, helped, strict=True):
         assert f"{code} {meaning}".startswith(text)
