@@ -23,19 +23,17 @@ from orchestration.simulation.engines.backlog import Backlog
 from orchestration.simulation.engines.board import Board
 from orchestration.simulation.engines.condition import Step
 from orchestration.simulation.engines.loop import Operation, library
-from orchestration.simulation.engines.room import Room, loop_in, private
+from orchestration.simulation.engines.memory import Allocator, allocated_loop
 from orchestration.simulation.engines.run_structures import RunStructures
 from orchestration.simulation.engines.running_system import RunningSystem, SampledComponent, Terminated
 from orchestration.simulation.engines.shared_tables import SharedTables
 from orchestration.simulation.engines.sources import SourceValues
-from orchestration.simulation.engines.structures import address, structures
+from orchestration.simulation.engines.structures import ONE_LANE, address
 from orchestration.systems.schedule.schedule import Schedule
 
-c = structures(1)
-"""The structures of one run"""
 SLICE = 0.05
 """[s] after which C returns, about"""
-_Look, _Stopped, _Collect = (dict(c.Loop._fields_)[name] for name in ("look", "stopped", "collect"))
+_Look, _Stopped, _Collect = (dict(ONE_LANE.Loop._fields_)[name] for name in ("look", "stopped", "collect"))
 _EXACT = 2**53
 """Up to here a float represents every integer"""
 
@@ -65,7 +63,7 @@ class CompiledLoop:
     engine = "compiled"
 
     def __init__(
-        self, running: RunningSystem, recorder: Recorder, *, condition: Condition, room: Room = private
+        self, running: RunningSystem, recorder: Recorder, *, condition: Condition, allocate: Allocator
     ) -> None:
         self._running = running
         self._pace = 4  # instants of a slice
@@ -75,20 +73,22 @@ class CompiledLoop:
         names = running.wires.names
         instances = cast(Mapping[str, NativeInstance], running.simulators)
         self._structures = structures = RunStructures([instances[name] for name in names])
-        self._loop = loop = loop_in(room)
-        self._tables = SharedTables(running, loop, room)
+        self._loop = loop = allocated_loop(allocate)
+        self._tables = SharedTables(running, loop, allocate)
         self.backlog = Backlog(running, self._tables, recorder)
         program, watched = condition(running.board)
         self._watched = list(watched)
         if self._watched == [values for _, values in running.sources]:
             loop.in_rows = sum(len(signals) for signals, _ in running.sources)
-        self._feed_table = (c.Feed * len(running.feeds))(
+        self._feed_table = (ONE_LANE.Feed * len(running.feeds))(
             *(structures.feed(names.index(feed.component), feed) for feed in running.feeds)
         )
-        self._channel_table = (c.Channel * len(running.channels))(*map(self._channel_of, range(len(running.channels))))
-        self._components = (c.Component * len(names))(*map(self._component_of, range(len(names))))
+        self._channel_table = (ONE_LANE.Channel * len(running.channels))(
+            *map(self._channel_of, range(len(running.channels)))
+        )
+        self._components = (ONE_LANE.Component * len(names))(*map(self._component_of, range(len(names))))
         self._reached: Integers = np.zeros(len(names), dtype=np.int64)
-        self._track = c.Track(lanes=1, stop=running.stop, now=address(self._reached))
+        self._track = ONE_LANE.Track(lanes=1, stop=running.stop, now=address(self._reached))
         fields: dict[str, Any] = {
             "components": ctypes.addressof(self._components),
             "channels": ctypes.addressof(self._channel_table),
@@ -131,14 +131,14 @@ class CompiledLoop:
         running = self._running
         while running.cursor.at < len(schedule):
             code = self._slice(schedule)
-            if code == c.FULL:
+            if code == ONE_LANE.FULL:
                 self.backlog.hand_over()
-            elif code not in (c.AT_END, c.PAUSED):
+            elif code not in (ONE_LANE.AT_END, ONE_LANE.PAUSED):
                 self._raise(code)
             if running.interrupted() and running.now < running.stop:
                 running.interrupted_at = running.now
                 return True
-            if code == c.PAUSED:
+            if code == ONE_LANE.PAUSED:
                 return False
             if progress is not None:
                 progress(running.now / running.stop)
@@ -165,14 +165,14 @@ class CompiledLoop:
     def _raise(self, code: int) -> None:
         """Raise the error for the code that C has returned."""
         index, part = self._loop.outcome_component[0], self._loop.failed
-        if code in (c.FAILED, c.REFUSED):
+        if code in (ONE_LANE.FAILED, ONE_LANE.REFUSED):
             function, transfer = self._structures.calls[part]
-            if code == c.FAILED:
+            if code == ONE_LANE.FAILED:
                 raise self._structures.instances[index].failure(function, self._loop.failed_status)
             transfer()
-        elif code == c.NOT_FINITE:
+        elif code == ONE_LANE.NOT_FINITE:
             self._running.component(index).expect_finite(seconds(self._running.now))
-        elif code == c.OVER:
+        elif code == ONE_LANE.OVER:
             raise Terminated(self._running.termination)
         elif self._failure is not None:  # of a Python function that C has called
             raise self._failure
@@ -203,7 +203,7 @@ class CompiledLoop:
         """Copy what a schedule needs to the structures of C, from the next instant on."""
         running, loop, track = self._running, self._loop, self._track
         track.at = running.cursor.at
-        for name, _ in c.Schedule._fields_:
+        for name, _ in ONE_LANE.Schedule._fields_:
             setattr(track.schedule, name, address(getattr(schedule, name)))
         self._tables.make_room(schedule)
         self._share_sources(seconds(schedule.times[:-1]))

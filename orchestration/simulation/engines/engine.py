@@ -10,7 +10,7 @@ from orchestration.foundation.basics.simulator import Simulator
 from orchestration.foundation.basics.times import nanoseconds
 from orchestration.simulation.engines.compiled import CompiledLoop, Condition, reason_unavailable
 from orchestration.simulation.engines.master import Master
-from orchestration.simulation.engines.room import Room
+from orchestration.simulation.engines.memory import Allocator
 from orchestration.systems.system.model import System
 
 _NOTES = logging.getLogger("quadcosim")
@@ -31,13 +31,13 @@ def create_master(
     simulators: Mapping[str, Simulator],
     *,
     condition: Condition,
-    room: Room,
+    allocate: Allocator,
     **others: Any,
 ) -> Master:
     """The master of a run, with an engine; default: the compiled loop where available.
 
-    The compiled loop stores what it has not handed over in `room`; `others` are arguments of `Master`. Raises
-    `QuadcosimError` with the reason if the compiled loop was requested and is not available.
+    The compiled loop keeps what it has not handed over in memory of `allocate`; `others` are arguments of `Master`.
+    Raises `QuadcosimError` with the reason if the compiled loop was requested and is not available.
     """
     reason = None if engine == "python" else reason_unavailable(simulators, nanoseconds(system.stop_time))
     if reason:
@@ -46,4 +46,4 @@ def create_master(
         return Master(system, simulators, **others)
     if reason:
         raise QuadcosimError(f"--engine compiled is not available: {reason}")
-    return Master(system, simulators, loop=partial(CompiledLoop, condition=condition, room=room), **others)
+    return Master(system, simulators, loop=partial(CompiledLoop, condition=condition, allocate=allocate), **others)

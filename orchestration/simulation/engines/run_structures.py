@@ -11,11 +11,8 @@ from orchestration.components.fmi.transfers import TransferCall, range_of
 from orchestration.foundation.basics.simulator import Floats, Transfer
 from orchestration.simulation.engines.channel import Channel, of_each
 from orchestration.simulation.engines.feeds import Feed
-from orchestration.simulation.engines.structures import address, structures
+from orchestration.simulation.engines.structures import ONE_LANE, address
 from orchestration.systems.system.connection import Connection
-
-c = structures(1)
-"""The structures of one run"""
 
 
 class RunStructures:
@@ -34,16 +31,16 @@ class RunStructures:
 
     def indices(self, items: Sequence[int]) -> Any:
         """Indices for C."""
-        return c.List(items=self.address(np.array(items, dtype=np.int64)), count=len(items))
+        return ONE_LANE.List(items=self.address(np.array(items, dtype=np.int64)), count=len(items))
 
     def transfer(self, component: int, transfer: Transfer, array: Floats) -> Any:
         """The calls of a transfer between a component and an array."""
         calls = self.instances[component].calls_of(transfer)
-        parts = (c.Part * len(calls))(*(self._part(component, call) for call in calls))
+        parts = (ONE_LANE.Part * len(calls))(*(self._part(component, call) for call in calls))
         self._kept.append(parts)
         for part, call in zip(parts, calls):
             self.calls[ctypes.addressof(part)] = (call.function, transfer)
-        return c.Transfer(parts=ctypes.addressof(parts), count=len(calls), array=self.address(array))
+        return ONE_LANE.Transfer(parts=ctypes.addressof(parts), count=len(calls), array=self.address(array))
 
     def component(self, index: int, read: Transfer, values: Floats, connected: int) -> Any:
         """The structure of a component, without the fields that its place in the system determines."""
@@ -51,7 +48,7 @@ class RunStructures:
         version = instance.model.version
         outputs = [ctypes.addressof(each) for each in instance.step_outputs] or [0, 0, 0, 0]
         event, ends, early, reached = outputs
-        return c.Component(
+        return ONE_LANE.Component(
             fmu=instance.handle,
             step=instance.address(f"fmi{version}DoStep"),
             version=version,
@@ -69,7 +66,7 @@ class RunStructures:
     def channel(self, x: Connection, channel: Channel, receiver: int, row: Floats, places: Sequence[int]) -> Any:
         """The structure of a connection, without messages in flight."""
         sigma, quantum = of_each(x, x.noise), of_each(x, x.quantisation)
-        return c.Channel(
+        return ONE_LANE.Channel(
             write=self.transfer(receiver, channel.write, channel.received),
             sender=self.address(row),
             places=self.address(np.array(places, dtype=np.int64)),
@@ -87,13 +84,13 @@ class RunStructures:
 
     def feed(self, component: int, feed: Feed) -> Any:
         """The structure of a source."""
-        return c.Feed(write=self.transfer(component, feed.transfer, feed.into), size=feed.size)
+        return ONE_LANE.Feed(write=self.transfer(component, feed.transfer, feed.into), size=feed.size)
 
     def _part(self, component: int, call: TransferCall) -> Any:
         instance, part = self.instances[component], call.part
         kind = "boolean32" if part.type == "Boolean" and part.buffer.dtype != bool else part.buffer.dtype.name
         low, high = range_of(part.buffer.dtype) if part.buffer.dtype.kind in "iuf" else (0.0, 0.0)
-        return c.Part(
+        return ONE_LANE.Part(
             function=instance.address(call.function),
             fmu=instance.handle,
             references=self.address(np.array(part.references, dtype=np.uint32)),
@@ -103,7 +100,7 @@ class RunStructures:
             asked=None if call.in_place else self.address(part.array_places.astype(np.int64)),
             places=None if call.in_place else self.address(part.places.astype(np.int64)),
             size=len(part.array_places),
-            type=getattr(c, kind.upper()),
+            type=getattr(ONE_LANE, kind.upper()),
             counts_values=instance.counts_values,
             low=low,
             high=high,

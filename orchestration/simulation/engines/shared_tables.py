@@ -6,17 +6,17 @@ import numpy as np
 
 from orchestration.foundation.basics.simulator import Floats, Integers
 from orchestration.simulation.engines.backlog import events_of_a_chunk, rows_of_a_chunk
-from orchestration.simulation.engines.room import EVENTS, ROWS, Room
+from orchestration.simulation.engines.memory import EVENTS, ROWS, Allocator
 from orchestration.simulation.engines.running_system import RunningSystem
 from orchestration.simulation.engines.structures import address
 from orchestration.systems.schedule.schedule import Schedule
 
 
 class SharedTables:
-    """Tables in memory of a `Room`; C has their addresses and counts."""
+    """Tables in memory of an `Allocator`; C has their addresses and counts."""
 
-    def __init__(self, running: RunningSystem, loop: Any, room: Room) -> None:
-        self._running, self._loop, self._room = running, loop, room
+    def __init__(self, running: RunningSystem, loop: Any, allocate: Allocator) -> None:
+        self._running, self._loop, self._allocate = running, loop, allocate
         self._most_rows, self._most_events = rows_of_a_chunk(running), events_of_a_chunk()
         self.content: Floats = self._new_rows()
         """memory for the rows of a chunk; the columns of sources are filled in when it is handed over, if not by C"""
@@ -79,7 +79,7 @@ class SharedTables:
 
     def _new_rows(self) -> Floats:
         shape = (self._most_rows, len(self._running.columns))
-        return self._room(ROWS, 8 * shape[0] * shape[1]).view(np.float64).reshape(shape)
+        return self._allocate(ROWS, 8 * shape[0] * shape[1]).view(np.float64).reshape(shape)
 
     def _new_events(self, count: int) -> Integers:
-        return self._room(EVENTS, 32 * count).view(np.int64).reshape(count, 4)
+        return self._allocate(EVENTS, 32 * count).view(np.int64).reshape(count, 4)

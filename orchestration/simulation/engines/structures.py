@@ -84,9 +84,13 @@ def _fields(declaration: str, known: Mapping[str, Any], lanes: int) -> Iterator[
         yield name, kind * math.prod(sizes) if sizes else kind
 
 
+ONE_LANE = structures(1)
+"""The structures and constants for FMUs that are called, one run at a time"""
+
+
 def expect_same_sizes(library: ctypes.CDLL, types: Mapping[str, Any]) -> None:
     """Raise `QuadcosimError` naming the first of `types` that is missing in a library or has another size there."""
-    size = structures(1).Size
+    size = ONE_LANE.Size
     sizes, place = {}, ctypes.addressof(size.in_dll(library, "sizes"))
     while (each := size.from_address(place)).name:
         sizes[ctypes.string_at(each.name).decode()] = each.size

@@ -14,7 +14,7 @@ from orchestration.foundation.processes.child import Child, Died
 from orchestration.foundation.processes.limits import UNLIMITED
 from orchestration.foundation.recording.recording import Chunk, Recorder
 from orchestration.simulation.engines.engine import Engine
-from orchestration.simulation.engines.room import Unrecorded, read_unrecorded
+from orchestration.simulation.engines.memory import Unrecorded, read_unrecorded
 from orchestration.simulation.runs.outcome import Course, Progress, RunLost, RunOutcome, result_of
 from orchestration.simulation.runs.resolved import ResolvedRequest
 from orchestration.simulation.runs.result import Result
@@ -50,12 +50,12 @@ def simulate(
     started: float,
 ) -> Result | None:
     """As `simulation.simulate`, of a request that is `resolved`; `started` is the time at which that began."""
-    room = scratch.temporary()
+    folder = scratch.temporary()
     try:
         with deferred_interrupts() as interrupt:
             order = Order(request=resolved.request, course=course, engine=engine, level=_MESSAGES.getEffectiveLevel())
             with Child(
-                subprocesses.Module.of("orchestration.simulation.runs.apart_process", room.path),
+                subprocesses.Module.of("orchestration.simulation.runs.apart_process", folder.path),
                 limits=replace(UNLIMITED, memory=memory_limit),
             ) as child:
 
@@ -67,14 +67,14 @@ def simulate(
                 ending = receiver.receive_all(child, order)
             outcome = receiver.run_outcome
             if outcome is None:
-                outcome = _lost(resolved, receiver, room.path, ending or "ended")
+                outcome = _lost(resolved, receiver, folder.path, ending or "ended")
             elif not receiver.is_over:
                 return None
             elif ending is not None:
                 outcome = replace(outcome, warnings=(*outcome.warnings, f"after the run, its process {ending}"))
             return result_of(resolved, outcome, recorder, time.perf_counter() - started, interrupt.requested)
     finally:
-        room.remove()
+        folder.remove()
 
 
 class _Receiver:
@@ -139,13 +139,13 @@ class _Receiver:
         raise error
 
 
-def _lost(resolved: ResolvedRequest, receiver: _Receiver, room: Path, ending: str) -> RunOutcome:
+def _lost(resolved: ResolvedRequest, receiver: _Receiver, folder: Path, ending: str) -> RunOutcome:
     """The outcome of a run whose process ended before its last message, once all that was recorded is received.
 
     Raises `RunLost` if nothing was.
     """
     activity, called = receiver.activity, [name for name in receiver.components if name in resolved.foreign]
-    unrecorded = read_unrecorded(room, receiver.columns)
+    unrecorded = read_unrecorded(folder, receiver.columns)
     if unrecorded is not None:
         if unrecorded.calling is not None:
             activity, called = "in a call of", [list(resolved.system.components)[unrecorded.calling]]

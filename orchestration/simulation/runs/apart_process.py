@@ -12,7 +12,7 @@ from orchestration.components.fmi.instance import Instance
 from orchestration.components.fmi.instances import open_instance
 from orchestration.foundation.processes.channel import Parent, picklable
 from orchestration.foundation.recording.recording import About, Chunk, InMemory, Recording
-from orchestration.simulation.engines.room import Shared
+from orchestration.simulation.engines.memory import FolderMemory
 from orchestration.simulation.runs.apart import Order
 from orchestration.simulation.runs.prepared import prepared
 
@@ -60,7 +60,7 @@ class _Reporter(logging.Handler):
             yield instance
 
 
-def main(room: str) -> None:
+def main(folder: str) -> None:
     """Run what is ordered."""
     parent = Parent(interrupt=signal.default_int_handler)
     order: Order = parent.receive()
@@ -68,17 +68,17 @@ def main(room: str) -> None:
     _MESSAGES.handlers[:] = [reporter]
     _MESSAGES.setLevel(order.level)
     try:
-        _simulate(order, reporter, Path(room))
+        _simulate(order, reporter, Path(folder))
     except BaseException as error:
         if not reporter.is_over:
             reporter.report("error", picklable(error))
     reporter.report("end")
 
 
-def _simulate(order: Order, reporter: _Reporter, room: Path) -> None:
+def _simulate(order: Order, reporter: _Reporter, folder: Path) -> None:
     """Run, and report the outcome before any instance is freed."""
     with prepared(
-        order.request, recorder=reporter, engine=order.engine, load=reporter.load, room=Shared(room)
+        order.request, recorder=reporter, engine=order.engine, load=reporter.load, allocate=FolderMemory(folder)
     ) as simulation:  # fmt: skip
         reporter.report("stage", "initialising", list(simulation.instances))
         is_over = simulation.follow(order.course, lambda share: reporter.report("share", share))

@@ -26,7 +26,7 @@ from orchestration.simulation.engines.condition import program
 from orchestration.simulation.engines.engine import Engine, create_master
 from orchestration.simulation.engines.feeds import Feed
 from orchestration.simulation.engines.master import Master
-from orchestration.simulation.engines.room import Room, private
+from orchestration.simulation.engines.memory import Allocator, process_memory
 from orchestration.simulation.engines.sources import SourceValues
 from orchestration.simulation.engines.watch import watch
 from orchestration.simulation.engines.wiring import fixed_steps
@@ -128,13 +128,13 @@ def prepared(
     recorder: Recorder | None = None,
     engine: Engine | None = None,
     resolved: ResolvedRequest | None = None,
-    room: Room = private,
+    allocate: Allocator = process_memory,
 ) -> Iterator[PreparedRun]:
     """A run whose FMUs, built if need be, are instantiated by `load` and have their parameters.
 
     Ctrl-C ends the run at its next instant. `resolved`: the request has been resolved already. The compiled loop keeps
-    rows in `room` until they are recorded. Raises `UsageError` for what the FMUs do not have or cannot take, before
-    any is loaded.
+    rows in memory of `allocate` until they are recorded. Raises `UsageError` for what the FMUs do not have or cannot
+    take, before any is loaded.
     """
     started = time.perf_counter()
     recorder = InMemory() if recorder is None else recorder
@@ -165,7 +165,7 @@ def prepared(
                 interrupted=lambda: interrupt.requested,
                 watch=lambda board: watch(system.criterion.diverged, board, *watched),
                 condition=lambda board: program(system.criterion.diverged, board, *watched),
-                room=room,
+                allocate=allocate,
                 first_exchange=initial.groups(system.connections, lambda name, output: models[name].depends_on(output)),
                 waiting=[name for name in system.components if models[name].waits],
             )

@@ -18,7 +18,7 @@ from orchestration.simulation.engines.batch.kernels import Kernel, batch, compon
 from orchestration.simulation.engines.batch.writing import Kind, Leaf
 from orchestration.simulation.engines.board import Board
 from orchestration.simulation.engines.channel import of_each
-from orchestration.simulation.engines.structures import structures
+from orchestration.simulation.engines.structures import ONE_LANE
 from orchestration.simulation.engines.wires import Wires
 from orchestration.simulation.results.objectives import GOOD
 from orchestration.systems.expressions.over_run import inlined, reductions
@@ -35,8 +35,7 @@ from orchestration.systems.system.source import Source
 from orchestration.systems.system.variable_names import component_of, variable_of
 
 Places = npt.NDArray[np.int64]
-c = structures(1)
-_TAKES = {"Boolean": c.TRUTH, "Integer": c.WHOLE, "Enumeration": c.WHOLE}
+_TAKES = {"Boolean": ONE_LANE.TRUTH, "Integer": ONE_LANE.WHOLE, "Enumeration": ONE_LANE.WHOLE}
 """By kind of an input that is not a Real"""
 _SIGNAL = re.compile(r"SIGNAL\((\d+), (\d+)\)")
 """The index of a component, and the place of a variable in its memory, in the C of expressions"""
@@ -326,7 +325,7 @@ def ends_of(shape: Shape, x: Connection) -> Ends:
     return Ends(
         start=np.array([shape.place(start)[1] for start in x.start], dtype=np.int64),
         end=np.array([variable.reference for variable in receivers], dtype=np.int64),
-        kinds=np.array([_TAKES.get(v.kind, c.REAL) for v in receivers], dtype=np.int64),
+        kinds=np.array([_TAKES.get(v.kind, ONE_LANE.REAL) for v in receivers], dtype=np.int64),
         low=np.full(len(receivers), float(bounds.min)), high=np.full(len(receivers), float(bounds.max)),
     )  # fmt: skip
 

@@ -11,29 +11,27 @@ import numpy.typing as npt
 
 from orchestration.foundation.basics.simulator import Floats, Integers
 from orchestration.foundation.basics.times import nanoseconds
-from orchestration.simulation.engines.structures import structures
+from orchestration.simulation.engines.structures import ONE_LANE
 
-c = structures(1)
-"""The structures of one run"""
 LOOP, ROWS, EVENTS = "loop", "rows", "events"
 Bytes = npt.NDArray[np.uint8]
-Room = Callable[[str, int], Bytes]
+Allocator = Callable[[str, int], Bytes]
 """Allocates memory of a size [byte] by name; a later allocation with the same name replaces the earlier one"""
 
 
-def private(name: str, size: int) -> Bytes:
+def process_memory(name: str, size: int) -> Bytes:
     """Allocate memory that ends with the process."""
     return np.empty(size, dtype=np.uint8)
 
 
 @dataclass(frozen=True)
-class Shared:
+class FolderMemory:
     """Memory in the files of `folder`."""
 
     folder: Path
 
     def __call__(self, name: str, size: int) -> Bytes:
-        """As `Room`."""
+        """As `Allocator`."""
         path = self.folder / name
         path.unlink(missing_ok=True)  # the earlier memory is still mapped
         return np.memmap(path, dtype=np.uint8, mode="w+", shape=(max(size, 1),))[:size].view(np.ndarray)
@@ -56,7 +54,7 @@ def read_unrecorded(folder: Path, columns: Sequence[str]) -> Unrecorded | None:
     """Read what the compiled loop of an ended process had recorded; None if it had not begun."""
     try:
         content: Mapping[str, bytes] = {name: (folder / name).read_bytes() for name in (LOOP, ROWS, EVENTS)}
-        loop = c.Loop.from_buffer_copy(content[LOOP])
+        loop = ONE_LANE.Loop.from_buffer_copy(content[LOOP])
     except (OSError, ValueError):
         return None
     rows = np.frombuffer(content[ROWS], count=loop.row_count * len(columns)).reshape(-1, len(columns))
@@ -70,8 +68,8 @@ def read_unrecorded(folder: Path, columns: Sequence[str]) -> Unrecorded | None:
     )
 
 
-def loop_in(room: Room) -> Any:
-    """Allocate the structure of a run in `room`."""
-    memory = room(LOOP, ctypes.sizeof(c.Loop))
+def allocated_loop(allocate: Allocator) -> Any:
+    """The structure of a run, zeroed, in memory that is allocated for it."""
+    memory = allocate(LOOP, ctypes.sizeof(ONE_LANE.Loop))
     memory[:] = 0
-    return c.Loop.from_buffer(memory.data)
+    return ONE_LANE.Loop.from_buffer(memory.data)
