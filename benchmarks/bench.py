@@ -26,9 +26,9 @@ from orchestration.quadrotor.scenarios import wiring
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.quadrotor.scenarios.timing import Timing
-from orchestration.simulation.engines.board import Board
+from orchestration.simulation.engines.wires import Board
 from orchestration.simulation.runs.prepared import prepared
-from orchestration.systems.schedule.cursor import Cursor
+from orchestration.systems.schedule.schedule import Cursor
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.check import recorded_variables

@@ -20,15 +20,13 @@ from orchestration.foundation.basics.simulator import Floats, Integers, Simulato
 from orchestration.foundation.basics.times import seconds
 from orchestration.foundation.recording.recording import Recorder
 from orchestration.simulation.engines.backlog import Backlog
-from orchestration.simulation.engines.board import Board
 from orchestration.simulation.engines.condition import Step
 from orchestration.simulation.engines.loop import Operation, library
-from orchestration.simulation.engines.memory import Allocator, allocated_loop
-from orchestration.simulation.engines.run_structures import RunStructures
+from orchestration.simulation.engines.memory import Allocator, SharedTables, allocated_loop
 from orchestration.simulation.engines.running_system import RunningSystem, SampledComponent, Terminated
-from orchestration.simulation.engines.shared_tables import SharedTables
 from orchestration.simulation.engines.sources import SourceValues
-from orchestration.simulation.engines.structures import ONE_LANE, address
+from orchestration.simulation.engines.structures import ONE_LANE, RunStructures, address
+from orchestration.simulation.engines.wires import Board
 from orchestration.systems.schedule.schedule import Schedule
 
 SLICE = 0.05

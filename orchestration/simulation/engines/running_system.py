@@ -12,14 +12,12 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import SimulatorError, StoppedStepError
 from orchestration.foundation.basics.simulator import Floats, Simulator, Transfer
-from orchestration.simulation.engines.board import Board
 from orchestration.simulation.engines.channel import Channel
+from orchestration.simulation.engines.condition import Watch
 from orchestration.simulation.engines.feeds import Feed
 from orchestration.simulation.engines.sources import SourceValues
-from orchestration.simulation.engines.watch import Watch
-from orchestration.simulation.engines.wires import Wires
-from orchestration.systems.schedule.cursor import Cursor
-from orchestration.systems.schedule.schedule import Schedule
+from orchestration.simulation.engines.wires import Board, Wires
+from orchestration.systems.schedule.schedule import Cursor, Schedule
 from orchestration.systems.schedule.streams import NOISE, Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.model import System

@@ -22,13 +22,12 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import seconds
 from orchestration.foundation.recording.recording import InMemory, Recorder
 from orchestration.simulation.engines import initial
-from orchestration.simulation.engines.condition import program
+from orchestration.simulation.engines.condition import program, watch
 from orchestration.simulation.engines.engine import Engine, create_master
 from orchestration.simulation.engines.feeds import Feed
 from orchestration.simulation.engines.master import Master
 from orchestration.simulation.engines.memory import Allocator, process_memory
 from orchestration.simulation.engines.sources import SourceValues
-from orchestration.simulation.engines.watch import watch
 from orchestration.simulation.engines.wiring import fixed_steps
 from orchestration.simulation.runs.outcome import Course, Progress, RunOutcome, result_of
 from orchestration.simulation.runs.resolved import Announce, ResolvedRequest, resolve

@@ -9,10 +9,9 @@ import numpy as np
 from orchestration.foundation.basics.simulator import Integers
 from orchestration.foundation.basics.times import Grid, exact_nanoseconds, nanoseconds
 from orchestration.systems.computers.parts import Constant
-from orchestration.systems.schedule.drawing import times
 from orchestration.systems.schedule.fixed_step import FixedStep, Misalignment, in_seconds
+from orchestration.systems.schedule.lateness_and_loss import lateness, losses, times
 from orchestration.systems.schedule.lookahead import NEVER, Lookahead
-from orchestration.systems.schedule.message_times import lateness, losses
 from orchestration.systems.schedule.plan import Plan
 from orchestration.systems.schedule.streams import DELAY, DELAY_JITTER, JITTER, LOSS, Streams
 from orchestration.systems.system.connection import Connection

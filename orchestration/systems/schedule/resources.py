@@ -37,9 +37,8 @@ from orchestration.systems.computers.parts import (
 from orchestration.systems.computers.results import Timeline
 from orchestration.systems.computers.scheduler_events import EventBuilder
 from orchestration.systems.computers.timeline import NEEDED, Names, timeline
-from orchestration.systems.schedule.drawing import times
+from orchestration.systems.schedule.lateness_and_loss import lateness, losses, times
 from orchestration.systems.schedule.longest import expect_no_longer
-from orchestration.systems.schedule.message_times import lateness, losses
 from orchestration.systems.schedule.streams import (
     ARRIVALS,
     DELAY,
@@ -50,6 +49,7 @@ from orchestration.systems.schedule.streams import (
     LOSS,
     Streams,
 )
+from orchestration.systems.system.choices import Spread
 from orchestration.systems.system.computers import Arrivals
 from orchestration.systems.system.distribution import Distribution, Varying, spreads
 from orchestration.systems.system.frames import ERROR_BITS, frame_nanoseconds
@@ -275,7 +275,7 @@ class Resources:
             return self._stream(Constant(nanoseconds(of))) if of else self._zero
         return self._stream(lambda streams: times(of, partial(streams.of, owner, cause)))
 
-    def _late(self, jitter: Varying, spread: str, owner: str) -> int:
+    def _late(self, jitter: Varying, spread: Spread, owner: str) -> int:
         if jitter == 0.0:
             return self._zero
         return self._stream(lambda streams: lateness(jitter, spread, partial(streams.of, owner, JITTER)))

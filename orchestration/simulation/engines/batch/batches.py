@@ -13,8 +13,8 @@ from orchestration.simulation.engines.batch.batch import NO_COLUMNS, Batch, Batc
 from orchestration.simulation.engines.batch.combining import combined
 from orchestration.simulation.engines.batch.kernels import preferred_lanes
 from orchestration.simulation.engines.batch.shape import Shape, outline
+from orchestration.simulation.engines.condition import watch
 from orchestration.simulation.engines.structures import structures
-from orchestration.simulation.engines.watch import watch
 from orchestration.simulation.engines.wiring import check_against_fmus, source_values
 from orchestration.simulation.results.objectives import Metrics, metrics_of
 from orchestration.systems.schedule.schedule_cache import ScheduleCache, schedule_key

@@ -16,10 +16,9 @@ from orchestration.simulation.engines import initial
 from orchestration.simulation.engines.batch.code import ExpressionCode, expression_code
 from orchestration.simulation.engines.batch.kernels import Kernel, batch, component, preferred_lanes
 from orchestration.simulation.engines.batch.writing import Kind, Leaf
-from orchestration.simulation.engines.board import Board
 from orchestration.simulation.engines.channel import of_each
 from orchestration.simulation.engines.structures import ONE_LANE
-from orchestration.simulation.engines.wires import Wires
+from orchestration.simulation.engines.wires import Board, Wires
 from orchestration.simulation.results.objectives import GOOD
 from orchestration.systems.expressions.over_run import inlined, reductions
 from orchestration.systems.expressions.recorded import STOP_TIME, TIME, vectors

@@ -14,10 +14,10 @@ from orchestration.foundation.recording.recording import Chunk, Event, InMemory
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.quadrotor.scenarios.wiring import COMMAND, MEASUREMENT, POSITION_REFERENCE
+from orchestration.simulation.engines.condition import watch
 from orchestration.simulation.engines.master import Master
 from orchestration.simulation.engines.sources import ConstantValues, SourceValues
-from orchestration.simulation.engines.watch import watch
-from orchestration.systems.schedule.cursor import Cursor
+from orchestration.systems.schedule.schedule import Cursor
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 

@@ -29,13 +29,13 @@ from orchestration.foundation.basics.errors import QuadcosimError, SimulatorErro
 from orchestration.foundation.basics.times import Grid, exact_nanoseconds
 from orchestration.foundation.recording.recording import InMemory
 from orchestration.simulation.engines import loop
-from orchestration.simulation.engines.shared_tables import SharedTables
+from orchestration.simulation.engines.memory import SharedTables
 from orchestration.simulation.runs import simulation
 from orchestration.simulation.runs.outcome import RunInterrupted
 from orchestration.simulation.runs.pause import resume, run_until
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.simulation.runs.result import Result
-from orchestration.systems.schedule import cursor
+from orchestration.systems.schedule import schedule
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.criterion import Criterion
@@ -115,7 +115,7 @@ def expect_that_a_pause_changes_nothing(
     first, then = engines
     whole = ran(system, "python", load=load)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(cursor, "INSTANTS", size)
+        patch.setattr(schedule, "INSTANTS", size)
         with prepared(system, engine=first, load=load) as run:
             run.master.initialise()
             if run.master.run(pause_at=int(share * 1e9 * system.stop_time)):
@@ -142,7 +142,7 @@ def test_random_systems_run_the_same_in_schedules_of_any_length(
     fmu: Path, kept: Kept, what: System, instants: int
 ) -> None:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(cursor, "INSTANTS", instants)
+        patch.setattr(schedule, "INSTANTS", instants)
         both(of(what, fmu), load=kept.load)
 
 
@@ -326,7 +326,7 @@ def test_a_run_that_one_engine_pauses_another_ends(first: Any, then: Any, fmu: P
 
 
 @settings(max_examples=30, derandomize=True, deadline=None)
-@given(systems(most=4), st.floats(0.0, 1.0), st.tuples(ENGINES, ENGINES), st.sampled_from((5, cursor.INSTANTS)))
+@given(systems(most=4), st.floats(0.0, 1.0), st.tuples(ENGINES, ENGINES), st.sampled_from((5, schedule.INSTANTS)))
 def test_random_systems_go_on_from_a_pause_as_if_there_was_none(
     fmu: Path, kept: Kept, what: System, share: float, engines: tuple[Any, Any], size: int
 ) -> None:

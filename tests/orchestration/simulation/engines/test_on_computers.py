@@ -16,7 +16,7 @@ from orchestration.foundation.recording.recording import KINDS
 from orchestration.simulation.engines.batch.batches import Batches
 from orchestration.simulation.runs.pause import resume, run_until
 from orchestration.simulation.runs.run_directory import load_run
-from orchestration.systems.schedule import cursor
+from orchestration.systems.schedule import schedule
 from orchestration.systems.schedule.resources import timeline_of
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.computers import Computer, Message, Network, Task
@@ -62,12 +62,14 @@ def test_random_systems_on_computers_run_the_same_in_schedules_of_any_length(
 ) -> None:
     whole = ran(of(what, fmu), "python", load=kept.load)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(cursor, "INSTANTS", instants)
+        patch.setattr(schedule, "INSTANTS", instants)
         assert_the_same(both(of(what, fmu), load=kept.load), whole)
 
 
 @settings(max_examples=30, derandomize=True, deadline=None)
-@given(systems_on_computers(), st.floats(0.0, 1.0), st.tuples(ENGINES, ENGINES), st.sampled_from((5, cursor.INSTANTS)))
+@given(
+    systems_on_computers(), st.floats(0.0, 1.0), st.tuples(ENGINES, ENGINES), st.sampled_from((5, schedule.INSTANTS))
+)
 def test_and_go_on_from_a_pause_as_if_there_was_none(
     fmu: Path, kept: Kept, what: System, share: float, engines: tuple[Any, Any], size: int
 ) -> None:

@@ -3,7 +3,7 @@
 import sys
 
 from orchestration.simulation.engines.initial import groups
-from orchestration.systems.schedule.order import ranked
+from orchestration.systems.schedule.plan import ranked
 from tests.orchestration.simulation.engines.stubs import wire
 
 

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestration.foundation.recording.recording import Event
+from orchestration.simulation.engines.backlog import RunEvents
 from orchestration.systems.schedule.resources import timeline_of
-from orchestration.systems.schedule.run_events import RunEvents
 from orchestration.systems.system.computers import Computer, Task
 from orchestration.systems.system.model import System
 from tests.orchestration.simulation.engines.systems_on_computers import systems_on_computers

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.systems.schedule import cursor
-from orchestration.systems.schedule.cursor import Cursor
+from orchestration.systems.schedule import schedule
+from orchestration.systems.schedule.schedule import Cursor
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.component import Component
@@ -191,7 +191,7 @@ def test_windows_of_any_length_are_one_schedule(monkeypatch):
     )  # fmt: skip
     found = instants(what)
     for size in (1, 7, 11, 100):
-        monkeypatch.setattr(cursor, "INSTANTS", size)
+        monkeypatch.setattr(schedule, "INSTANTS", size)
         assert instants(what) == found
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import NANOSECONDS
-from orchestration.systems.schedule.drawing import times_from
+from orchestration.systems.schedule.lateness_and_loss import times_from
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.description import describe_faults, describe_varying
 from orchestration.systems.system.distribution import Distribution, content, highest, is_random, lowest, mean
