@@ -81,7 +81,7 @@ figures: .venv/.base
 	$(BIN)/python examples/lqg/design.py
 
 site: .venv/.test
-	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 	@echo "open site/index.html"
 
 # By a path, not by setuptools' finder, which each process of this environment would import in 15 ms.

@@ -21,7 +21,7 @@ LOCAL = re.compile(r'\b(?:src|href)="(?![a-z]+:|//|#)([^"#?]+)')
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of the site; where the strict build fails, so do all tests here."""
     folder = tmp_path_factory.mktemp("site")
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(folder)]
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
     done = subprocess.run(
         command, cwd=ROOT, capture_output=True, text=True, env={**os.environ, "NO_MKDOCS_2_WARNING": "1"}
     )
