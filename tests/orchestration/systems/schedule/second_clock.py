@@ -1,4 +1,4 @@
-"""A second clock, written from `docs/timing.md` and `docs/systems.md`: nothing of the project is imported here.
+"""A second clock, written from `docs/timing.md`: nothing of the project is imported here.
 
 It makes all samples and messages of a system before it runs, where the project's clock makes each from the one before.
 """
