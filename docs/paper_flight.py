@@ -10,8 +10,8 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.quadrotor.flight.errors import ERRORS, Error, draw_components
 from orchestration.quadrotor.flight.path import draw_in_space
 from orchestration.quadrotor.scenarios.measures import position_error
+from orchestration.simulation.figures.drawn_run import DrawnRun
 from orchestration.simulation.figures.lines import TIME
-from orchestration.simulation.figures.run import Run
 from orchestration.simulation.figures.style import Style
 from orchestration.simulation.runs.draw import runs_of
 from orchestration.simulation.runs.result import Result
@@ -80,7 +80,7 @@ def _as_printed() -> Sequence[Error]:
     return attitude, turning, position, velocity
 
 
-def _values(run: Run, name: str) -> Floats:
+def _values(run: DrawnRun, name: str) -> Floats:
     (error,) = [error for error in ERRORS if error.name == name]
     values = error.of(run)
     assert values is not None

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from orchestration.foundation.basics.times import seconds
-from orchestration.foundation.recording.recording import KINDS, About, Events, Recording
+from orchestration.foundation.recording.recording import KINDS, About, Recording, events_of, rows_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,8 +20,7 @@ def signals(recording: Recording, about: About) -> "pd.DataFrame":
     """A row for each instant, indexed by `time` [s]; the units are in `attrs["units"]`, by column."""
     import pandas as pd
 
-    rows = np.concatenate([chunk.rows for chunk in recording.chunks()])
-    table = pd.DataFrame(rows, columns=list(recording.columns)).set_index("time")
+    table = pd.DataFrame(rows_of(recording), columns=list(recording.columns)).set_index("time")
     table.attrs["units"] = units_of(about)
     return table
 
@@ -30,14 +29,9 @@ def events(recording: Recording) -> "pd.DataFrame":
     """A row for each event in order of time: `time` [s], `event`, its object (`what`) and the index `sample`."""
     import pandas as pd
 
-    table = pd.concat([_events(chunk.events) for chunk in recording.chunks(("time",))], ignore_index=True)
-    table.attrs["units"] = {"time": "s"}
-    return table
-
-
-def _events(events: Events) -> "pd.DataFrame":
-    import pandas as pd
-
+    events = events_of(recording)
     time, kind, what, sample = events.table.T
     words, names = np.array(KINDS, dtype=object), np.array([*events.names], dtype=object)
-    return pd.DataFrame({"time": seconds(time), "event": words[kind], "what": names[what], "sample": sample})
+    table = pd.DataFrame({"time": seconds(time), "event": words[kind], "what": names[what], "sample": sample})
+    table.attrs["units"] = {"time": "s"}
+    return table

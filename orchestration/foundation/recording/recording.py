@@ -115,6 +115,23 @@ About = Mapping[str, Mapping[str, str]]
 """The `unit` and the `description` of columns, where they have them, by column"""
 
 
+def rows_of(recording: Recording) -> Floats:
+    """All rows, shape (n, number of columns)."""
+    return np.concatenate([chunk.rows for chunk in recording.chunks()])
+
+
+def events_of(recording: Recording) -> Events:
+    """All events, in order of time."""
+    parts = [chunk.events for chunk in recording.chunks(("time",))]
+    names = tuple(dict.fromkeys(name for part in parts for name in part.names))
+    places = [np.array([names.index(name) for name in part.names], dtype=np.int64) for part in parts]
+    tables = [
+        np.column_stack([part.table[:, :2], place[part.table[:, 2]], part.table[:, 3]])
+        for part, place in zip(parts, places, strict=True)
+    ]
+    return Events(names, np.concatenate(tables))
+
+
 class Recorder(Protocol):
     """Receives the chunks of a run."""
 

@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 
 from orchestration.quadrotor.scenarios.measures import saturated
 from orchestration.quadrotor.scenarios.wiring import COMMAND
+from orchestration.simulation.figures.drawn_run import DrawnRun, Window, title
 from orchestration.simulation.figures.lines import TIME, clip_peaks, legend_of_runs, quantity, set_span
-from orchestration.simulation.figures.palette import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RED
-from orchestration.simulation.figures.run import Run, Window, title
+from orchestration.simulation.figures.palette import BLACK, GREEN, GREY, ORANGE, PURPLE, RED
 from orchestration.simulation.figures.style import Style
 
 NAMES = dict(zip(COMMAND, ("thrust", "torque x", "torque y", "torque z"), strict=True))
@@ -22,7 +22,7 @@ MAX_MARKS = 150
 AT_LIMIT = "a limit of the plant is active"
 
 
-def commands(runs: Sequence[Run], style: Style) -> Figure:
+def commands(runs: Sequence[DrawnRun], style: Style) -> Figure:
     """The whole run, and a window of it: by default the first second. In a narrow figure the window alone, if any."""
     end = max(float(run.rows[-1, 0]) for run in runs)
     window = runs[0].window
@@ -50,13 +50,12 @@ def commands(runs: Sequence[Run], style: Style) -> Figure:
     return figure
 
 
-def _draw(panel: Axes, runs: Sequence[Run], name: str, span: Window, style: Style, *, clips: bool) -> None:
+def _draw(panel: Axes, runs: Sequence[DrawnRun], name: str, span: Window, style: Style, *, clips: bool) -> None:
     """One command over one span, with the limits that are near."""
     lines = []
     for run in runs:
         t, values = run.signals["time"], run.signals[f"plant.{name}"]
-        color = BLUE if len(runs) == 1 else run.color
-        panel.plot(t, values, drawstyle="steps-post", color=color, linestyle=run.dashes if len(runs) > 1 else "-")
+        panel.plot(t, values, drawstyle="steps-post", color=run.color, linestyle=run.dashes)
         inside = (t >= span[0]) & (t <= span[1])
         lines.append((t[inside], values[inside]) if inside.any() else (t, values))
     set_span(panel, span)
@@ -68,7 +67,7 @@ def _draw(panel: Axes, runs: Sequence[Run], name: str, span: Window, style: Styl
     _mark_saturation(panel, runs, name)
 
 
-def _mark_limits(panel: Axes, runs: Sequence[Run], name: str) -> None:
+def _mark_limits(panel: Axes, runs: Sequence[DrawnRun], name: str) -> None:
     """A line at each limit within the range of the axis."""
     bottom, top = panel.get_ylim()
     for run in runs:
@@ -78,7 +77,7 @@ def _mark_limits(panel: Axes, runs: Sequence[Run], name: str) -> None:
                 panel.axhline(limit, color=BLACK, linestyle=":", label="limit of the plant")
 
 
-def _mark_saturation(panel: Axes, runs: Sequence[Run], name: str) -> None:
+def _mark_saturation(panel: Axes, runs: Sequence[DrawnRun], name: str) -> None:
     """Shade the time during which a limit alters the command."""
     for run in runs:
         t = run.signals["time"]
@@ -90,7 +89,7 @@ def _mark_saturation(panel: Axes, runs: Sequence[Run], name: str) -> None:
             )  # fmt: skip
 
 
-def mark_events(axes: Axes, run: Run, span: Window) -> None:
+def mark_events(axes: Axes, run: DrawnRun, span: Window) -> None:
     """Marks along the lower and upper edge for the events in the window; for losses only where there are too many."""
     for kind, what, marker, color, height, label in (
         ("sampled", "measurement", "|", GREY, 0.04, "sampled"),

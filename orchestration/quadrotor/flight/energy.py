@@ -8,15 +8,14 @@ from matplotlib.figure import Figure
 
 from orchestration.foundation.basics.times import instants_of
 from orchestration.quadrotor.scenarios.wiring import ENERGY
+from orchestration.simulation.figures.drawn_run import DrawnRun, title
 from orchestration.simulation.figures.lines import TIME, legend_of_runs, logarithmic, positive, quantity, set_time_axis
-from orchestration.simulation.figures.palette import BLUE
-from orchestration.simulation.figures.run import Run, title
 from orchestration.simulation.figures.style import Style
 
 COLUMN = f"controller.{ENERGY}"
 
 
-def energy(runs: Sequence[Run], style: Style) -> Figure | None:
+def energy(runs: Sequence[DrawnRun], style: Style) -> Figure | None:
     """L (33) at the samples; None if no controller has this variable, or none has sampled."""
     with_energy = [run for run in runs if COLUMN in run and _sampled(run).any()]
     if not with_energy:
@@ -25,8 +24,7 @@ def energy(runs: Sequence[Run], style: Style) -> Figure | None:
     panel = figure.add_subplot()
     for run in with_energy:
         at = _sampled(run)
-        color = BLUE if len(runs) == 1 else run.color
-        panel.plot(run.time[at], positive(run[COLUMN][at]), color=color, linestyle=run.dashes, label=run.name)
+        panel.plot(run.time[at], positive(run[COLUMN][at]), color=run.color, linestyle=run.dashes, label=run.name)
     unit = with_energy[0].described[COLUMN].unit
     logarithmic(panel)
     panel.set(xlabel=TIME, ylabel=quantity("energy L", unit))
@@ -37,6 +35,6 @@ def energy(runs: Sequence[Run], style: Style) -> Figure | None:
     return figure
 
 
-def _sampled(run: Run) -> npt.NDArray[np.bool_]:
+def _sampled(run: DrawnRun) -> npt.NDArray[np.bool_]:
     """Mask of the visible rows that are sampling instants."""
     return np.isin(instants_of(run.time), instants_of(run.instants("sampled")))

@@ -10,18 +10,19 @@ from matplotlib.figure import Figure
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.quadrotor.scenarios.measures import desired
 from orchestration.quadrotor.scenarios.wiring import POSITION, components
+from orchestration.simulation.figures.drawn_run import DrawnRun
 from orchestration.simulation.figures.lines import (
     TIME,
     clip_peaks,
     legend_of_runs,
     logarithmic,
+    name_runs,
     positive,
     quantity,
     set_time_axis,
     wrapped,
 )
 from orchestration.simulation.figures.palette import BLUE, GREEN, RED
-from orchestration.simulation.figures.run import Run, title
 from orchestration.simulation.figures.style import Style
 
 AXES = tuple(zip("xyz", (BLUE, RED, GREEN), ("-", "--", "-."), strict=True))
@@ -33,20 +34,19 @@ class Error:
 
     name: str
     unit: str
-    of: Callable[[Run], Floats | None]
+    of: Callable[[DrawnRun], Floats | None]
     """shape (n, 3); None: not an output of the controller"""
 
 
-def errors(runs: Sequence[Run], style: Style) -> Figure:
+def errors(runs: Sequence[DrawnRun], style: Style) -> Figure:
     """Norms of the errors on logarithmic axes; position at every row, the others as of the last sample."""
     figure, panels = _panels(runs, style)
     for panel, error in panels:
         for run in runs:
             values = error.of(run)
             if values is not None:
-                color = BLUE if len(runs) == 1 else run.color
                 norm = positive(np.linalg.norm(values, axis=1))
-                panel.plot(run.time, norm, color=color, linestyle=run.dashes, label=run.name)
+                panel.plot(run.time, norm, color=run.color, linestyle=run.dashes, label=run.name)
         logarithmic(panel)
         panel.set_ylabel(wrapped(quantity(f"{error.name}, norm", error.unit)))
         panel.minorticks_off()
@@ -54,7 +54,7 @@ def errors(runs: Sequence[Run], style: Style) -> Figure:
     return figure
 
 
-def components_of_errors(runs: Sequence[Run], style: Style) -> Figure:
+def components_of_errors(runs: Sequence[DrawnRun], style: Style) -> Figure:
     """x, y and z of each error; with several runs a panel for each component."""
     if len(runs) > 1:
         return _overlaid(runs, style)
@@ -66,7 +66,7 @@ def components_of_errors(runs: Sequence[Run], style: Style) -> Figure:
     return figure
 
 
-def draw_components(panel: Axes, run: Run, error: Error, style: Style, *, clips: bool = True) -> None:
+def draw_components(panel: Axes, run: DrawnRun, error: Error, style: Style, *, clips: bool = True) -> None:
     """x, y and z of an error that the run has."""
     values = error.of(run)
     assert values is not None
@@ -78,7 +78,7 @@ def draw_components(panel: Axes, run: Run, error: Error, style: Style, *, clips:
         clip_peaks(panel, [(run.time, values[:, k]) for k in range(3)], error.unit, style)
 
 
-def _overlaid(runs: Sequence[Run], style: Style) -> Figure:
+def _overlaid(runs: Sequence[DrawnRun], style: Style) -> Figure:
     """A row for each error, a column for each component, a line for each run."""
     available = _available_errors(runs)
     figure = style.figure(2.0 + 11.0 * len(available))
@@ -96,7 +96,7 @@ def _overlaid(runs: Sequence[Run], style: Style) -> Figure:
     return figure
 
 
-def _panels(runs: Sequence[Run], style: Style) -> tuple[Figure, list[tuple[Axes, Error]]]:
+def _panels(runs: Sequence[DrawnRun], style: Style) -> tuple[Figure, list[tuple[Axes, Error]]]:
     """A figure with legend and title, and a panel for each available error."""
     available = _available_errors(runs)
     columns = 2 if style.is_wide and len(available) > 1 else 1
@@ -107,22 +107,20 @@ def _panels(runs: Sequence[Run], style: Style) -> tuple[Figure, list[tuple[Axes,
         panel.set_visible(False)
     for panel in panels[max(0, len(available) - columns) : len(available)]:
         panel.set_xlabel(TIME)
-    if style.has_titles and title(runs):
-        figure.suptitle(title(runs))
-    legend_of_runs(figure, runs, style)
+    name_runs(figure, runs, style)
     return figure, list(zip(panels, available))
 
 
-def _available_errors(runs: Sequence[Run]) -> list[Error]:
+def _available_errors(runs: Sequence[DrawnRun]) -> list[Error]:
     return [error for error in ERRORS if any(error.of(run) is not None for run in runs)]
 
 
-def _position_error(run: Run) -> Floats | None:
+def _position_error(run: DrawnRun) -> Floats | None:
     position = run.stacked([f"plant.{name}" for name in POSITION])
     return position - desired(run.signals)[run.visible]
 
 
-def _output_of_controller(name: str) -> Callable[[Run], Floats | None]:
+def _output_of_controller(name: str) -> Callable[[DrawnRun], Floats | None]:
     columns = [f"controller.{component}" for component in components(name)]
     return lambda run: run.stacked(columns) if run.has(columns) else None
 

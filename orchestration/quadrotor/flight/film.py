@@ -13,8 +13,8 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.terminal import Share
 from orchestration.quadrotor.flight.path import fill, stage
 from orchestration.quadrotor.scenarios.wiring import COMMAND, POSITION, POSITION_REFERENCE, QUATERNION
-from orchestration.simulation.figures.palette import BLACK, BLUE, GREEN, ORANGE
-from orchestration.simulation.figures.run import Run
+from orchestration.simulation.figures.drawn_run import DrawnRun
+from orchestration.simulation.figures.palette import BLACK, GREEN, ORANGE
 from orchestration.simulation.figures.style import Style
 
 RATE = 20
@@ -53,7 +53,7 @@ def writer(path: Path) -> AbstractMovieWriter:
     return FFMpegWriter(fps=RATE)
 
 
-def film(runs: Sequence[Run], path: Path, style: Style, progress: Share = lambda share: None) -> Path:
+def film(runs: Sequence[DrawnRun], path: Path, style: Style, progress: Share = lambda share: None) -> Path:
     """Write an animation of runs, each with its trail; its path. Raises `UsageError` as `writer` does."""
     movie = writer(path)
     start, end = min(run.span[0] for run in runs), max(run.span[1] for run in runs)
@@ -69,7 +69,7 @@ def film(runs: Sequence[Run], path: Path, style: Style, progress: Share = lambda
         title = figure.suptitle("0.00 s")
         fill(figure, axes)
         size = SIZE * max(float(np.ptp(limits)) for limits in (axes.get_xlim(), axes.get_ylim(), axes.get_zlim()))
-        vehicles = [_Vehicle.on(axes, run, BLUE if len(runs) == 1 else run.color, size) for run in runs]
+        vehicles = [_Vehicle.on(axes, run, size) for run in runs]
         with movie.saving(figure, str(path), DPI):
             for place, now in enumerate(times, start=1):
                 title.set_text(f"{now:.2f} s" + ("" if abs(pace - 1.0) < 0.1 else f", {pace:.2g} times as fast"))
@@ -84,7 +84,7 @@ def film(runs: Sequence[Run], path: Path, style: Style, progress: Share = lambda
 class _Vehicle:
     """A vehicle, its trail, thrust and reference, as lines that are moved."""
 
-    run: Run
+    run: DrawnRun
     size: float
     lines: dict[str, Any]
     outlines: Sequence[Any]
@@ -92,9 +92,9 @@ class _Vehicle:
     """largest thrust of the run [N]"""
 
     @classmethod
-    def on(cls, axes: Any, run: Run, color: str, size: float) -> "_Vehicle":
+    def on(cls, axes: Any, run: DrawnRun, size: float) -> "_Vehicle":
         def line(**how: Any) -> Any:
-            return axes.plot([], [], [], **{"color": color, "zorder": 5, **how})[0]
+            return axes.plot([], [], [], **{"color": run.color, "zorder": 5, **how})[0]
 
         return cls(
             run=run, size=size,

@@ -15,9 +15,9 @@ from fmu_kit.frames import Frame
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.quadrotor.scenarios.nominal_model import frame_of
 from orchestration.quadrotor.scenarios.wiring import POSITION, POSITION_REFERENCE
+from orchestration.simulation.figures.drawn_run import DrawnRun, title
 from orchestration.simulation.figures.lines import abreast
-from orchestration.simulation.figures.palette import BLUE, ORANGE
-from orchestration.simulation.figures.run import Run, title
+from orchestration.simulation.figures.palette import ORANGE
 from orchestration.simulation.figures.style import Style
 
 ROUNDS = 4
@@ -26,7 +26,7 @@ MIN_SIDE = 0.45
 """shortest side of the box as a share of the longest"""
 
 
-def path(runs: Sequence[Run], style: Style) -> Figure:
+def path(runs: Sequence[DrawnRun], style: Style) -> Figure:
     """The path of the vehicle and its reference, with equal scales of the axes and up upwards."""
     figure, axes = stage(runs, style)
     if style.has_titles:
@@ -38,7 +38,7 @@ def path(runs: Sequence[Run], style: Style) -> Figure:
     return figure
 
 
-def stage(runs: Sequence[Run], style: Style) -> tuple[Figure, Any]:
+def stage(runs: Sequence[DrawnRun], style: Style) -> tuple[Figure, Any]:
     """A figure with paths in space and its legend, and the axes, which do not `fill` it yet."""
     figure = style.figure(38.0, width=0.75 if style.is_wide else 1.0)
     figure.set_layout_engine("none")
@@ -86,7 +86,7 @@ def extent(axes: Any) -> Bbox:
     return Bbox.union([*labels, Bbox([seen.min(axis=0), seen.max(axis=0)])])
 
 
-def draw_in_space(axes: Any, runs: Sequence[Run], style: Style) -> None:
+def draw_in_space(axes: Any, runs: Sequence[DrawnRun], style: Style) -> None:
     """Draw paths and references on existing three-dimensional axes."""
     paths = [run.stacked([f"plant.{name}" for name in POSITION]) for run in runs]
     references = [run.stacked(POSITION_REFERENCE) for run in runs]
@@ -98,13 +98,12 @@ def draw_in_space(axes: Any, runs: Sequence[Run], style: Style) -> None:
                 linewidth=3.5 * style.line, alpha=0.6, zorder=1, label="reference" if i == 0 else None,
             )  # fmt: skip
     for run, points in zip(runs, paths, strict=True):
-        alone = len(runs) == 1
-        color = BLUE if alone else run.color
-        axes.plot(*points.T, color=color, linestyle=run.dashes, label="flown" if alone else None, zorder=2)
+        label = "flown" if len(runs) == 1 else None
+        axes.plot(*points.T, color=run.color, linestyle=run.dashes, label=label, zorder=2)
         for place, marker, what in ((0, "o", "start"), (-1, "s", "end")):
             axes.plot(
-                *points[place, :, None], marker, color=color, zorder=3, label=what if run.place == 0 else None,
-                markerfacecolor="white" if what == "start" else color,
+                *points[place, :, None], marker, color=run.color, zorder=3, label=what if run.place == 0 else None,
+                markerfacecolor="white" if what == "start" else run.color,
             )  # fmt: skip
     is_enu = frame_of(runs[0].parameters, "plant") == Frame.ENU
     _equal(axes, np.concatenate([*paths, *references]), is_enu=is_enu, is_wide=style.is_wide)

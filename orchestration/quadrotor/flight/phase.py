@@ -8,16 +8,16 @@ from matplotlib.figure import Figure
 
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.quadrotor.scenarios.wiring import BOUNDARY_LAYER, SURFACE_EXPONENT, SURFACE_GAIN, components
-from orchestration.simulation.figures.lines import legend_of_runs, quantity
-from orchestration.simulation.figures.palette import BLUE, GREY
-from orchestration.simulation.figures.run import Run, title
+from orchestration.simulation.figures.drawn_run import DrawnRun
+from orchestration.simulation.figures.lines import name_runs, quantity
+from orchestration.simulation.figures.palette import GREY
 from orchestration.simulation.figures.style import Style
 
 ERROR, RATE = (tuple(f"controller.{c}" for c in components(name)) for name in ("position_error", "velocity_error"))
 DRAWN = (*ERROR, *RATE)
 
 
-def phase(runs: Sequence[Run], style: Style) -> Figure | None:
+def phase(runs: Sequence[DrawnRun], style: Style) -> Figure | None:
     """A panel each for x, y and z, as of the samples; None if no controller has its errors as outputs."""
     with_errors = [run for run in runs if run.has(DRAWN)]
     if not with_errors:
@@ -32,15 +32,13 @@ def phase(runs: Sequence[Run], style: Style) -> Figure | None:
         panel.set(xlabel=quantity(f"position error {axis}", "m"), ylabel=quantity(f"velocity error {axis}", "m/s"))
     handles, names = panels[0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside lower center", ncols=len(names))
-    if style.has_titles and title(runs):
-        figure.suptitle(title(runs))
-    legend_of_runs(figure, runs, style)
+    name_runs(figure, runs, style)
     return figure
 
 
-def _draw(panel: Axes, run: Run, error: Floats, rate: Floats, *, alone: bool) -> None:
-    color, first = BLUE if alone else run.color, run.place == 0
-    panel.plot(error, rate, color=color, linestyle=run.dashes if not alone else "-", label="flown" if alone else None)
+def _draw(panel: Axes, run: DrawnRun, error: Floats, rate: Floats, *, alone: bool) -> None:
+    color, first = run.color, run.place == 0
+    panel.plot(error, rate, color=color, linestyle=run.dashes, label="flown" if alone else None)
     for k, marker, what in ((0, "o", "start"), (-1, "s", "end")):
         filled = "white" if what == "start" else color
         panel.plot(
@@ -48,7 +46,7 @@ def _draw(panel: Axes, run: Run, error: Floats, rate: Floats, *, alone: bool) ->
         )
 
 
-def _draw_surfaces(panel: Axes, runs: Sequence[Run]) -> None:
+def _draw_surfaces(panel: Axes, runs: Sequence[DrawnRun]) -> None:
     """The surface s = 0 of each law that has one, over the visible range."""
     panel.margins(0.06)
     seen, rates = panel.get_xlim(), panel.get_ylim()

@@ -8,9 +8,9 @@ from matplotlib.figure import Figure
 
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.quadrotor.flight.commands import COLUMNS
-from orchestration.simulation.figures.lines import legend_of_runs, logarithmic, positive, wrapped
+from orchestration.simulation.figures.drawn_run import DrawnRun
+from orchestration.simulation.figures.lines import logarithmic, name_runs, positive, wrapped
 from orchestration.simulation.figures.palette import BLACK, BLUE, GREEN, RED
-from orchestration.simulation.figures.run import Run, title
 from orchestration.simulation.figures.style import Style
 from orchestration.simulation.figures.ticks import plain
 
@@ -22,7 +22,7 @@ MIN_SEGMENT = 64
 """values in a segment"""
 
 
-def spectrum(runs: Sequence[Run], style: Style) -> Figure | None:
+def spectrum(runs: Sequence[DrawnRun], style: Style) -> Figure | None:
     """Power spectral densities of thrust and torques as applied; None for less than `MIN_SEGMENT` plant steps."""
     with_command = [(run, *of) for run in runs if (of := _command(run)) is not None]
     if not with_command:
@@ -31,7 +31,7 @@ def spectrum(runs: Sequence[Run], style: Style) -> Figure | None:
     figure = style.figure(25.0 if columns == 2 else 42.0)
     thrust, torque = figure.subplots(2 // columns, columns, squeeze=False).ravel()
     for run, step, command in with_command:
-        color, dashes = (BLUE, "-") if len(runs) == 1 else (run.color, run.dashes)
+        color, dashes = run.color, run.dashes
         frequency, densities = welch(command, step)
         thrust.plot(frequency, positive(densities[:, 0]), color=color, linestyle=dashes)
         if len(runs) == 1:
@@ -53,9 +53,7 @@ def spectrum(runs: Sequence[Run], style: Style) -> Figure | None:
         _mark_rates(panel, runs, style)
     if len(runs) == 1:
         torque.legend(loc="lower left")
-    if style.has_titles and title(runs):
-        figure.suptitle(title(runs))
-    legend_of_runs(figure, runs, style)
+    name_runs(figure, runs, style)
     return figure
 
 
@@ -80,7 +78,7 @@ def welch(values: Floats, step: float) -> tuple[Floats, Floats]:
     return frequencies, density
 
 
-def _command(run: Run) -> tuple[float, Floats] | None:
+def _command(run: DrawnRun) -> tuple[float, Floats] | None:
     """The step of the plant [s] and its command at each, shape (n, 4), for all rows in the window."""
     step = run.system.components["plant"].step
     if step is None:
@@ -96,7 +94,7 @@ def _command(run: Run) -> tuple[float, Floats] | None:
     return step, rows[held, 1:]
 
 
-def _mark_rates(panel: Axes, runs: Sequence[Run], style: Style) -> None:
+def _mark_rates(panel: Axes, runs: Sequence[DrawnRun], style: Style) -> None:
     """Mark the sampling rate of the controller and its Nyquist frequency."""
     for run in runs:
         sampling = run.system.components["controller"].sampling

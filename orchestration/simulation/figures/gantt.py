@@ -12,8 +12,8 @@ from matplotlib.patches import Patch
 
 from orchestration.foundation.basics.simulator import Booleans, Integers
 from orchestration.foundation.basics.times import NANOSECONDS, seconds
+from orchestration.simulation.figures.drawn_run import DrawnRun, Window
 from orchestration.simulation.figures.palette import BLACK, BLUE, BROWN, GREEN, GREY, ORANGE, PURPLE, RED, SKY
-from orchestration.simulation.figures.run import Run, Window
 from orchestration.simulation.figures.style import Style
 from orchestration.systems.computers.results import (
     CORRUPTED,
@@ -48,7 +48,7 @@ class _Row:
     of: Jobs | Frames
 
 
-def chart(runs: Sequence[Run], style: Style) -> Figure | None:
+def chart(runs: Sequence[DrawnRun], style: Style) -> Figure | None:
     """The chart of one run; None without computers and networks, or for several runs."""
     system = runs[0].system
     if len(runs) > 1 or not (system.computers or system.networks):

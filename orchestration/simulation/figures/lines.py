@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.simulation.figures.drawn_run import DrawnRun, Window, title
 from orchestration.simulation.figures.palette import BLACK, GREY
-from orchestration.simulation.figures.run import Run, Window
 from orchestration.simulation.figures.shades import CLIPPED, OUTSIDE
 from orchestration.simulation.figures.style import Style
 from orchestration.simulation.results import display_names as labels
@@ -34,7 +34,7 @@ def logarithmic(axes: Axes) -> None:
         axes.set_yscale("log")
 
 
-def set_time_axis(axes: Axes, runs: Sequence[Run]) -> None:
+def set_time_axis(axes: Axes, runs: Sequence[DrawnRun]) -> None:
     """Set the limits of the time axis to the span of the runs, or to the window."""
     set_span(axes, (min(run.span[0] for run in runs), max(run.span[1] for run in runs)))
 
@@ -45,12 +45,19 @@ def set_span(axes: Axes, span: Window) -> None:
         axes.set_xlim(span)
 
 
-def legend_of_runs(figure: Figure, runs: Sequence[Run], style: Style) -> None:
+def legend_of_runs(figure: Figure, runs: Sequence[DrawnRun], style: Style) -> None:
     """A legend of the runs above all panels; none for one run."""
     if len(runs) > 1:
         handles = [Line2D([], [], color=run.color, linestyle=run.dashes, label=run.name) for run in runs]
         columns = abreast([run.name for run in runs], style)
         figure.legend(handles=handles, loc="outside upper center", ncols=columns)
+
+
+def name_runs(figure: Figure, runs: Sequence[DrawnRun], style: Style) -> None:
+    """Their common title above the figure, if the style has titles, and a legend of several runs."""
+    if style.has_titles and (common := title(runs)):
+        figure.suptitle(common)
+    legend_of_runs(figure, runs, style)
 
 
 def abreast(names: Sequence[str], style: Style, *, width: float = 1.0) -> int:

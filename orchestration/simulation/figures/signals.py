@@ -5,9 +5,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestration.simulation.figures.lines import TIME, abreast, legend_of_runs, quantity, set_time_axis, wrapped
+from orchestration.simulation.figures.drawn_run import DrawnRun
+from orchestration.simulation.figures.lines import TIME, abreast, name_runs, quantity, set_time_axis, wrapped
 from orchestration.simulation.figures.palette import CYCLE, DASHES, MAX_LINES, MAX_PANELS
-from orchestration.simulation.figures.run import Run, title
 from orchestration.simulation.figures.style import Style
 from orchestration.simulation.results import display_names as labels
 from orchestration.simulation.results.column_info import ColumnInfo
@@ -18,7 +18,7 @@ Panel = tuple[str, str | None, list[str]]
 """Name of the connection or component, unit, columns"""
 
 
-def signals(runs: Sequence[Run], style: Style) -> Figure:
+def signals(runs: Sequence[DrawnRun], style: Style) -> Figure:
     """A panel for each connection and unit, its signals as the receiver has them.
 
     Without connections, the recorded outputs of each component. Of more than `MAX_PANELS` the first are drawn,
@@ -35,12 +35,10 @@ def signals(runs: Sequence[Run], style: Style) -> Figure:
         set_time_axis(panel, runs)
         handles, names = panel.get_legend_handles_labels()
         panel.legend(handles, names, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=abreast(names, style))
-    if style.has_titles and title(runs):
-        figure.suptitle(title(runs))
     panels[-1].set_xlabel(TIME)
     if left_out := sum(len(columns) for _, _, columns in available[MAX_PANELS:]):
         figure.supxlabel(f"and {left_out} more signals")
-    legend_of_runs(figure, runs, style)
+    name_runs(figure, runs, style)
     return figure
 
 
@@ -67,7 +65,7 @@ def _panels(system: System, described: Mapping[str, ColumnInfo]) -> Iterator[Pan
                 yield name, unit, of_unit[first : first + MAX_LINES]
 
 
-def _draw(panel: Axes, run: Run, columns: Sequence[str], *, alone: bool) -> None:
+def _draw(panel: Axes, run: DrawnRun, columns: Sequence[str], *, alone: bool) -> None:
     """Colours distinguish the signals of one run, or several runs; dashes then the signals."""
     system = run.system
     applied = {end for x in system.connections for end in x.end}

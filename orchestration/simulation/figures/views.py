@@ -11,12 +11,12 @@ from orchestration.simulation.figures.names import FORMATS
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from orchestration.simulation.figures.run import Run
+    from orchestration.simulation.figures.drawn_run import DrawnRun
     from orchestration.simulation.figures.style import Style
     from orchestration.simulation.results.column_info import ColumnInfo
     from orchestration.systems.system.model import System
 
-    Maker = Callable[[Sequence[Run], Style], Figure | None]
+    Maker = Callable[[Sequence[DrawnRun], Style], Figure | None]
 
 
 @dataclass(frozen=True, kw_only=True)

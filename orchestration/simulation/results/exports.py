@@ -4,12 +4,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from orchestration.foundation.basics.times import seconds
 from orchestration.foundation.recording import mat_file
 from orchestration.foundation.recording.frames import units_of
-from orchestration.foundation.recording.recording import About, Chunk, Recording
+from orchestration.foundation.recording.recording import About, Events, Recording, events_of, rows_of
 from orchestration.simulation.results.objectives import Metrics
 
 
@@ -21,8 +19,7 @@ def to_mat(path: Path, recording: Recording, about: About, metrics: Metrics, uni
     and `sample`; `run.metrics` the metrics, `run.metric_units` their units. `run.columns` lists the signals by their
     usual names.
     """
-    chunks = list(recording.chunks())
-    rows = np.concatenate([chunk.rows for chunk in chunks])
+    rows = rows_of(recording)
     columns = {name: rows[:, i] for i, name in enumerate(recording.columns)}
     time, known = columns.pop("time"), units_of(about)
     run = {
@@ -30,18 +27,17 @@ def to_mat(path: Path, recording: Recording, about: About, metrics: Metrics, uni
         "columns": [*columns],
         "signals": mat_file.nested(columns),
         "units": mat_file.nested({name: known.get(name, "") for name in columns}),
-        "events": _events(chunks),
+        "events": _events(events_of(recording)),
         "metrics": mat_file.flat(metrics),
         "metric_units": mat_file.flat({name: units.get(name, "") for name in metrics}),
     }
     return mat_file.write(path, {"run": run})
 
 
-def _events(chunks: list[Chunk]) -> dict[str, Any]:
-    listed = [event for chunk in chunks for event in chunk.events]
+def _events(events: Events) -> dict[str, Any]:
     return {
-        "time": np.array([seconds(event.time) for event in listed]),
-        "event": [event.kind for event in listed],
-        "what": [event.what for event in listed],
-        "sample": np.array([event.sample for event in listed], dtype=float),
+        "time": seconds(events.table[:, 0]),
+        "event": [event.kind for event in events],
+        "what": [event.what for event in events],
+        "sample": events.table[:, 3].astype(float),
     }

@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.recording.recording import thinned
+from orchestration.simulation.figures.drawn_run import DrawnRun, Window
 from orchestration.simulation.figures.gallery import Figures
-from orchestration.simulation.figures.run import Run, Window
 from orchestration.simulation.figures.style import SCREEN, Style, style_named
 from orchestration.simulation.figures.views import VIEWS, view_of
 from orchestration.simulation.runs.result import Result
@@ -54,16 +54,15 @@ def figures_of(
 ) -> Figures:
     """The figures of runs overlaid; raises `UsageError` for an unknown figure or style."""
     chosen = style_named(style)
-    names = labels_of_runs(results, [f"run {i + 1}" for i in range(len(results))])
-    return Figures(draw(results, which, names=names, window=window, style=chosen), chosen)
+    return Figures(draw(results, which, window=window, style=chosen), chosen)
 
 
 def runs_of(
     results: Sequence[Result], names: Sequence[str], columns: Collection[str] | None, window: Window | None
-) -> list[Run]:
+) -> list[DrawnRun]:
     """Runs ready to be drawn: at most `MAX_ROWS_OUTSIDE` rows, and all in the window; default: all columns."""
     return [
-        Run(
+        DrawnRun(
             name=name,
             place=place,
             title=_title(result),

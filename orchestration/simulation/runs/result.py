@@ -13,7 +13,7 @@ from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import instants_of
 from orchestration.foundation.recording import frames
-from orchestration.foundation.recording.recording import About, Event, Recording
+from orchestration.foundation.recording.recording import About, Event, Recording, events_of, rows_of
 from orchestration.simulation.results import display_names as labels
 from orchestration.simulation.results import exports, html
 from orchestration.simulation.results.column_info import ColumnInfo
@@ -120,12 +120,12 @@ class Result:
     @cached_property
     def rows(self) -> Floats:
         """All rows, shape (n, number of columns); a row is the value just after its instant."""
-        return np.concatenate([chunk.rows for chunk in self.recording.chunks()])
+        return rows_of(self.recording)
 
     @cached_property
     def events(self) -> tuple[Event, ...]:
         """All events of messages, jobs of tasks and frames of networks, in order of time."""
-        return tuple(event for chunk in self.recording.chunks(("time",)) for event in chunk.events)
+        return tuple(events_of(self.recording))
 
     @property
     def about(self) -> About:
@@ -145,7 +145,8 @@ class Result:
     @cached_property
     def sampled(self) -> npt.NDArray[np.bool_]:
         """Which rows are sampling instants, shape (n,)."""
-        return rows_of(self.rows[:, 0], self.events, "sampled")
+        events = events_of(self.recording)
+        return np.isin(instants_of(self.rows[:, 0]), events.table[events.are("sampled"), 0])
 
     def plot(
         self,
@@ -187,9 +188,3 @@ class Result:
         Raises `QuadcosimError` where SciPy is not installed.
         """
         return exports.to_mat(Path(path), self.recording, self.about, self.metrics, self.units)
-
-
-def rows_of(time: Floats, events: tuple[Event, ...], kind: str, what: str | None = None) -> npt.NDArray[np.bool_]:
-    """At which of the recorded times [s] there is an event of a kind, and of `what` if it is given; shape of `time`."""
-    instants = [event.time for event in events if event.kind == kind and what in (None, event.what)]
-    return np.isin(instants_of(time), np.array(instants, dtype=np.int64))

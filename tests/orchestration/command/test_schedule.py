@@ -9,7 +9,7 @@ import pytest
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.recording.recording import InMemory
 from orchestration.simulation.figures import gantt
-from orchestration.simulation.figures.run import Run, Window
+from orchestration.simulation.figures.drawn_run import DrawnRun, Window
 from orchestration.simulation.figures.style import SCREEN
 from orchestration.simulation.requests.ranges import default_quantity
 from orchestration.systems.computers.results import Timeline
@@ -44,10 +44,10 @@ identifier = 1
 """
 
 
-def run_of(system: System, window: Window | None = None) -> Run:
+def run_of(system: System, window: Window | None = None) -> DrawnRun:
     """A run as figures see it, of which nothing was recorded."""
     recording = InMemory().finish()
-    return Run(
+    return DrawnRun(
         name="", place=0, title="", system=system, recording=recording, whole=recording, described={}, parameters={},
         window=window,
     )  # fmt: skip

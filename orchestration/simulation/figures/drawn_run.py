@@ -9,7 +9,7 @@ import numpy as np
 
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import seconds
-from orchestration.foundation.recording.recording import Events, Recording
+from orchestration.foundation.recording.recording import Events, Recording, events_of, rows_of
 from orchestration.simulation.figures.palette import CYCLE, DASHES
 from orchestration.simulation.results.column_info import ColumnInfo
 from orchestration.systems.system.model import System
@@ -19,31 +19,31 @@ Window: TypeAlias = tuple[float, float]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Run:
-    """One of the runs in a figure."""
+class DrawnRun:
+    """A run that has ended, as one of those in a figure."""
 
     name: str
-    """that distinguishes it from the others"""
+    """Name that distinguishes it from the others"""
     place: int
-    """among them"""
+    """Index among the runs that are drawn"""
     title: str
-    """what was run, and how it ended"""
+    """Words for what was run, and how it ended"""
     system: System
     recording: Recording
-    """as many rows as a figure can show"""
+    """As many of the rows as a figure can show"""
     whole: Recording
-    """all rows"""
+    """All rows"""
     described: Mapping[str, ColumnInfo]
-    """by column"""
+    """Unit and description of each column"""
     parameters: Mapping[str, float]
-    """of all components, by COMPONENT.NAME"""
+    """Parameters of all components, by COMPONENT.NAME"""
     window: Window | None
-    """the visible span of time; None: all"""
+    """The visible span of time; None: all"""
 
     @cached_property
     def rows(self) -> Floats:
         """The decimated rows, shape (n, number of columns)."""
-        return np.concatenate([chunk.rows for chunk in self.recording.chunks()])
+        return rows_of(self.recording)
 
     @cached_property
     def signals(self) -> dict[str, Floats]:
@@ -52,12 +52,12 @@ class Run:
 
     @property
     def color(self) -> str:
-        """The colour of its lines where runs are overlaid."""
+        """The colour of its lines; blue for a run alone."""
         return CYCLE[self.place % len(CYCLE)]
 
     @property
     def dashes(self) -> str:
-        """The dashes of its lines, likewise."""
+        """The dashes of its lines; none for a run alone."""
         return DASHES[self.place % len(DASHES)]
 
     @property
@@ -81,14 +81,7 @@ class Run:
     @cached_property
     def events(self) -> Events:
         """All events of the run."""
-        parts = [chunk.events for chunk in self.recording.chunks(("time",))]
-        names = tuple(dict.fromkeys(name for part in parts for name in part.names))
-        places = [np.array([names.index(name) for name in part.names], dtype=np.int64) for part in parts]
-        tables = [
-            np.column_stack([part.table[:, :2], place[part.table[:, 2]], part.table[:, 3]])
-            for part, place in zip(parts, places, strict=True)
-        ]
-        return Events(names, np.concatenate(tables))
+        return events_of(self.recording)
 
     def instants(self, kind: str, what: str | None = None) -> Floats:
         """The times of the events of a kind, of one connection if `what` names it [s], shape (n,)."""
@@ -110,7 +103,7 @@ class Run:
         return np.column_stack([self[signal] for signal in signals])
 
 
-def title(runs: Sequence[Run]) -> str:
+def title(runs: Sequence[DrawnRun]) -> str:
     """The common title of all runs; empty if they differ."""
     titles = {run.title for run in runs}
     return titles.pop() if len(titles) == 1 else ""
