@@ -1,11 +1,9 @@
-"""Violations of MISRA C:2012 in the C of the controller: `python -m benchmarks.misra [--page PAGE]`.
+"""Violations of MISRA C:2012 in the C of the controller: `python -m benchmarks.misra`.
 
 Needs cppcheck with its addon, which checks most decidable rules, without their texts. The controller is the law without
-redesign and prediction, in both precisions: with them cppcheck takes more than ten minutes. With `--page` the table is
-written there.
+redesign and prediction, in both precisions: with them cppcheck takes more than ten minutes.
 """
 
-import argparse
 import re
 import subprocess
 import sys
@@ -16,7 +14,6 @@ from pathlib import Path
 
 from benchmarks.embedded import FIXED
 from benchmarks.mathematics import table
-from docs.pages import fill
 from fmu_kit.bundle import Target
 from fmu_kit.compiler.pack.embedded import write
 from fmu_kit.variants import Variant
@@ -49,9 +46,6 @@ def _addon() -> Path:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--page", type=Path)
-    page = parser.parse_args().page
     found: dict[str, Counter[str]] = {}
     law = replace(
         Target.parse(MODELS["UnifiedController"]), variant=Variant.of("Law", FIXED["no redesign, no prediction"])
@@ -62,11 +56,8 @@ def main() -> None:
     rules = sorted({rule for each in found.values() for rule in each}, key=lambda rule: [*map(int, rule.split("."))])
     rows = [[rule, *(str(each[rule]) for each in found.values())] for rule in rules]
     rows.append(["all", *(str(each.total()) for each in found.values())])
-    text = table(["rule", *found], rows)
     version = subprocess.run([CPPCHECK, "--version"], check=True, capture_output=True, text=True).stdout.strip()
-    print(text, version, sep="\n\n")
-    if page is not None:
-        fill(page, {"misra": f"{text}\n\n`{version}`"})
+    print(table(["rule", *found], rows), version, sep="\n\n")
 
 
 if __name__ == "__main__":
