@@ -90,7 +90,7 @@ def no_such_key(table: str, key: str, known: Sequence[str], beside: str = "") ->
 
 def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
     """The end of a message about an unknown `name`: the `most` known names that are closest to it, if any is close."""
-    close = difflib.get_close_matches(name, list(known), n=most, cutoff=0.5)
+    close = difflib.get_close_matches(name, list(known), n=most)
     return f"; did you mean {' or '.join(close)}?" if close else ""
 
 
