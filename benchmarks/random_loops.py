@@ -17,11 +17,10 @@ import numpy as np
 from orchestration.components.building import fmus
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.runs.many_runs import run_many
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System
-from orchestration.systems.system.sampling import Sampling
 from orchestration.systems.system.source import Source
 from orchestration.theory.exact.expect import Expected, expect
 

@@ -18,10 +18,9 @@ from orchestration.simulation.engines.master import Master
 from orchestration.simulation.figures.palette import GREY
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.model import System
-from orchestration.systems.system.sampling import Sampling
 
 SIZES = (2, 4, 10, 20, 50, 100, 200)
 INSTANTS = 200

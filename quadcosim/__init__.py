@@ -72,15 +72,13 @@ if TYPE_CHECKING:
     from orchestration.simulation.runs.scheduling import Scheduled, schedule
     from orchestration.simulation.runs.simulation import run
     from orchestration.simulation.runs.stepping import Simulation
-    from orchestration.systems.system.component import Component
+    from orchestration.systems.system.component import Component, Sampling, SamplingOnArrival
     from orchestration.systems.system.computers import Arrivals, Computer, Message, Network, Task
     from orchestration.systems.system.connection import Connection
-    from orchestration.systems.system.criterion import Criterion
     from orchestration.systems.system.distribution import Distribution
     from orchestration.systems.system.file import load_system
-    from orchestration.systems.system.model import System
+    from orchestration.systems.system.model import Criterion, System
     from orchestration.systems.system.paths import changed
-    from orchestration.systems.system.sampling import Sampling, SamplingOnArrival
     from orchestration.systems.system.source import Source
     from orchestration.systems.system.vehicle import Vehicle
     from orchestration.theory.certificates.basin import Basin, basin
@@ -116,12 +114,12 @@ _HOMES = {
     # any system
     "System": "orchestration.systems.system.model",
     "Component": "orchestration.systems.system.component",
-    "Sampling": "orchestration.systems.system.sampling",
-    "SamplingOnArrival": "orchestration.systems.system.sampling",
+    "Sampling": "orchestration.systems.system.component",
+    "SamplingOnArrival": "orchestration.systems.system.component",
     "Connection": "orchestration.systems.system.connection",
     "Source": "orchestration.systems.system.source",
     "Distribution": "orchestration.systems.system.distribution",
-    "Criterion": "orchestration.systems.system.criterion",
+    "Criterion": "orchestration.systems.system.model",
     "Computer": "orchestration.systems.system.computers",
     "Task": "orchestration.systems.system.computers",
     "Network": "orchestration.systems.system.computers",

@@ -10,7 +10,7 @@ from orchestration.experiments.studies.linked_settings import Key, LinkedSetting
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.records import record
-from orchestration.systems.system.parameters import Values
+from orchestration.systems.system.component import Values
 from orchestration.systems.system.paths import value_at
 from orchestration.systems.system.request import ControlLoop
 from orchestration.systems.system.starts import InitialConditions, Starts

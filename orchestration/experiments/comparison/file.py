@@ -16,7 +16,7 @@ from orchestration.foundation.basics.records import record
 from orchestration.foundation.basics.typed_tables import table_of
 from orchestration.systems.expressions.at_instant import compiled
 from orchestration.systems.expressions.syntax import is_truth, names, parse
-from orchestration.systems.system.parameters import parameters_in
+from orchestration.systems.system.component import parameters_in
 from orchestration.systems.system.request import ControlLoop
 from orchestration.systems.system.starts import Starts
 

@@ -8,8 +8,8 @@ from orchestration.experiments.report.model import Line, Panel, ReportLayout
 from orchestration.simulation.figures.palette import MAX_LINES, MAX_PANELS
 from orchestration.simulation.results import display_names as labels
 from orchestration.simulation.results.column_info import ColumnInfo
+from orchestration.systems.system.connection import component_of
 from orchestration.systems.system.model import System
-from orchestration.systems.system.variable_names import component_of
 
 About = Mapping[str, ColumnInfo]
 """By column"""

@@ -15,8 +15,8 @@ from orchestration.simulation.results import display_names as labels
 from orchestration.simulation.results import quantities
 from orchestration.simulation.runs.result import Result
 from orchestration.systems.schedule.resources import timeline_of
+from orchestration.systems.system.component import flattened
 from orchestration.systems.system.model import System
-from orchestration.systems.system.parameters import flattened
 
 BYTES = 9_000_000
 """Characters that the signals of all runs may take"""

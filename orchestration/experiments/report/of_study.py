@@ -29,7 +29,7 @@ from orchestration.simulation.results.column_info import column_infos
 from orchestration.simulation.results.criterion import judged_objective
 from orchestration.simulation.results.quantities import quantity
 from orchestration.simulation.workers.batching import LaneAgreement
-from orchestration.systems.system.criterion import DIVERGED, TERMINATED
+from orchestration.systems.system.model import DIVERGED, TERMINATED
 
 RERUN_TOLERANCE = 1e-6
 """Relative difference of the metric that is drawn first up to which a rerun equals the run in the store"""

@@ -22,7 +22,7 @@ from orchestration.simulation.figures.style import save as write
 from orchestration.simulation.figures.ticks import plain
 from orchestration.simulation.results import display_names as labels
 from orchestration.simulation.results.quantities import setting
-from orchestration.systems.system.criterion import DIVERGED, TERMINATED
+from orchestration.systems.system.model import DIVERGED, TERMINATED
 
 if TYPE_CHECKING:
     import pandas as pd

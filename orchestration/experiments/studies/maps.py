@@ -18,7 +18,7 @@ from orchestration.simulation.figures.palette import DIVERGED as DARK
 from orchestration.simulation.figures.palette import NOT_GOOD, RED, SHADES
 from orchestration.simulation.figures.style import SCREEN, Style
 from orchestration.simulation.results import display_names as labels
-from orchestration.systems.system.criterion import DIVERGED, TERMINATED
+from orchestration.systems.system.model import DIVERGED, TERMINATED
 
 if TYPE_CHECKING:
     import pandas as pd

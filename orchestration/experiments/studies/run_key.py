@@ -14,9 +14,8 @@ from orchestration.simulation.workers.provenance import machine, versions
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.computers import Computer, Network
 from orchestration.systems.system.connection import Connection
-from orchestration.systems.system.criterion import Criterion
 from orchestration.systems.system.files import Files, files_read_by
-from orchestration.systems.system.model import System
+from orchestration.systems.system.model import Criterion, System
 from orchestration.systems.system.source import Source
 
 

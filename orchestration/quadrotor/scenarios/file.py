@@ -14,8 +14,8 @@ from orchestration.quadrotor.scenarios.signals import DisturbanceChoice, Referen
 from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.quadrotor.scenarios.vehicle import load_vehicle
 from orchestration.quadrotor.scenarios.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT
+from orchestration.systems.system.component import parameters_in
 from orchestration.systems.system.distribution_table import DistributionTable, with_distributions
-from orchestration.systems.system.parameters import parameters_in
 
 TimingTable = table_of(Timing, within=[DistributionTable])
 ScenarioFile = table_of(

@@ -6,8 +6,7 @@ from typing import Any
 
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError, did_you_mean, expected_name
-from orchestration.systems.system.component import Parameter
-from orchestration.systems.system.parameters import parameters_in
+from orchestration.systems.system.component import Parameter, parameters_in
 from orchestration.systems.system.vehicle import Vehicle
 
 SHIPPED = Path(__file__).with_name("vehicles")

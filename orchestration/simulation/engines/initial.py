@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from orchestration.foundation.basics.simulator import Booleans, Floats
-from orchestration.systems.system.connection import Connection
-from orchestration.systems.system.variable_names import variable_of
+from orchestration.systems.system.connection import Connection, variable_of
 
 ITERATIONS, CONVERGED = 100, 1e-12
 """The most iterations around a loop, and the relative change below which it has converged"""

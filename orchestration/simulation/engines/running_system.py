@@ -20,8 +20,8 @@ from orchestration.simulation.engines.wires import Board, Wires
 from orchestration.systems.schedule.schedule import Cursor, Schedule
 from orchestration.systems.schedule.streams import NOISE, Streams
 from orchestration.systems.schedule.timetable import Timetable
+from orchestration.systems.system.connection import variable_of
 from orchestration.systems.system.model import System
-from orchestration.systems.system.variable_names import variable_of
 
 Sources = Sequence[tuple[Sequence[str], SourceValues]]
 """Signals of each source, and their values"""

@@ -10,8 +10,8 @@ import numpy.typing as npt
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import seconds
 from orchestration.systems.schedule.plan import Plan
+from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import System
-from orchestration.systems.system.variable_names import component_of, variable_of
 
 
 class Board:

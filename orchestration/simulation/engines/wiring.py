@@ -33,12 +33,11 @@ from orchestration.systems.signals.library import make_signal
 from orchestration.systems.signals.table_file import read_table
 from orchestration.systems.signals.waypoints import read_waypoints
 from orchestration.systems.system.check import check, recorded_variables
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, has_scheduled_instants
+from orchestration.systems.system.connection import variable_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.references import connect_references, describe_references
-from orchestration.systems.system.sampling import has_scheduled_instants
 from orchestration.systems.system.source import MOTION, Source
-from orchestration.systems.system.variable_names import variable_of
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,9 +13,9 @@ from orchestration.foundation.basics.errors import UsageError, listed
 from orchestration.simulation.figures.names import expect_figure
 from orchestration.simulation.figures.palette import CONTINUOUS, LINE, SAMPLED, SOURCE
 from orchestration.simulation.figures.style import SCREEN, save
+from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.description import describe_faults, describe_rate, describe_source
 from orchestration.systems.system.model import System
-from orchestration.systems.system.variable_names import component_of, variable_of
 
 MAX_BOXES = 40
 """Boxes in a row that are still legible"""

@@ -11,8 +11,8 @@ from orchestration.simulation.figures.palette import CYCLE, DASHES, MAX_LINES, M
 from orchestration.simulation.figures.style import Style
 from orchestration.simulation.results import display_names as labels
 from orchestration.simulation.results.column_info import ColumnInfo
+from orchestration.systems.system.connection import component_of
 from orchestration.systems.system.model import System
-from orchestration.systems.system.variable_names import component_of
 
 Panel = tuple[str, str | None, list[str]]
 """Name of the connection or component, unit, columns"""

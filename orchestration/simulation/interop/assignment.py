@@ -7,7 +7,7 @@ from orchestration.components.fmi.model import Kind
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.interop.job import End
 from orchestration.simulation.requests.ssp.export import Export
-from orchestration.systems.system.variable_names import variable_of
+from orchestration.systems.system.connection import variable_of
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,8 +16,8 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.interop.catalogue import Tool
 from orchestration.simulation.interop.tool_runs import ToolRuns
 from orchestration.simulation.interop.trace import Trace
+from orchestration.systems.system.connection import component_of
 from orchestration.systems.system.request import Request
-from orchestration.systems.system.variable_names import component_of
 
 MISSING = 1
 """steps at the end that a tool may omit: some stop where the next step would end beyond it"""

@@ -10,7 +10,7 @@ from orchestration.simulation.figures.palette import BLUE, GREEN, GREY, INDIGO, 
 from orchestration.simulation.figures.style import SCREEN, save
 from orchestration.simulation.interop.compare import Agreement
 from orchestration.simulation.interop.table import TOLERANCE
-from orchestration.systems.system.variable_names import component_of
+from orchestration.systems.system.connection import component_of
 
 ZERO_DRAWN_AT = 1e-17
 """at which a difference of zero is drawn"""

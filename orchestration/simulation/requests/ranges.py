@@ -10,11 +10,11 @@ from orchestration.foundation.basics.bisection import Range
 from orchestration.foundation.basics.errors import UsageError, expected_name
 from orchestration.foundation.basics.units import after
 from orchestration.simulation.results.quantities import is_in_seconds
+from orchestration.systems.system.component import TaskSampling
 from orchestration.systems.system.distribution import Distribution
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import TOP, changed, value_at
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
-from orchestration.systems.system.sampling import TaskSampling
 
 PERIOD = "period"
 QUANTITIES = (PERIOD, "delay", "jitter", "loss")

@@ -4,8 +4,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from orchestration.components.fmi.model import Model
+from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import System
-from orchestration.systems.system.variable_names import component_of, variable_of
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,10 +10,9 @@ from orchestration.foundation.basics.simulator import Booleans, Floats
 from orchestration.foundation.basics.times import instants_of
 from orchestration.foundation.recording.recording import Events, Recording
 from orchestration.systems.expressions.over_run import evaluate, expect_names
-from orchestration.systems.expressions.recorded import Recorded, Spans, vectors
+from orchestration.systems.expressions.over_span import Recorded, Spans, vectors
 from orchestration.systems.expressions.syntax import names, parse
-from orchestration.systems.system.criterion import DIVERGED, TERMINATED
-from orchestration.systems.system.model import System, expressions
+from orchestration.systems.system.model import DIVERGED, TERMINATED, System, expressions
 
 Metrics = dict[str, float | int | bool | str | None]
 

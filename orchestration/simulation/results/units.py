@@ -1,15 +1,36 @@
-"""The units of the metrics of a run, from those that its FMUs declare."""
+"""The units of the metrics of a run: those of expressions, from those that its FMUs declare for their names.
+
+Units that do not fit each other are errors.
+"""
 
 import functools
 from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from typing import TypeAlias
 
 from orchestration.components.fmi.model import Model
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.units import METRE, SECOND, Unit
-from orchestration.systems.expressions.syntax import names, parse
-from orchestration.systems.expressions.units import unit_of
+from orchestration.foundation.basics.units import METRE, NUMBER, ONE, SECOND, Unit
+from orchestration.systems.expressions.operators import OPERATORS
+from orchestration.systems.expressions.over_span import STOP_TIME, TIME
+from orchestration.systems.expressions.syntax import (
+    Call,
+    JobMeasure,
+    Name,
+    Node,
+    Number,
+    Operation,
+    Sampled,
+    is_over_run,
+    names,
+    names_job_measure,
+    parse,
+    parse_job_measures,
+    text,
+)
+from orchestration.systems.expressions.unit_rules import Operand, agreed
+from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import System
-from orchestration.systems.system.variable_names import component_of, variable_of
 
 OF_EVERY_RUN = dict.fromkeys(("horizon", "divergence_time"), str(SECOND))
 """Units of the metrics that every run has beside its objectives"""
@@ -37,13 +58,13 @@ def _units(
     models: tuple[tuple[str, Model], ...],
 ) -> dict[str, str]:
     """Cached by all that it depends on, which the runs of a study, checked one by one, share."""
-    texts = [text for _, text in objectives] + [text for text in criterion if text is not None]
-    known = _of_signals(texts, sources, dict(models))
-    for name, text in objectives:
-        known[name] = _unit(f"objectives.{name}", text, known)
-    for place, expression in zip(("good", "diverged"), criterion):
-        if expression is not None:
-            _unit(f"criterion.{place}", expression, known)
+    expressions = [each for _, each in objectives] + [each for each in criterion if each is not None]
+    known = _of_signals(expressions, sources, dict(models))
+    for name, expression in objectives:
+        known[name] = _unit(f"objectives.{name}", expression, known)
+    for place, condition in zip(("good", "diverged"), criterion):
+        if condition is not None:
+            _unit(f"criterion.{place}", condition, known)
     return OF_EVERY_RUN | {name: str(unit) for name, _ in objectives if (unit := known[name]) is not None}
 
 
@@ -54,9 +75,9 @@ def _unit(place: str, expression: str, known: Mapping[str, Unit | None]) -> Unit
         raise UsageError(f"{place}: {error}") from error
 
 
-def _of_signals(texts: Sequence[str], sources: Sources, models: Mapping[str, Model]) -> dict[str, Unit | None]:
+def _of_signals(expressions: Sequence[str], sources: Sources, models: Mapping[str, Model]) -> dict[str, Unit | None]:
     """The units of all names in expressions, by COMPONENT.VARIABLE and SOURCE.VARIABLE."""
-    named = {name for expression in texts for name in names(parse(expression))}
+    named = {name for expression in expressions for name in names(parse(expression))}
     units: dict[str, Unit | None] = {}
     for name, model in models.items():
         for variable in model.variables:
@@ -67,3 +88,68 @@ def _of_signals(texts: Sequence[str], sources: Sources, models: Mapping[str, Mod
         fed = [models[component_of(end)].units.get(variable_of(end)) for end in to]
         units |= zip(signals, [METRE] * len(signals) if are_positions else fed, strict=True)
     return units
+
+
+Units: TypeAlias = Mapping[str, Unit | None]
+"""By name; None: it has none, or an unknown one"""
+
+
+def unit_of(node: Node, units: Units) -> Unit | None:
+    """The unit of an expression of names in `units`; None where one of these has none.
+
+    Raises `UsageError` for values in different units that are added or compared, and for functions of a ratio with
+    other arguments. A number has no unit and fits any other: also `x + 2 * v`.
+    """
+    match node:
+        case Number():
+            return NUMBER
+        case JobMeasure(what):
+            return SECOND if what == "response" else NUMBER
+        case Name(name):
+            return _named(name, units)
+        case Sampled(_, argument):
+            return unit_of(argument, units)
+        case Call(function, arguments) if is_over_run(node):
+            return _over_run(function, [_operand(argument, units) for argument in arguments])
+        case Operation(word, operands) | Call(word, operands):
+            return OPERATORS[word].unit(word, [_operand(operand, units) for operand in operands])
+
+
+def _operand(node: Node, units: Units) -> Operand:
+    return Operand(text=text(node), unit=unit_of(node, units), number=_constant(node))
+
+
+def _named(name: str, units: Units) -> Unit | None:
+    if names_job_measure(name):
+        return unit_of(parse_job_measures(name), units)
+    if name in (TIME, STOP_TIME):
+        return SECOND
+    if name in units:
+        return units[name]
+    parts = [f"{name}.{axis}" for axis in "xyzw" if f"{name}.{axis}" in units]
+    return agreed(name, [Operand(text=part, unit=units[part]) for part in parts]) if parts else None
+
+
+def _constant(node: Node) -> Fraction | None:
+    """The value of an expression that consists of numbers only, as 1 / 2."""
+    match node:
+        case Number(value):
+            return Fraction(value).limit_denominator(1000)
+        case Operation("neg", (operand,)):
+            inner = _constant(operand)
+            return None if inner is None else -inner
+        case Operation("/", (above, below)):
+            one, other = _constant(above), _constant(below)
+            return one / other if one is not None and other else None
+    return None
+
+
+def _over_run(function: str, arguments: Sequence[Operand]) -> Unit | None:
+    of = arguments[0].unit
+    if function == "settling_time":
+        agreed(function, arguments)
+    if function in ("settling_time", "peak_time"):
+        return SECOND
+    if function in ("share", "growth_share"):
+        return ONE
+    return of.times(SECOND) if function == "integral" and of is not None else of

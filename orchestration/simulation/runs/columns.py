@@ -11,10 +11,10 @@ from orchestration.components.fmi.model import Model
 from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.systems.system.check import check_parameter
+from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed, value_at
 from orchestration.systems.system.request import Request
-from orchestration.systems.system.variable_names import component_of, variable_of
 
 _COMPONENTS, _PARAMETERS = "components.", ".parameters."
 

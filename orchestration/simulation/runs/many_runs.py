@@ -21,10 +21,10 @@ from orchestration.simulation.results.objectives import FIXED, Metrics
 from orchestration.simulation.runs.columns import Columns, columns
 from orchestration.simulation.runs.simulation import run
 from orchestration.systems.system.check import check, recorded_variables
+from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.references import connect_references
 from orchestration.systems.system.request import errors_in_own_terms
-from orchestration.systems.system.variable_names import component_of, variable_of
 
 BATCH = "batch"
 _NOTES = logging.getLogger("quadcosim")

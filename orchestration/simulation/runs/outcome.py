@@ -14,7 +14,7 @@ from orchestration.simulation.results import objectives
 from orchestration.simulation.results.column_info import column_infos
 from orchestration.simulation.runs.resolved import ResolvedRequest
 from orchestration.simulation.runs.result import Provenance, Result
-from orchestration.systems.expressions.recorded import Recorded
+from orchestration.systems.expressions.over_span import Recorded
 
 _NOTES = logging.getLogger("quadcosim")
 

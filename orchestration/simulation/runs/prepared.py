@@ -36,9 +36,9 @@ from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.check import recorded_variables
 from orchestration.systems.system.component import Component
+from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request, errors_in_own_terms
-from orchestration.systems.system.variable_names import component_of, variable_of
 
 
 @dataclass(frozen=True, kw_only=True)

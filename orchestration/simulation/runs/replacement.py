@@ -10,10 +10,10 @@ from orchestration.components.fmi.model import Model, read_model
 from orchestration.foundation.basics.errors import UsageError, expected_name
 from orchestration.simulation.engines.wiring import check_against_fmus
 from orchestration.simulation.runs.resolved import ResolvedRequest
+from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.systems.system.request import Request, errors_in_own_terms
-from orchestration.systems.system.variable_names import component_of, variable_of
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@ from orchestration.foundation.basics.documents import tables_in
 from orchestration.simulation.results import quantities
 from orchestration.simulation.results.quantities import Quantity
 from orchestration.simulation.runs.result import Result
-from orchestration.systems.system.parameters import flattened
+from orchestration.systems.system.component import flattened
 
 MAX_SETTINGS_IN_LABEL = 3
 """Most settings in a label"""

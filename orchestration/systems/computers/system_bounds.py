@@ -7,11 +7,11 @@ from typing import Any
 
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds, nanoseconds
 from orchestration.systems.computers.bounds import Periodic, can, earliest_deadline, fixed_priority
+from orchestration.systems.system.component import SamplingOnArrival
 from orchestration.systems.system.computers import Computer, Message, Network, Task
 from orchestration.systems.system.distribution import highest, lowest
 from orchestration.systems.system.frames import frame_nanoseconds
 from orchestration.systems.system.model import System
-from orchestration.systems.system.sampling import SamplingOnArrival
 
 Bounds = dict[str, int | None]
 """[ns], by COMPUTER.TASK or NETWORK.MESSAGE; None without a bound"""

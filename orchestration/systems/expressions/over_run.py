@@ -8,8 +8,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError, did_you_mean
-from orchestration.systems.expressions.over_span import SpanValues
-from orchestration.systems.expressions.recorded import Recorded, Spans
+from orchestration.systems.expressions.over_span import Recorded, Spans, SpanValues
 from orchestration.systems.expressions.reductions import FOLDS
 from orchestration.systems.expressions.syntax import (
     Call,

@@ -14,10 +14,10 @@ from orchestration.systems.schedule.longest import expect_no_longer
 from orchestration.systems.schedule.plan import Plan
 from orchestration.systems.schedule.resources import Resources
 from orchestration.systems.schedule.spans import InstantCollector, Instants
+from orchestration.systems.system.component import has_scheduled_instants
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import messages_by_connection, placed_tasks, tasks_of
-from orchestration.systems.system.sampling import has_scheduled_instants
 
 _KEPT = 8
 """Spans whose regular instants are cached"""

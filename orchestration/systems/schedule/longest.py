@@ -2,12 +2,12 @@
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import seconds
+from orchestration.systems.system.component import Sampling
 from orchestration.systems.system.computers import require_less
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.frames import ERROR_BITS, frame_nanoseconds
 from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import messages_by_connection, placed_messages, placed_tasks
-from orchestration.systems.system.sampling import Sampling
 
 MAX_TIME = 2**60
 """[ns], 36 years: the sum of a few of them still fits into 64 bits"""

@@ -50,6 +50,7 @@ from orchestration.systems.schedule.streams import (
     Streams,
 )
 from orchestration.systems.system.choices import Spread
+from orchestration.systems.system.component import SamplingOnArrival, TaskSampling
 from orchestration.systems.system.computers import Arrivals
 from orchestration.systems.system.distribution import Distribution, Varying, spreads
 from orchestration.systems.system.frames import ERROR_BITS, frame_nanoseconds
@@ -63,7 +64,6 @@ from orchestration.systems.system.placement import (
     placed_tasks,
     released_by,
 )
-from orchestration.systems.system.sampling import SamplingOnArrival, TaskSampling
 
 _POLICIES = {
     "fixed-priority": FIXED_PRIORITY,

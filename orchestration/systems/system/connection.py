@@ -15,7 +15,6 @@ from orchestration.systems.system.distribution import (
     spreads,
 )
 from orchestration.systems.system.requirements import is_finite, require
-from orchestration.systems.system.variable_names import component_of, variable_of
 
 
 @record()
@@ -106,3 +105,13 @@ class Connection:
     def receiver(self) -> str:
         """The component that receives it."""
         return component_of(self.end[0])
+
+
+def component_of(variable: str) -> str:
+    """The component of COMPONENT.VARIABLE."""
+    return variable.partition(".")[0]
+
+
+def variable_of(variable: str) -> str:
+    """The variable of COMPONENT.VARIABLE."""
+    return variable.partition(".")[2]

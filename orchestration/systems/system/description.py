@@ -5,15 +5,13 @@ from pathlib import Path
 
 from orchestration.foundation.basics.errors import listed
 from orchestration.foundation.basics.units import in_brackets
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, Sampling, SamplingOnArrival, TaskSampling
 from orchestration.systems.system.computers import Message, Task
-from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.connection import Connection, variable_of
 from orchestration.systems.system.distribution import Distribution, Varying
 from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import PlacedMessage, PlacedTask, placed_messages, placed_tasks
-from orchestration.systems.system.sampling import Sampling, SamplingOnArrival, TaskSampling
 from orchestration.systems.system.source import Source
-from orchestration.systems.system.variable_names import variable_of
 
 MAX_NAMES_IN_CELL = 6
 """names in a cell; more are counted"""

@@ -8,16 +8,13 @@ from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError, at_place
 from orchestration.foundation.basics.typed_tables import fields_of, parsed, table_of
 from orchestration.systems.system.choices import Order
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, Sampling, SamplingOnArrival, flattened, parameters_in
 from orchestration.systems.system.computers import Arrivals, Computer, Message, Network, Task
 from orchestration.systems.system.connection import Connection
-from orchestration.systems.system.criterion import Criterion
 from orchestration.systems.system.distribution_table import DistributionTable, with_distributions
-from orchestration.systems.system.model import System
-from orchestration.systems.system.parameters import flattened, parameters_in
+from orchestration.systems.system.model import Criterion, System
 from orchestration.systems.system.paths import changed, for_each
 from orchestration.systems.system.requirements import require
-from orchestration.systems.system.sampling import Sampling, SamplingOnArrival
 from orchestration.systems.system.source import Source
 
 Part = TypeVar("Part")

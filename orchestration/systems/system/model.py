@@ -1,4 +1,7 @@
-"""A system: components, what connects and drives them, and its objectives; checked without opening any FMU."""
+"""A system: components, what connects and drives them, its objectives and its criterion of good and diverged runs.
+
+It is checked without opening any FMU.
+"""
 
 import functools
 from collections.abc import Callable, Iterable, Mapping
@@ -11,13 +14,31 @@ from orchestration.foundation.basics.times import is_at_least
 from orchestration.systems.expressions.syntax import is_number, parse
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.computers import Computer, Network
-from orchestration.systems.system.connection import Connection
-from orchestration.systems.system.criterion import Criterion
+from orchestration.systems.system.connection import Connection, component_of
 from orchestration.systems.system.file_tables import tables_of
 from orchestration.systems.system.placement import expect_placement, placed_messages, placed_tasks, with_tasks
 from orchestration.systems.system.requirements import require, require_positive
 from orchestration.systems.system.source import Source
-from orchestration.systems.system.variable_names import component_of
+
+DIVERGED, TERMINATED = "diverged", "terminated"
+"""Outcomes whatever the criterion is: the run left the region of validity, or an FMU ended it"""
+
+
+@record()
+class Criterion:
+    """The expressions by which a run is good, or has diverged."""
+
+    good: str | None = None
+    """The condition over objectives, at the end, by which a run is good; default: no run is judged."""
+    diverged: str | None = None
+    """The condition over signals that ends a run at the first instant at which it holds; default: none."""
+    outcomes: tuple[str, str] = ("good", "bad")
+    """The names of a good run and of one that is not; one that diverged or was terminated keeps that name."""
+
+    def __post_init__(self) -> None:
+        given = ", ".join(self.outcomes)
+        two = len({*self.outcomes, DIVERGED, TERMINATED, ""}) == 5 and given.isprintable()
+        require(two, "outcomes", ascii(given), f"two names, and neither is {DIVERGED} or {TERMINATED}")
 
 
 @record()

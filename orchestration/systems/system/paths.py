@@ -7,12 +7,11 @@ from typing import Any
 
 from orchestration.foundation.basics.errors import UsageError, did_you_mean
 from orchestration.foundation.basics.records import replaced
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, Sampling, SamplingOnArrival, TaskSampling
 from orchestration.systems.system.computers import Arrivals, Computer, Network
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import SHARED
-from orchestration.systems.system.sampling import Sampling, SamplingOnArrival, TaskSampling
 from orchestration.systems.system.source import Source
 
 TOP = ("stop_time", "seed")

@@ -5,12 +5,11 @@ from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, Sampling, SamplingOnArrival, TaskSampling
 from orchestration.systems.system.computers import Computer, Message, Network, Task
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.distribution import content, lowest
 from orchestration.systems.system.requirements import require
-from orchestration.systems.system.sampling import Sampling, SamplingOnArrival, TaskSampling
 
 if TYPE_CHECKING:
     from orchestration.systems.system.model import System

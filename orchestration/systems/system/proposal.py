@@ -11,8 +11,8 @@ from typing import Any
 
 from orchestration.components.fmi.model import Model
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.systems.system.connection import component_of
 from orchestration.systems.system.matching import Match, match
-from orchestration.systems.system.variable_names import component_of
 
 STEP, PERIOD, STOP = 0.001, 0.01, 10.0
 """[s], where no FMU has a default experiment"""

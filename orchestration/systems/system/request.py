@@ -8,8 +8,8 @@ from typing import Any, ClassVar, Protocol, TypeVar, runtime_checkable
 from orchestration.foundation.basics.bisection import Range
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.records import described_as
+from orchestration.systems.system.component import Values
 from orchestration.systems.system.model import System
-from orchestration.systems.system.parameters import Values
 from orchestration.systems.system.starts import InitialConditions, Starts
 from orchestration.systems.system.vehicle import Vehicle
 

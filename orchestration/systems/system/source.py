@@ -8,8 +8,8 @@ from orchestration.foundation.basics.records import record
 from orchestration.foundation.basics.times import is_at_least
 from orchestration.systems.signals import WINDS
 from orchestration.systems.system.choices import Interpolation
+from orchestration.systems.system.connection import variable_of
 from orchestration.systems.system.requirements import is_finite, require, require_not_negative, require_positive
-from orchestration.systems.system.variable_names import variable_of
 
 MOTION = tuple(f"{each}.{axis}" for each in ("position", "velocity", "acceleration", "jerk", "snap") for axis in "xyz")
 """The values of a motion, in its order"""

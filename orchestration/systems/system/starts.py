@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.records import record
-from orchestration.systems.system.parameters import Values
+from orchestration.systems.system.component import Values
 
 
 @dataclass(frozen=True, kw_only=True)

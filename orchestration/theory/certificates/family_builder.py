@@ -11,9 +11,8 @@ import numpy as np
 
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
-from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.connection import Connection, variable_of
 from orchestration.systems.system.distribution import lowest
-from orchestration.systems.system.variable_names import variable_of
 from orchestration.theory.certificates.events import LoopEvent
 from orchestration.theory.certificates.family import Factor, Letter, LoopFamily
 from orchestration.theory.certificates.parts import InstantMap, StateLayout

@@ -17,11 +17,11 @@ from orchestration.foundation.basics.terminal import Share
 from orchestration.foundation.basics.times import NANOSECONDS, floor_to_nanoseconds
 from orchestration.simulation.requests.ranges import paths_in
 from orchestration.simulation.requests.request import RequestLike, request_of
+from orchestration.systems.system.connection import variable_of
 from orchestration.systems.system.distribution import lowest
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.placement import messages_by_connection, tasks_of
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
-from orchestration.systems.system.variable_names import variable_of
 from orchestration.theory.certificates.breaking import LONGEST, BreakingSequence, breaking_at, least_breaking
 from orchestration.theory.certificates.causes import Cause, ScheduledLoop, cause_at
 from orchestration.theory.certificates.events import DELAY, JITTER, LOSS, Varying

@@ -12,9 +12,8 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
 from orchestration.systems.schedule.plan import Plan
-from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.connection import Connection, variable_of
 from orchestration.systems.system.model import System
-from orchestration.systems.system.variable_names import variable_of
 from orchestration.theory.stability.loop_at_rest import AtRest
 from orchestration.theory.stability.matrices import (
     Matrices,

@@ -11,8 +11,8 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
 from orchestration.systems.schedule.plan import Plan
+from orchestration.systems.system.connection import component_of
 from orchestration.systems.system.model import System
-from orchestration.systems.system.variable_names import component_of
 from orchestration.theory.exact.effects import LoopEffects, Places
 from orchestration.theory.exact.flows import Flows
 from orchestration.theory.exact.linear import Components, Continuous

@@ -17,9 +17,8 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.engines.channel import of_each
 from orchestration.systems.schedule.plan import Plan
-from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.connection import Connection, component_of, variable_of
 from orchestration.systems.system.model import System
-from orchestration.systems.system.variable_names import component_of, variable_of
 from orchestration.theory.exact.flows import Flows
 from orchestration.theory.exact.initial_state import InitialState
 from orchestration.theory.exact.linear import Components, Continuous, SampledSystem

@@ -19,11 +19,11 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
 from orchestration.systems.expressions.syntax import Call
 from orchestration.systems.schedule.plan import Plan
+from orchestration.systems.system.component import Sampling, has_scheduled_instants
+from orchestration.systems.system.connection import component_of
 from orchestration.systems.system.file_tables import tables_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
-from orchestration.systems.system.sampling import Sampling, has_scheduled_instants
-from orchestration.systems.system.variable_names import component_of
 from orchestration.theory.exact.as_simulated import SimulatedEffects, expect_rows
 from orchestration.theory.exact.components import ComponentIdentifier
 from orchestration.theory.exact.effects import ContinuousEffects, LoopEffects

@@ -35,10 +35,10 @@ from orchestration.systems.computers.parts import (
     SWITCHING,
     WRITTEN,
 )
+from orchestration.systems.system.component import has_scheduled_instants
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import messages_by_connection, placed_messages, placed_tasks, released_by
-from orchestration.systems.system.sampling import has_scheduled_instants
 from orchestration.theory.exact.links import hyperperiod
 from orchestration.theory.exact.periodic_schedule import NO_SCHEDULE, PeriodicSchedule, ScheduleTrace
 from orchestration.theory.exact.scheduled import expect_certain, is_scheduled

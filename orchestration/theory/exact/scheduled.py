@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.systems.system.component import Sampling, has_scheduled_instants
 from orchestration.systems.system.distribution import Distribution, Varying
 from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import messages_by_connection, placed_messages, placed_tasks, released_by
-from orchestration.systems.system.sampling import Sampling, has_scheduled_instants
 
 
 def is_scheduled(system: System) -> bool:

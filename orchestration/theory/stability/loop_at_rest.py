@@ -19,10 +19,10 @@ from orchestration.foundation.basics.simulator import Floats, Transfer
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
 from orchestration.simulation.runs.prepared import PreparedRun, prepared
 from orchestration.simulation.runs.resolved import resolve_with_models
+from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import expect_fixed_periods
-from orchestration.systems.system.variable_names import component_of, variable_of
 from orchestration.theory.stability.linearised_component import PULSE, Rest, Tangent
 from orchestration.theory.stability.operating_point import (
     deterministic,

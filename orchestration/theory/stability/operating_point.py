@@ -10,13 +10,11 @@ import numpy as np
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import exact_nanoseconds
-from orchestration.systems.system.component import Component
-from orchestration.systems.system.criterion import Criterion
+from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.distribution import lowest
-from orchestration.systems.system.model import System
+from orchestration.systems.system.model import Criterion, System
 from orchestration.systems.system.paths import changed
 from orchestration.systems.system.placement import punctual
-from orchestration.systems.system.sampling import Sampling
 
 AT_REST = 1e-6
 """change allowed in the first periods of the unperturbed run"""

@@ -21,7 +21,7 @@ from orchestration.simulation.engines.wiring import fixed_steps
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.component import Component
-from orchestration.systems.system.criterion import Criterion
+from orchestration.systems.system.model import Criterion
 from orchestration.theory.stability.linear_simulator import LinearSimulator, OpenPort
 from orchestration.theory.stability.loop_at_rest import AtRest
 

@@ -22,13 +22,13 @@ from orchestration.simulation.engines.sources import SourceValues
 from orchestration.simulation.engines.structures import address, structures
 from orchestration.simulation.engines.wires import clock_of
 from orchestration.simulation.engines.wiring import source_values
-from orchestration.systems.expressions.recorded import STOP_TIME
+from orchestration.systems.expressions.over_span import STOP_TIME
 from orchestration.systems.expressions.syntax import Call, names_job_measure
 from orchestration.systems.schedule.schedule_cache import RunSchedule, ScheduleCache, ScheduleKey
 from orchestration.systems.schedule.spans import Instants, Span
 from orchestration.systems.schedule.streams import NOISE, Streams
+from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import System
-from orchestration.systems.system.variable_names import component_of, variable_of
 
 MAX_ROWS = 2**20
 """Largest number of rows of a run that are recorded"""

@@ -7,8 +7,7 @@ import numpy as np
 
 from orchestration.foundation.basics.simulator import Booleans, Floats
 from orchestration.systems.expressions.over_run import reductions
-from orchestration.systems.expressions.over_span import SpanValues
-from orchestration.systems.expressions.recorded import Recorded
+from orchestration.systems.expressions.over_span import Recorded, SpanValues
 from orchestration.systems.expressions.syntax import Call, Node
 
 

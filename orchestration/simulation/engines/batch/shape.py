@@ -20,18 +20,17 @@ from orchestration.simulation.engines.channel import of_each
 from orchestration.simulation.engines.structures import ONE_LANE
 from orchestration.simulation.engines.wires import Board, Wires
 from orchestration.simulation.results.objectives import GOOD
+from orchestration.systems.expressions.at_instant import scalars
 from orchestration.systems.expressions.over_run import inlined, reductions
-from orchestration.systems.expressions.recorded import STOP_TIME, TIME, vectors
-from orchestration.systems.expressions.scalars import scalars
+from orchestration.systems.expressions.over_span import STOP_TIME, TIME, vectors
 from orchestration.systems.expressions.syntax import Call, Node, names, names_job_measure, parse
 from orchestration.systems.schedule.plan import is_plain
 from orchestration.systems.system.check import recorded_variables
 from orchestration.systems.system.computers import Network
-from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.connection import Connection, component_of, variable_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import placed_messages
 from orchestration.systems.system.source import Source
-from orchestration.systems.system.variable_names import component_of, variable_of
 
 Places = npt.NDArray[np.int64]
 _TAKES = {"Boolean": ONE_LANE.TRUTH, "Integer": ONE_LANE.WHOLE, "Enumeration": ONE_LANE.WHOLE}

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from orchestration.systems.expressions.operators import OPERATORS
-from orchestration.systems.expressions.recorded import alone, unknown
+from orchestration.systems.expressions.over_span import alone, unknown
 from orchestration.systems.expressions.syntax import Call, Name, Node, Number, Operation, Sampled
 
 Moment: TypeAlias = Literal["row", "end", "middle"]

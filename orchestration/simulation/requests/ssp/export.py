@@ -12,14 +12,12 @@ from orchestration.simulation.engines.wiring import source_values
 from orchestration.systems.schedule.plan import Plan
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.system.check import check
-from orchestration.systems.system.component import Component, Parameter
-from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.component import Component, Parameter, Sampling
+from orchestration.systems.system.connection import Connection, component_of, variable_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.references import AT_REST, connect_references
 from orchestration.systems.system.request import Request, errors_in_own_terms
-from orchestration.systems.system.sampling import Sampling
 from orchestration.systems.system.source import Source
-from orchestration.systems.system.variable_names import component_of, variable_of
 
 
 @dataclass(frozen=True, kw_only=True)

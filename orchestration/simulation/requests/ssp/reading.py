@@ -16,9 +16,9 @@ from orchestration.simulation.requests.ssp.parameters import Value
 from orchestration.simulation.requests.ssp.structure import Node, Path_, Structure, Wire, dotted, structure_of
 from orchestration.simulation.requests.ssp.timing import expect_tables, from_text
 from orchestration.systems.system.component import Parameter
+from orchestration.systems.system.connection import component_of
 from orchestration.systems.system.conversion import Conversion, OtherQuantity, between
 from orchestration.systems.system.proposal import TAKEN
-from orchestration.systems.system.variable_names import component_of
 
 CLOCK = (SAMPLE_PERIOD, SAMPLE_OFFSET)
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from fmu_kit.variables import INDEX
 from orchestration.simulation.requests.ssp.export import Export, Part
 from orchestration.systems.system.component import Parameter
-from orchestration.systems.system.variable_names import variable_of
+from orchestration.systems.system.connection import variable_of
 
 
 def rejections(export: Export) -> Iterator[str]:

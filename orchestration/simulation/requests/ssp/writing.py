@@ -22,9 +22,9 @@ from orchestration.simulation.requests.ssp.document import add, document, elemen
 from orchestration.simulation.requests.ssp.export import Export, Part, export_of
 from orchestration.simulation.requests.ssp.names import PARAMETER_SET, SYSTEM_PARAMETERS
 from orchestration.simulation.requests.ssp.rejections import rejections
+from orchestration.systems.system.connection import variable_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request
-from orchestration.systems.system.variable_names import variable_of
 
 TYPED: tuple[Kind, ...] = ("Real", "Integer", "Boolean", "String")
 """Types of connectors without a list of items"""

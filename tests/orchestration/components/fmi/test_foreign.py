@@ -8,11 +8,9 @@ import pytest
 from orchestration.components.fmi.foreign import LostError, isolated_call
 from orchestration.experiments.limits.limit import find
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.connection import Connection
-from orchestration.systems.system.criterion import Criterion
-from orchestration.systems.system.model import System
-from orchestration.systems.system.sampling import Sampling
+from orchestration.systems.system.model import Criterion, System
 from tests.orchestration.components.fmi.small import needs_compiler, small
 
 pytestmark = needs_compiler

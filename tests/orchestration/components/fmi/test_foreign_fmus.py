@@ -22,11 +22,9 @@ from orchestration.foundation.basics.errors import QuadcosimError, SimulatorErro
 from orchestration.foundation.processes import subprocesses
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.simulation.runs.result import Result
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.connection import Connection
-from orchestration.systems.system.criterion import Criterion
-from orchestration.systems.system.model import System
-from orchestration.systems.system.sampling import Sampling
+from orchestration.systems.system.model import Criterion, System
 from orchestration.systems.system.source import Source
 from tests.fmus.archive import files_of
 from tests.fmus.damage import write_fmu

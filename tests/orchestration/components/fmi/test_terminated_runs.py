@@ -17,11 +17,9 @@ from orchestration.simulation.engines.engine import Engine
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.simulation.runs.result import Result
 from orchestration.simulation.runs.run_directory import load_run, save_run
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.connection import Connection
-from orchestration.systems.system.criterion import Criterion
-from orchestration.systems.system.model import System
-from orchestration.systems.system.sampling import Sampling
+from orchestration.systems.system.model import Criterion, System
 from tests.commands import Main
 from tests.native import assert_the_same
 from tests.orchestration.components.fmi.small import needs_compiler, small

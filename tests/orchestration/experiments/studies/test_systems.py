@@ -21,8 +21,7 @@ from orchestration.experiments.studies.study_file import load_study
 from orchestration.experiments.studies.table import frame
 from orchestration.quadrotor.flight.hover_loop import HoverLoop
 from orchestration.simulation.requests.request import load_request
-from orchestration.systems.system.criterion import Criterion
-from orchestration.systems.system.model import System
+from orchestration.systems.system.model import Criterion, System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.stability.perturbed_runs import growth_of
 from quadcosim import Scenario, Timing, UsageError, run

@@ -13,10 +13,9 @@ from orchestration.foundation.basics.records import replaced
 from orchestration.foundation.basics.times import exact_nanoseconds, is_at_least
 from orchestration.foundation.basics.typed_tables import docs_of_keys, fields_of, parsed
 from orchestration.quadrotor.scenarios.timing import TIMING_KEYS
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.file import ConnectionTable, SamplingTable, schema
 from orchestration.systems.system.model import System
-from orchestration.systems.system.sampling import Sampling
 from tests.commands import Main
 
 
@@ -36,19 +35,19 @@ def test_a_whole_number_beyond_64_bits_is_refused_as_a_parameter(value: int) -> 
 
 
 def test_docstrings_of_fields_are_read_without_importing_the_module() -> None:
-    docs = attribute_docs("orchestration.systems.system.sampling", "Sampling")
+    docs = attribute_docs("orchestration.systems.system.component", "Sampling")
     assert docs["offset"] == ("The time of the first instant [s], in its own time.", "0.0")
     assert docs["period"].default == ""
-    assert attribute_docs("orchestration.systems.system.sampling", "Nobody") == {}
+    assert attribute_docs("orchestration.systems.system.component", "Nobody") == {}
 
 
 def test_a_table_has_the_keys_and_docstrings_of_its_record() -> None:
-    assert [*fields_of(SamplingTable)] == [*attribute_docs("orchestration.systems.system.sampling", "Sampling"), "on"]
+    assert [*fields_of(SamplingTable)] == [*attribute_docs("orchestration.systems.system.component", "Sampling"), "on"]
     assert {"from", "to", "name"} <= fields_of(ConnectionTable).keys()
     assert not {"start", "end", "stated"} & fields_of(ConnectionTable).keys()
     assert docs_of_keys(DesignTable)["seed"] == "The seed of the sampling."
     period = schema()["$defs"]["SamplingTable"]["properties"]["period"]
-    assert period["description"] == attribute_docs("orchestration.systems.system.sampling", "Sampling")["period"].text
+    assert period["description"] == attribute_docs("orchestration.systems.system.component", "Sampling")["period"].text
 
 
 def test_the_help_of_a_flight_s_flags_is_the_docstrings_of_its_timing_record(main: Main) -> None:

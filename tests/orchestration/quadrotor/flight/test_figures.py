@@ -23,7 +23,7 @@ from orchestration.simulation.figures.names import COLUMNS
 from orchestration.simulation.figures.style import SCREEN, STYLES, Style, save
 from orchestration.simulation.runs.draw import draw
 from orchestration.simulation.runs.run_labels import labels_of_runs
-from orchestration.systems.system.criterion import Criterion
+from orchestration.systems.system.model import Criterion
 from quadcosim import Result, UsageError
 from tests.native import native
 from tests.places import EXAMPLES

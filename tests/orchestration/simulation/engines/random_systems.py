@@ -12,11 +12,10 @@ from typing import Any
 from hypothesis import strategies as st
 
 from orchestration.systems.system.choices import TraceOrder
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.distribution import Distribution
 from orchestration.systems.system.model import System
-from orchestration.systems.system.sampling import Sampling
 
 OUTPUTS = ("y", "z")
 TIMES = (0.01, 0.02, 0.025, 0.03, 0.05, 0.1)

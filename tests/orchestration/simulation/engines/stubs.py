@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.model import System
-from orchestration.systems.system.sampling import Sampling
 
 
 class Stub:

@@ -36,12 +36,10 @@ from orchestration.simulation.runs.pause import resume, run_until
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.simulation.runs.result import Result
 from orchestration.systems.schedule import schedule
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.connection import Connection
-from orchestration.systems.system.criterion import Criterion
 from orchestration.systems.system.file import load_system
-from orchestration.systems.system.model import System
-from orchestration.systems.system.sampling import Sampling
+from orchestration.systems.system.model import Criterion, System
 from orchestration.systems.system.source import Source
 from tests.native import assert_the_same
 from tests.orchestration.components.fmi.small import needs_compiler, small

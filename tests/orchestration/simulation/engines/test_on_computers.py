@@ -18,14 +18,12 @@ from orchestration.simulation.runs.pause import resume, run_until
 from orchestration.simulation.runs.run_directory import load_run
 from orchestration.systems.schedule import schedule
 from orchestration.systems.schedule.resources import timeline_of
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.computers import Computer, Message, Network, Task
 from orchestration.systems.system.connection import Connection
-from orchestration.systems.system.criterion import Criterion
 from orchestration.systems.system.distribution import Distribution
-from orchestration.systems.system.model import System
+from orchestration.systems.system.model import Criterion, System
 from orchestration.systems.system.paths import changed
-from orchestration.systems.system.sampling import Sampling
 from tests.native import assert_the_same
 from tests.orchestration.components.fmi.small import needs_compiler
 from tests.orchestration.simulation.engines.batch.lanes import assert_the_same_signals, in_lanes, shape_of

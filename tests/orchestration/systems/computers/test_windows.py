@@ -9,12 +9,11 @@ import pytest
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.systems.computers.windows import Window, windows_of
 from orchestration.systems.schedule.resources import timeline_of
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.computers import Arrivals, Computer, Message, Network, Task
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.distribution import Distribution
 from orchestration.systems.system.model import System
-from orchestration.systems.system.sampling import Sampling
 
 MS = 1e-3
 FRAME = 0.27

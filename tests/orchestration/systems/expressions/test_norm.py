@@ -9,10 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestration.simulation.engines.batch.writing import ExpressionWriter, Leaf, Section
-from orchestration.systems.expressions.at_instant import compiled
+from orchestration.systems.expressions.at_instant import compiled, scalars
 from orchestration.systems.expressions.over_run import evaluate
-from orchestration.systems.expressions.recorded import Recorded
-from orchestration.systems.expressions.scalars import scalars
+from orchestration.systems.expressions.over_span import Recorded
 from orchestration.systems.expressions.syntax import Call, Node, parse
 
 PLACES = {"p.x": 0, "p.y": 1, "p.z": 2, "v": 3}

@@ -7,8 +7,8 @@ import pytest
 from fmu_kit.units import BASE
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.units import BaseUnits, Unit, named
+from orchestration.simulation.results.units import unit_of
 from orchestration.systems.expressions.syntax import parse
-from orchestration.systems.expressions.units import unit_of
 
 
 def defined(name: str, factor: float = 1.0, offset: float = 0.0, **exponents: int) -> Unit:

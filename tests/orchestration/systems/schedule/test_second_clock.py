@@ -25,8 +25,8 @@ from orchestration.systems.schedule import schedule as position
 from orchestration.systems.schedule.fixed_step import FixedStep
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
+from orchestration.systems.system.connection import variable_of
 from orchestration.systems.system.model import System
-from orchestration.systems.system.variable_names import variable_of
 from tests.orchestration.quadrotor.scenarios.strategies import Case, cases
 from tests.orchestration.simulation.engines.random_systems import systems, systems_of_fixed_steps
 from tests.orchestration.simulation.engines.stubs import Stub, continuous, events, sampled, system, wire

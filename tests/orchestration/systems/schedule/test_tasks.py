@@ -12,9 +12,8 @@ from orchestration.systems.schedule import schedule
 from orchestration.systems.schedule.schedule import Cursor
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, SamplingOnArrival
 from orchestration.systems.system.computers import Computer, Message, Network, Task
-from orchestration.systems.system.sampling import SamplingOnArrival
 from tests.orchestration.simulation.engines.stubs import continuous, sampled, system, wire
 
 MS = 1_000_000

@@ -9,6 +9,7 @@ import pytest
 from orchestration.experiments.studies.run_key import run_key
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.systems.schedule.schedule_cache import schedule_key
+from orchestration.systems.system.component import SamplingOnArrival, TaskSampling
 from orchestration.systems.system.computers import Message, Network
 from orchestration.systems.system.file import is_system, load_system
 from orchestration.systems.system.files import Files
@@ -16,7 +17,6 @@ from orchestration.systems.system.frames import frame_nanoseconds
 from orchestration.systems.system.paths import changed, value_at
 from orchestration.systems.system.placement import SHARED, punctual
 from orchestration.systems.system.randomness import depends_on_seed
-from orchestration.systems.system.sampling import SamplingOnArrival, TaskSampling
 
 FILE = """
 stop_time = 1.0

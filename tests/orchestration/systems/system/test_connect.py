@@ -9,11 +9,11 @@ import pytest
 
 from orchestration.components.fmi.model import read_model
 from orchestration.systems.system.check import check
+from orchestration.systems.system.component import Sampling
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System
 from orchestration.systems.system.proposal import PERIOD, STEP, STOP, propose
-from orchestration.systems.system.sampling import Sampling
 from tests.commands import Main
 from tests.orchestration.systems.system.described import described
 

@@ -11,12 +11,12 @@ import pytest
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.systems.schedule.lateness_and_loss import times_from
+from orchestration.systems.system.component import Sampling
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.description import describe_faults, describe_varying
 from orchestration.systems.system.distribution import Distribution, content, highest, is_random, lowest, mean
 from orchestration.systems.system.file import load_system
 from orchestration.systems.system.input_files import input_files
-from orchestration.systems.system.sampling import Sampling
 
 SYSTEM = """
 stop_time = 1.0

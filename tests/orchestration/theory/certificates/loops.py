@@ -6,10 +6,9 @@ import numpy as np
 
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.systems.schedule.plan import Plan
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.model import System
-from orchestration.systems.system.sampling import Sampling
 from orchestration.theory.certificates.certificate import Cells, Certificate
 from orchestration.theory.certificates.family import Factor, Letter, LoopFamily
 from orchestration.theory.certificates.parts import CertifiedLoop

@@ -13,12 +13,12 @@ import quadcosim
 from orchestration.experiments.limits.evaluation import is_good
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.requests.request import request_of
+from orchestration.systems.system.component import Sampling
 from orchestration.systems.system.computers import Computer, Message, Network, Task
 from orchestration.systems.system.distribution import Distribution
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
-from orchestration.systems.system.sampling import Sampling
 from orchestration.theory.certificates import margin as certificates
 from orchestration.theory.certificates.breaking import unstable_sequence
 from orchestration.theory.certificates.causes import ScheduledLoop, cause_at

@@ -5,10 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.model import System
-from orchestration.systems.system.sampling import Sampling
 from orchestration.theory.exact.effects import ContinuousEffects
 from orchestration.theory.exact.linear import Components, Continuous, SampledSystem
 from orchestration.theory.exact.moments import JumpLinear

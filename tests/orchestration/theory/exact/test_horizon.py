@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.systems.system.criterion import Criterion
+from orchestration.systems.system.model import Criterion
 from orchestration.theory.exact.expect import expect
 from quadcosim import UsageError, run
 from tests.commands import Main

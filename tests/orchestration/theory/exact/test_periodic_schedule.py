@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.systems.system.component import SamplingOnArrival
 from orchestration.systems.system.computers import Arrivals, Computer, Message, Network, Task
-from orchestration.systems.system.criterion import Criterion
 from orchestration.systems.system.distribution import Distribution
 from orchestration.systems.system.file import load_system
-from orchestration.systems.system.model import System
+from orchestration.systems.system.model import Criterion, System
 from orchestration.systems.system.paths import changed
-from orchestration.systems.system.sampling import SamplingOnArrival
 from orchestration.theory.exact.expect import expect
 from orchestration.theory.exact.linear import Components, SampledSystem
 from orchestration.theory.exact.loops import expect_same_steps

@@ -16,11 +16,10 @@ from orchestration.foundation.basics.bisection import Range
 from orchestration.quadrotor.flight.hover import at_hover
 from orchestration.quadrotor.flight.hover_loop import HoverLoop
 from orchestration.simulation.requests.ranges import Varied
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
-from orchestration.systems.system.sampling import Sampling
 from orchestration.theory.stability import local_limit as local
 from orchestration.theory.stability.local_limit import LOOP, TWINS, local_limits
 from orchestration.theory.stability.monodromy import growth_of_loop

@@ -14,12 +14,10 @@ from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.simulation.engines.batch.batches import Batches
 from orchestration.simulation.runs.many_runs import located as with_files
 from orchestration.systems.schedule import schedule_cache
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.connection import Connection
-from orchestration.systems.system.criterion import Criterion
-from orchestration.systems.system.model import System
+from orchestration.systems.system.model import Criterion, System
 from orchestration.systems.system.paths import changed
-from orchestration.systems.system.sampling import Sampling
 from orchestration.systems.system.source import Source
 from tests.orchestration.components.fmi.small import needs_compiler, small
 from tests.orchestration.simulation.engines.batch.lanes import in_lanes, shape_of

@@ -11,8 +11,8 @@ from orchestration.components.fmi.model import read_model
 from orchestration.simulation.requests.request import load_request
 from orchestration.simulation.requests.ssp import package, writing
 from orchestration.systems.system.check import check
+from orchestration.systems.system.component import Sampling
 from orchestration.systems.system.model import System
-from orchestration.systems.system.sampling import Sampling
 from quadcosim import Scenario, UsageError
 from tests.commands import Main
 from tests.orchestration.experiments.studies.common import one_line

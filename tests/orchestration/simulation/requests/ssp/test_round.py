@@ -10,8 +10,7 @@ from orchestration.simulation.requests.request import load_request
 from orchestration.simulation.requests.ssp import package, writing
 from orchestration.simulation.runs.result import Result
 from orchestration.simulation.runs.simulation import run
-from orchestration.systems.system.criterion import Criterion
-from orchestration.systems.system.model import System
+from orchestration.systems.system.model import Criterion, System
 from orchestration.systems.system.source import Source
 from quadcosim import Scenario, UsageError
 from tests.commands import Main
