@@ -8,8 +8,6 @@ import sys
 from pathlib import Path
 
 from docs.pages import fill
-from orchestration.components.checks.validation import rules
-from orchestration.components.checks.validation.finding import name_of
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.simulation.figures import style
@@ -18,7 +16,7 @@ from orchestration.simulation.interop.catalogue import chosen
 from orchestration.simulation.interop.compare import agreements
 from orchestration.simulation.interop.figure import agreement_chart
 from tests.fmus import mutants
-from tests.fmus.verdicts import Verdict, as_markdown
+from tests.fmus.verdicts import Verdict
 
 DOCS = Path(__file__).parent
 INTERVALS = ("0.01", "0.001")
@@ -48,18 +46,10 @@ def interop() -> None:
 
 
 def validation() -> None:
-    """Write the rules, and the damage that each tool finds."""
+    """Write how many damaged FMUs each tool finds."""
     print(f"damaging FMUs in {len(mutants.MUTANTS)} ways", file=sys.stderr)
     found = mutants.tables()
-    fill(
-        DOCS / "validation.md",
-        {
-            "standard": _sentences(rules.STANDARD),
-            "ours": _sentences(rules.OURS),
-            "count": "\n".join(_count(version, table) for version, table in found.items()),
-            "mutants": as_markdown(found),
-        },
-    )
+    fill(DOCS / "validation.md", {"count": "\n".join(_count(version, table) for version, table in found.items())})
 
 
 def _count(version: int, table: list[Verdict]) -> str:
@@ -69,11 +59,6 @@ def _count(version: int, table: list[Verdict]) -> str:
     return (
         f"Of {len(table)} damaged FMUs of FMI {version}.0 quadcosim finds {quadcosim}, fmpy {fmpy}, fmutool {fmutool}."
     )
-
-
-def _sentences(rules: tuple[object, ...]) -> str:
-    rows = [f"| `{name_of(rule)}` | {(rule.__doc__ or '').splitlines()[0]} |" for rule in rules]  # type: ignore[arg-type]
-    return "\n".join(["| rule | |", "|---|---|", *rows])
 
 
 if __name__ == "__main__":

@@ -6,16 +6,19 @@ from typing import Any
 
 from mkdocs.structure.files import File, Files, InclusionLevel
 
-from docs.website import commands, fmus, keys
+from docs.website import commands, fmus, keys, rules
 from docs.website.links import ROOT, Links, pages_elsewhere
 from docs.website.markdown import for_the_site
 
 GENERATED: dict[str, Callable[[], str]] = {
-    "keys.md": keys.page,
-    **{f"fmus/{slave.__name__}.md": partial(fmus.page, slave) for slave in fmus.SLAVES},
+    f"fmus/{slave.__name__}.md": partial(fmus.page, slave) for slave in fmus.SLAVES
 }
 """Pages generated from the code, by address."""
-CONTINUED: dict[str, Callable[[], str]] = {"commands.md": commands.section}
+CONTINUED: dict[str, Callable[[], str]] = {
+    "commands.md": commands.section,
+    "keys.md": keys.section,
+    "validation.md": rules.section,
+}
 """What is generated from the code at the end of pages in `docs/`, by address."""
 BEHIND = 1e-6
 """Search weight of sources relative to pages, so that pages are found first even if the title of a source matches"""

@@ -1,4 +1,4 @@
-"""The page of the keys of files: every table of every kind of file that the program reads."""
+"""The tables on the page of keys: those of every kind of file that the program reads."""
 
 import types
 import typing
@@ -22,14 +22,6 @@ FILES = {
     "Comparison file": (ComparisonFile, "Controllers against each other; [how to write one](compare.md)."),
     "Tuning file": (TuningFile, "What `quadcosim tune` searches; [how to write one](compare.md#tuning)."),
 }
-INTRODUCTION = """\
-# Keys of files
-
-All files are TOML. A key that is not here is refused by name. Times are in seconds. A file's paths are relative to the
-folder of the file. `quadcosim schema` prints the first of these tables as a JSON schema, from which editors complete
-and check a system file.
-
-"""
 KINDS = {
     float: "number",
     int: "whole number",
@@ -47,9 +39,9 @@ class _Key(NamedTuple):
     description: str
 
 
-def page() -> str:
-    """The Markdown of the page."""
-    return INTRODUCTION + "".join(_file(title, *about) for title, about in FILES.items())
+def section() -> str:
+    """The Markdown that follows the text of `docs/keys.md` on the site."""
+    return "\n" + "".join(_file(title, *about) for title, about in FILES.items())
 
 
 def _file(title: str, shape: Any, description: str) -> str:
