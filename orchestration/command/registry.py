@@ -23,7 +23,7 @@ class CommandResult:
     """Printed to standard output: with `--json` the document, else the lines."""
 
     document: object
-    """of numbers, texts, booleans, lists, mappings, paths and dataclasses of them"""
+    """Numbers, texts, booleans, lists, mappings, paths and dataclasses of them"""
     lines: Sequence[str]
     good: bool = True
     """false: exit code 1"""
@@ -103,9 +103,9 @@ RUN, STUDY, FMUS, TOOLS = "Run", "Study", "FMUs", "Other tools"
 """Groups of commands in the help"""
 
 arguments: Sequence[str] = ()
-"""of the command line"""
+"""Arguments of the command line"""
 output_options = OutputOptions()
-"""of the current command: those before it, then also those after it"""
+"""Output options of the current command: those before it, then also those after it"""
 
 
 def set_output_options(options: OutputOptions, *, anew: bool = False) -> None:

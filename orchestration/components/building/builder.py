@@ -31,7 +31,7 @@ class Packing:
     """A kind of FMU that can be built of a slave."""
 
     folder: str
-    """of such FMUs, relative to the modules of the slaves and to `default_folder`"""
+    """Folder of such FMUs, relative to the modules of the slaves and to `default_folder`"""
     command: tuple[str, ...]
     """the module that packs, and its first arguments"""
     source_hash: Callable[[Target], str]
@@ -49,7 +49,7 @@ class Packing:
 
 IN_PYTHON = Packing(folder="", command=("fmu_kit.packaging",), source_hash=packaging.source_hash)
 NATIVE = Packing(folder="native", command=("fmu_kit.compiler.pack.building",), source_hash=freshness.source_hash)
-"""Without Python inside, by a C compiler."""
+"""FMUs without Python inside, by a C compiler"""
 NATIVE_FMI_3 = Packing(
     folder="native/fmi3",
     command=("fmu_kit.compiler.pack.building", "--fmi", "3"),

@@ -33,7 +33,7 @@ class Archive:
 
     path: Path
     entries: tuple[zipfile.ZipInfo, ...]
-    """As listed in the archive; a name may occur more than once"""
+    """Entries of the archive; a name may occur more than once"""
     files: Mapping[str, bytes]
     """Content by name"""
 

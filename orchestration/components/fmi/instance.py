@@ -21,7 +21,7 @@ class Instance(Simulator, Protocol):
     name: str
     model: Model
     warnings: list[str]
-    """of the FMU since it was instantiated or reset, and of parameters that it has not kept"""
+    """Warnings of the FMU since it was instantiated or reset, and of parameters that it has not kept"""
     failed: bool
     """Whether a call has failed; the instance is then never called again."""
     stopped: bool

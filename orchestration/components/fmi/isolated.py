@@ -22,7 +22,7 @@ Command = tuple[Any, ...]
 """`("write", index, bytes)`, `("reader" or "writer", names)`, `("read",)` or the name of a method and its arguments"""
 
 _PATIENCE = 5.0
-"""[s] in which a process must end after its last command"""
+"""Time in which a process must end after its last command [s]"""
 
 
 class IsolatedInstance(Instance):

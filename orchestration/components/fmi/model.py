@@ -43,7 +43,7 @@ class Variable:
     name: str
     kind: Kind
     type: str
-    """as in the description: Real, Float64, Int32 …"""
+    """Type as in the description: Real, Float64, Int32 …"""
     causality: str
     variability: str
     unit: str | None
@@ -53,7 +53,7 @@ class Variable:
     element: int
     """place within the array, 0 for a scalar"""
     length: int
-    """of that array; 0 for a scalar"""
+    """Number of elements of that array; 0 for a scalar"""
     minimum: float | None
     maximum: float | None
     choices: Mapping[str, int]
@@ -75,13 +75,13 @@ class Model:
     """An FMU file and its description; it is read once and compared by identity."""
 
     path: Path
-    """Of the FMU."""
+    """Path of the FMU"""
     description: ModelDescription
     """Its model description, as fmpy reads it."""
     variables: Mapping[str, Variable]
     """Its variables by name, arrays by their elements: causality, unit, start value, description."""
     initial_dependencies: Mapping[str, frozenset[str] | None]
-    """By output, the inputs that it depends on at initialisation; None: all of them."""
+    """Inputs that an output depends on at initialisation, by output; None: all of them"""
 
     def __repr__(self) -> str:
         counts = Counter(v.causality for v in self.variables.values())

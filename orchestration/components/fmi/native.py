@@ -40,7 +40,7 @@ _AT_END = 1e-9
 """Relative and in [s]: the rounding error at the end of a step of an FMU that sums its steps"""
 
 _MAX_WARNINGS = 100
-"""Of one instance; some FMUs log one in every step"""
+"""Largest number of warnings kept of an instance; some FMUs log one in every step"""
 
 _NOT_USED = ("documentation/", "sources/")
 """Folders that an FMU of this project's kit never reads"""
@@ -96,7 +96,7 @@ class NativeInstance(Instance):
     counts_values: ClassVar[bool]
     """whether a call has the number of values beside the number of references: arrays have more"""
     step_outputs: tuple[Any, ...] = ()
-    """where an FMU of FMI 3.0 writes how a step has ended"""
+    """Arguments into which an FMU of FMI 3.0 writes how a step has ended"""
     state_calls: tuple[str, str, str, str, str]
     """fmpy's names of the calls that get, serialise, free, deserialise and set a state"""
 

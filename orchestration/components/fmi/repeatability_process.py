@@ -25,7 +25,7 @@ _STEPS = 25
 _PARAMETERS = 200
 """The most that are changed"""
 _FACTOR = 1.0 + 2.0**-10
-"""By which a parameter is changed: little, as many parameters constrain each other"""
+"""Factor on a parameter that is changed: little, as many parameters constrain each other"""
 
 
 class _Runs:

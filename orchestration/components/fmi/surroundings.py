@@ -8,7 +8,7 @@ from contextlib import suppress
 ROUNDING, FOLDER = "the floating-point mode", "the current folder"
 _ONE, _LITTLE, _SMALLEST, _HALF, _TINY = 1.0, 2.0**-60, 2.0**-1022, 0.5, 2.0**-1074
 _ENVIRONMENT = 512
-"""[byte] an upper bound on the size of the floating-point environment"""
+"""Upper bound on the size of the floating-point environment [byte]"""
 
 
 class Surroundings:

@@ -37,7 +37,7 @@ class Estimate(NamedTuple):
     high: float
     """ends of its interval; infinite where there are too few values to bound it"""
     confidence: float
-    """of the interval: at least the requested one, since it ends at observed values"""
+    """Confidence of the interval: at least the requested one, since it ends at observed values"""
 
 
 def quantile(values: Sequence[float], share: float = 0.5, confidence: float = 0.95) -> Estimate:

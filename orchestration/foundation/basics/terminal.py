@@ -17,7 +17,7 @@ Count = Callable[[int, int], None]
 """Called with the number of runs done and the total."""
 
 SPARSE = 10.0
-"""[s] between two progress lines, where no bar can be drawn"""
+"""Time between two progress lines where no bar can be drawn [s]"""
 
 
 class _Screen(logging.Handler):

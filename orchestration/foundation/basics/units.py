@@ -13,7 +13,7 @@ class BaseUnits:
     """A unit in SI base units: value · factor + offset, with these exponents."""
 
     exponents: tuple[Fraction, ...]
-    """of `BASE`; whole numbers in FMI"""
+    """Exponents of `BASE`; whole numbers in FMI"""
     factor: float = 1.0
     offset: float = 0.0
 

@@ -12,7 +12,7 @@ from typing import IO, Any
 
 _HEADER = struct.Struct("<Q")
 _POLL = 0.5
-"""[s] between two checks whether the parent lives"""
+"""Time between two checks whether the parent lives [s]"""
 
 
 parent_id = os.getppid()

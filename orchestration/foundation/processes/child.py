@@ -25,10 +25,10 @@ from orchestration.foundation.processes.watch import Watch
 _KEPT = 16_384
 """Bytes kept of the end of the process's output"""
 _MAX_MESSAGE_MB = 64.0
-"""[MB] of one message from a process whose output is limited, at most"""
+"""Largest size of one message from a process whose output is limited [MB]"""
 _OUT_OF_PROCESSOR = "it uses more processor time than the system allows (ulimit -t)"
 _PATIENCE = 60.0
-"""[s] to wait for the exit of a process that has closed its channel"""
+"""Time to wait for the exit of a process that has closed its channel [s]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +42,7 @@ class Ending:
     out_of_time: bool = False
     """Whether that is a limit of time"""
     last_line: str = ""
-    """of its output, if that is kept"""
+    """Last line of its output, if that is kept"""
 
     @property
     def description(self) -> str:

@@ -31,11 +31,11 @@ class Member:
     limited: bool
     """Whether it belongs to an inner family with its own time limit"""
     processor: float
-    """[s] of processor time used"""
+    """Processor time used [s]"""
     waits: Mapping[int, float]
-    """[s] for which it was runnable but not running, by thread"""
+    """Time for which it was runnable but not running [s], by thread"""
     memory: int
-    """[byte] resident"""
+    """Resident memory [byte]"""
 
 
 class Family:

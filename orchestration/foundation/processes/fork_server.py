@@ -25,13 +25,13 @@ from orchestration.foundation.processes.family import room_for_names
 from orchestration.foundation.processes.subprocesses import Module
 
 LENGTH = struct.Struct("<Q")
-"""of a request, before it"""
+"""Length of a request, sent before it"""
 ANSWER = struct.Struct("<?q")
 """False and the process's id, or minus the error number if it cannot start; True and its exit code, at its end"""
 _READ_AT_START = ("PYTHON", "LD_", "LC_", "LANG", "OPENBLAS_", "OMP_", "MKL_", "MALLOC_", "GLIBC_", "COVERAGE_", "TZ")
 """Prefixes of the environment variables that are read only when a process starts or loads a library"""
 _PATIENCE = 10.0
-"""[s] within which an unused server must exit"""
+"""Time within which an unused server must exit [s]"""
 _Pipes = tuple[IO[bytes] | None, IO[bytes] | None, IO[bytes] | None]
 
 
@@ -135,7 +135,7 @@ class ForkServer:
 
 
 servers: dict[tuple[object, ...], ForkServer] = {}
-"""by module and variables"""
+"""Servers by module and variables"""
 _lock = threading.Lock()
 
 

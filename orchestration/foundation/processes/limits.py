@@ -10,13 +10,13 @@ class Limits:
     """Resource limits of a process that handles a foreign file."""
 
     time: float = 60.0
-    """[s] in which it computes or sleeps; on Linux, time spent waiting for a processor does not count"""
+    """Time in which it computes or sleeps [s]; on Linux, time spent waiting for a processor does not count"""
     memory: float = 2000.0
-    """[MB] resident, of the process and its descendants together; enforced on Linux"""
+    """Resident memory of the process and its descendants together [MB]; enforced on Linux"""
     size: float = 1000.0
-    """[MB] that an archive unpacks to, and that any one file may grow to"""
+    """Size that an archive unpacks to, and that any one file may grow to [MB]"""
     output: float = 10.0
-    """[MB] written to standard output and standard error"""
+    """Output written to standard output and standard error [MB]"""
 
 
 UNLIMITED = Limits(time=math.inf, memory=math.inf, size=math.inf, output=math.inf)

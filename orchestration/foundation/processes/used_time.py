@@ -11,12 +11,12 @@ class UsedTime:
 
     def __init__(self) -> None:
         self.own = 0.0
-        """[s] of wall-clock time in which it computed or slept: waiting for a processor does not count, unless for one
+        """Wall-clock time in which it computed or slept [s]: waiting for a processor does not count, unless for one
         that it occupies itself (all processors for a second are a second)."""
         self.processor = 0.0
-        """[s] of processor time, of all its threads together"""
+        """Processor time of all its threads together [s]"""
         self._excess = 0.0
-        """[s] by which `own` is too large: the system reports a wait only when it has ended"""
+        """Time by which `own` is too large [s]: the system reports a wait only when it has ended"""
 
     def count(self, before: Mapping[int, Member], now: Mapping[int, Member], passed: float) -> None:
         """Add an interval of `passed` [s] between two observations; none if a member has its own time limit."""

@@ -11,11 +11,11 @@ from orchestration.foundation.processes.process import Process
 from orchestration.foundation.processes.used_time import UsedTime
 
 _POLL = 0.05
-"""[s] between two checks, unless the time limit is short or checking is slow"""
+"""Time between two checks [s], unless the time limit is short or checking is slow"""
 _SHARE = 0.1
-"""of the time limit between two checks, at most"""
+"""Largest share of the time limit between two checks"""
 _EFFORT = 0.05
-"""of a processor used for checking, at most"""
+"""Largest share of a processor used for checking"""
 
 
 class Counted(Protocol):

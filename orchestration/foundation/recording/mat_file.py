@@ -13,7 +13,7 @@ _KEYWORDS = {
     "break", "case", "catch", "classdef", "continue", "else", "elseif", "end", "for", "function", "global", "if",
     "otherwise", "parfor", "persistent", "return", "spmd", "switch", "try", "while",
 }  # fmt: skip
-"""of MATLAB"""
+"""Keywords of MATLAB"""
 
 Struct = dict[str, Any]
 

@@ -14,14 +14,14 @@ ROWS, EVENTS = 2**15, 2**18
 """A chunk is complete with this many rows or events, so that what is computed by chunks does not depend on where they
 are stored."""
 BYTES = 2**27
-"""Or with this many bytes of rows, where a row is wide"""
+"""Largest number of bytes of rows in a chunk, where a row is wide"""
 
 
 class Event(NamedTuple):
     """An event of one message, or of one job of a task."""
 
     time: int
-    """[ns]"""
+    """Time [ns]"""
     kind: str
     """One of `KINDS`"""
     what: str
@@ -35,7 +35,7 @@ KINDS = (
     "released", "started", "preempted", "resumed", "finished", "missed", "skipped", "aborted",
     "queued", "transmitted", "retransmitted",
 )  # fmt: skip
-"""Of messages of connections, of jobs of tasks, and of frames of messages over networks"""
+"""Kinds of events: of messages of connections, of jobs of tasks, and of frames of messages over networks"""
 SAMPLED, SENT, ARRIVED, LOST = range(4)
 
 
@@ -89,7 +89,7 @@ class Chunk:
     rows: Floats
     """shape (n, number of columns), at most `ROWS` of them"""
     events: Events
-    """in order of time; the last chunk also has those after its last row"""
+    """Events in order of time; the last chunk also has those after its last row"""
 
     @property
     def signals(self) -> dict[str, Floats]:

@@ -25,11 +25,11 @@ class Periodic:
     execution: int
     """the worst-case execution time of a job, or the length of a frame"""
     period: int | Fraction | None
-    """from one nominal release to the next; None: releases are random or unknown"""
+    """Time from one nominal release to the next; None: releases are random or unknown"""
     jitter: int = 0
     """the largest lateness of a release"""
     deadline: int = 0
-    """from the nominal release; only used for earliest deadline first"""
+    """Time from the nominal release to the deadline; only used for earliest deadline first"""
     priority: int = 1
     """1 is more urgent than 2"""
     counts_when_queued: bool = False

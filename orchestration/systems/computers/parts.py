@@ -14,14 +14,14 @@ from orchestration.foundation.basics.simulator import Integers
 
 NONE = -1
 LATER = 2**62
-"""[ns], after all other times"""
+"""Time after all others [ns]"""
 
 Stream: TypeAlias = Callable[[int], Integers]
 """The next `count` numbers: times [ns], or 0 and 1"""
 AT_ONCE = 1024
 """Numbers drawn at once"""
 IS_CONSTANT = -1
-"""In place of the used numbers of a stream: it is constant"""
+"""Mark of a constant stream, in place of its used numbers"""
 
 MAX_WAITING = 2**20
 """The most jobs of a task, or frames of a message on a link, that may wait: 100 MB or less"""
@@ -37,7 +37,7 @@ class Processor(NamedTuple):
     """FIXED_PRIORITY, EARLIEST_DEADLINE or FIRST_COME"""
     preemptive: int
     switch: int
-    """[ns], the overhead before a job starts or resumes"""
+    """Overhead before a job starts or resumes [ns]"""
 
 
 class ScheduledTask(NamedTuple):
@@ -46,7 +46,7 @@ class ScheduledTask(NamedTuple):
     processor: int
     priority: int
     deadline: int
-    """[ns] from the nominal release"""
+    """Time from the nominal release to the deadline [ns]"""
     overrun: int
     """QUEUE, SKIP or ABORT"""
     reads_at_release: int
@@ -84,7 +84,7 @@ class ScheduledFrame(NamedTuple):
     legs: tuple["Leg", ...]
     """its links, in order"""
     pause: int
-    """[ns] from the end of a leg until it is queued for the next one"""
+    """Time from the end of a leg until it is queued for the next one [ns]"""
     nominal: int
     """the stream of its nominal instants; NONE: it is queued when its task writes"""
     late: int
@@ -101,9 +101,9 @@ class Leg(NamedTuple):
     slot: int
     """its slot, on a link with slots"""
     length: int
-    """[ns]"""
+    """Length [ns]"""
     corrupted_length: int
-    """[ns], of a corrupted frame"""
+    """Length of a corrupted frame [ns]"""
 
 
 class NetworkLink(NamedTuple):
@@ -120,7 +120,7 @@ class Parts:
     """All parts."""
 
     stop: int
-    """[ns]: nothing is released from here on"""
+    """End [ns]: nothing is released from here on"""
     processors: Sequence[Processor]
     tasks: Sequence[ScheduledTask]
     carriers: Sequence[Carrier]
@@ -142,16 +142,17 @@ class Parts:
 # Kinds of notes; a note is a row of time, kind, owner, index of its job or frame, and one more value.
 
 RELEASED, STARTED, PREEMPTED, RESUMED, FINISHED, ABORTED, SKIPPED, SWITCHING, INTERRUPTED, SAMPLED, WRITTEN = range(11)
-"""Of a task: the number of a job, and of RELEASED and SKIPPED the nominal release. SAMPLED has the time of the sample
-where that is another, WRITTEN the sample whose outputs these are. Each
-SWITCHING, STARTED and RESUMED is ended on its processor by the next of these, or by PREEMPTED, FINISHED or INTERRUPTED,
-of one that is in its switch or aborted."""
+"""Happenings of a task: the number of a job, and of RELEASED and SKIPPED the nominal release. SAMPLED has the time of
+the sample where that is another, WRITTEN the sample whose outputs these are. Each SWITCHING, STARTED and RESUMED is
+ended on its processor by the next of these, or by PREEMPTED, FINISHED or INTERRUPTED, of one that is in its switch or
+aborted."""
 QUEUED, FRAME_STARTED, FRAME_CORRUPTED, FRAME_TRANSMITTED = range(11, 15)
-"""Of a message: the number of a frame, and of QUEUED the nominal instant, of the others the leg. FRAME_STARTED is the
-first bit; FRAME_CORRUPTED the last bit of a frame that is sent again, FRAME_TRANSMITTED of one that is not."""
+"""Happenings of a message: the number of a frame, and of QUEUED the nominal instant, of the others the leg.
+FRAME_STARTED is the first bit; FRAME_CORRUPTED the last bit of a frame that is sent again, FRAME_TRANSMITTED of one
+that is not."""
 SENT, ARRIVES = range(15, 17)
-"""Of a carrier: the number of a sample; 1 if it is lost on the way, 2 if nothing was sent, else 0; the time when it
-arrives"""
+"""Happenings of a carrier: the number of a sample; 1 if it is lost on the way, 2 if nothing was sent, else 0; the time
+when it arrives"""
 KINDS = 17
 COLUMNS = 5
 

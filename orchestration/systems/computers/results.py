@@ -24,9 +24,9 @@ class _Records:
     nominal: Integers
     """the nominal releases, from which responses and deadlines count"""
     started: Integers
-    """when its first instruction ran, or its first bit was first sent"""
+    """Times at which its first instruction ran, or its first bit was first sent"""
     ended: Integers
-    """when it was done, or received"""
+    """Times at which it was done, or received"""
     deadline: Integers
     """the largest number for none"""
     stop: int
@@ -66,7 +66,7 @@ class Jobs(_Records):
     released: Integers
     """the releases"""
     written: Integers
-    """when outputs were sent"""
+    """Times at which outputs were sent"""
     preemptions: Integers
     """the number of preemptions of each"""
     outcome: Integers
@@ -110,12 +110,12 @@ class Timeline:
 
     stop: int
     jobs: Mapping[str, Jobs]
-    """by COMPUTER.TASK"""
+    """Jobs by COMPUTER.TASK"""
     frames: Mapping[str, Frames]
-    """by NETWORK.MESSAGE"""
+    """Frames by NETWORK.MESSAGE"""
     processors: Mapping[str, Slices]
-    """by computer"""
+    """Slices by computer"""
     links: Mapping[str, Slices]
-    """by network or, where it has several links, as `NETWORK: NODE -> switch`"""
+    """Slices by network or, where it has several links, by `NETWORK: NODE -> switch`"""
     happenings: Callable[[], Events]
     """the events, in order"""

@@ -99,7 +99,7 @@ class _ProcessorState:
         self.executing = False
         """whether that job executes, after its switch"""
         self.ready_at = 0
-        """when its switch is over, or when it started to execute"""
+        """Time at which its switch is over, or at which it started to execute"""
         self.changed = False
 
 

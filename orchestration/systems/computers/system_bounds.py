@@ -14,7 +14,7 @@ from orchestration.systems.system.frames import frame_nanoseconds
 from orchestration.systems.system.model import System
 
 Bounds = dict[str, int | None]
-"""[ns], by COMPUTER.TASK or NETWORK.MESSAGE; None without a bound"""
+"""Bounds [ns] by COMPUTER.TASK or NETWORK.MESSAGE; None without a bound"""
 
 
 def bounds_of(system: System) -> Bounds:

@@ -57,9 +57,9 @@ class Names:
 
     processors: Sequence[str]
     tasks: Sequence[str]
-    """as COMPUTER.TASK"""
+    """Names as COMPUTER.TASK"""
     messages: Sequence[str]
-    """as NETWORK.MESSAGE"""
+    """Names as NETWORK.MESSAGE"""
     links: Sequence[str]
 
     @property

@@ -24,7 +24,7 @@ class Window:
     """The windows of one component, after each nominal sample [ns]."""
 
     earliest: int
-    """of its samples"""
+    """Earliest time of its samples"""
     latest: int
     at_deadline: bool
     """whether it writes at its deadline"""

@@ -17,7 +17,7 @@ from orchestration.systems.expressions import unit_rules
 from orchestration.systems.expressions.unit_rules import Rule
 
 Printer: TypeAlias = Callable[..., str]
-"""From the texts of the operands to that of the result"""
+"""Function from the texts of the operands to that of the result"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,12 +36,12 @@ class Operator:
     takes_truths: bool = False
     """whether its operands are truth values; a number is true unless it is 0"""
     python: Printer
-    """on names and numbers; it calls functions of `PYTHON`"""
+    """Python on names and numbers; it calls functions of `PYTHON`"""
     numpy: Callable[..., Any]
     lanes: Printer
-    """on names and calls; it calls functions of lanes.h, mathematics.h and batch.c"""
+    """C on names and calls; it calls functions of lanes.h, mathematics.h and batch.c"""
     bounded: str | None = None
-    """on `n` operands `a`, each a `Known` of condition.h; None: Python evaluates it"""
+    """C on `n` operands `a`, each a `Known` of condition.h; None: Python evaluates it"""
 
 
 def _infix(sign: str) -> Printer:
@@ -171,7 +171,7 @@ OPERATORS: Mapping[str, Operator] = {
         lanes=_two_by_two("highest"),
     ),
 }  # fmt: skip
-"""By the sign of an `Operation` or the function of a `Call`"""
+"""Operators by the sign of an `Operation` or the function of a `Call`"""
 
 PYTHON: Mapping[str, Any] = {
     "__builtins__": {}, "abs": abs, "min": min, "max": max, "root": math.sqrt,

@@ -21,7 +21,7 @@ class Operand:
 
 
 Rule: TypeAlias = Callable[[str, Sequence[Operand]], Unit | None]
-"""From a word and its operands to the unit of the result; raises `UsageError` for incompatible units"""
+"""Function from a word and its operands to the unit of the result; raises `UsageError` for incompatible units"""
 
 
 def agreed(word: str, operands: Sequence[Operand]) -> Unit | None:

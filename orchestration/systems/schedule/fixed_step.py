@@ -14,7 +14,7 @@ class Misalignment(NamedTuple):
     """An instant between two points of a component that may not move: the run ends there."""
 
     time: int
-    """[ns], of that instant"""
+    """Time of that instant [ns]"""
     text: str
 
 

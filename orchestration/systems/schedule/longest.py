@@ -10,7 +10,7 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import messages_by_connection, placed_messages, placed_tasks
 
 MAX_TIME = 2**60
-"""[ns], 36 years: the sum of a few of them still fits into 64 bits"""
+"""Latest time [ns], 36 years: the sum of a few of them still fits into 64 bits"""
 MAX_AHEAD = 10**6
 """The largest delay of a measurement in samples: all of them are drawn before the first one"""
 

@@ -12,12 +12,12 @@ from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.system.model import System
 
 NEVER = 2**60
-"""[ns], the time of what does not occur before the end"""
+"""Time of what does not occur before the end [ns]"""
 _UNKNOWN = -2
 _SENT, _LOST, _NOTHING = range(3)
 """The outcome of a message of a connection, as in a note SENT"""
 _FURTHER = 1_000_000
-"""[ns], the least time by which the scheduler advances"""
+"""Least time by which the scheduler advances [ns]"""
 
 
 class ForeseenMessages:
@@ -97,14 +97,14 @@ class Lookahead:
         self._tasks, self._stop = resources.tasks, resources.parts.stop
         self._reached = 0
         self.messages = {name: ForeseenMessages() for name in resources.carriers}
-        """by connection"""
+        """Messages by connection"""
         self.samples = {
             name: Samples(
                 [self.messages[x.name] for x in system.connections if x.sender == name and x.name in self.messages]
             )
             for name in self._tasks
         }
-        """by component"""
+        """Samples by component"""
 
     @property
     def is_complete(self) -> bool:

@@ -67,7 +67,7 @@ class TimedComponent:
     """A sampled component, and its samples that are drawn and not past, in order."""
 
     first: int
-    """[ns], its first sample"""
+    """Time of its first sample [ns]"""
 
     def __init__(
         self,

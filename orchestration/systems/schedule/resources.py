@@ -130,7 +130,7 @@ class Resources:
             places=[*(each.place for each in placed), *(f"components.{name}" for name in self._without_computer),
                     *(each.place for each in self._placed_messages)],
         )  # fmt: skip
-        """without the streams, which belong to a run"""
+        """Parts without the streams, which belong to a run"""
         self._names = Names(
             processors=[*system.computers, *self._without_computer],
             tasks=[*(f"{each.computer_name}.{each.name}" for each in placed), *self._without_computer],

@@ -18,7 +18,7 @@ from orchestration.systems.system.frames import frame_nanoseconds
 from orchestration.systems.system.model import System
 
 NO_DEADLINE = 2**60
-"""[ns]; a deadline this late or later counts as none"""
+"""Deadline that counts as none [ns], as every later one"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +52,7 @@ class Responses:
     """the demanded share of the time of the processor or link: the mean demand of one, divided by the mean time
     between them"""
     response: Spread | None
-    """from the nominal release to the end, of those that are done"""
+    """Time from the nominal release to the end, of those that are done"""
     bound: float | None
     """the bound of theory on the response; None where there is none"""
     start_jitter: float | None
@@ -60,7 +60,7 @@ class Responses:
     end_jitter: float | None
     """the range of those to the end"""
     latency: Spread | None
-    """of a task, from reading its inputs to writing its outputs"""
+    """Time of a task from reading its inputs to writing its outputs"""
     deadline: float | None
     missed: float | None
     """the share not done by its deadline, of those whose deadline is within the run; None if there are none"""
@@ -75,9 +75,9 @@ class SystemResponses:
     """Statistics of all tasks and messages of a system, up to its end."""
 
     tasks: Mapping[str, Responses]
-    """by COMPUTER.TASK"""
+    """Responses by COMPUTER.TASK"""
     messages: Mapping[str, Responses]
-    """by NETWORK.MESSAGE"""
+    """Responses by NETWORK.MESSAGE"""
     busy: Mapping[str, float]
     """the share of the time in which a computer was busy, switches included, or a link carried a frame"""
 

@@ -34,9 +34,9 @@ class Instant(NamedTuple):
     """One instant; its parts are processed in this order."""
 
     time: int
-    """[ns]"""
+    """Time [ns]"""
     next_time: int
-    """of the instant after it [ns]"""
+    """Time of the instant after it [ns]"""
     stepped: Sequence[int]
     """components in continuous time that are stepped to this time, in this order"""
     arrivals: Sequence[Message]
@@ -54,7 +54,7 @@ class Schedule:
     """Consecutive instants; instant i has the rows of each table from `…_at[i]` to before `…_at[i + 1]`."""
 
     times: Integers
-    """[ns], shape (n + 1,), the last one of the instant after these"""
+    """Times [ns], shape (n + 1,), the last one of the instant after these"""
     stepped: Integers
     """components in continuous time, in the order in which they are stepped"""
     stepped_at: Integers

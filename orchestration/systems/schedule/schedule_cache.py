@@ -26,7 +26,7 @@ class ScheduleKey:
     """The key of a schedule: everything in a system that determines it."""
 
     regular: Hashable
-    """of the regular part"""
+    """Key of the regular part"""
     drawn: Hashable
     """the seed and the streams; None: nothing is random"""
 
@@ -54,7 +54,7 @@ class RunSchedule:
     """The schedule of one run."""
 
     first_samples: Mapping[str, int]
-    """as in a `Timetable`"""
+    """First samples as in a `Timetable`"""
     spans: Iterator[Span]
 
 

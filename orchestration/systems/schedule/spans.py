@@ -14,7 +14,7 @@ class Instants:
     """Instants in order, each once, and the components that are stepped to them."""
 
     times: Integers
-    """[ns], shape (n,)"""
+    """Times [ns], shape (n,)"""
     stepped: Booleans
     """shape (n, components in continuous time), in the order of stepping"""
 
@@ -90,7 +90,7 @@ class Span:
     """Everything from one time to another, in order; the tables are those of a `Schedule`."""
 
     end: int
-    """[ns], of the instant after these"""
+    """Time of the instant after these [ns]"""
     regular: Instants
     """those that do not depend on the seed"""
     own: Instants
@@ -101,7 +101,7 @@ class Span:
     arrivals: Integers
     samples: Integers
     sampled: Integers
-    """[ns], the times of the samples"""
+    """Times of the samples [ns]"""
     exchanged: Integers
 
     @property

@@ -56,7 +56,7 @@ class Timetable:
         self.first_samples = {
             name: task.first for name, task in zip(self._plan.sampled, self._tasks) if task.first < self.stop
         }
-        """[ns], by sampled component, of those that sample before the end"""
+        """Times of the first samples [ns], by sampled component, of those that sample before the end"""
         own = [j for j in self._plan.posted if j not in self._plan.over_networks]
         self._posted = {i: [self._links[j] for j in own if common.sender[j] == i] for i in common.points}
         self._over_networks = [self._links[j] for j in self._plan.posted if j in self._plan.over_networks]

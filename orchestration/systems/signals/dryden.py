@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from orchestration.foundation.basics.errors import UsageError
 
 FOOT = 0.3048
-"""[m]"""
+"""Length of a foot [m]"""
 LOWEST, HIGHEST = 10.0 * FOOT, 1000.0 * FOOT
-"""[m], the range of the low-altitude model"""
+"""Range of heights of the low-altitude model [m]"""
 DRAWS = 5
 """Normal variates of each step: one for u, two for v, two for w"""
 

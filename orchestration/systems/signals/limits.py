@@ -13,9 +13,9 @@ class SignalLimits:
     """The limits of a curve through way-points without times."""
 
     speed: float = 1.0
-    """[m/s], for points without one in the file"""
+    """Speed for points without one in the file [m/s]"""
     acceleration: float = 1.0
-    """[m/s²]"""
+    """Largest acceleration [m/s²]"""
 
     def __post_init__(self) -> None:
         for name in ("speed", "acceleration"):

@@ -27,7 +27,7 @@ from orchestration.systems.signals.derivatives import (
 
 _PAPER = Trajectory()
 PERIOD = 10.0
-"""[s], the default of periodic motions"""
+"""Default period of periodic motions [s]"""
 
 
 class Motion(Protocol):
@@ -42,7 +42,7 @@ class Hover:
     """At rest at one point."""
 
     x: float = 0.0
-    """[m], as y and z"""
+    """Position x [m], as y and z"""
     y: float = 0.0
     z: float = 0.0
 
@@ -56,7 +56,7 @@ class Step:
     """From one point to another, P + d S(τ) with the smooth step S of degree nine, and at rest before and after."""
 
     x: float = 0.0
-    """[m], as y and z"""
+    """Position x [m], as y and z"""
     y: float = 0.0
     z: float = 0.0
     dx: float = 1.0
@@ -64,7 +64,7 @@ class Step:
     dy: float = 0.0
     dz: float = 0.0
     start: float = 1.0
-    """when it begins [s]"""
+    """Time at which it begins [s]"""
     duration: float = 2.0
     """the time that it takes [s]"""
 
@@ -84,15 +84,15 @@ class _Periodic:
     """A periodic motion at an angular rate ω."""
 
     x: float = 0.0
-    """where it begins [m], as y and z"""
+    """Position x at which it begins [m], as y and z"""
     y: float = 0.0
     z: float = 0.0
     radius: float = 2.0
-    """[m]"""
+    """Radius [m]"""
     period: float | None = None
-    """of one turn [s]; default: 10, if no speed is given"""
+    """Period of one turn [s]; default: 10, if no speed is given"""
     speed: float | None = None
-    """[m/s], in place of a period"""
+    """Speed in place of a period [m/s]"""
     ramp: float = 3.0
     """the time from rest to full speed [s]; 0: at full speed from the beginning"""
 
@@ -125,7 +125,7 @@ class Helix(_Periodic):
     """As the circle, and z + rate_z σ(t): it climbs or descends at the same time; `speed` is the level part."""
 
     rate_z: float = -0.2
-    """[m/s]; z points down, so that a negative one climbs"""
+    """Rate of z [m/s]; z points down, so that a negative one climbs"""
 
     def at(self, t: Scalar, ops: ScalarOps = FLOAT) -> Reference:
         """The motion on the helix."""
@@ -162,9 +162,9 @@ class Paper:
     frequency: float = _PAPER.frequency
     """ω [rad/s]"""
     start_z: float = _PAPER.start_z
-    """[m]"""
+    """Start of z [m]"""
     rate_z: float = _PAPER.rate_z
-    """[m/s]"""
+    """Rate of z [m/s]"""
     ramp: float = 0.0
     """the time from rest to full speed [s]"""
 

@@ -25,7 +25,7 @@ class TableRows:
 
     path: Path
     columns: Mapping[str, Floats]
-    """(n,) by name, in the order of the file"""
+    """Columns (n,) by name, in the order of the file"""
     lines: Sequence[int]
 
     def error(self, row: int, column: str, expected: str) -> UsageError:

@@ -110,7 +110,8 @@ class Component:
     """The distance of the communication points [s] of a component in continuous time; a component has either this or
     `sampling`."""
     sampling: Sampling | None = None
-    """When a digital task runs; a component has either this or `step`, or neither if it is the task of a computer."""
+    """The times at which a digital task runs; a component has either this or `step`, or neither if it is the task of a
+    computer."""
     tolerance: float | None = None
     """The relative tolerance of the FMU's solver; default: that of the experiment that the FMU declares, if any."""
     align: Align = "exact"

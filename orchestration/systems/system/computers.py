@@ -61,9 +61,10 @@ class Task:
     """The time from the nominal release to when a job should be done [s]; default: the period, or the mean time between
     arrivals."""
     read: Read = "start"
-    """When it reads its inputs: when the job starts (start), or at its release."""
+    """The time at which it reads its inputs: when the job starts (start), or at its release."""
     write: Write = "end"
-    """When it sends its outputs: when the job is done (end), or at its deadline (logical execution time)."""
+    """The time at which it sends its outputs: when the job is done (end), or at its deadline (logical execution
+    time)."""
     overrun: Overrun = "queue"
     """The treatment of a release while a job is not done: it waits (queue), or makes no job (skip); or the late job is
     ended at its deadline without output (abort)."""
@@ -92,8 +93,8 @@ class Computer:
     """A processor and the tasks that share it."""
 
     scheduling: Scheduling = "fixed-priority"
-    """Which of the waiting jobs runs: that of the most urgent priority, of the earliest deadline, or the one that came
-    first."""
+    """The choice of the waiting job that runs: that of the most urgent priority, of the earliest deadline, or the one
+    that came first."""
     preemptive: bool = True
     """Whether a job of higher rank preempts the one that runs."""
     switch: float = 0.0
@@ -124,16 +125,16 @@ class Message:
     bytes: int
     """The length of its data."""
     identifier: int | None = None
-    """Of CAN: the identifier, of 11 bits; the lowest is sent first."""
+    """The identifier of CAN, of 11 bits; the lowest is sent first."""
     slot: int | None = None
-    """Of TDMA: the slot of the cycle in which it is sent, counted from 0."""
+    """The slot of TDMA: that of the cycle in which it is sent, counted from 0."""
     priority: int = 1
-    """Of Ethernet: the priority; 1 is more urgent than 2."""
+    """The priority of Ethernet; 1 is more urgent than 2."""
     start: str | None = None
-    """Of Ethernet: the sending node (`from` in files); default for a connection: the computer of its sender, or the
+    """The sending node of Ethernet (`from` in files); default for a connection: the computer of its sender, or the
     sender itself."""
     end: str | None = None
-    """Of Ethernet: the receiving node (`to` in files); default for a connection: the computer of its receiver, or the
+    """The receiving node of Ethernet (`to` in files); default for a connection: the computer of its receiver, or the
     receiver itself."""
     period: float | None = None
     """The time from one message to the next [s]: of load, and of a connection from a component in continuous time."""
@@ -181,13 +182,13 @@ class Network:
     bit_rate: float
     """Bits per second."""
     data_bit_rate: float | None = None
-    """Of CAN FD: bits per second in the data phase of a frame."""
+    """The bits per second in the data phase of a frame of CAN FD."""
     stuffing: Stuffing = "longest"
-    """Of CAN: the number of stuff bits of a frame: the largest possible (longest), or none."""
+    """The number of stuff bits of a frame of CAN: the largest possible (longest), or none."""
     slots: tuple[float, ...] = ()
-    """Of TDMA: the lengths of the slots of a cycle [s]."""
+    """The lengths of the slots of a cycle of TDMA [s]."""
     latency: float = 0.0
-    """Of Ethernet: the time in the switch from the last bit in until a frame can go out [s]."""
+    """The latency of Ethernet: the time in the switch from the last bit in until a frame can go out [s]."""
     error: float = 0.0
     """The probability that a frame is corrupted, and sent again."""
     messages: Mapping[str, Message] = field(default_factory=dict)

@@ -26,7 +26,7 @@ class Connection:
     start: tuple[str, ...]
     """The outputs that it carries, as COMPONENT.VARIABLE, of one component (`from` in files)."""
     end: tuple[str, ...]
-    """As many inputs of one component, in the same order (`to` in files)."""
+    """The inputs of one component, as many and in the same order (`to` in files)."""
     order: Order = "gauss-seidel"
     """Whether a message can arrive at the instant at which it is sent (gauss-seidel), or at the next one of its sender
     (jacobi); default in a file: `order` at the top."""
@@ -43,7 +43,8 @@ class Connection:
     burst_length: float | None = None
     """The mean number of losses in a row (Gilbert-Elliott); default: losses are independent."""
     hold: Hold = "zero"
-    """What the receiver gets between arrivals: the last value (zero), or the line through the last two (first)."""
+    """The value that the receiver gets between arrivals: the last one (zero), or the line through the last two
+    (first)."""
     noise: Mapping[str, float] = field(default_factory=dict)
     """The standard deviation of normal noise by variable of the sender, in its unit; a vector's name stands for its
     components. In a file, one number applies to all of them."""
@@ -52,7 +53,7 @@ class Connection:
     scale: float = 1.0
     """The factor in scale · value + offset, which is what arrives; without either of them, units must be the same."""
     offset: float = 0.0
-    """What is added after the scale, in the unit of the receiver."""
+    """The offset that is added after the scale, in the unit of the receiver."""
     stated: bool = False
     """Whether scale and offset are given, even if they change nothing: then units may differ. In a file, one of them is
     enough."""

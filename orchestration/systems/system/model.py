@@ -57,7 +57,7 @@ class System:
     connections: tuple[Connection, ...] = ()
     """The messages from component to component."""
     sources: Mapping[str, Source] = field(default_factory=dict)
-    """What drives inputs from outside, by name."""
+    """The sources that drive inputs from outside, by name."""
     computers: Mapping[str, Computer] = field(default_factory=dict)
     """The processors that run components as tasks, by name."""
     networks: Mapping[str, Network] = field(default_factory=dict)
@@ -67,7 +67,7 @@ class System:
     optional: tuple[str, ...] = ()
     """The objectives that may lack a value: where an FMU does not have one of their variables."""
     criterion: Criterion = field(default_factory=Criterion)
-    """When a run is good, and when it has diverged."""
+    """The conditions under which a run is good, and under which it has diverged."""
     streams: Mapping[str, int] = field(default_factory=dict)
     """The random streams that have a number instead of a name, as `connections.NAME.CAUSE` and
     `components.NAME.jitter`."""

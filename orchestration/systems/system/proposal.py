@@ -15,7 +15,7 @@ from orchestration.systems.system.connection import component_of
 from orchestration.systems.system.matching import Match, match
 
 STEP, PERIOD, STOP = 0.001, 0.01, 10.0
-"""[s], where no FMU has a default experiment"""
+"""Step, period and stop time [s] where no FMU has a default experiment"""
 WIDTH = 110
 """Characters of a line; a longer list has a line for each of its members"""
 _TO_FILL_IN = (
@@ -47,7 +47,7 @@ class ProposedResources:
     """Computers and networks of other files, for the proposal."""
 
     tables: Mapping[str, Any] = field(default_factory=dict)
-    """of a system file"""
+    """Tables of a system file"""
     guessed: tuple[str, ...] = ()
     undecided: tuple[str, ...] = ()
 

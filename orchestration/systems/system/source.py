@@ -32,7 +32,7 @@ class Source:
     """The path of a CSV file with `time` [s] and one column for each input, named as the input without its component,
     or with way-points; in a file, relative to its folder."""
     interpolation: Interpolation = "linear"
-    """What holds between the rows of a file: the line (linear), the row before (previous), or a smooth curve (spline)
+    """The values between the rows of a file: the line (linear), the row before (previous), or a smooth curve (spline)
     through the rows as way-points, with columns x, y, z [m] and either `time` [s] or, optionally, `hold` [s] and
     `speed` [m/s]."""
     columns: tuple[str, ...] | None = None

@@ -24,7 +24,7 @@ from orchestration.components.fmi.archive import DESCRIPTION, UnreadableFmuError
 
 CO_SIMULATION = "CoSimulation"
 KINDS = {CO_SIMULATION: "co-simulation", "ModelExchange": "model exchange", "ScheduledExecution": "scheduled execution"}
-"""by the elements that declare them"""
+"""Kinds of an FMU by the elements that declare them"""
 
 ARCHITECTURES = {
     "x86": "x86",
@@ -89,9 +89,9 @@ class InspectedFmu:
     kinds: tuple[str, ...]
     model_identifier: str
     guid: str
-    """In FMI 3.0 the instantiation token."""
+    """GUID; in FMI 3.0 the instantiation token"""
     start_time: float
-    """[s]; of the default experiment, 0 if it has none"""
+    """Start of the default experiment [s]; 0 if it has none"""
     needs_tool: str | None
     """The tool that must be installed, as the FMU declares (needsExecutionTool)."""
     platforms: tuple[PlatformBinary, ...]

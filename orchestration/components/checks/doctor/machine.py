@@ -33,7 +33,7 @@ class Library:
 
 
 Libraries = Mapping[str, Library | None]
-"""By the name in a binary; None: not found."""
+"""Libraries by the name in a binary; None: not found"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +49,7 @@ class Machine:
     shared: bool | None = None
     """Whether this Python is linked to a shared libpython; None: unknown."""
     temp_folder: Path
-    """Where FMUs are unpacked."""
+    """Folder in which FMUs are unpacked"""
     python_libraries: tuple[PythonLibrary, ...] = ()
     """Those that a host that is not Python could load, best first."""
     found: Libraries = field(default_factory=dict)

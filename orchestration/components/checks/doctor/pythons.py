@@ -14,7 +14,7 @@ from orchestration.components.checks.doctor.loader import DynamicLoader
 THIS_PYTHON, PRELOADED, ON_PATH, BY_LOADER = "this Python", "LD_PRELOAD", "PATH", "the loader"
 
 _LIBPYTHON = re.compile(r"libpython(3\.\d+)[dm]*\.so")
-"""without that of free-threaded Python, whose binary interface differs"""
+"""Names of libpython without that of free-threaded Python, whose binary interface differs"""
 
 _PYTHON_DLL = re.compile(r"python3(\d+)\.dll", re.IGNORECASE)
 

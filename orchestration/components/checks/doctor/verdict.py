@@ -23,11 +23,11 @@ class Host:
     """Whether a kind of host can load an FMU."""
 
     needs: tuple[str, ...] = ()
-    """What is missing."""
+    """Things that are missing"""
     start: str | None = None
     """The command that starts the host, if more than its name is needed."""
     note: str | None = None
-    """What cannot be determined here."""
+    """Note on a thing that cannot be determined here"""
 
     @property
     def ready(self) -> bool:

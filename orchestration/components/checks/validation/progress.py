@@ -13,7 +13,7 @@ MAX_FINDINGS = 100
 MAX_FINDING_LENGTH = 1000
 """Characters of the text of a finding"""
 _BEAT = 0.02
-"""[s] between two beats, at least"""
+"""Least time between two beats [s]"""
 Frame = tuple[Any, ...]
 """The name of a method of `ReceivedReport` without its underscore, and its arguments"""
 
@@ -83,7 +83,7 @@ class ReceivedReport:
         self.ended = False
         self.error: str | None = None
         self.last_beat: float | None = None
-        """when a call of the FMU last began or returned, by the clock; None if there was none"""
+        """Time at which a call of the FMU last began or returned, by the clock; None if there was none"""
         self._clock = clock
 
     def receive(self, frame: Frame) -> None:
