@@ -41,10 +41,10 @@ def on_files(files: Files, config: Any) -> Files:
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:
     """The Markdown of a page, with links and code blocks converted for the site."""
     address = page.file.src_uri
-    if page.file.inclusion.is_not_in_nav():
-        page.meta["search"] = {"boost": BEHIND}
-    shows_source = page.file.inclusion.is_not_in_nav() or address.endswith(".ipynb")
+    shows_source = page.file.inclusion.is_not_in_nav() and address not in pages_elsewhere()
     if shows_source:
+        page.meta["search"] = {"boost": BEHIND}
+    if shows_source or address.endswith(".ipynb"):
         return markdown
     continued = CONTINUED[address]() if address in CONTINUED else ""
     return for_the_site(Links(repo_url=config.repo_url).rewritten(markdown + continued, address))
