@@ -43,8 +43,8 @@ if TYPE_CHECKING:
     from orchestration.experiments.comparison.design import Comparison
     from orchestration.experiments.comparison.file import load_comparison
     from orchestration.experiments.comparison.run import Compared, compare
-    from orchestration.experiments.limits.limit import Limit
     from orchestration.experiments.limits.limit import find as limit
+    from orchestration.experiments.limits.limit_result import Limit
     from orchestration.experiments.report.writing import report
     from orchestration.experiments.studies.axes import Axis
     from orchestration.experiments.studies.study import Study
@@ -135,7 +135,7 @@ _HOMES = {
     "fly": "orchestration.simulation.runs.many_runs",
     "Flights": "orchestration.simulation.runs.many_runs",
     "limit": "orchestration.experiments.limits.limit",
-    "Limit": "orchestration.experiments.limits.limit",
+    "Limit": "orchestration.experiments.limits.limit_result",
     "expect": "orchestration.theory.exact.expect",
     "Expected": "orchestration.theory.exact.expect",
     "linearise": "orchestration.theory.stability.linearise",

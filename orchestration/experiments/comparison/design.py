@@ -10,6 +10,7 @@ from orchestration.experiments.studies.linked_settings import Key, LinkedSetting
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.records import record
+from orchestration.simulation.results.quantities import is_in_seconds
 from orchestration.systems.system.component import Values
 from orchestration.systems.system.paths import value_at
 from orchestration.systems.system.request import ControlLoop
@@ -119,6 +120,12 @@ class Comparison:
     def values(self) -> tuple[Value, ...]:
         """The values of the axis."""
         return self.axis.values or ()
+
+    @property
+    def is_in_seconds(self) -> bool:
+        """Whether the axis sets times [s]."""
+        axis = self.axis
+        return not axis.multiplies and bool(axis.targets) and all(map(is_in_seconds, axis.targets))
 
     @cached_property
     def initial_conditions(self) -> tuple[InitialConditions, ...]:

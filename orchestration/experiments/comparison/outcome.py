@@ -1,8 +1,6 @@
 """The conclusions of a comparison, as one value and as the files in its folder."""
 
-import dataclasses
 import json
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +11,7 @@ from orchestration.experiments.comparison.cells import CellSummary, cell_summari
 from orchestration.experiments.comparison.design import Comparison
 from orchestration.experiments.comparison.limits import GridLimit, limits
 from orchestration.experiments.comparison.pairs import Pair, pairs
-from orchestration.simulation.results.quantities import is_in_seconds
+from orchestration.foundation.basics.documents import plain
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,13 +34,12 @@ class Outcome:
 def outcome_of(comparison: Comparison, table: "pd.DataFrame", bandwidths: Bandwidths) -> Outcome:
     """The conclusions from the runs of a comparison and the bandwidths of its controllers."""
     cells = cell_summaries(comparison, table)
-    in_seconds = all(is_in_seconds(target) for target in comparison.axis.targets) and not comparison.axis.multiplies
     return Outcome(
         cells=cells,
         limits=limits(comparison, table, bandwidths),
         fronts=[*fronts.points(comparison, table)],
         pairs=[*pairs(comparison, table)],
-        at_equal_bandwidth=[*equal_terms.at_equal_bandwidth(cells, bandwidths)] if in_seconds else [],
+        at_equal_bandwidth=[*equal_terms.at_equal_bandwidth(cells, bandwidths)] if comparison.is_in_seconds else [],
         at_equal_torque=[*equal_terms.at_equal_torque(comparison, table)],
     )
 
@@ -57,11 +54,11 @@ def as_json(comparison: Comparison, outcome: Outcome, bandwidths: Bandwidths) ->
             {"controller": controller, "vehicle": vehicle, "value": value, "bandwidth": bandwidth}
             for (controller, vehicle, value), bandwidth in bandwidths.items()
         ],
-        **dataclasses.asdict(dataclasses.replace(outcome, cells=[])),
+        **vars(outcome),
         "cells": [cell.row("value") for cell in outcome.cells],
     }
-    finite: dict[str, Any] = _finite(content)
-    return finite
+    document: dict[str, Any] = plain(content)
+    return document
 
 
 def write(comparison: Comparison, outcome: Outcome, bandwidths: Bandwidths, folder: Path) -> list[Path]:
@@ -76,11 +73,3 @@ def write(comparison: Comparison, outcome: Outcome, bandwidths: Bandwidths, fold
     table.to_csv(written[1], index=False)
     written[2].write_text(json.dumps(as_json(comparison, outcome, bandwidths), indent=2) + "\n", encoding="utf-8")
     return written
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(one) for one in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -21,7 +21,6 @@ from orchestration.experiments.studies.figures import save
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.figures.style import SCREEN, Style
 from orchestration.simulation.results import display_names as labels
-from orchestration.simulation.results.quantities import is_in_seconds
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,7 +46,7 @@ def draw(
         for path in _of_one(comparison, units, outcome, rows, (vehicle, condition), folder, style)
     ]
     if outcome.limits:
-        reaches, in_seconds = reaches_of(comparison, outcome.limits), _in_seconds(comparison)
+        reaches, in_seconds = reaches_of(comparison, outcome.limits), comparison.is_in_seconds
         written += save(partial(limits_of, reaches, axis, in_seconds), folder / "limits", style)
     return written
 
@@ -107,8 +106,3 @@ def _by_size(comparison: Comparison, rows: "pd.DataFrame", fate: str) -> Floats:
 
 def _is_known(point: Point) -> bool:
     return point.error.value is not None and point.effort.value is not None
-
-
-def _in_seconds(comparison: Comparison) -> bool:
-    axis = comparison.axis
-    return not axis.multiplies and bool(axis.targets) and all(map(is_in_seconds, axis.targets))

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from orchestration.components.fmi.foreign import LostError, isolated_call
 from orchestration.experiments.limits.evaluation import RELIABILITY, Evaluation
-from orchestration.experiments.limits.limit_result import LimitResult
+from orchestration.experiments.limits.limit_result import Limit
 from orchestration.experiments.studies import figures
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
@@ -27,7 +27,7 @@ DIGITS = 4
 """of values in text"""
 
 
-def limit_figure(result: LimitResult, style: Style = SCREEN) -> Figure:
+def limit_figure(result: Limit, style: Style = SCREEN) -> Figure:
     """The judged objective over the quantity, or the share of good seeds, with the limits."""
     across = _quantity(result)
     figure = style.figure(38.0)
@@ -44,7 +44,7 @@ def limit_figure(result: LimitResult, style: Style = SCREEN) -> Figure:
     return figure
 
 
-def _draw_values(axes: Axes, result: LimitResult, across: Quantity) -> None:
+def _draw_values(axes: Axes, result: Limit, across: Quantity) -> None:
     """One run per value: the judged objective, or good and not good where it has no value."""
     known = [one for one in result.tried if one.measured is not None]
     if not known:
@@ -74,7 +74,7 @@ def _draw_values(axes: Axes, result: LimitResult, across: Quantity) -> None:
     axes.set_ylabel(labels.with_unit(labels.metric(result.judged or ""), result.judged_unit))
 
 
-def _draw_shares(axes: Axes, result: LimitResult, across: Quantity) -> None:
+def _draw_shares(axes: Axes, result: Limit, across: Quantity) -> None:
     """Many runs per value: the share of good seeds, with its interval where all were run."""
     shares = [one.flew / one.runs for one in result.tried]
     _draw_marks(axes, result.tried, shares, across)
@@ -105,7 +105,7 @@ def is_good(tried: Evaluation) -> bool:
     return tried.flew == tried.runs
 
 
-def _draw_limits(axes: Axes, result: LimitResult, across: Quantity) -> None:
+def _draw_limits(axes: Axes, result: Limit, across: Quantity) -> None:
     """The limits as lines, with the region beyond the measured one shaded."""
     named = (
         (result.large_signal_limit, RED, "-", "measured limit"),
@@ -121,7 +121,7 @@ def _draw_limits(axes: Axes, result: LimitResult, across: Quantity) -> None:
         axes.axvspan(result.large_signal_limit * across.factor, right, color=RED, alpha=0.06, linewidth=0.0)
 
 
-def _title(result: LimitResult, across: Quantity) -> str:
+def _title(result: Limit, across: Quantity) -> str:
     what, until = across.name, f", in runs of {result.horizon:g} s"
     if result.large_signal_limit is not None:
         return f"Good up to {across.text_of(result.large_signal_limit, DIGITS)}: {what}{until}"
@@ -129,7 +129,7 @@ def _title(result: LimitResult, across: Quantity) -> str:
     return f"{what}: {'good throughout' if is_good(first) else 'never good'}{until}"
 
 
-def _quantity(result: LimitResult) -> Quantity:
+def _quantity(result: Limit) -> Quantity:
     return quantities.setting(result.of, [one.value for one in result.tried], result.unit)
 
 
@@ -138,7 +138,7 @@ def _with_margin(values: list[float]) -> tuple[float, float]:
     return min(values) - room, max(values) + room
 
 
-def draw_limit(request: Request, result: LimitResult, folder: Path, style: Style = SCREEN) -> list[Path]:
+def draw_limit(request: Request, result: Limit, folder: Path, style: Style = SCREEN) -> list[Path]:
     """Draw the measurements with both limits, and the spectral radius where a linear loop is known; the paths."""
     name = "limit_" + re.sub(r"[^A-Za-z0-9]+", "_", result.of).strip("_")
     written = figures.save(lambda chosen: limit_figure(result, chosen), folder / name, style)
@@ -147,7 +147,7 @@ def draw_limit(request: Request, result: LimitResult, folder: Path, style: Style
     return written
 
 
-def draw_spectral_radius(request: Request, result: LimitResult, folder: Path, style: Style) -> list[Path]:
+def draw_spectral_radius(request: Request, result: Limit, folder: Path, style: Style) -> list[Path]:
     """Draw the spectral radius of the loop over the quantity; the paths, empty if no linear loop is known.
 
     Raises `UsageError` where linear theory does not apply, and `LostError` as `isolated_call` does.
@@ -159,22 +159,31 @@ def draw_spectral_radius(request: Request, result: LimitResult, folder: Path, st
     last = 1.3 * max(ends, default=0.1)
     values = np.array([0.001 + i / 199.0 * (last - 0.001) for i in range(200)])
     radii = isolated_call(files_of(system_of(request)).fmus.values(), _radii, known, request, result.of, values)
-    return (
-        []
-        if radii is None
-        else figures.save(
-            lambda chosen: figures.spectral_radius(
-                result.of,
-                values,
-                radii,
-                local_limit=result.local_limit,
-                large_signal_limit=result.large_signal_limit,
-                style=chosen,
-            ),
-            folder / f"spectral_radius_{result.of}",
-            style,
-        )
-    )
+    if radii is None:
+        return []
+    path = folder / f"spectral_radius_{result.of}"
+    return figures.save(lambda chosen: spectral_radius(result, values, radii, chosen), path, style)
+
+
+def spectral_radius(result: Limit, values: Floats, radii: Floats, style: Style = SCREEN) -> Figure:
+    """The spectral radius of the sampled loop about hover against the period or delay [s], with both limits."""
+    figure = style.figure(30.0)
+    panel = figure.add_subplot()
+    across = quantities.setting(result.of, values)
+    panel.plot(across.of(values), radii, color=BLUE)
+    panel.axhline(1.0, color=GREY, linewidth=0.8)
+    for limit, color, name in (
+        (result.local_limit, BLUE, "local"),
+        (result.large_signal_limit, ORANGE, "large-signal"),
+    ):
+        if limit is not None:
+            at = across.factor * limit
+            panel.axvline(at, color=color, linestyle="--", label=f"{name} limit, {across.text_of(limit, DIGITS)}")
+    panel.set(xlabel=across.title, ylabel="spectral radius about hover [1]")
+    panel.margins(x=0)
+    if panel.get_legend_handles_labels()[0]:
+        panel.legend()
+    return figure
 
 
 def _radii(known: KnownLoop, request: Request, of: str, values: Floats) -> Floats | None:

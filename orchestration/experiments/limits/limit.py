@@ -2,12 +2,11 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from orchestration.components.fmi.foreign import LostError, isolated_call
 from orchestration.experiments.limits.evaluation import RELIABILITY, Evaluator, describe
-from orchestration.experiments.limits.limit_result import ContinuousRun, LimitResult
+from orchestration.experiments.limits.limit_result import ContinuousRun, Limit
 from orchestration.foundation.basics.bisection import Bracket, Range, bisected, first_failure
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
@@ -17,7 +16,6 @@ from orchestration.simulation.engines.engine import Engine
 from orchestration.simulation.engines.wiring import check_against_fmus
 from orchestration.simulation.requests.ranges import Varied, default_quantity, search_range
 from orchestration.simulation.requests.request import RequestLike, request_of
-from orchestration.simulation.results import html
 from orchestration.simulation.results.criterion import bound_of, judged_objective
 from orchestration.simulation.workers.choice import single_run_execution
 from orchestration.simulation.workers.executors import RunEvaluator
@@ -28,11 +26,6 @@ from orchestration.theory.exact.mean_square import MeanSquareLimit, mean_square_
 from orchestration.theory.stability.known_loops import LocalLimit
 from orchestration.theory.stability.local_limit import local_limits
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from orchestration.simulation.figures.gallery import Figures
-
 GAP = 0.1
 """of the local limit: a larger difference to the large-signal limit is noted"""
 PARTS_OF_STEP = 5
@@ -41,48 +34,6 @@ BEYOND = 4
 """values of the scan that are evaluated beyond the first that fails"""
 CONTINUOUS = 1e-4
 """[s], the period of the flight that approximates continuous time"""
-
-
-@dataclass(frozen=True, kw_only=True, repr=False)
-class Limit(LimitResult):
-    """The last good value of a quantity and the evidence for it, in the quantity's unit."""
-
-    def __repr__(self) -> str:
-        return f"<Limit of {self.of}: {self.note}>"
-
-    def _repr_html_(self) -> str:
-        """The form that notebooks show."""
-        limits = {
-            "last value that is good": self.large_signal_limit,
-            "local limit, of small errors at rest": self.local_limit,
-            "mean-square limit": self.mean_square_limit,
-            "refuted from": self.refuted_limit,
-        }
-        rows = [(name, html.number(value), "" if value is None else self.unit or "") for name, value in limits.items()]
-        return html.card(
-            f"The limit of {self.of}", None, None, self.note, [*rows, ("values tried", str(len(self.tried)), "")]
-        )
-
-    @explains_missing
-    def plot(self, *, style: Literal["screen", "paper", "slides"] = "screen") -> "Figures":
-        """The figure of the measurements over the quantity, with both limits; a notebook shows it.
-
-        `style` sets its size and fonts. Raises `UsageError` for an unknown style.
-        """
-        from orchestration.experiments.limits.figure import limit_figure
-        from orchestration.simulation.figures.gallery import Figures
-        from orchestration.simulation.figures.style import style_named
-
-        chosen = style_named(style)
-        with chosen.applied():
-            return Figures({"limit": limit_figure(self, chosen)}, chosen)
-
-    @explains_missing
-    def to_pandas(self) -> "pd.DataFrame":
-        """A row for each evaluated value, in rising order: outcome, and numbers of seeds run and good."""
-        import pandas as pd
-
-        return pd.DataFrame([vars(one) for one in self.tried])
 
 
 @explains_missing

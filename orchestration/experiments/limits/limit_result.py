@@ -1,8 +1,16 @@
 """The result of the search for a limit, with all evaluated values."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
 
 from orchestration.experiments.limits.evaluation import Evaluation
+from orchestration.foundation.basics.extras import explains_missing
+from orchestration.simulation.results import html
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from orchestration.simulation.figures.gallery import Figures
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,7 +25,7 @@ class ContinuousRun:
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class LimitResult:
+class Limit:
     """The last good value of a quantity and the evidence for it, in the quantity's unit."""
 
     of: str
@@ -70,3 +78,40 @@ class LimitResult:
     """All evaluated values, in rising order."""
     note: str
     """A summary in one sentence."""
+
+    def __repr__(self) -> str:
+        return f"<Limit of {self.of}: {self.note}>"
+
+    def _repr_html_(self) -> str:
+        """The form that notebooks show."""
+        limits = {
+            "last value that is good": self.large_signal_limit,
+            "local limit, of small errors at rest": self.local_limit,
+            "mean-square limit": self.mean_square_limit,
+            "refuted from": self.refuted_limit,
+        }
+        rows = [(name, html.number(value), "" if value is None else self.unit or "") for name, value in limits.items()]
+        return html.card(
+            f"The limit of {self.of}", None, None, self.note, [*rows, ("values tried", str(len(self.tried)), "")]
+        )
+
+    @explains_missing
+    def plot(self, *, style: Literal["screen", "paper", "slides"] = "screen") -> "Figures":
+        """The figure of the measurements over the quantity, with both limits; a notebook shows it.
+
+        `style` sets its size and fonts. Raises `UsageError` for an unknown style.
+        """
+        from orchestration.experiments.limits.figure import limit_figure
+        from orchestration.simulation.figures.gallery import Figures
+        from orchestration.simulation.figures.style import style_named
+
+        chosen = style_named(style)
+        with chosen.applied():
+            return Figures({"limit": limit_figure(self, chosen)}, chosen)
+
+    @explains_missing
+    def to_pandas(self) -> "pd.DataFrame":
+        """A row for each evaluated value, in rising order: outcome, and numbers of seeds run and good."""
+        import pandas as pd
+
+        return pd.DataFrame([vars(one) for one in self.tried])

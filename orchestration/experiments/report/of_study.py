@@ -19,7 +19,7 @@ from orchestration.experiments.report.tracks import Tracks
 from orchestration.experiments.studies.axis_labels import quantity_of
 from orchestration.experiments.studies.default_metric import default_metric
 from orchestration.experiments.studies.store import open_for_reading
-from orchestration.experiments.studies.store_columns import FIXED, TEXTS, UNITS
+from orchestration.experiments.studies.store_columns import TEXTS, UNITS
 from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.sweep import AGREEMENT, expect_current
 from orchestration.foundation.basics.errors import UsageError
@@ -27,6 +27,7 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.results import display_names as labels
 from orchestration.simulation.results.column_info import column_infos
 from orchestration.simulation.results.criterion import judged_objective
+from orchestration.simulation.results.objectives import FIXED
 from orchestration.simulation.results.quantities import quantity
 from orchestration.simulation.workers.batching import LaneAgreement
 from orchestration.systems.system.model import DIVERGED, TERMINATED

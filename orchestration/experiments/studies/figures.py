@@ -1,4 +1,4 @@
-"""Figures of a study: a metric over one or two axes, the spectral radius, sensitivity bars."""
+"""Figures of a study: a metric over one or two axes, sensitivity bars."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -21,7 +21,6 @@ from orchestration.simulation.figures.style import SCREEN, Style
 from orchestration.simulation.figures.style import save as write
 from orchestration.simulation.figures.ticks import plain
 from orchestration.simulation.results import display_names as labels
-from orchestration.simulation.results.quantities import setting
 from orchestration.systems.system.model import DIVERGED, TERMINATED
 
 if TYPE_CHECKING:
@@ -128,32 +127,6 @@ def scatter(
         f"{len(table)} runs: {', '.join(counts)}{by_horizon(table)}\n"
         f"share that is {words[0]} {(~not_good).mean():.0%}, 95 % interval {low:.0%} to {high:.0%}",
     )
-    return figure
-
-
-def spectral_radius(
-    of: str,
-    values: Floats,
-    radii: Floats,
-    *,
-    local_limit: float | None,
-    large_signal_limit: float | None,
-    style: Style = SCREEN,
-) -> Figure:
-    """The spectral radius of the sampled loop about hover against the period or delay [s], with both limits."""
-    figure = style.figure(30.0)
-    panel = figure.add_subplot()
-    across = setting(of, values)
-    panel.plot(across.of(values), radii, color=BLUE)
-    panel.axhline(1.0, color=GREY, linewidth=0.8)
-    for limit, color, name in ((local_limit, BLUE, "local"), (large_signal_limit, ORANGE, "large-signal")):
-        if limit is not None:
-            at = across.factor * limit
-            panel.axvline(at, color=color, linestyle="--", label=f"{name} limit, {across.text_of(limit, 4)}")
-    panel.set(xlabel=across.title, ylabel="spectral radius about hover [1]")
-    panel.margins(x=0)
-    if panel.get_legend_handles_labels()[0]:
-        panel.legend()
     return figure
 
 

@@ -64,7 +64,7 @@ def _texts_shared(
     """The JSON of the parts that most runs of a study share."""
     parts: dict[str, Any] = {
         "connections": [_content(x, hashes) for x in connections],
-        "sources": [[name, _source_of(source, hashes)] for name, source in sources.items()],
+        "sources": [[name, _content(source, hashes)] for name, source in sources.items()],
         **{
             key: dict(value)
             for key, value in (("objectives", objectives), ("streams", streams), ("versions", software))
@@ -101,10 +101,6 @@ def _shared_of(part: str, shared: Mapping[str, Any], hashes: Mapping[str, str]) 
     ]
 
 
-def _source_of(source: Source, hashes: Mapping[str, str]) -> dict[str, Any]:
-    return _content(source, hashes)
-
-
 def _values_of(of: Any) -> dict[str, Any]:
     return {field.name: getattr(of, field.name) for field in dataclasses.fields(of)}
 
@@ -130,7 +126,7 @@ def study_parts(study: Study) -> dict[str, str]:
     for x in system.connections:
         parts |= _parts(f"connections.{x.name}", x, tables)
     for name, source in system.sources.items():
-        parts |= {f"sources.{name}.{key}": value for key, value in _source_of(source, tables).items()}
+        parts |= {f"sources.{name}.{key}": value for key, value in _content(source, tables).items()}
     for table, part in (("computers", "tasks"), ("networks", "messages")):
         for name, shared in getattr(system, table).items():
             parts |= _parts(f"{table}.{name}", shared, tables, without=(part,))

@@ -1,6 +1,6 @@
 """Global sensitivity of a metric to the sampled axes of a study, with SALib."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -78,13 +78,8 @@ def write(indices: list[Index], path: Path) -> Path:
     """Write the indices as CSV."""
     import pandas as pd
 
-    pd.DataFrame([vars_of(index) for index in indices]).to_csv(path, index=False)
+    pd.DataFrame([asdict(index) for index in indices]).to_csv(path, index=False)
     return path
-
-
-def vars_of(index: Index) -> dict[str, Any]:
-    """The columns of one index."""
-    return {"axis": index.axis, "kind": index.kind, "value": index.value, "confidence": index.confidence}
 
 
 def _indices(axes: list[str], kind: str, values: Any, confidence: Any) -> list[Index]:

@@ -77,32 +77,27 @@ class Store:
 
     def missing(self, *, failed_too: bool = False) -> dict[int, str]:
         """Indices and keys of the design whose runs have no row, or a failed one; of equal runs the first."""
-        self.expect_whole()
-        with store_errors(self.path):
-            rows = self._connection.execute(
-                "SELECT min(design_index), key FROM design LEFT JOIN runs USING (key) "
-                "WHERE status IS NULL OR (? AND status = 'failed') GROUP BY key ORDER BY 1",
-                (failed_too,),
-            )
-            return dict(rows)
+        return self._pairs(
+            "SELECT min(design_index), key FROM design LEFT JOIN runs USING (key) "
+            "WHERE status IS NULL OR (? AND status = 'failed') GROUP BY key ORDER BY 1",
+            failed_too,
+        )
 
     def missing_counts(self) -> dict[str, int]:
         """The keys of the runs of the design that have no row, each with its number of points."""
-        self.expect_whole()
-        with store_errors(self.path):
-            return dict(
-                self._connection.execute(
-                    "SELECT key, count(*) FROM design LEFT JOIN runs USING (key) WHERE status IS NULL GROUP BY key"
-                )
-            )
+        return self._pairs(
+            "SELECT key, count(*) FROM design LEFT JOIN runs USING (key) WHERE status IS NULL GROUP BY key"
+        )
 
     def counts(self) -> dict[str, int]:
         """The number of points of the design by the status of their rows."""
+        return self._pairs("SELECT status, count(*) FROM design JOIN runs USING (key) GROUP BY status")
+
+    def _pairs(self, query: str, *values: bool) -> dict[Any, Any]:
+        """The two columns of a query over a store that is whole, the second by the first."""
         self.expect_whole()
         with store_errors(self.path):
-            return dict(
-                self._connection.execute("SELECT status, count(*) FROM design JOIN runs USING (key) GROUP BY status")
-            )
+            return dict(self._connection.execute(query, values))
 
     def add(self, rows: Iterable[Row]) -> None:
         """Write rows in one transaction, replacing rows of the same runs."""

@@ -3,9 +3,8 @@
 from collections.abc import Iterable
 
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.simulation.results.objectives import FIXED
 
-FIXED = ("outcome", "good", "horizon", "diverged", "divergence_time", "steps")
-"""Metrics of every system, besides its objectives; the wall-clock time of a run is its duration"""
 TEXTS = ("outcome",)
 """Metrics that are texts; all others are numbers"""
 MAX_OBJECTIVES = 1000

@@ -15,8 +15,8 @@ from matplotlib.patches import Rectangle
 from orchestration.components.fmi.foreign import LostError
 from orchestration.experiments.limits import figure as limit_figure
 from orchestration.experiments.limits.evaluation import Evaluation
-from orchestration.experiments.limits.figure import draw_limit
-from orchestration.experiments.limits.limit import Limit
+from orchestration.experiments.limits.figure import draw_limit, spectral_radius
+from orchestration.experiments.limits.limit_result import Limit
 from orchestration.experiments.report.of_study import axes_of, read
 from orchestration.experiments.studies import figures
 from orchestration.experiments.studies.axes import Axis
@@ -282,7 +282,7 @@ def test_the_spectral_radius_is_drawn_with_the_known_limits(
     tmp_path: Path, local: float | None, large: float | None, marks: int
 ) -> None:
     periods = np.linspace(0.001, 0.1, 50)
-    figure = figures.spectral_radius("period", periods, 10.0 * periods, local_limit=local, large_signal_limit=large)
+    figure = spectral_radius(limit("period", local_limit=local, large_signal_limit=large), periods, 10.0 * periods)
     curve, unit, *limits = lines_of(figure)
     assert curve.get_xdata() == pytest.approx(periods * 1e3)
     assert unit.get_ydata() == [1.0, 1.0]
