@@ -66,16 +66,17 @@ class CellSummary:
     controller: str
     value: Value
     count: int
-    """of runs"""
+    """Number of runs"""
     survives: Share
     """have not diverged by the horizon"""
     settles: Share
     """stay within 5 cm throughout the last third"""
     diverged: int
     diverged_late: int
-    """of these, in the second half of the horizon: if there are any, the share still depends on the horizon"""
+    """Number of these in the second half of the horizon: if there are any, the share still depends on the horizon"""
     medians: dict[str, Median]
-    """over the runs that survive, by objective; `settling_time` over those that settle, `residual` the final error"""
+    """Medians over the runs that survive, by objective; `settling_time` over those that settle, `residual` the final
+    error"""
 
     def row(self, axis: str) -> dict[str, Any]:
         """The row of the table, also used in JSON."""

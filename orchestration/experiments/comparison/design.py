@@ -30,7 +30,7 @@ class Controller:
     tuned: Mapping[Key, Values] = field(default_factory=dict)
     """further values by vehicle and value of the axis"""
     bandwidth: float | None = None
-    """of its attitude loop [rad/s]; None: that of the FMU about hover"""
+    """Bandwidth of its attitude loop [rad/s]; None: that of the FMU about hover"""
 
 
 @record()

@@ -45,7 +45,7 @@ class WithinTorque:
     controller: str
     value: Value
     torque: float
-    """[N.m]"""
+    """Torque [N.m]"""
     share: float
     low: float
     high: float

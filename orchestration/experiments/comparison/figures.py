@@ -25,7 +25,7 @@ from orchestration.simulation.figures.ticks import plain
 from orchestration.simulation.results.quantities import Quantity
 
 BINS = 8
-"""of the size of the initial error"""
+"""Number of intervals of the size of the initial error"""
 
 BySize: TypeAlias = tuple[Sequence[Any], Floats]
 """Values of an axis, and the share of the initial conditions, shape (`BINS` of the size of the error, values)"""

@@ -25,10 +25,10 @@ class Point:
     value: Value
     controller: str
     starts: int
-    """that all of these controllers survive"""
+    """Number of initial conditions that all of these controllers survive"""
     error: Median
     effort: Median
-    """over those starts"""
+    """Effort over those initial conditions"""
     on_front: bool
     """whether no other is better in one and no worse in the other"""
 

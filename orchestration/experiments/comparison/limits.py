@@ -35,7 +35,7 @@ class GridLimit:
     high: float | None
     """interval of two order statistics, at 95 % or more, extended to the next value; None: beyond the last value"""
     bandwidth: float | None
-    """of the attitude loop at that value [rad/s]"""
+    """Bandwidth of the attitude loop at that value [rad/s]"""
 
 
 def limits(comparison: Comparison, table: "pd.DataFrame", bandwidths: Bandwidths) -> list[GridLimit]:

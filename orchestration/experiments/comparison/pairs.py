@@ -32,7 +32,7 @@ class Pair:
     only_other: int
     neither: int
     settles: int
-    """among those that both survive, the number that only it settles minus the number that only the other settles"""
+    """Number that only it settles minus the number that only the other settles, among those that both survive"""
     error: Median
     effort: Median
     """medians of the ratio of its value to that of the first where both survive; the intervals hold for all pairs of

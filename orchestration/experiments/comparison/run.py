@@ -46,7 +46,7 @@ class Compared:
     table: "pd.DataFrame"
     """A row for each run."""
     bandwidths: Bandwidths
-    """Of the attitude loop [rad/s], by controller, vehicle and value of the axis."""
+    """Bandwidths of the attitude loop [rad/s], by controller, vehicle and value of the axis."""
     outcome: Outcome
     """Cells, limits, pairs and fronts, with their intervals."""
     written: list[Path]

@@ -35,4 +35,4 @@ def diverged_late(table: "pd.DataFrame", horizon: float) -> "pd.Series":
 
 
 FATES: Mapping[str, "Fate"] = {"survive": survived, "settle": settled}
-"""By the name in tables and files"""
+"""Fates by the name in tables and files"""

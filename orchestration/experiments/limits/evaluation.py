@@ -12,7 +12,7 @@ from orchestration.simulation.results.criterion import judged_objective, unmet
 from orchestration.simulation.workers.executors import RunEvaluator
 
 RELIABILITY = 0.9
-"""For random quantities: the share of good seeds to which the stated confidence refers"""
+"""Share of good seeds to which the stated confidence refers, for random quantities"""
 
 
 def is_good(metrics: dict[str, Any]) -> bool:
@@ -26,9 +26,9 @@ class Evaluation:
 
     value: float
     outcome: str
-    """of a good run if all were good, else of the first seed that was not"""
+    """Outcome of a good run if all were good, else of the first seed that was not"""
     divergence_time: float | None
-    """of that seed [s]"""
+    """Divergence time of the run with that seed [s]"""
     flew: int
     """number of good runs"""
     runs: int

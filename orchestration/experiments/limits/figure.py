@@ -24,7 +24,7 @@ from orchestration.systems.system.request import Request, system_of
 from orchestration.theory.stability.known_loops import LOOPS, KnownLoop
 
 DIGITS = 4
-"""of values in text"""
+"""Digits of values in text"""
 
 
 def limit_figure(result: Limit, style: Style = SCREEN) -> Figure:

@@ -27,13 +27,13 @@ from orchestration.theory.stability.known_loops import LocalLimit
 from orchestration.theory.stability.local_limit import local_limits
 
 GAP = 0.1
-"""of the local limit: a larger difference to the large-signal limit is noted"""
+"""Share of the local limit: a larger difference to the large-signal limit is noted"""
 PARTS_OF_STEP = 5
 """parts of the step of the scan within the bracket"""
 BEYOND = 4
 """values of the scan that are evaluated beyond the first that fails"""
 CONTINUOUS = 1e-4
-"""[s], the period of the flight that approximates continuous time"""
+"""Period of the flight that approximates continuous time [s]"""
 
 
 @explains_missing

@@ -18,10 +18,10 @@ class ContinuousRun:
     """The same flight near continuous time, without digital effects, to show what is not due to sampling."""
 
     period: float
-    """[s]"""
+    """Period [s]"""
     outcome: str
     settling_time: float | None
-    """[s]"""
+    """Settling time [s]"""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -55,8 +55,8 @@ class Limit:
     """The last value that is good from the scenario's own initial state; None: no value in the range failed, or the
     first did."""
     refuted_limit: float | None
-    """For random quantities, the lowest evaluated value at which so many seeds fail that `RELIABILITY` is refuted at
-    the confidence; None: nothing is random, or there is none in the range."""
+    """The lowest evaluated value of a random quantity at which so many seeds fail that `RELIABILITY` is refuted at the
+    confidence; None: nothing is random, or there is none in the range."""
     follows: str = ""
     """The references and the components that follow them; empty if there are none."""
     horizon: float

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 Kind = Literal["float32", "int16"]
 STEPS = 2**15 - 4
-"""of an int16 to each side of the middle; -2**15 is reserved for nan, a few for rounding"""
+"""Steps of an int16 to each side of the middle; -2**15 is reserved for nan, a few for rounding"""
 NOTHING = -(2**15)
 """The int16 of nan; in a logarithmic array, of zero"""
 

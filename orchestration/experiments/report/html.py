@@ -14,7 +14,7 @@ SCRIPTS = (
     "data.js", "words.js", "theme.js", "scene.js", "peaks.js", "timeplots.js", "map.js", "shares.js", "run.js",
     "tables.js", "page.js",
 )  # fmt: skip
-"""In the order of loading; each depends only on those before it"""
+"""Scripts in the order of loading; each depends only on those before it"""
 FIGURES = {
     "CYCLE": palette.CYCLE,
     "NOT_GOOD": {"bad": palette.NOT_GOOD, "diverged": palette.DIVERGED},
@@ -23,7 +23,7 @@ FIGURES = {
     },
     "PEAKS": {name: getattr(shades, name) for name in ("OUTSIDE", "CLIPPED")},
 }
-"""What the page shows as figures do: colours, and what ranges leave out"""
+"""Constants that the page shares with figures: colours, and what ranges leave out"""
 _PAGE = resources.files("orchestration.experiments.report") / "page"
 _PLACE = re.compile(r"\{\{(\w+)\}\}")
 

@@ -12,7 +12,7 @@ from orchestration.systems.system.connection import component_of
 from orchestration.systems.system.model import System
 
 About = Mapping[str, ColumnInfo]
-"""By column"""
+"""Descriptions by column"""
 
 
 def layout_of(system: System | None, columns: Collection[str], about: About) -> ReportLayout:

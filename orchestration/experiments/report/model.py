@@ -58,7 +58,7 @@ class ReportLayout:
     """The panels and the scene of tracks with the same columns."""
 
     columns: tuple[str, ...]
-    """of a track"""
+    """Columns of a track"""
     panels: tuple[Panel, ...]
     scene: Scene | None
 
@@ -70,7 +70,7 @@ class ReportTrack:
     layout: int
     time: int
     columns: tuple[int, ...]
-    """in the order of those of the layout"""
+    """Columns in the order of those of the layout"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,11 +80,11 @@ class Bars:
     rows: tuple[str, ...]
     """tasks and messages"""
     row: int
-    """of each piece"""
+    """Row of each piece"""
     begin: int
-    """[s]"""
+    """Begin [s]"""
     end: int
-    """[s]"""
+    """End [s]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,17 +93,17 @@ class ReportRun:
 
     name: str
     index: int | None = None
-    """in the design of a study"""
+    """Index in the design of a study"""
     settings: Mapping[str, Setting] = field(default_factory=dict)
     metrics: Mapping[str, float | int | bool | str | None] = field(default_factory=dict)
-    """of a run that is not in a table"""
+    """Metrics of a run that is not in a table"""
     message: str | None = None
-    """what diverged"""
+    """Text of what diverged"""
     note: str | None = None
-    """on its track"""
+    """Note on its track"""
     track: ReportTrack | None = None
     bars: Bars | None = None
-    """of a system with computers or networks"""
+    """Bars of a system with computers or networks"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,14 +124,14 @@ class ReportTable:
     """The runs of a study."""
 
     count: int
-    """of rows here"""
+    """Number of rows here"""
     total: int
-    """of runs in the store"""
+    """Number of runs in the store"""
     columns: tuple[Column, ...]
     tracks: Mapping[str, int]
-    """by row: the index of its run in the report"""
+    """Index of its run in the report, by row"""
     messages: Mapping[str, str]
-    """by row: the reason of a failure or divergence"""
+    """Reason of a failure or divergence, by row"""
     is_grid: bool
     """whether every axis lists its values"""
 
@@ -142,7 +142,7 @@ class ReportShare:
 
     label: str
     value: Number
-    """of the axis, or the middle of its interval"""
+    """Value of the axis, or the middle of its interval"""
     good: int
     runs: int
     low: Number
@@ -173,7 +173,7 @@ class ReportCell:
     settles: ReportShare
     diverged: int
     medians: Mapping[str, tuple[Number, Number, Number]]
-    """by metric: value, and the ends of its interval at 95 %"""
+    """Median and the ends of its interval at 95 %, by metric"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -201,9 +201,9 @@ class Report:
     runs: tuple[ReportRun, ...]
     blobs: Sequence[Blob]
     units: Mapping[str, str] = field(default_factory=dict)
-    """of metrics"""
+    """Units of metrics"""
     labels: Mapping[str, str] = field(default_factory=dict)
-    """of metrics"""
+    """Labels of metrics"""
     table: ReportTable | None = None
     metric: str | None = None
     """the one of the table that is drawn first"""
@@ -215,7 +215,7 @@ class Report:
     warnings: tuple[str, ...] = ()
     provenance: tuple[tuple[str, str], ...] = ()
     command: str = ""
-    """that makes this file"""
+    """Command that makes this file"""
 
 
 def as_json(report: Report) -> str:

@@ -21,10 +21,10 @@ from orchestration.systems.system.model import System
 BYTES = 9_000_000
 """Characters that the signals of all runs may take"""
 MAX_ROWS, MIN_ROWS = 6000, 200
-"""of a run"""
+"""Most and fewest rows of a run"""
 MAX_RUNS = 200
 MAX_PIECES = 20_000
-"""of the timeline of a computer or a network"""
+"""Most pieces of the timeline of a computer or a network"""
 SETTLING = "settling_time"
 """The objective that is the time at which a run settles, in systems that have it"""
 _CODED = 4.0 * 4.0 / 3.0

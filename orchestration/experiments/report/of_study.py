@@ -70,7 +70,7 @@ class Embedded:
 
     runs: Sequence[ReportRun]
     places: Mapping[int, int]
-    """in `runs`, by index in the design"""
+    """Places in `runs`, by index in the design"""
     contents: Sequence[str]
 
 

@@ -22,7 +22,7 @@ from orchestration.systems.system.references import connect_references
 BATCH = 64
 """Runs at once, which limits the memory for their signals"""
 MAX_COLUMNS = 24
-"""of a system other than a quadrotor"""
+"""Most columns of a system other than a quadrotor"""
 Progress = Callable[[float], None]
 """Receives the share of the reruns that is done"""
 

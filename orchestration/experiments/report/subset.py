@@ -10,7 +10,7 @@ MAX_SINGLY = 60
 BYTES = 8_000_000
 """Limit on the characters of all signals"""
 MAX_POINTS, MIN_POINTS = 400, 40
-"""of a run"""
+"""Most and fewest points of a run"""
 _CODED = 2.0 * 4.0 / 3.0
 """Characters of a number"""
 

@@ -17,9 +17,9 @@ from orchestration.simulation.results import display_names as labels
 from orchestration.simulation.results.quantities import Quantity
 
 MAX_ROWS = 50_000
-"""of a table; a larger study is thinned evenly"""
+"""Most rows of a table; a larger study is thinned evenly"""
 MAX_VALUES = 40
-"""of an axis with a share for each value; other axes are divided into parts"""
+"""Most values of an axis with a share for each value; other axes are divided into parts"""
 PARTS = 8
 OUTCOME = "outcome"
 
@@ -31,9 +31,9 @@ class ColumnAxis:
     """An axis as the page draws it."""
 
     name: str
-    """of the column"""
+    """Name of the column"""
     quantity: Quantity
-    """with the unit in which its values are displayed"""
+    """Quantity with the unit in which its values are displayed"""
     logarithmic: bool = False
 
 

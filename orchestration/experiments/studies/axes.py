@@ -33,8 +33,8 @@ class Axis:
     name: str
     """The name of its column in the table of runs; default target."""
     targets: tuple[str, ...] = _BY_NAME
-    """What it sets: paths of the system, for the quadrotor also `timing.KEY`, `controller.NAME`, `plant.NAME`; `seed`,
-    `stop_time`."""
+    """The paths that it sets: those of the system, for the quadrotor also `timing.KEY`, `controller.NAME`,
+    `plant.NAME`; `seed`, `stop_time`."""
     multiplies: bool = False
     """Whether its values are factors on the targets' values in the base, instead of setting them."""
     values: tuple[Value, ...] | None = None

@@ -7,7 +7,7 @@ import numpy as np
 from orchestration.foundation.basics.simulator import Floats
 
 VARIES = 0.01
-"""of the largest value: an objective that varies less over a study is not informative"""
+"""Share of the largest value: an objective that varies less over a study is not informative"""
 
 
 def default_metric(objectives: Iterable[str], values: Callable[[str], Floats], preferred: str | None) -> str:

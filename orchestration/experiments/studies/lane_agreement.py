@@ -22,7 +22,7 @@ from orchestration.systems.system.files import Files
 from orchestration.systems.system.model import System
 
 BEGINNING, SHARE = 1.0, 0.05
-"""[s] simulated by FMUs in Python, and least share of a run: a whole run costs as much as hundreds in lanes"""
+"""Time simulated by FMUs in Python [s], and least share of a run: a whole run costs as much as hundreds in lanes"""
 _BEGINNING, _NUDGED, _PYTHON = "begun ", "nudged ", "in Python "
 """Prefixes of the keys of variants of a run"""
 

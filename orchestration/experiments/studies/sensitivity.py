@@ -12,9 +12,9 @@ from orchestration.foundation.basics.simulator import Floats
 SensitivityMethod = Literal["morris", "saltelli"]
 METHODS: tuple[SensitivityMethod, ...] = ("morris", "saltelli")
 LEVELS = 4
-"""of the Morris design"""
+"""Levels of the Morris design"""
 RESAMPLING_SEED = 1
-"""of the confidence intervals; SALib treats 0 as no seed"""
+"""Seed of the confidence intervals; SALib treats 0 as no seed"""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -58,9 +58,9 @@ class Store:
         self._connection = connection
         self._is_whole = False
         self.metrics = metrics_with(objectives)
-        """of a row"""
+        """Metrics of a row"""
         self.columns = ("design_index", *RUN, *self.metrics)
-        """of the table of runs, besides the axes"""
+        """Columns of the table of runs, besides the axes"""
 
     def about(self) -> dict[str, str]:
         """The entries that describe the study, by name."""

@@ -102,12 +102,12 @@ class SearchResult:
     """The result of one search."""
 
     period: float
-    """[s]"""
+    """Period [s]"""
     seed: int
     values: dict[str, float]
-    """of each target"""
+    """Values of each target"""
     cost: float
-    """of these values, as minimised"""
+    """Cost of these values, as minimised"""
     evaluations: int
 
     @property

@@ -16,15 +16,15 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.request import ControlLoop
 
 PERIOD = 1e-3
-"""[s] between samples while it is measured; a redesign for longer ones has other gains by design"""
+"""Time between samples while it is measured [s]; a redesign for longer ones has other gains by design"""
 RANGE, FIRST = (0.1, 1000.0), 20.0
-"""[rad/s] of the search, and its initial value"""
+"""Range of the search, and its initial value [rad/s]"""
 ACCURACY = 1e-3
-"""of the gain"""
+"""Accuracy of the gain"""
 AMPLITUDE = 1e-4
-"""of roll [rad]"""
+"""Amplitude of roll [rad]"""
 CYCLES = 6
-"""of the oscillation; the second half is evaluated"""
+"""Cycles of the oscillation; the second half is evaluated"""
 _ROLL, _SCALAR, _RATE = (
     wiring.MEASUREMENT.index(name) for name in ("quaternion.x", "quaternion.w", "angular_velocity.x")
 )

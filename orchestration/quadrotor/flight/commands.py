@@ -18,7 +18,7 @@ NAMES = dict(zip(COMMAND, ("thrust", "torque x", "torque y", "torque z"), strict
 UNITS = dict(zip(COMMAND, ("N", "N.m", "N.m", "N.m"), strict=True))
 COLUMNS = tuple(f"plant.{name}" for name in COMMAND)
 MAX_MARKS = 150
-"""of one kind that can be told apart in a window"""
+"""Most marks of one kind that can be told apart in a window"""
 AT_LIMIT = "a limit of the plant is active"
 
 

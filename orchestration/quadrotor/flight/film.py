@@ -18,12 +18,12 @@ from orchestration.simulation.figures.palette import BLACK, GREEN, ORANGE
 from orchestration.simulation.figures.style import Style
 
 RATE = 20
-"""[pictures/s]"""
+"""Pictures per second of the flight, if it is short [1/s]"""
 MAX_PICTURES = 240
 """pictures: a longer flight is shown faster"""
 DPI = 100.0
 TRAIL = 2.0
-"""[s] of the path that is drawn thick"""
+"""Part of the path that is drawn thick [s]"""
 SIZE = 0.06
 """Half the length of an arm as a share of the longest side of the view: much larger than in reality"""
 

@@ -19,9 +19,9 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.references import AT_REST
 
 STEP = 1e-6
-"""of each coordinate in a difference; a thousandth of a boundary layer that is smaller than 1 mm"""
+"""Step of each coordinate in a difference; a thousandth of a boundary layer that is smaller than 1 mm"""
 COORDINATES = wiring.POSITION + wiring.VELOCITY + wiring.QUATERNION[:3] + wiring.ANGULAR_VELOCITY
-"""of the vehicle; the attitude by its vector part"""
+"""Coordinates of the vehicle; the attitude by its vector part"""
 SCALAR_PART = wiring.QUATERNION[3]
 
 

@@ -16,7 +16,7 @@ class Margin:
 
     period: float
     delay: float
-    """of every command, the smallest if it varies"""
+    """Delay of every command, the smallest if it varies"""
     delay_limit: float | None
     """the largest constant delay, exact; None: every delay of the range is stable, or none"""
     certain_jitter: float

@@ -19,13 +19,13 @@ from orchestration.simulation.runs.prepared import set_parameters
 from orchestration.simulation.runs.resolved import resolve
 
 INSTANT = 1e-12
-"""[s]; shorter spans count as zero"""
+"""Span that counts as zero [s], as do shorter ones"""
 _MEASURED = [wiring.MEASUREMENT.index(name) for name in COORDINATES]
 _COMMANDS = len(wiring.COMMAND)
 _UNITS = np.eye(_COMMANDS)
 _BOTH_WAYS = (STEP, -STEP)
 _NO_EFFECT = 1e-9
-"""of an actuator's state on the vehicle's, per unit: the rounding of the differences"""
+"""Effect of an actuator's state on the vehicle's, per unit, that counts as none: the rounding of the differences"""
 _BENT = 1e-3
 """relative difference of the one-sided derivatives about hover that is tolerated"""
 

@@ -15,9 +15,9 @@ from orchestration.simulation.figures.style import Style
 from orchestration.simulation.figures.ticks import plain
 
 SEGMENTS = 8
-"""of the run, before they overlap by half"""
+"""Segments of the run, before they overlap by half"""
 ROUNDING = 1e-18
-"""of the largest density: below it is rounding, not signal"""
+"""Share of the largest density below which there is rounding, not signal"""
 MIN_SEGMENT = 64
 """values in a segment"""
 

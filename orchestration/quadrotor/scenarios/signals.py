@@ -11,7 +11,7 @@ from orchestration.systems.system.requirements import is_finite, require
 
 Between = Literal["linear", "previous"]
 DRAG = 0.1
-"""[N·s/m] by which a wind becomes a force by default: an assumption, not a measured figure"""
+"""Factor by which a wind becomes a force by default [N·s/m]: an assumption, not a measured figure"""
 
 
 @record("reference.")

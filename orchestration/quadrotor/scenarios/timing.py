@@ -48,7 +48,7 @@ class Timing:
     hold: Hold = "zero"
     """The command of the plant between arrivals: the last one (zero), or the line through the last two (first)."""
     clock: Clock = "master"
-    """What decides when the controller samples: the master, or the FMU by its parameters sample_period and
+    """The clock by which the controller samples: that of the master, or of the FMU, by its parameters sample_period and
     sample_offset."""
     delay: Varying = 0.0
     """The time d from a sample to the application of its command [s], or its distribution; it may exceed the period."""

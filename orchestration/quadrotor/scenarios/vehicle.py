@@ -13,7 +13,7 @@ SHIPPED = Path(__file__).with_name("vehicles")
 """The folder of the vehicles that have names"""
 ENDING = ".toml"
 TABLES = ("plant", "controller", "controllers")
-"""of a vehicle file"""
+"""Tables of a vehicle file"""
 
 
 def names() -> list[str]:

@@ -18,7 +18,7 @@ from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.system.model import System
 
 _AT_ONCE = 1_000_000_000
-"""[ns], the time advanced at once over unneeded events"""
+"""Time advanced at once over unneeded events [ns]"""
 
 
 class _OnComputers:

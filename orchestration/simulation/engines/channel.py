@@ -38,7 +38,7 @@ class Channel:
         self._rounds = len(self._rounded) > 0
         self._noise: Floats = np.zeros(len(connection.start))
         self.stream = noise
-        """of the noise"""
+        """Stream of the noise"""
         self._scale, self._offset = connection.scale, connection.offset
         self._plain = not connection.converts
         self._extrapolates = connection.hold == "first"

@@ -30,7 +30,7 @@ from orchestration.simulation.engines.wires import Board
 from orchestration.systems.schedule.schedule import Schedule
 
 SLICE = 0.05
-"""[s] after which C returns, about"""
+"""Time after which C returns, about [s]"""
 _Look, _Stopped, _Collect = (dict(ONE_LANE.Loop._fields_)[name] for name in ("look", "stopped", "collect"))
 _EXACT = 2**53
 """Up to here a float represents every integer"""

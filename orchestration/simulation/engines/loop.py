@@ -13,7 +13,7 @@ from orchestration.simulation.engines import condition
 from orchestration.simulation.engines.structures import HEADER, declared, expect_same_sizes, shared
 
 INSTANTS = Path(__file__).with_name("instants.h")
-"""What happens at an instant, for runs of FMUs and of kernels in SIMD lanes"""
+"""C of what happens at an instant, for runs of FMUs and of kernels in SIMD lanes"""
 FILES = (Path(__file__).with_name("loop.c"), condition.HEADER, INSTANTS, HEADER, FOLDER / "lanes.h")
 """Its sources, beside the generated operators.h"""
 Operation: Any = declared(condition.HEADER.read_text(encoding="utf-8"))["Operation"]

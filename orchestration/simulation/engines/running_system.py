@@ -44,10 +44,10 @@ class _RunningComponent:
     outputs: Floats
     """the connected ones, in the row"""
     names: tuple[str, ...]
-    """of those"""
+    """Names of those"""
     feeds: list[Feed]
     held: list[Channel]
-    """into it, with a first-order hold"""
+    """Channels into it with a first-order hold"""
 
     def expect_finite(self, t: float) -> None:
         """Raise `Diverged` for an output that is not finite, before it is passed on."""
@@ -99,7 +99,7 @@ class RunningSystem:
         self.board = board = wires.board
         self.sources, self.feeds = list(sources), list(feeds)
         self.columns = (*board.columns, *(signal for signals, _ in sources for signal in signals))
-        """of every row: those of the board, then the signals of the sources"""
+        """Columns of every row: those of the board, then the signals of the sources"""
         self.cursor = Cursor(timetable)
         self.interrupted = interrupted
         self.interrupted_at: int | None = None

@@ -129,7 +129,7 @@ def _elementwise(function: Callable[[float], float]) -> Callable[[Floats], Float
 
 
 EXACT = replace(NUMPY, sin=_elementwise(math.sin), cos=_elementwise(math.cos))
-"""As `NUMPY`, with the mathematical functions of Python: many points at once have the bits of single ones"""
+"""Functions of `NUMPY`, the mathematical ones those of Python: many points at once have the bits of single ones"""
 
 
 class Moving:

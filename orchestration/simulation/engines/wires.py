@@ -58,7 +58,7 @@ class Into:
     """Connections into a component."""
 
     held: tuple[int, ...]
-    """with a first-order hold"""
+    """Connections with a first-order hold"""
     ahead: tuple[int, ...]
     """wires from components that are stepped before it, which carry their new values"""
     behind: tuple[int, ...]

@@ -45,13 +45,14 @@ class CheckedSystem:
     """A system that has been checked against its FMUs."""
 
     system: System
-    """with the objectives whose variables exist, and with each reference connected to the component that follows it"""
+    """System with the objectives whose variables exist, and with each reference connected to the component that follows
+    it"""
     parameters: dict[str, float]
     """the numeric ones of all components, as COMPONENT.NAME"""
     units: dict[str, str]
-    """of the metrics that have one"""
+    """Units of the metrics that have one"""
     follows: str
-    """which component follows which reference, as text; empty where none does"""
+    """Text of which component follows which reference; empty where none does"""
 
 
 def check_against_fmus(system: System, models: Mapping[str, Model]) -> CheckedSystem:

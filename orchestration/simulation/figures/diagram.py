@@ -20,7 +20,7 @@ from orchestration.systems.system.model import System
 MAX_BOXES = 40
 """Boxes in a row that are still legible"""
 PITCH, WIDTH, HEIGHT, LANE = 4.2, 2.6, 1.5, 0.75
-"""Between boxes, of a box, between lanes [inch]"""
+"""Distances between boxes, sizes of a box, distance between lanes [inch]"""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -30,7 +30,7 @@ class DrawnRun:
     """Words for what was run, and how it ended"""
     system: System
     recording: Recording
-    """As many of the rows as a figure can show"""
+    """Recording with as many of the rows as a figure can show"""
     whole: Recording
     """All rows"""
     described: Mapping[str, ColumnInfo]

@@ -29,11 +29,11 @@ from orchestration.systems.computers.results import (
 from orchestration.systems.schedule.resources import timeline_of
 
 PIECES = 160
-"""of the busiest processor or link, as many as can be told apart"""
+"""Pieces of the busiest processor or link, as many as can be told apart"""
 BAR, LATE = 0.62, 0.16
 """Heights in a row of bars for running and for waiting"""
 COLORS = (BLUE, GREEN, ORANGE, PURPLE, SKY, BROWN)
-"""Of tasks and messages; a context switch is grey, a missed deadline or an error red"""
+"""Colours of tasks and messages; a context switch is grey, a missed deadline or an error red"""
 _UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
 
 

@@ -6,18 +6,18 @@ VIOLET, INDIGO, PALE_GREEN = "#5b3f8f", "#5b4a8a", "#8ecf9b"
 UMBER, SAND, CHARCOAL, SILVER = "#6f4f28", "#c9a66b", "#3a3a3a", "#b0b0b0"
 
 CYCLE = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY, BROWN, GREY)
-"""For lines of one kind in turn: neighbours differ in brightness too"""
+"""Colours of lines of one kind in turn: neighbours differ in brightness too"""
 MAX_LINES = len(CYCLE)
-"""In one panel; more get further panels"""
+"""Most lines in one panel; more get further panels"""
 MAX_PANELS = 24
-"""Of signals, at first sight: a page or figure of more takes long and says little"""
+"""Most panels of signals at first sight: a page or figure of more takes long and says little"""
 DASHES = ("-", "--", "-.", ":")
-"""Of overlaid lines, so that they differ in grey print too"""
+"""Dashes of overlaid lines, so that they differ in grey print too"""
 MARKS = ("o", "s", "D", "^", "v", "P", "X", "*")
-"""Of points, likewise"""
+"""Marks of points, likewise"""
 SHADES = "viridis"
-"""For values: perceptually uniform, also in grey"""
+"""Colour map of values: perceptually uniform, also in grey"""
 NOT_GOOD, DIVERGED = "#d9d9d9", "#6e6e6e"
-"""Of outcomes on a map"""
+"""Colours of outcomes on a map"""
 CONTINUOUS, SAMPLED, SOURCE, LINE = "#dcebf5", "#fbe6d0", "#ececec", "#444444"
-"""Of a block diagram: boxes by their kind, and arrows"""
+"""Colours of a block diagram: boxes by their kind, and arrows"""

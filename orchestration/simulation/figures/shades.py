@@ -15,7 +15,7 @@ MIN_RANGE = 0.05
 LOGARITHMIC_RATIO = 50.0
 """ratio of the largest to the smallest value above which colours and axes are logarithmic"""
 OUTSIDE, CLIPPED = 0.015, 3.0
-"""Of lines: largest share of the time that counts as a peak, and smallest ratio of its range to that of the rest"""
+"""Share of the time that counts as a peak of a line, at most, and smallest ratio of its range to that of the rest"""
 
 
 @dataclass(frozen=True, kw_only=True)

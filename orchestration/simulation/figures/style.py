@@ -19,9 +19,9 @@ from orchestration.simulation.figures.names import COLUMNS, FORMATS, WRITTEN
 from orchestration.simulation.figures.palette import CYCLE
 
 INCH = 25.4
-"""[mm]"""
+"""Length of an inch [mm]"""
 POINT = INCH / 72.0
-"""[mm]"""
+"""Length of a point [mm]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,22 +32,22 @@ class Style:
     """
 
     width: float = 203.0
-    """[mm]"""
+    """Width [mm]"""
     height: float | None = None
-    """[mm]; default: as the content needs"""
+    """Height [mm]; default: as the content needs"""
     font: float = 10.0
-    """[pt]"""
+    """Size of the font [pt]"""
     serif: bool = False
     line: float = 1.3
-    """[pt]"""
+    """Width of a line [pt]"""
     has_titles: bool = True
     """false for papers, which have captions instead"""
     dpi: float = 200.0
-    """of PNG"""
+    """Resolution of PNG"""
     colors: int | None = None
     """largest number in a PNG; None: unlimited"""
     formats: tuple[str, ...] = WRITTEN
-    """of the files"""
+    """Formats of the files"""
 
     def __post_init__(self) -> None:
         for ending in self.formats:

@@ -24,9 +24,9 @@ class Drawing:
     """The functions that draw the figures of a kind."""
 
     makers: Mapping[str, Maker]
-    """by the names of figures; they return None if a run has no such figure"""
+    """Makers by the names of figures; they return None if a run has no such figure"""
     columns: Callable[[System, Mapping[str, ColumnInfo]], Collection[str]]
-    """that they read of a run of a system, all of whose columns are described"""
+    """Columns that they read of a run of a system, all of whose columns are described"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,7 +34,7 @@ class View:
     """The figures of one kind of runs."""
 
     names: tuple[str, ...]
-    """in the order in which they are drawn"""
+    """Names in the order in which they are drawn"""
     first: tuple[str, ...]
     """drawn after every run; the others on request"""
     load: Callable[[], Drawing]
@@ -52,7 +52,7 @@ def _of_any_system() -> Drawing:
 
 ANY = "run"
 VIEWS = {ANY: View(names=("signals", "schedule"), first=("signals", "schedule"), load=_of_any_system)}
-"""By kind of request; rooms above register theirs"""
+"""Views by kind of request; rooms above register theirs"""
 
 
 def view_of(kind: str, columns: Collection[str]) -> View:

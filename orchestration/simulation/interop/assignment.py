@@ -23,7 +23,7 @@ class AssignedLoop:
     """The connections of a system, and its compared signals."""
 
     ports: Mapping[str, Ports]
-    """by component, in the order for tools that step one after the other"""
+    """Ports by component, in the order for tools that step one after the other"""
     connections: tuple[tuple[End, End], ...]
     """output to input"""
     states: tuple[str, ...]
@@ -32,7 +32,7 @@ class AssignedLoop:
     """those of sampled components: a step returns the value computed at its start"""
 
     kinds: Mapping[End, Kind]
-    """of every connected variable"""
+    """Kinds of every connected variable"""
 
     @property
     def converted(self) -> tuple[str, ...]:

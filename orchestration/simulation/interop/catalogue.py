@@ -19,7 +19,7 @@ class Tool:
 
     name: str
     packages: tuple[str, ...]
-    """that it needs from pip"""
+    """Packages that it needs from pip"""
     call: str
     """module:function in `orchestration.simulation.interop.tools`"""
     alone: str | None = None

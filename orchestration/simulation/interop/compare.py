@@ -31,7 +31,7 @@ class Agreement:
     versions: dict[str, str]
     trace: Trace
     as_it_comes: dict[str, float]
-    """by signal: largest difference from `quadcosim run` [SI]"""
+    """Largest difference from `quadcosim run` by signal [SI]"""
     same_first_inputs: dict[str, float]
     """the same, with the tool's inputs until the end of the first step in this project's master, too"""
 

@@ -19,7 +19,7 @@ from orchestration.simulation.interop.assignment import Ports
 
 SOURCE = Path(__file__).with_name("recorder.c")
 _KINDS: dict[Kind, int] = {"Real": 0, "Integer": 1, "Enumeration": 1, "Boolean": 2}
-"""as numbered in `recorder.c`"""
+"""Numbers of kinds as in `recorder.c`"""
 _GUID = re.compile(rb"""(\sguid\s*=\s*)("[^"]*"|'[^']*')""")
 
 

@@ -13,7 +13,7 @@ from orchestration.simulation.interop.table import TOLERANCE
 from orchestration.systems.system.connection import component_of
 
 ZERO_DRAWN_AT = 1e-17
-"""at which a difference of zero is drawn"""
+"""Place at which a difference of zero is drawn"""
 
 _KINDS = {
     "position": ("plant.position", "o", BLUE),
@@ -22,7 +22,7 @@ _KINDS = {
     "angular velocity": ("plant.angular_velocity", "D", RED),
     "command": ("controller.", "P", INDIGO),
 }
-"""Of the quadrotor, by name: prefix of the signals, marker, colour; any other system has one by component"""
+"""Kinds of signals of the quadrotor, by name: prefix, marker, colour; any other system has one by component"""
 
 
 def draw(agreements: Sequence[Agreement], folder: Path) -> list[Path]:

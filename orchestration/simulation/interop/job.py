@@ -22,22 +22,22 @@ class Job:
     """A run for a tool."""
 
     fmus: dict[str, Path]
-    """by component, in the order of the loop"""
+    """FMUs by component, in the order of the loop"""
     ssp: Path
     """the same system as an SSP"""
     step: float
     """communication step of all [s]"""
     stop: float
-    """[s]"""
+    """Stop time [s]"""
     parameters: dict[str, dict[str, Parameter]]
-    """by component, as in the SSP"""
+    """Parameters by component, as in the SSP"""
     connections: tuple[tuple[End, End], ...]
     signals: tuple[str, ...]
     """see `assignment.Loop`"""
     recorded: Path
     """a run of this project's master, as .npy: time and signals at the start of each step"""
     folder: Path
-    """for files of the tool"""
+    """Folder for files of the tool"""
 
     @property
     def steps(self) -> int:

@@ -13,9 +13,9 @@ from orchestration.simulation.requests.ssp.export import Export
 
 READERS = tuple(name for name in TOOLS if name.endswith(", SSP"))
 STEPS = 2
-"""that each runs: by then parameters are set and values exchanged"""
+"""Steps that each runs: by then parameters are set and values exchanged"""
 TIME_LIMIT = 60.0
-"""[s] for a master"""
+"""Time limit of a master [s]"""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -33,7 +33,7 @@ _TEMPORARY = ("TMPDIR", "TEMP", "TMP")
 """variables with the folder in which a tool unpacks: not all clean up after themselves"""
 
 FirstInputs = dict[str, tuple[tuple[float, ...], tuple[float, ...]]]
-"""By component: its connected inputs at the end of its initialisation, and those of its first step"""
+"""Connected inputs of a component at the end of its initialisation, and those of its first step, by component"""
 
 
 class ToolRuns:
@@ -49,7 +49,7 @@ class ToolRuns:
             self._clocks = {part.name for part in export.parts if part.model.has_clock}
             self.loop = assigned_loop(export)
             self.step = export.step
-            """[s]"""
+            """Step [s]"""
             _expect_common_grid(system, export.step)
             for fmu in self._fmus.values():
                 expect_traceable(fmu)

@@ -10,7 +10,7 @@ from orchestration.foundation.basics.extras import needs
 
 ENDINGS = (".dbc", ".arxml", ".kcd", ".sym")
 BIT_RATE, DATA_BIT_RATE = 500e3, 2e6
-"""[1/s], where the database has none"""
+"""Rates where the database has none [1/s]"""
 
 
 @dataclass(frozen=True, kw_only=True)

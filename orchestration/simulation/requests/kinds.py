@@ -19,7 +19,7 @@ class RequestKind:
     """A kind of request beside systems."""
 
     default: Callable[[], Request]
-    """What runs if nothing is said"""
+    """Request that runs if nothing is said"""
     from_tables: Callable[[dict[str, Any], Path], Request]
     """Reads a TOML document whose paths are relative to a folder; raises `UsageError`"""
     files: tuple[Path, ...]
@@ -27,4 +27,4 @@ class RequestKind:
 
 
 KINDS: Registry[RequestKind] = Registry()
-"""At present one, the scenarios of the quadrotor"""
+"""Kinds of requests: at present one, the scenarios of the quadrotor"""

@@ -20,7 +20,7 @@ PERIOD = "period"
 QUANTITIES = (PERIOD, "delay", "jitter", "loss")
 """Names of quantities that a request may have; any other is a path"""
 STEPS, PARTS = 20, 50
-"""Of a given range: the number of steps of the scan, and of tolerances in a step"""
+"""Number of steps of the scan of a given range, and of tolerances in a step"""
 
 
 @dataclass(frozen=True, kw_only=True)

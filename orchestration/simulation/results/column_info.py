@@ -13,7 +13,7 @@ class ColumnInfo:
     """Unit and description of one column."""
 
     unit: str | None = None
-    """as FMI writes it, N.m for instance"""
+    """Unit as FMI writes it, N.m for instance"""
     text: str | None = None
     """the FMU's description"""
 

@@ -20,7 +20,7 @@ GOOD = "criterion.good"
 FIXED = ("outcome", "good", "horizon", "diverged", "divergence_time", "steps")
 """Metrics that every run has beside its objectives."""
 PRINTED = ("wall_time", "engine")
-"""What `run` prints beside them."""
+"""Names that `run` prints beside them"""
 
 
 def compute(

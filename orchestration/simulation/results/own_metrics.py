@@ -21,7 +21,7 @@ class OwnMetric:
 
     name: str
     source: str
-    """without comments and annotations, and with the imports that it needs"""
+    """Source without comments and annotations, and with the imports that it needs"""
     function: str
     """its name in the source"""
     _compiled: list[Callable[[Any], Any]] = field(default_factory=list, compare=False, repr=False)

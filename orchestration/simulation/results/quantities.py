@@ -10,7 +10,7 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.results import display_names as labels
 
 LONG = 1.0
-"""[s]: times that are all shorter are shown in milliseconds"""
+"""Time below which times are shown in milliseconds, if all are shorter [s]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,9 +19,9 @@ class Quantity:
 
     name: str
     unit: str | None = None
-    """in which values are shown, as FMI writes it; None: they have none, or it is unknown"""
+    """Unit in which values are shown, as FMI writes it; None: they have none, or it is unknown"""
     factor: float = 1.0
-    """by which stored values are multiplied to have that unit"""
+    """Factor by which stored values are multiplied to have that unit"""
 
     @property
     def title(self) -> str:

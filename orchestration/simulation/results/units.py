@@ -47,7 +47,7 @@ def units(system: System, models: Mapping[str, Model]) -> dict[str, str]:
 
 
 Sources = tuple[tuple[tuple[str, ...], tuple[str, ...], bool], ...]
-"""Of each: its signals, their destinations, and whether they are positions without a destination"""
+"""Signals, their destinations, and whether they are positions without a destination, of each source"""
 
 
 @functools.lru_cache(maxsize=256)
@@ -91,7 +91,7 @@ def _of_signals(expressions: Sequence[str], sources: Sources, models: Mapping[st
 
 
 Units: TypeAlias = Mapping[str, Unit | None]
-"""By name; None: it has none, or an unknown one"""
+"""Units by name; None: it has none, or an unknown one"""
 
 
 def unit_of(node: Node, units: Units) -> Unit | None:

@@ -24,7 +24,7 @@ from orchestration.systems.system.request import Request
 
 _MESSAGES = logging.getLogger("quadcosim")
 _PATIENCE = 5.0
-"""[s] in which the process must end after its last message"""
+"""Time in which the process must end after its last message [s]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +35,7 @@ class Order:
     course: Course
     engine: Engine | None
     level: int
-    """of the log messages that are passed on"""
+    """Level of the log messages that are passed on"""
 
 
 def simulate(
@@ -86,12 +86,12 @@ class _Receiver:
         self.is_over = False
         """whether the run is over"""
         self.activity = ""
-        """what the process is doing"""
+        """Activity of the process"""
         self.components: Sequence[str] = ()
         """whose FMUs may be called meanwhile"""
         self.columns: tuple[str, ...] = ()
         self.recorded_until = -1.0
-        """[s]"""
+        """Time up to which rows are recorded [s]"""
         self.recorder, self._progress, self._on_start = recorder, progress, on_start
 
     def receive_all(self, child: Child, order: Order) -> str | None:

@@ -24,9 +24,9 @@ class NewFolder:
     path: Path
     place: Path
     precious: bool = False
-    """If it cannot be completed or moved to its place, it is kept beside that."""
+    """Whether it is kept beside its place if it cannot be completed or moved there"""
     replaces: bool = True
-    """If not, it is kept beside an existing folder."""
+    """Whether it takes the place of an existing folder, instead of being kept beside it"""
 
 
 @contextmanager

@@ -35,7 +35,7 @@ class Flights(Mapping[str, Floats]):
     """The results of many runs as arrays by name: `flights["position_rmse"]` has a value for each run."""
 
     arrays: Mapping[str, Floats]
-    """By name: of an output shape (runs,), NaN where it has no value; of `time` and what was recorded shape
+    """Arrays by name: of an output shape (runs,), NaN where it has no value; of `time` and what was recorded shape
     (runs, rows), NaN after the last row of a run that has fewer."""
     engine: str
     """The engine of the runs: `batch`, which is SIMD lanes, `compiled` or `python`; the numbers are the same."""

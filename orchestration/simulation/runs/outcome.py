@@ -47,7 +47,7 @@ class RunOutcome:
     divergence_time: float | None
     termination: str | None
     failure: SimulatorError | None
-    """what ended the run after its first row, beside Ctrl-C"""
+    """Error that ended the run after its first row, beside Ctrl-C"""
     interrupted_at: float | None
     provenance: Provenance
     warnings: tuple[str, ...]

@@ -51,7 +51,7 @@ class PreparedRun:
     recorder: Recorder
     interrupt: Interrupt
     started: float
-    """on the performance counter [s]"""
+    """Start on the performance counter [s]"""
 
     @property
     def request(self) -> Request:

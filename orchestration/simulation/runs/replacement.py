@@ -25,7 +25,7 @@ class Replacement:
     system: System
     paths: Mapping[str, Path]
     models: Mapping[str, Model]
-    """of the replaced component without the variables that have no value after initialisation"""
+    """Models, that of the replaced component without the variables that have no value after initialisation"""
     measured: tuple[str, ...]
     """its inputs that are connected or fed by a source"""
     commanded: tuple[str, ...]

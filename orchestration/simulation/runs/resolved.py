@@ -23,18 +23,18 @@ class ResolvedRequest:
     """A request whose system has been checked against its FMUs."""
 
     request: Request
-    """as the user wrote it"""
+    """Request as the user wrote it"""
     system: System
     """the system that it describes"""
     paths: Mapping[str, Path]
-    """of the FMUs, by component"""
+    """Paths of the FMUs, by component"""
     models: Mapping[str, Model]
     parameters: Mapping[str, float]
     """all numeric parameters of all components, as COMPONENT.NAME"""
     units: Mapping[str, str]
-    """of the metrics"""
+    """Units of the metrics"""
     follows: str
-    """which component follows which reference, as text; empty where none does"""
+    """Text of which component follows which reference; empty where none does"""
 
     @property
     def foreign(self) -> list[str]:

@@ -43,15 +43,15 @@ class Provenance(TypedDict, total=False):
     """Where the numbers of a run come from."""
 
     versions: dict[str, str]
-    """Of Python and of the packages that are used."""
+    """Versions of Python and of the packages that are used."""
     platform: str
     """The operating system and the processor."""
     fmus: dict[str, Origin]
-    """By component."""
+    """Origins of FMUs, by component."""
     engine: str
     """The engine, `compiled` or `python`; the numbers are the same."""
     follows: str
-    """Which component follows which reference, as text; empty where none does."""
+    """Text of which component follows which reference; empty where none does."""
     wall_time: float
     """The duration of the run [s]."""
 
@@ -65,7 +65,7 @@ class Result:
     """
 
     request: Request
-    """What was run, as the user wrote it: a `Scenario` or a `System`."""
+    """The request as the user wrote it: a `Scenario` or a `System`."""
     system: System
     """The system of the request, with the objectives that its FMUs have the variables for."""
     recording: Recording
@@ -80,13 +80,13 @@ class Result:
     parameters: Mapping[str, float]
     """The numeric parameters of all components in the run, by COMPONENT.NAME, in the units of their FMUs."""
     divergence: str | None
-    """What diverged, as text; None if nothing did."""
+    """Text of what diverged; None if nothing did."""
     termination: str | None
-    """Which FMU ended the run, and how; None if none did."""
+    """Text of which FMU ended the run, and how; None if none did."""
     interrupted_at: float | None
     """The time [s] at which Ctrl-C, or an FMU that failed, ended the run; None if neither did."""
     provenance: Provenance
-    """Where the numbers come from: versions of the software, the GUID of each FMU, the engine, the wall time [s]."""
+    """Origin of the numbers: versions of the software, the GUID of each FMU, the engine, the wall time [s]."""
     warnings: tuple[str, ...] = ()
     """Warnings of likely mistakes in the request, and those of the FMUs, a sentence each."""
 

@@ -24,14 +24,14 @@ from orchestration.systems.system.request import system_of
 SIGNALS, EVENTS = tables.SIGNALS, tables.EVENTS
 METRICS, SCENARIO, PROVENANCE = "metrics.json", "scenario.toml", "provenance.json"
 CHECKSUMS = "checksums"
-"""in the provenance, of all files of a run"""
+"""Key in the provenance of the checksums of all files of a run"""
 _CHECKED = (SIGNALS, EVENTS, METRICS, SCENARIO)
 MAX_JSON_LENGTH = 2**26
 """Largest number of characters of its JSON files: the provenance describes each column"""
 MAT = "run.mat"
-"""of a run that has been exported to it"""
+"""File of a run that has been exported to it"""
 STATE = "paused.npz"
-"""of a run that has been paused"""
+"""File of a run that has been paused"""
 
 
 def save_run(result: Result, folder: str | Path, *, figures: bool = True) -> Path:

@@ -26,9 +26,9 @@ class Scheduled:
     until: float
     """The end of the schedule [s]."""
     tasks: Mapping[str, Responses]
-    """By COMPUTER.TASK."""
+    """Responses by COMPUTER.TASK."""
     messages: Mapping[str, Responses]
-    """By NETWORK.MESSAGE."""
+    """Responses by NETWORK.MESSAGE."""
     busy: Mapping[str, float]
     """The share of the time in which a computer was busy, switches included, or a link carried a frame."""
     timeline: Timeline

@@ -26,7 +26,7 @@ class Execution:
     in_lanes: bool
     """whether many at once, in SIMD lanes"""
     engine: Engine | None
-    """for runs one at a time; None: the fastest that each can use"""
+    """Engine for runs one at a time; None: the fastest that each can use"""
     reason: str | None = None
     """why `auto` did not choose the fastest"""
 

@@ -24,9 +24,9 @@ TaskRunner = Callable[[Iterable[RunTask | TaskBatch]], Generator[list[TaskOutcom
 """Yields the outcomes of tasks as they come, in any order."""
 Submit = Callable[[RunTask | TaskBatch], "Future[list[TaskOutcome]]"]
 _PATIENCE = 10.0
-"""[s] to wait for the scheduler"""
+"""Time to wait for the scheduler [s]"""
 _WORKERS_PATIENCE = 60.0
-"""[s] to wait for its first worker"""
+"""Time to wait for its first worker [s]"""
 _ADDRESS = re.compile(r"(?:(?:tcp|tls|ws|wss)://)?(\[[0-9a-fA-F:.]+\]|[^\s:/\[\]]+):(\d{1,5})")
 
 

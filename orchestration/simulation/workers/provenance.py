@@ -41,7 +41,7 @@ class Sources:
 
     hash: str
     states: Mapping[str, tuple[int, int, int]]
-    """by path: size, and times of the last change of content and of status [ns]"""
+    """State of a file by path: size, and times of the last change of content and of status [ns]"""
 
     @classmethod
     def read(cls) -> "Sources":

@@ -38,7 +38,7 @@ class RunTask:
     engine: Engine | None = None
     """None: the fastest available"""
     time_limit: float | None = None
-    """[s] of processor time; None: unlimited"""
+    """Limit of processor time [s]; None: unlimited"""
 
 
 @dataclass(frozen=True, kw_only=True)

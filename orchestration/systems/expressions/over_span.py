@@ -25,14 +25,14 @@ class Recorded:
     time: Floats
     signals: Mapping[str, Floats]
     ends: Mapping[str, Floats] = field(default_factory=dict)
-    """of held signals: the value just before the next row, shape (n - 1,), reached along a line; all others are in
+    """Values of held signals just before the next row, shape (n - 1,), reached along a line; all others are in
     continuous time, known at the rows and linear between them"""
     numbers: Mapping[str, float] = field(default_factory=dict)
     """constants of the run, such as parameters, by name"""
     arrivals: Mapping[str, Booleans] = field(default_factory=dict)
-    """by connection, the rows at which a message arrived, shape (n,)"""
+    """Rows at which a message arrived, by connection, shape (n,)"""
     stop_time: float
-    """[s], at which the run ended"""
+    """Time at which the run ended [s]"""
     goes_on: bool = False
     """whether the first row is the last one of the span before"""
 

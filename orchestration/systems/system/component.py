@@ -39,7 +39,8 @@ class Sampling:
     clock_ratio: float = 1.0
     """The seconds r that the component believes pass per true second."""
     clock: Clock = "master"
-    """What decides when it samples: the master, or the FMU by its parameters sample_period and sample_offset."""
+    """The clock by which it samples: that of the master, or of the FMU, by its parameters sample_period and
+    sample_offset."""
 
     def __post_init__(self) -> None:
         require_positive(self, "period", "clock_ratio")

@@ -45,11 +45,11 @@ class BatchResult:
 
     outcome: Integers
     time: Integers
-    """[ns] of divergence"""
+    """Time of divergence [ns]"""
     component: Integers
     steps: Integers
     doubtful: Booleans
-    """in which a value was not a number: such a run is repeated by another engine"""
+    """Runs in which a value was not a number: they are repeated by another engine"""
     reductions: Mapping[Call, Floats]
     """NaN where there is no value"""
     signals: Sequence[Floats]
@@ -63,7 +63,7 @@ class Group:
     systems: Sequence[System]
     timings: Sequence[ScheduleKey]
     parameters: ParameterColumns = field(default_factory=lambda: NO_COLUMNS)
-    """of each run, overriding those of its system"""
+    """Parameters of each run, overriding those of its system"""
 
 
 @dataclass(kw_only=True)
@@ -73,7 +73,7 @@ class LaneRun:
     system: System
     streams: Streams
     numbers: Mapping[str, float]
-    """as `Batch.parameters`"""
+    """Numbers as in `Batch.parameters`"""
     seen: list[SourceValues]
     given: list[SourceValues]
     source_key: Hashable
@@ -91,7 +91,7 @@ class Track:
     spans: Iterator[Span]
     ahead: Span | None
     now: Integers
-    """[ns] of each component"""
+    """Present time of each component [ns]"""
     same_sources: bool
     """whether the sources of all of them have the same values"""
     span: Span | None = None
@@ -118,7 +118,7 @@ class Batch:
             for variable in [shape.variable(name)]
         }
         self.memories = [self._array(kernel.lanes.places) for kernel in kernels]
-        """of the components, shape (places, lanes)"""
+        """Memories of the components, shape (places, lanes)"""
         self._read = [shape.read(name) for name in shape.names]
         self._wanted = [read.copy() for read in self._read]
         """the same, including what is recorded in the current runs"""

@@ -25,11 +25,11 @@ class Rows:
 
     section: Section
     mask: str
-    """of the lanes that have such a row now"""
+    """Mask of the lanes that have such a row now"""
     first: list[str] = field(default_factory=list)
     """lines of the first row alone"""
     next: list[str] = field(default_factory=list)
-    """of all others"""
+    """Statements for all other lanes"""
     always: list[str] = field(default_factory=list)
 
 
@@ -39,7 +39,7 @@ class Folds:
     def __init__(self, writer: ExpressionWriter) -> None:
         self.writer = writer
         self.rows: dict[str | None, Rows] = {None: Rows(section=writer.now, mask="m")}
-        """by connection; None: all"""
+        """Rows by connection; None: all"""
         self.held = Rows(section=writer.held, mask="m")
         self.values: dict[Call, Value] = {}
         self.kept: dict[Call, int] = {}

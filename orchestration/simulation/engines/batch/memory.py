@@ -11,7 +11,7 @@ from orchestration.foundation.basics.simulator import Floats, Integers
 from orchestration.simulation.engines.structures import address
 
 _ALIGNED = 64
-"""[byte], the size of the largest vector registers and of cache lines"""
+"""Size of the largest vector registers and of cache lines [byte]"""
 
 
 class Memory:

@@ -34,7 +34,7 @@ from orchestration.systems.system.source import Source
 
 Places = npt.NDArray[np.int64]
 _TAKES = {"Boolean": ONE_LANE.TRUTH, "Integer": ONE_LANE.WHOLE, "Enumeration": ONE_LANE.WHOLE}
-"""By kind of an input that is not a Real"""
+"""Conversion of an input that is not a Real, by its kind"""
 _SIGNAL = re.compile(r"SIGNAL\((\d+), (\d+)\)")
 """The index of a component, and the place of a variable in its memory, in the C of expressions"""
 

@@ -51,13 +51,13 @@ class ExpressionWriter:
     def __init__(self, leaves: Mapping[str, Leaf], reductions: Mapping[Node, str]) -> None:
         self._leaves, self._reductions = leaves, reductions
         self.once = Section("c")
-        """what is constant in a run"""
+        """Code of what is constant in a run"""
         self.now = Section("x")
-        """what is computed at every row"""
+        """Code of what is computed at every row"""
         self.held = Section("h", self.now)
-        """what is computed at rows at which something that is held may have changed"""
+        """Code of what is computed at rows at which something that is held may have changed"""
         self.step = Section("e", self.now)
-        """what is computed for the step that ends at a row"""
+        """Code of what is computed for the step that ends at a row"""
         self.states: list[float] = []
         """initial values"""
         self.constants: dict[Node, int] = {}

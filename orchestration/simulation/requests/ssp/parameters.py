@@ -21,7 +21,7 @@ class Value:
     value: Parameter
     unit: str | None
     definition: BaseUnits | None
-    """of the unit, in the parameter set itself"""
+    """Definition of the unit, in the parameter set itself"""
 
 
 def values_of(element: Read, package: Package, component: Path) -> Iterator[tuple[str, Value]]:

@@ -41,16 +41,16 @@ class Structure:
     """their FMUs"""
     kinds: dict[Node, str] = field(default_factory=dict)
     units: dict[Node, str] = field(default_factory=dict)
-    """of the connectors that name one"""
+    """Units of the connectors that name one"""
     wires: dict[Node, Wire] = field(default_factory=dict)
-    """by their end"""
+    """Wires by their end"""
     values: dict[Node, Value] = field(default_factory=dict)
-    """of parameters and inputs"""
+    """Values of parameters and inputs"""
     definitions: dict[str, BaseUnits] = field(default_factory=dict)
-    """of units"""
+    """Definitions of units"""
     stop: float | None = None
     step: float | None = None
-    """[s], if the document has them"""
+    """Step [s], if the document has one"""
     timing: str | None = None
     """the text of this project's annotation"""
 

@@ -81,7 +81,8 @@ def _sources(parts: Iterable[Part]) -> dict[str, Path]:
 
 
 _ESCAPES = {ord(character): f"%{ord(character):02X}" for character in "%#?"}
-"""Of the name of a file in a URI that would otherwise end there; other tools do not decode more than they need to"""
+"""Escapes in the name of a file in a URI that would otherwise end there; other tools do not decode more than they need
+to"""
 
 
 def _source(part: Part) -> str:
