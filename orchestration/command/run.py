@@ -93,7 +93,8 @@ def run(
         return CommandResult(document={"paused_in": out}, lines=[])
     for warning in result.warnings:
         warn(warning)
-    exact.warn_if_means_are_infinite(result.request)
+    if result.system.depends_on_seed:
+        exact.warn_if_means_are_infinite(result.request)
     if follows := result.provenance["follows"]:
         inform(f"follows {follows}")
     if out is not None:

@@ -20,7 +20,6 @@ from orchestration.simulation.results.criterion import bound_of, judged_objectiv
 from orchestration.simulation.workers.choice import single_run_execution
 from orchestration.simulation.workers.executors import RunEvaluator
 from orchestration.systems.system.files import Files, files_of
-from orchestration.systems.system.randomness import depends_on_seed, has_random_timing
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
 from orchestration.theory.exact.mean_square import MeanSquareLimit, mean_square_limit
 from orchestration.theory.stability.known_loops import LocalLimit
@@ -73,7 +72,7 @@ def find(
     with errors_in_own_terms(loop):
         checks = [check_against_fmus(varied.at(value), models) for value in span.values()]
     units, metric = checks[0].units, judged_objective(varied.system)
-    random = depends_on_seed(varied.at(span.last))
+    random = varied.at(span.last).depends_on_seed
     seeds = math.ceil(math.log(1.0 - confidence) / math.log(RELIABILITY)) if random else 1
     local = _local(varied, span, files)
     mean_square = _mean_square(varied, span, files, local) if random else MeanSquareLimit()
@@ -134,7 +133,7 @@ def _local(varied: Varied, span: Range, files: Files) -> LocalLimit:
 
 def _mean_square(varied: Varied, span: Range, files: Files, local: LocalLimit) -> MeanSquareLimit:
     """The mean-square limit; with additive noise alone, which does not change the loop, it is the local limit."""
-    if local.limit is not None and not has_random_timing(varied.at(span.last)):
+    if local.limit is not None and not varied.at(span.last).has_random_timing:
         return MeanSquareLimit(limit=local.limit)
     try:
         return isolated_call(files.fmus.values(), mean_square_limit, varied, span, files.models_of(varied.system))

@@ -4,6 +4,7 @@ import functools
 import itertools
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, overload
 
@@ -107,3 +108,16 @@ def _round_ratio(numerator: int, denominator: int) -> int:
     quotient, rest = divmod(numerator, denominator)
     twice = 2 * rest
     return quotient + (twice > denominator or (twice == denominator and quotient % 2 == 1))
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A stream of numbers that are all the same, as of times that do not vary."""
+
+    value: int
+
+    def __call__(self, count: int) -> "npt.NDArray[np.int64]":
+        """The next `count` of them."""
+        import numpy as np  # not needed to read a system
+
+        return np.full(count, self.value, dtype=np.int64)

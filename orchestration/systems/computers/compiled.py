@@ -13,6 +13,7 @@ from fmu_kit.compiler.pack.c_compiler import OPTIONS, compiled_here
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.basics.libraries import cached_library
 from orchestration.foundation.basics.simulator import Integers
+from orchestration.foundation.basics.times import Constant
 from orchestration.systems.computers import parts as constants
 from orchestration.systems.computers.parts import (
     ALL_KINDS,
@@ -21,7 +22,6 @@ from orchestration.systems.computers.parts import (
     IS_CONSTANT,
     LATER,
     Carrier,
-    Constant,
     Leg,
     NetworkLink,
     Parts,

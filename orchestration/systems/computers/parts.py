@@ -7,8 +7,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
-import numpy as np
-
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Integers
 
@@ -157,14 +155,3 @@ KINDS = 17
 COLUMNS = 5
 
 ALL_KINDS = frozenset(range(KINDS))
-
-
-@dataclass(frozen=True)
-class Constant:
-    """The stream of a constant number."""
-
-    value: int
-
-    def __call__(self, count: int) -> Integers:
-        """As `Stream`."""
-        return np.full(count, self.value, dtype=np.int64)

@@ -10,8 +10,7 @@ import numpy as np
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import Grid, exact_nanoseconds, nanoseconds
 from orchestration.systems.schedule.fixed_step import FixedStep, in_seconds
-from orchestration.systems.schedule.longest import expect_no_longer
-from orchestration.systems.schedule.plan import Plan
+from orchestration.systems.schedule.plan import Plan, expect_no_longer
 from orchestration.systems.schedule.resources import Resources
 from orchestration.systems.schedule.spans import InstantCollector, Instants
 from orchestration.systems.system.component import has_scheduled_instants
@@ -36,7 +35,8 @@ class CommonTimetable:
         self.stop = nanoseconds(system.stop_time)
         for each in fixed.values():
             each.expect_end(self.stop)
-        _expect_moves(system, fixed)
+        if system.uses_scheduler:
+            _expect_moves(system, fixed)
         names = list(system.components)
         self.continuous = np.array([names.index(name) for name in self.plan.continuous], dtype=np.int64)
         """indices of components in continuous time, in the order in which they are stepped"""
@@ -51,10 +51,6 @@ class CommonTimetable:
         self.sender = np.array([names.index(x.sender) for x in system.connections], dtype=np.int64)
         self.receiver = np.array([names.index(x.receiver) for x in system.connections], dtype=np.int64)
         """the components at the ends of the connections"""
-        self.uses_scheduler = bool(system.computers or system.networks) or any(
-            each.sampling is not None and has_scheduled_instants(each.sampling) for each in system.components.values()
-        )
-        """whether the scheduler computes the instants of any component or connection"""
         self.mean_interval = _mean_interval(system)
         """the approximate mean time between instants [ns]"""
         self._changes = [
@@ -121,7 +117,7 @@ def _mean_interval(system: System) -> float:
             instants = 2.0 if has_scheduled_instants(component.sampling) else 1.0  # it samples, and it writes
             period = float(exact_nanoseconds(component.sampling.period))
             rates.append(instants * component.sampling.clock_ratio / period)
-    by_connection = messages_by_connection(system)
+    by_connection = messages_by_connection(system) if system.networks else {}
     periods = [by_connection[x.name].message.period for x in system.connections if x.name in by_connection]
     rates += [1.0 / float(exact_nanoseconds(period)) for period in periods if period is not None]
     if not rates:

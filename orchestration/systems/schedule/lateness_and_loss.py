@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orchestration.foundation.basics.simulator import Booleans, Floats, Integers
-from orchestration.foundation.basics.times import NANOSECONDS, nanoseconds
-from orchestration.systems.computers.parts import Constant
+from orchestration.foundation.basics.times import NANOSECONDS, Constant, nanoseconds
 from orchestration.systems.schedule.streams import cut_normal
 from orchestration.systems.system.choices import Spread
 from orchestration.systems.system.distribution import Distribution, Varying

@@ -7,8 +7,7 @@ from functools import lru_cache, partial
 import numpy as np
 
 from orchestration.foundation.basics.simulator import Integers
-from orchestration.foundation.basics.times import Grid, exact_nanoseconds, nanoseconds
-from orchestration.systems.computers.parts import Constant
+from orchestration.foundation.basics.times import Constant, Grid, exact_nanoseconds, nanoseconds
 from orchestration.systems.schedule.fixed_step import FixedStep, Misalignment, in_seconds
 from orchestration.systems.schedule.lateness_and_loss import lateness, losses, times
 from orchestration.systems.schedule.lookahead import NEVER, Lookahead

@@ -13,7 +13,7 @@ from typing import TypeAlias
 import numpy as np
 
 from orchestration.foundation.basics.simulator import Integers
-from orchestration.foundation.basics.times import NANOSECONDS, Grid, exact_nanoseconds, nanoseconds
+from orchestration.foundation.basics.times import NANOSECONDS, Constant, Grid, exact_nanoseconds, nanoseconds
 from orchestration.systems.computers.compiled import scheduler
 from orchestration.systems.computers.parts import (
     ABORT,
@@ -25,7 +25,6 @@ from orchestration.systems.computers.parts import (
     QUEUE,
     SKIP,
     Carrier,
-    Constant,
     Leg,
     NetworkLink,
     Parts,
@@ -38,7 +37,7 @@ from orchestration.systems.computers.results import Timeline
 from orchestration.systems.computers.scheduler_events import EventBuilder
 from orchestration.systems.computers.timeline import NEEDED, Names, timeline
 from orchestration.systems.schedule.lateness_and_loss import lateness, losses, times
-from orchestration.systems.schedule.longest import expect_no_longer
+from orchestration.systems.schedule.plan import expect_no_longer
 from orchestration.systems.schedule.streams import (
     ARRIVALS,
     DELAY,

@@ -12,7 +12,6 @@ from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system import placement
 from orchestration.systems.system.distribution import content
 from orchestration.systems.system.model import System
-from orchestration.systems.system.randomness import has_random_timing
 
 INSTANTS = 2**15
 """Approximate number of a span"""
@@ -45,7 +44,7 @@ def schedule_key(system: System) -> ScheduleKey:
         placement.content_of(system),
         tuple((source.to, source.period) for source in system.sources.values() if source.period is not None),
     )
-    drawn = (system.seed, tuple(sorted(system.streams.items()))) if has_random_timing(system) else None
+    drawn = (system.seed, tuple(sorted(system.streams.items()))) if system.has_random_timing else None
     return ScheduleKey(regular, drawn)
 
 

@@ -51,7 +51,7 @@ class Timetable:
         for i, x in enumerate(self._connections):
             stepped = self._fixed.get(x.sender if i in self._plan.measured else x.receiver)
             self._links.append(Link(i, x, streams, stepped, self._misaligned))
-        self._lookahead = Lookahead(common.system, common.resources, streams) if common.uses_scheduler else None
+        self._lookahead = Lookahead(common.system, common.resources, streams) if common.system.uses_scheduler else None
         self._tasks = [self._timed(name, streams) for name in self._plan.sampled]
         self.first_samples = {
             name: task.first for name, task in zip(self._plan.sampled, self._tasks) if task.first < self.stop

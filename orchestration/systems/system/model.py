@@ -12,11 +12,17 @@ from orchestration.foundation.basics.errors import UsageError, listed
 from orchestration.foundation.basics.records import record
 from orchestration.foundation.basics.times import is_at_least
 from orchestration.systems.expressions.syntax import is_number, parse
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, has_scheduled_instants
 from orchestration.systems.system.computers import Computer, Network
 from orchestration.systems.system.connection import Connection, component_of
 from orchestration.systems.system.file_tables import tables_of
-from orchestration.systems.system.placement import expect_placement, placed_messages, placed_tasks, with_tasks
+from orchestration.systems.system.placement import (
+    expect_placement,
+    has_random_schedule,
+    placed_messages,
+    placed_tasks,
+    with_tasks,
+)
 from orchestration.systems.system.requirements import require, require_positive
 from orchestration.systems.system.source import Source
 
@@ -92,6 +98,31 @@ class System:
         """The FMU of each component, by its name."""
         return {name: component.fmu for name, component in self.components.items()}
 
+    @property
+    def uses_scheduler(self) -> bool:
+        """Whether the scheduler computes the instants of any component or connection."""
+        samplings = (component.sampling for component in self.components.values())
+        on_its_own = (sampling is not None and has_scheduled_instants(sampling) for sampling in samplings)
+        return bool(self.computers or self.networks) or any(on_its_own)
+
+    @property
+    def has_random_timing(self) -> bool:
+        """Whether the seed changes when its components are stepped, or which messages arrive and when."""
+        return (
+            any(one.sampling is not None and one.sampling.is_random for one in self.components.values())
+            or any(x.is_random for x in self.connections)
+            or (self.uses_scheduler and has_random_schedule(self))
+        )
+
+    @property
+    def depends_on_seed(self) -> bool:
+        """Whether the seed changes its runs."""
+        return (
+            self.has_random_timing
+            or any(any(x.noise.values()) for x in self.connections)
+            or any(source.is_random and source.noise != 0.0 for source in self.sources.values())
+        )
+
     def to_toml(self) -> str:
         """The system file that loads as this system, wherever it lies."""
         import tomli_w
@@ -154,8 +185,10 @@ class System:
             _require_names(f"computers.{place}.tasks", owner.tasks, without=".")
         for place, network in self.networks.items():
             _require_names(f"networks.{place}.messages", network.messages, without=".")
-        components = with_tasks(self.components, self.connections, self.computers, self.networks)
-        object.__setattr__(self, "components", components)
+        is_stepped = all(one.step is not None or one.sampling is not None for one in self.components.values())
+        if self.uses_scheduler or not is_stepped:
+            components = with_tasks(self.components, self.connections, self.computers, self.networks)
+            object.__setattr__(self, "components", components)
         _require_names("connections", (x.name for x in self.connections))
         _require_names("objectives", self.objectives)
         causes = self._causes()
@@ -176,16 +209,17 @@ class System:
         names = [x.name for x in self.connections]
         for name in names:
             require(names.count(name) == 1, "connections", name, "a different name for each")
-        expect_placement(self)
+        if self.uses_scheduler:
+            expect_placement(self)
         _require_expressions(tuple(expressions(self)))
 
     def _causes(self) -> list[str]:
         """The names of its random streams."""
         tasks = [f"components.{name}.jitter" for name, c in self.components.items() if c.sampling is not None]
         sent = [f"connections.{x.name}.{cause}" for x in self.connections for cause in _CAUSES]
-        on_computers = [f"{each.place}.{cause}" for each in placed_tasks(self.computers) for cause in TASK_CAUSES]
-        over_networks = [f"{each.place}.{cause}" for each in placed_messages(self.networks) for cause in MESSAGE_CAUSES]
-        sent += [*on_computers, *over_networks]
+        if self.uses_scheduler:
+            sent += [f"{each.place}.{cause}" for each in placed_tasks(self.computers) for cause in TASK_CAUSES]
+            sent += [f"{each.place}.{cause}" for each in placed_messages(self.networks) for cause in MESSAGE_CAUSES]
         return [*tasks, *sent, *(f"sources.{name}.value" for name, x in self.sources.items() if x.is_random)]
 
     def _feeds(self) -> list[tuple[str, str | None, str]]:

@@ -15,7 +15,6 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.request import errors_in_own_terms
 from orchestration.theory.exact.loops import Loops
 from orchestration.theory.exact.objective_means import ObjectiveMeans
-from orchestration.theory.exact.scheduled import is_scheduled
 from orchestration.theory.stability.known_loops import LOOPS, rested
 
 
@@ -111,7 +110,7 @@ def _method(
     parts += [f"{', '.join(listed)} known by {method}" for method, listed in known.items()]
     if horizon is not None:
         parts.append(f"from its initial conditions to {horizon:g} s")
-    if is_scheduled(system):
+    if system.uses_scheduler:
         parts.append("computers and networks by their periodic timetable")
     if simulated:
         parts.append("noise held, steps and means over rows as in a run")

@@ -10,7 +10,6 @@ from orchestration.components.fmi.model import Model
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.systems.system.files import Files
 from orchestration.systems.system.model import System
-from orchestration.systems.system.randomness import depends_on_seed
 from orchestration.systems.system.request import Request
 from orchestration.theory.exact.loops import Loops
 from orchestration.theory.exact.objectives import inlined_objectives, means_of
@@ -32,7 +31,7 @@ def infinite_means_warning(request: Request, systems: Sequence[System], files: F
         return None
     chosen: dict[str, System] = {}
     for system in systems:
-        if len(chosen) < MOST and depends_on_seed(system) and _averages(system):
+        if len(chosen) < MOST and system.depends_on_seed and _averages(system):
             once = replace(system, seed=0)
             chosen.setdefault(once.to_toml(), once)
     if not chosen:

@@ -41,7 +41,7 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import messages_by_connection, placed_messages, placed_tasks, released_by
 from orchestration.theory.exact.links import hyperperiod
 from orchestration.theory.exact.periodic_schedule import NO_SCHEDULE, PeriodicSchedule, ScheduleTrace
-from orchestration.theory.exact.scheduled import expect_certain, is_scheduled
+from orchestration.theory.exact.scheduled import expect_certain
 
 MOST_JOBS = 200_000
 """of all tasks and messages, that are simulated"""
@@ -61,7 +61,7 @@ def periodic_schedule(
     [s]. Raises `UsageError` for a random quantity that the scheduler depends on, and for a schedule that does not
     become periodic.
     """
-    if not is_scheduled(system):
+    if not system.uses_scheduler:
         return NO_SCHEDULE
     expect_certain(system)
     released = released_by(system)

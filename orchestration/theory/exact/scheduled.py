@@ -12,16 +12,9 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import messages_by_connection, placed_messages, placed_tasks, released_by
 
 
-def is_scheduled(system: System) -> bool:
-    """Whether a scheduler decides on times of events of a system."""
-    samplings = (one.sampling for one in system.components.values())
-    on_arrivals = any(each is not None and has_scheduled_instants(each) for each in samplings)
-    return bool(system.computers or system.networks) or on_arrivals
-
-
 def without_scheduler(system: System) -> System:
     """The same components and connections, each component sampled periodically, without computers and networks."""
-    if not is_scheduled(system):
+    if not system.uses_scheduler:
         return system
     components = {
         name: one

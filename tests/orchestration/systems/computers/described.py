@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestration.foundation.basics.times import Constant
 from orchestration.systems.computers.compiled import Schedules
 from orchestration.systems.computers.parts import (
     FIXED_PRIORITY,
@@ -12,7 +13,6 @@ from orchestration.systems.computers.parts import (
     NONE,
     QUEUE,
     Carrier,
-    Constant,
     Leg,
     NetworkLink,
     Parts,

@@ -8,7 +8,7 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import Grid, exact_nanoseconds
 from orchestration.systems.schedule import schedule
 from orchestration.systems.schedule.fixed_step import FixedStep
-from orchestration.systems.schedule.longest import MAX_TIME
+from orchestration.systems.schedule.plan import MAX_TIME
 from orchestration.systems.schedule.schedule import Cursor
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable

@@ -16,7 +16,6 @@ from orchestration.systems.system.files import Files
 from orchestration.systems.system.frames import frame_nanoseconds
 from orchestration.systems.system.paths import changed, value_at
 from orchestration.systems.system.placement import SHARED, punctual
-from orchestration.systems.system.randomness import depends_on_seed
 
 FILE = """
 stop_time = 1.0
@@ -151,8 +150,8 @@ def test_a_trace_that_is_written_anew_has_another_schedule(file):
 def test_a_system_is_random_where_anything_is_drawn(file):
     system = load_system(file)
     calm = replace(system, **punctual(system))
-    assert depends_on_seed(system)
-    assert depends_on_seed(calm)  # arrivals are random
+    assert system.depends_on_seed
+    assert calm.depends_on_seed  # arrivals are random
     assert calm.computers["node"].tasks["control"].execution == 0.001
     by_chance = {"tasks": "radio", "messages": "load"}
     without: dict[str, Any] = {
@@ -163,8 +162,8 @@ def test_a_system_is_random_where_anything_is_drawn(file):
         for table, (part, _) in SHARED.items()
     }
     calm = replace(calm, **without)
-    assert not depends_on_seed(calm)
-    assert depends_on_seed(changed(calm, {"networks.bus.error": 0.1}))
+    assert not calm.depends_on_seed
+    assert changed(calm, {"networks.bus.error": 0.1}).depends_on_seed
 
 
 CONTROL, ANGLE = "computers.node.tasks.control", "networks.bus.messages.angle"
