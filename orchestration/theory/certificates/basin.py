@@ -23,11 +23,11 @@ from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.theory.certificates.certificate import Cells, Certificate
 from orchestration.theory.certificates.certify import RADIUS
 from orchestration.theory.certificates.checker import BITS, NotProven, verified
-from orchestration.theory.certificates.events import LOSS, Varying
 from orchestration.theory.certificates.family import Factor, Letter, LoopFamily
 from orchestration.theory.certificates.margin import linear_loop_of
 from orchestration.theory.certificates.search import least_cost
 from orchestration.theory.certificates.timeline import LoopTimeline
+from orchestration.theory.certificates.varying import LOSS, Varying
 
 FALL = 1e-4
 """by which a form falls at least, relative; it covers the radius of measured matrices"""

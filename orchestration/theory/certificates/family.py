@@ -74,8 +74,15 @@ class LoopFamily:
                    for x in self.letters for share in (0.0, 0.37, 1.0)]  # fmt: skip
         total = np.sum(samples, axis=0)
         alive = np.arange(len(self.kept))
-        while True:
-            used = alive[(total[np.ix_(alive, alive)] > 0.0).any(axis=0)]
-            if len(used) == len(alive):
-                return replace(self, kept=tuple(self.kept[i] for i in alive))
+        while len(used := alive[(total[np.ix_(alive, alive)] > 0.0).any(axis=0)]) < len(alive):
             alive = used
+        return replace(self, kept=tuple(self.kept[i] for i in alive))._without_unused()
+
+    def _without_unused(self) -> LoopFamily:
+        """The family without coordinates that no kept one depends on, not even within a period."""
+        acts, used = np.sum([abs(M) for M in self.matrices.values()], axis=0) > 0.0, np.zeros(0, dtype=int)
+        then = np.array(self.kept)
+        while len(then) > len(used):
+            used, then = then, np.union1d(then, np.flatnonzero(acts[then].any(axis=0)))
+        matrices = {name: M[np.ix_(used, used)] for name, M in self.matrices.items()}
+        return replace(self, matrices=matrices, kept=tuple(np.searchsorted(used, self.kept).tolist()))

@@ -24,11 +24,11 @@ from orchestration.systems.system.placement import messages_by_connection, tasks
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
 from orchestration.theory.certificates.breaking import LONGEST, BreakingSequence, breaking_at, least_breaking
 from orchestration.theory.certificates.causes import Cause, ScheduledLoop, cause_at
-from orchestration.theory.certificates.events import DELAY, JITTER, LOSS, Varying
 from orchestration.theory.certificates.family import LoopFamily
 from orchestration.theory.certificates.parts import CertifiedLoop, certified_loop
 from orchestration.theory.certificates.repeated import least_repeated
 from orchestration.theory.certificates.timeline import LoopTimeline
+from orchestration.theory.certificates.varying import DELAY, JITTER, LOSS, Varying
 from orchestration.theory.exact.scheduled import without_scheduler
 from orchestration.theory.stability.delay_bounds import SampledLoop, certain_jitter
 from orchestration.theory.stability.known_loops import rested
@@ -266,7 +266,7 @@ def small_gain(loop: CertifiedLoop, varying: Varying) -> float | None:
     command = loop.connection(varying.name)
     measurement = next(x for x in loop.system.connections if x.name != command.name)
     controller, of = loop.components[law], loop.components[plant]
-    static = not len(controller.A) and not of.D.any() and len(loop.samples_of(law)) == 1
+    static = not len(controller.A) and not of.D.any()
     if command.sender != law or measurement.delay or command.order != "gauss-seidel" or not static:
         return None
     measured = [of.outputs.index(variable_of(start)) for start in measurement.start]

@@ -16,7 +16,6 @@ from orchestration.simulation.figures.palette import BLUE, RED
 from orchestration.simulation.figures.style import SCREEN, Style, save
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.theory.certificates.breaking import BreakingSequence, least_breaking, unstable_sequence
-from orchestration.theory.certificates.events import LOSS
 from orchestration.theory.certificates.family import LoopFamily
 from orchestration.theory.certificates.margin import (
     expect_without_scheduler,
@@ -25,6 +24,7 @@ from orchestration.theory.certificates.margin import (
     varying_of,
 )
 from orchestration.theory.certificates.timeline import LoopTimeline
+from orchestration.theory.certificates.varying import LOSS
 
 COLUMNS = 6
 """values of the first quantity, from 0 to the one that alone breaks the loop"""

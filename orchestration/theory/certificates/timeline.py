@@ -2,38 +2,31 @@
 
 A period is divided at instants at which no draw is open: within a piece each varying quantity has one draw. The events
 of a piece follow one another in an order; where the order depends on the draw there is a letter for each order, and one
-for a single value at which events of one instant are in an order that matters and that no other value has.
+for a single value at which events of one instant have an effect that no other value has.
 """
 
 from __future__ import annotations
 
-import itertools
-import math
-from collections.abc import Sequence
-from fractions import Fraction
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
-from orchestration.systems.system.connection import Connection
-from orchestration.systems.system.distribution import lowest
-from orchestration.theory.certificates.events import (
-    DELAY,
-    JITTER,
-    LATENCY,
-    LOSS,
-    SHIFT,
-    Draws,
-    LoopEvent,
-    Varying,
-    first_time,
-    last_time,
-)
+from orchestration.theory.certificates.course import Courses, PieceAt, Steps, time_at
 from orchestration.theory.certificates.family import Letter, LoopFamily
-from orchestration.theory.certificates.family_builder import FamilyBuilder
-from orchestration.theory.certificates.parts import CertifiedLoop, StateLayout
+from orchestration.theory.certificates.parts import CertifiedLoop
+from orchestration.theory.certificates.varying import DELAY, JITTER, LATENCY, LOSS, SHIFT, Draws, Point, Varying
+from orchestration.theory.exact.links import ATTOSECONDS, RandomLink, SampledTask, attoseconds, hyperperiod
+from orchestration.theory.exact.random_times import RandomTime
+from orchestration.theory.exact.timing import links_of, sampled_tasks
 
-LARGEST = 400
-"""numbers in the state of a loop"""
+Same = Callable[[Steps, Steps, Point], bool]
+"""Whether two courses have the same effect at a point"""
+INSTANT = ATTOSECONDS // NANOSECONDS
+"""by which the events of a draw are over before those of the next one begin"""
+
+Box = tuple[tuple[int, int], ...]
+"""The ends of a range, along each quantity"""
 
 
 class LoopTimeline:
@@ -43,82 +36,41 @@ class LoopTimeline:
         self.loop, self.varying = loop, varying
         self._timed = [each for each in varying if each.kind != LOSS]
         for each in varying:
-            if each.kind in (JITTER, SHIFT) and each.name in loop.step_dependent:
+            if each.kind in (JITTER, SHIFT) and loop.depends_on_step(each.name):
                 raise UsageError(f"{each.path}: samples of {each.name} depend on the time to the next one")
         self._lossy = next((each.name for each in varying if each.kind == LOSS), None)
-        self._events = self._all_events()
-        self._queued = frozenset(event.subject for event in self._events if event.kind != "sample")
-        self._groups = self._groups_by_draw()
+        self._tasks, self._links = sampled_tasks(loop.system), links_of(loop.system)
+        self._owner = self._owner_of_draws()
+        self._period = attoseconds(self._tasks[self._owner].period)
+        self._events = self._events_of_a_draw()
 
     def largest(self) -> float:
         """The largest value [s] of one quantity, the others at 0, for which no two draws are open at once."""
-        gap, nothing = self.loop.period / len(self._groups), [(Fraction(0),) * len(self._timed)]
-        spans = [last_time(group, nothing) - first_time(group, nothing) for group in self._groups]
-        return float(gap - max(spans)) / NANOSECONDS
+        begin, end = self._extent([(0,) * len(self._timed)])
+        return (self._period - (end - begin)) / ATTOSECONDS
 
     def family(self, largest: Sequence[float] = (), run: int = 0, largest_sum: float | None = None) -> LoopFamily:
         """The family for values of times in [0, `largest`] [s], the sum of two at most `largest_sum`.
 
         At most `run` messages are lost in a row. Raises `UsageError` where two draws would be open at once.
         """
-        limits = [exact_nanoseconds(J) for J in largest]
-        draws = Draws(limits, sum(limits, Fraction(0)) if largest_sum is None else exact_nanoseconds(largest_sum))
-        run = run if self._lossy else 0
-        begins = sorted((first_time(group, draws.corners()), i) for i, group in enumerate(self._groups))
-        ends = [time for time, _ in begins[1:]] + [begins[0][0] + self.loop.period]
-        for (_, i), end in zip(begins, ends):
-            if last_time(self._groups[i], draws.corners()) > end:
-                raise UsageError(
-                    f"{self._paths_text()}: expected less, so that no message is open when the next one is drawn"
-                )
-        layout = StateLayout(loop=self.loop, kept=frozenset([self._lossy] if self._lossy else []))
-        for size in (LARGEST, None):
-            builder = FamilyBuilder(layout, size or len(layout.places), self._lossy, self._queued)
-            letters: list[Letter] = []
-            for piece, ((begin, i), end) in enumerate(zip(begins, ends)):
-                events = [*self._groups[i], *self._deterministic_events(begin, end)]
-                letters += self._letters(builder, events, draws, (begin, end), (piece, len(begins)), run)
-        return builder.family(letters, [begin for begin, _ in begins])
+        limits = [_attoseconds(J) for J in largest]
+        draws = Draws(limits, sum(limits) if largest_sum is None else _attoseconds(largest_sum))
+        begin, end = self._extent(draws.corners())
+        if end - begin > self._period:
+            raise UsageError(
+                f"{self._paths_text()}: expected less, so that no message is open when the next one is drawn"
+            )
+        courses = Courses(self.loop, self._timing_at, self._begins(begin), self._lossy)
+        pieces = range(len(courses.begins))
+        return courses.family([x for i in pieces for x in self._letters(courses, draws, i, run if self._lossy else 0)])
 
-    # -- events ----------------------------------------------------------------------------------------------------
+    # -- draws -------------------------------------------------------------------------------------------------------
 
-    def _all_events(self) -> list[LoopEvent]:
-        """The events that begin in one period of the loop."""
-        loop, found = self.loop, []
-        for rank, name in enumerate(loop.order):
-            for k, time in enumerate(loop.samples_of(name)):
-                by, sent = self._slopes((JITTER, SHIFT), name), self._slopes((JITTER, LATENCY), name)
-                found.append(LoopEvent(time, by, (1, rank, k), "sample", name))
-                for place, x in enumerate(loop.system.connections):
-                    delay = exact_nanoseconds(lowest(x.delay))
-                    own = self._slopes((DELAY,), x.name)
-                    if x.receiver == name and not loop.is_sampled(x.sender) and self._is_late(x):
-                        slopes = tuple(a - b for a, b in zip(by, own))
-                        found.append(LoopEvent(time - delay, slopes, (0, rank, place), "measure", x.name))
-                    elif x.sender == name and (self._is_late(x) or x.order == "jacobi"):
-                        slopes = tuple(a + b for a, b in zip(sent, own))
-                        wait = delay
-                        if x.order == "jacobi":
-                            wait += loop.period / len(loop.samples_of(name))
-                            if any(by):
-                                raise UsageError(f"connections.{x.name}.order: expected gauss-seidel beside jitter")
-                        order = (1, rank, k, place) if not wait else (0, rank, place)  # at once, or before all samples
-                        if not loop.is_sampled(x.receiver):
-                            order = (2, rank, place)
-                        found.append(LoopEvent(time + wait, slopes, order, "arrive", x.name))
-        return found
-
-    def _is_late(self, x: Connection) -> bool:
-        """Whether its messages do not arrive with the sample that sends or reads them."""
-        own = (*self._slopes((DELAY,), x.name), *self._slopes((LATENCY,), x.sender))
-        return lowest(x.delay) > 0.0 or any(own) or self.loop.feeds_through(x.receiver)
-
-    def _slopes(self, kinds: Sequence[str], name: str) -> tuple[int, ...]:
-        return tuple(int(each.kind in kinds and each.name == name) for each in self._timed)
-
-    def _owner(self) -> str:
-        """The sampled component at whose samples quantities are drawn; any, where nothing varies."""
-        owners = set[str]() if self.varying else {self.loop.order[0]}
+    def _owner_of_draws(self) -> int:
+        """The task at whose samples quantities are drawn; any, where nothing varies."""
+        names = [task.name for task in self._tasks]
+        owners = set[str]() if self.varying else {names[0]}
         for each in self.varying:
             if each.kind in (JITTER, SHIFT, LATENCY):
                 owners.add(each.name)
@@ -127,126 +79,128 @@ class LoopTimeline:
                 owners.add(x.sender if self.loop.is_sampled(x.sender) else x.receiver)
         if len(owners) != 1:
             raise UsageError(f"{self._paths_text()}: expected quantities of one sampled component")
-        return owners.pop()
+        return names.index(owners.pop())
 
-    def _groups_by_draw(self) -> list[list[LoopEvent]]:
-        """For each draw the events that depend on it; of losses the sample at which they occur."""
-        owner = self._owner()
-        count = len(self.loop.samples_of(owner))
-        depend = [event for event in self._events if any(event.slopes)]
-        if not depend:
-            kinds = [event for event in self._events if (event.kind, event.subject) == ("sample", owner)]
-            late = [event for event in self._events if (event.kind, event.subject) == ("measure", self._lossy)]
-            depend = late or kinds
-        groups: list[list[LoopEvent]] = [[] for _ in range(count)]
-        for event in depend:
-            groups[self._draw_of(event, count)].append(event)
-        return groups
+    def _events_of_a_draw(self) -> list[tuple[int, Point]]:
+        """The events that depend on a draw: their times after its nominal sample, and how often each quantity is added.
 
-    def _draw_of(self, event: LoopEvent, count: int) -> int:
-        """The index of the sample within a period to which an event belongs: each kind of event is in order."""
-        alike = [e for e in self._events if (e.kind, e.subject) == (event.kind, event.subject)]
-        return alike.index(event) % count
+        Of losses it is the one at which they occur.
+        """
+        sample, lossy = self._added((JITTER, SHIFT)), 0
+        found = [(0, sample)]
+        for x, link in zip(self.loop.system.connections, self._links):
+            own = self._added((DELAY,), x.name)
+            if link.is_measured and link.receiver == self._owner:
+                found.append((-link.delay, tuple(a - b for a, b in zip(sample, own))))
+                lossy = -link.delay if x.name == self._lossy else lossy
+            elif link.sender == self._owner:
+                if link.jacobi and any(sample):
+                    raise UsageError(f"connections.{x.name}.order: expected gauss-seidel beside jitter")
+                sent = self._added((JITTER, LATENCY))
+                wait = link.delay + (self._period if link.jacobi else 0)
+                found.append((wait, tuple(a + b for a, b in zip(sent, own))))
+        return [each for each in found if any(each[1])] or [(lossy, sample)]
 
-    def _deterministic_events(self, begin: Fraction, end: Fraction) -> list[LoopEvent]:
-        """The events between two instants that do not depend on draws."""
-        drawn = {id(event) for group in self._groups for event in group}
-        found, period = [], self.loop.period
-        for event in self._events:
-            if id(event) not in drawn:
-                first = event.later(math.ceil((begin - event.time) / period) * period)
-                if first.time < end:
-                    found.append(first)
-        return found
+    def _added(self, kinds: Sequence[str], connection: str | None = None) -> Point:
+        """By quantity, 1 where it is of these kinds, and of a connection, if given."""
+        return tuple(int(each.kind in kinds and connection in (None, each.name)) for each in self._timed)
 
-    # -- letters ---------------------------------------------------------------------------------------------------
+    def _extent(self, corners: Sequence[Point]) -> tuple[int, int]:
+        """The first and the last time after a nominal sample at which a draw may have an effect.
 
-    def _letters(
-        self, builder: FamilyBuilder, events: list[LoopEvent], draws: Draws, span: tuple[Fraction, Fraction],
-        piece: tuple[int, int], run: int,
-    ) -> list[Letter]:  # fmt: skip
+        The last one is an instant later: others of its instant may come before it.
+        """
+        times = [time + sum(s * x for s, x in zip(added, point)) for time, added in self._events for point in corners]
+        return min(times), max(times) + INSTANT
+
+    def _begins(self, first: int) -> list[int]:
+        """The times at which the pieces of a period begin, `first` after the nominal samples."""
+        task, length = self._tasks[self._owner], hyperperiod([task.period for task in self._tasks])
+        samples = [(task.offsets[0] + k * task.period) % length for k in range(round(length / task.period))]
+        return [(attoseconds(sample) + first) % attoseconds(length) for sample in sorted(samples)]
+
+    def _timing_at(self, point: Point) -> tuple[list[SampledTask], list[RandomLink]]:
+        """The tasks and links where every draw has these values."""
+        tasks, links = list(self._tasks), list(self._links)
+        for each, value in zip(self._timed, point):
+            if each.kind in (JITTER, SHIFT):
+                task = tasks[self._owner]
+                tasks[self._owner] = replace(task, jitter=RandomTime((task.jitter.highest + value,)))
+            added = {(DELAY, each.name): value, (LATENCY, each.name): value, (SHIFT, each.name): -value}
+            for i, x in enumerate(self.loop.system.connections):
+                more = sum(added.get((each.kind, name), 0) for name in ({x.name} if each.kind == DELAY else {x.sender}))
+                links[i] = replace(links[i], delay=links[i].delay + more)
+        return tasks, links
+
+    # -- letters -----------------------------------------------------------------------------------------------------
+
+    def _letters(self, courses: Courses, draws: Draws, piece: int, run: int) -> list[Letter]:
         """The letters of a piece: one for each order of its events, and another one where a message may be lost."""
-        moves, lost_moves = _moves(piece, run)
-        number = f" {piece[0] + 1}" if piece[1] > 1 else ""
+        pieces = len(courses.begins)
+        number = f" {piece + 1}" if pieces > 1 else ""
         found = []
-        for box in self._boxes(events, draws):
-            in_order = _in_order(events, [(low + high) / 2 for low, high in box])
-            ranges = tuple((float(low) / NANOSECONDS, float(high) / NANOSECONDS) for low, high in box)
-            for lost, these in ((False, moves), (True, lost_moves)):
-                if these:
-                    product = builder.product(in_order, span, lost=lost)
-                    name = ("lost" if lost else "arrives" if self._lossy else "late") + number
-                    found.append(Letter(name=name, moves=these, product=product, ranges=ranges))
+        for lost, moves in zip((False, True), _moves((piece, pieces), run)):
+            for box, steps in self._boxes(courses.of(piece, lost=lost), courses.same, draws) if moves else ():
+                name = ("lost" if lost else "arrives" if self._lossy else "late") + number
+                ranges = tuple((low / ATTOSECONDS, high / ATTOSECONDS) for low, high in box)
+                found.append(Letter(name=name, moves=moves, product=courses.product(steps), ranges=ranges))
         names, word = [letter.name for letter in found], "order" if len(draws.largest) < 2 else "part"
         return [
-            letter if names.count(letter.name) == 1 else Letter(
-                name=f"{letter.name}, {word} {names[:i].count(letter.name) + 1}", moves=letter.moves,
-                product=letter.product, ranges=letter.ranges,
-            )
+            letter if names.count(letter.name) == 1
+            else replace(letter, name=f"{letter.name}, {word} {names[:i].count(letter.name) + 1}")
             for i, letter in enumerate(found)
         ]  # fmt: skip
 
-    def _boxes(self, events: Sequence[LoopEvent], draws: Draws) -> list[list[tuple[Fraction, Fraction]]]:
+    def _boxes(self, of: PieceAt, same: Same, draws: Draws) -> list[tuple[Box, Steps]]:
         """Boxes of values, divided where two events change their order, and covering two of a limited sum."""
         if not draws.largest:
-            return [[]]
-        pairs = [
-            (a.time - b.time, tuple(p - q for p, q in zip(a.slopes, b.slopes)))
-            for a, b in itertools.combinations(events, 2)
-        ]
+            return [((), of(()))]
         if len(draws.largest) == 1:
-            (limit,) = draws.largest
-            cuts = {Fraction(0), limit}
-            cuts |= {-distance / slope for distance, (slope,) in pairs if slope and 0 < -distance / slope < limit}
-            between = [*itertools.pairwise(sorted(cuts))]
-            orders = [self._order_that_matters(events, [(low + high) / 2]) for low, high in between]
-            single = [
-                (cut, cut)
-                for cut in sorted(cuts)
-                if self._order_that_matters(events, [cut])
-                not in (order for order, ends in zip(orders, between) if cut in ends)
+            between = [*_orders(of, draws.largest[0])]
+            ends = sorted({0, *draws.largest, *(high for ((_, high),), _ in between)})
+            single: list[tuple[Box, Steps]] = [
+                (((end, end),), of((end,)))
+                for end in ends
+                if not any(end in box and same(of((end,)), steps, (end,)) for (box,), steps in between)
             ]
-            return [[each] for each in sorted([*between, *single])]
+            return sorted([*between, *single], key=lambda one: one[0])
         corners = draws.corners()
-        middle = [sum(along, Fraction(0)) / len(corners) for along in zip(*corners)]
-        one_order = self._order_that_matters(events, middle)
-        changes = any(self._order_that_matters(events, corner) != one_order for corner in corners)
-        for distance, slopes in pairs:
-            ends = [distance + sum(s * x for s, x in zip(slopes, corner)) for corner in corners]
-            changes = changes or min(ends) < 0 < max(ends)
-        if changes:
+        middle = tuple(sum(along) // len(corners) for along in zip(*corners))
+        steps = _about(of, middle, [limit > 0 for limit in draws.largest])
+        times = [time_at(step, corner) for step in steps if isinstance(step, tuple) for corner in corners]
+        if min(times) < 0 or not all(same(of(corner), steps, corner) for corner in corners):
             raise UsageError(f"{self._paths_text()}: expected values that do not change the order of events")
-        return draws.boxes()
-
-    def _order_that_matters(
-        self, events: Sequence[LoopEvent], point: Sequence[Fraction]
-    ) -> set[tuple[LoopEvent, LoopEvent]]:
-        """The pairs of events, in order, of which one may have an effect on the other."""
-        return {pair for pair in itertools.combinations(_in_order(events, point), 2) if self._interact(*pair)}
-
-    def _interact(self, a: LoopEvent, b: LoopEvent) -> bool:
-        """Whether the order of two events of one instant may matter."""
-        return bool(self._touched(a) & self._touched(b))
-
-    def _touched(self, event: LoopEvent) -> set[str]:
-        """The components that an event reads or changes; of those in continuous time, whose states no instant changes,
-        only those with inputs that act on outputs at once. Messages stay in order, so their queues do not count.
-        """
-        if event.kind == "sample":
-            at_once = [x for x in self.loop.system.connections if x.name not in self._queued]
-            ends = [{x.sender, x.receiver} for x in at_once if event.subject in (x.sender, x.receiver)]
-            names = {event.subject}.union(*ends)
-        else:
-            x = self.loop.connection(event.subject)
-            names = {x.receiver if event.kind == "arrive" else x.sender}
-        return {name for name in names if self.loop.is_sampled(name) or self.loop.feeds_through(name)}
+        return [(box, steps) for box in draws.boxes()]
 
     def _paths_text(self) -> str:
         return " and ".join(dict.fromkeys(each.path for each in self.varying))
 
 
-def _in_order(events: Sequence[LoopEvent], point: Sequence[Fraction]) -> list[LoopEvent]:
-    return sorted(events, key=lambda event: (event.at(point), event.rank))
+def _orders(of: PieceAt, limit: int) -> Iterator[tuple[Box, Steps]]:
+    """The ranges of one quantity in which events have one order, from 0 to `limit`: each ends where a time vanishes."""
+    low = 0
+    while low < limit:
+        steps = _about(of, (low + 1,), [True])
+        high = min([limit, *(t[0] // -t[1] for t in steps if isinstance(t, tuple) and t[1] < 0)])
+        yield ((low, high),), steps
+        low = high
+
+
+def _about(of: PieceAt, point: Point, varies: Sequence[bool]) -> Steps:
+    """The steps about a point at which no two events that vary are at one time: times by the values of quantities."""
+    moved = [of((*point[:i], x + which, *point[i + 1 :])) for i, (x, which) in enumerate(zip(point, varies))]
+    found: Steps = []
+    for step, *others in zip(of(point), *moved, strict=True):
+        if isinstance(step, tuple):
+            added = [other[0] - step[0] for other in others if isinstance(other, tuple)]
+            found.append((step[0] - sum(s * x for s, x in zip(added, point)), *added))
+        else:
+            found.append(step)
+    return found
+
+
+def _attoseconds(seconds: float) -> int:
+    return attoseconds(exact_nanoseconds(seconds) / NANOSECONDS)
 
 
 def _moves(piece: tuple[int, int], run: int) -> tuple[tuple[tuple[int, int], ...], tuple[tuple[int, int], ...]]:

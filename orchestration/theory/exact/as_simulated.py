@@ -144,7 +144,7 @@ class SimulatedEffects(LoopEffects):
     def _transfer(self, now: Floats, wire: int) -> Floats:
         x = self.system.connections[wire]
         now = now.copy()
-        now[self.places("received", x.name)] = np.array([x.scale * self._message_row(start) for start in x.start]) @ now
+        now[self.places("received", x.name)] = self._message_rows(x) @ now
         return now
 
     def _trapezoid(self, after: Floats, h: float) -> Floats:

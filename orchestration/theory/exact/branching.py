@@ -5,7 +5,6 @@ An event with a random outcome splits a branch in two or more. Times are whole a
 
 from __future__ import annotations
 
-import bisect
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -15,7 +14,19 @@ from typing import Protocol
 import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.theory.exact.branch import ARRIVES, MEASURES, NEVER, POSTS, SAMPLES, Branch, BranchEvent, Mode
+from orchestration.theory.exact.branch import (
+    ARRIVES,
+    MEASURES,
+    NEVER,
+    POSTS,
+    SAMPLES,
+    SETTLES,
+    Branch,
+    BranchEvent,
+    Mode,
+    in_transit,
+    place_in,
+)
 from orchestration.theory.exact.links import RandomLink, SampledTask, attoseconds
 from orchestration.theory.exact.pieces import Piece
 from orchestration.theory.exact.random_times import Kinks
@@ -27,28 +38,33 @@ LONGEST_AGE = 100
 
 
 class Effects(Protocol):
-    """What events do to the state: the numbers of the loop, followed by the messages in transit."""
+    """What events do to the state: the numbers of the loop, followed by those of the messages in transit, in order."""
 
     size: int
-    costs: int
+
+    def start(self, in_transit: Sequence[int]) -> Piece:
+        """No time, with messages of these links in transit."""
 
     def advance(self, piece: Piece, duration: int) -> Piece:
         """Time passes."""
 
-    def send(self, piece: Piece, link: int) -> Piece:
-        """A message is appended to those in transit."""
+    def send(self, piece: Piece, link: int, at: int) -> Piece:
+        """A message is put among the numbers of those in transit, at number `at`."""
 
-    def receive(self, piece: Piece, link: int, at: int, since: int, gap: int | None) -> Piece:
-        """The message that begins at number `at` arrives, and leaves the state.
+    def receive(self, piece: Piece, link: int, since: int, gap: int | None) -> Piece:
+        """The first message in transit arrives, and leaves the state.
 
         The one before arrived `since` ago. Where that is 0, it arrived `gap` after the one before it.
         """
 
-    def sample(self, piece: Piece, task: int, ages: Sequence[tuple[int, int | None]]) -> Piece:
-        """A task samples; `ages` has for each link the age of the last arrival, and its gap to the one before."""
+    def sample(self, piece: Piece, task: int) -> Piece:
+        """A task samples."""
 
     def tick(self, piece: Piece, grid: int) -> Piece:
         """A point of a grid of known times is reached."""
+
+    def done(self, piece: Piece, event: BranchEvent, in_transit: Sequence[int]) -> Piece:
+        """All of an event has happened; messages of these links are in transit."""
 
 
 class Branching:
@@ -69,39 +85,18 @@ class Branching:
         self._kinks_between, self._hyperperiod = kinks, hyperperiod
 
     def mode_of(self, branch: Branch) -> tuple[Mode, float, Piece]:
-        """The mode that a branch has reached, its messages in the order of their events; its probability and piece."""
-        order = [event.token for event in branch.events if event.kind != "measure" and event.token >= 0]
-        places, at = {}, self._effects.size
-        for token, size in branch.in_transit:
-            places[token] = range(at, at + size)
-            at += size
-        sizes = dict(branch.in_transit)
-        rows = [*range(self._effects.size), *(row for token in order for row in places[token])]
-        piece = branch.piece if rows == list(range(at)) else branch.piece.mapped(np.eye(at)[rows])
-        events = tuple(
-            (x.time - branch.time if x.time != NEVER else NEVER, x.phase, x.rank, x.kind, x.of,
-             x.token if x.kind == "measure" or x.token < 0 else order.index(x.token), x.place)
-            for x in branch.events
-        )  # fmt: skip
+        """The mode that a branch has reached, its probability and piece."""
         holds = tuple(self._hold_age(i, branch.time - at, gap) for i, (at, gap) in enumerate(branch.holds))
-        return (events, tuple(sizes[token] for token in order), branch.bursts, holds), branch.probability, piece
+        events = tuple(event.later(-branch.time) for event in branch.events)
+        return (events, branch.bursts, holds), branch.probability, branch.piece
 
     def branch_of(self, mode: Mode, time: int) -> Branch:
         """The branch that is in a mode at a time, with probability 1."""
-        events, sizes, bursts, holds = mode
+        events, bursts, holds = mode
         return Branch(
-            time=time,
-            events=tuple(
-                BranchEvent(time + after if after != NEVER else NEVER, phase, rank, birth, kind, of, token, place)
-                for birth, (after, phase, rank, kind, of, token, place) in enumerate(events)
-            ),
-            in_transit=tuple(enumerate(sizes)),
-            bursts=bursts,
-            holds=tuple((time - age, gap) for age, gap in holds),
-            born=len(events) + len(sizes),
-            probability=1.0,
-            piece=Piece.start(self._effects.size + sum(sizes), self._effects.costs),
-        )
+            time=time, events=tuple(event.later(time) for event in events), bursts=bursts,
+            holds=tuple((time - age, gap) for age, gap in holds), piece=self._effects.start(in_transit(events)),
+        )  # fmt: skip
 
     def _hold_age(self, i: int, age: int, gap: int | None) -> tuple[int, int | None]:
         """Age and gap of the last arrival at a first-order hold; ages beyond the longest are folded."""
@@ -131,7 +126,7 @@ class Branching:
 
     def plan_post(self, branch: Branch, link: int, place: int) -> Branch:
         """A message from continuous time to continuous time, sent now."""
-        return self._plan(branch, branch.time, POSTS, link, "post", link, place=place)
+        return _planned(branch, BranchEvent(branch.time, POSTS, link, "post", link, place=place))
 
     def tick(self, branch: Branch, grid: int) -> Branch:
         """A point of a grid is reached."""
@@ -139,7 +134,7 @@ class Branching:
 
     def _plan_sample(self, branch: Branch, task: int, time: int, place: int) -> Iterator[Branch]:
         """A sample at a known time, with its measurements, and the dispatch of messages that wait for it."""
-        branches = [self._plan(branch, time, SAMPLES, 2 * task + 1, "sample", task, place=place)]
+        branches = [_planned(branch, BranchEvent(time, SAMPLES, 2 * task + 1, "sample", task, place=place))]
         for i, link in enumerate(self.links):
             if link.is_read_ahead and link.receiver == task:
                 branches = [after for each in branches for after in self._plan_measurement(each, i, time)]
@@ -154,21 +149,25 @@ class Branching:
         kinks = lambda low, high: [time - at for at in reversed(self._kinks_between(time - high, time - low))]  # noqa: E731
         for late, p in link.delay_jitter.draws(link.delay, kinks, self._order):
             measured = max(time - link.delay - late, last)
-            likely = _likely(branch, p)
-            yield self._plan(likely, measured, MEASURES, i, "measure", i, time - measured)
+            event = BranchEvent(measured, MEASURES, i, "measure", i, place=time - measured)
+            yield _planned(_likely(branch, p), event)
 
     def _dispatch(self, branch: Branch, event: BranchEvent, sent: int) -> Iterator[Branch]:
         """A message that waited for the next sample of its sender is sent then."""
-        rest = replace(branch, events=tuple(x for x in branch.events if x is not event))
+        which = next(k for k, each in enumerate(branch.events) if each is event)
+        rest = replace(branch, events=branch.events[:which] + branch.events[which + 1 :])
+        begins = [self._effects.size, *(self._effects.size + np.cumsum([x.size for x in branch.events]))]
         for arrival, likely in self._arrivals(rest, event.of, sent):
-            yield self._plan(likely, arrival, ARRIVES, event.of, "arrive", event.of, event.token)
+            then = self._arrival(event.of, arrival)
+            order = [k for k in range(len(branch.events)) if k != which]
+            order.insert(place_in(rest.events, then), which)
+            rows = [*range(self._effects.size), *(i for k in order for i in range(begins[k], begins[k + 1]))]
+            yield replace(_planned(likely, then), piece=likely.piece.mapped(np.eye(len(rows))[rows]))
 
-    def _plan(
-        self, branch: Branch, time: int, phase: int, rank: int, kind: str, of: int, token: int = -1, place: int = 0
-    ) -> Branch:
-        events = list(branch.events)
-        bisect.insort(events, BranchEvent(time, phase, rank, branch.born, kind, of, token, place))
-        return replace(branch, events=tuple(events), born=branch.born + 1)
+    def _arrival(self, i: int, time: int) -> BranchEvent:
+        """The arrival of a message at a time."""
+        link = self.links[i]
+        return BranchEvent(time, ARRIVES if link.receiver is not None else SETTLES, i, "arrive", i, link.size)
 
     # -- events happen -------------------------------------------------------------------------------------------
 
@@ -177,7 +176,10 @@ class Branching:
         while branch.events and branch.events[0].time < until:
             event = branch.events[0]
             branch = self._advance(replace(branch, events=branch.events[1:]), event.time)
-            outcomes = list(self._outcomes(branch, event))
+            outcomes = [
+                replace(each, piece=self._effects.done(each.piece, event, in_transit(each.events)))
+                for each in self._outcomes(branch, event)
+            ]
             if len(outcomes) > 1:
                 for each in outcomes:
                     yield from self.branches_until(each, until)
@@ -192,7 +194,7 @@ class Branching:
 
     def _outcomes(self, branch: Branch, event: BranchEvent) -> Iterator[Branch]:
         if event.kind == "arrive":
-            yield self._receive(branch, event.of, event.token)
+            yield self._receive(branch, event.of)
         elif event.kind == "sample":
             yield from self._sample(branch, event.of, event.place)
         else:  # a message from continuous time, measured or posted
@@ -200,9 +202,10 @@ class Branching:
                 if lost:
                     yield likely
                 elif event.kind == "measure":
-                    after, token = self._put_in_transit(likely, event.of)
-                    rank = 2 * (self.links[event.of].receiver or 0)
-                    yield self._plan(after, branch.time + event.token, SAMPLES, rank, "arrive", event.of, token)
+                    link = self.links[event.of]
+                    yield self._put_in_transit(likely, BranchEvent(
+                        branch.time + event.place, SAMPLES, 2 * (link.receiver or 0), "arrive", event.of, link.size
+                    ))  # fmt: skip
                 else:
                     yield from self._send(likely, event.of, event.place)
 
@@ -213,8 +216,7 @@ class Branching:
                 branches = [
                     each if lost else self._deliver_now(each, i) for b in branches for lost, each in self._losses(b, i)
                 ]
-        ages = [tuple((b.time - at, gap) for at, gap in b.holds) for b in branches]
-        branches = [replace(b, piece=self._effects.sample(b.piece, task, age)) for b, age in zip(branches, ages)]
+        branches = [replace(b, piece=self._effects.sample(b.piece, task)) for b in branches]
         for i, link in enumerate(self.links):
             if link.sender == task:
                 branches = [
@@ -251,15 +253,13 @@ class Branching:
         if link.jacobi and link.sender is not None:
             sent = next((x.time for x in branch.events if x.kind == "sample" and x.of == link.sender), None)
         if sent is None:
-            after, token = self._put_in_transit(branch, i)
-            yield self._plan(after, NEVER, ARRIVES, i, "wait", i, token)
+            yield self._put_in_transit(branch, BranchEvent(NEVER, ARRIVES, i, "wait", i, link.size))
             return
         for arrival, likely in self._arrivals(branch, i, sent):
-            if arrival == branch.time:
+            if arrival == branch.time and link.receiver is not None:
                 yield self._deliver_now(likely, i)
             else:
-                after, token = self._put_in_transit(likely, i)
-                yield self._plan(after, arrival, ARRIVES, i, "arrive", i, token)
+                yield self._put_in_transit(likely, self._arrival(i, arrival))
 
     def _arrivals(self, branch: Branch, i: int, sent: int) -> Iterator[tuple[int, Branch]]:
         """Arrival times of a message sent at a time: none overtakes another."""
@@ -268,29 +268,27 @@ class Branching:
         for late, p in link.delay_jitter.draws(sent + link.delay, self._kinks_between, self._order):
             yield max(sent + link.delay + late, last), _likely(branch, p)
 
-    def _put_in_transit(self, branch: Branch, i: int) -> tuple[Branch, int]:
-        in_transit = (*branch.in_transit, (branch.born, self.links[i].size))
-        piece = self._effects.send(branch.piece, i)
-        return replace(branch, in_transit=in_transit, piece=piece, born=branch.born + 1), branch.born
+    def _put_in_transit(self, branch: Branch, arrival: BranchEvent) -> Branch:
+        before = branch.events[: place_in(branch.events, arrival)]
+        piece = self._effects.send(branch.piece, arrival.of, sum(event.size for event in before))
+        return replace(_planned(branch, arrival), piece=piece)
 
     def _deliver_now(self, branch: Branch, i: int) -> Branch:
-        after, token = self._put_in_transit(branch, i)
-        return self._receive(after, i, token)
+        return self._receive(replace(branch, piece=self._effects.send(branch.piece, i, 0)), i)
 
-    def _receive(self, branch: Branch, i: int, token: int) -> Branch:
-        at = self._effects.size
-        for other, size in branch.in_transit:
-            if other == token:
-                break
-            at += size
+    def _receive(self, branch: Branch, i: int) -> Branch:
+        """The first message in transit arrives."""
         last, gap = branch.holds[i]
         since = branch.time - last
-        piece = self._effects.receive(branch.piece, i, at, since, gap)
-        holds = branch.holds
+        piece, holds = self._effects.receive(branch.piece, i, since, gap), branch.holds
         if self.links[i].first_order and since > 0:
             holds = (*holds[:i], (branch.time, since), *holds[i + 1 :])
-        in_transit = tuple(x for x in branch.in_transit if x[0] != token)
-        return replace(branch, piece=piece, holds=holds, in_transit=in_transit)
+        return replace(branch, piece=piece, holds=holds)
+
+
+def _planned(branch: Branch, event: BranchEvent) -> Branch:
+    at = place_in(branch.events, event)
+    return replace(branch, events=(*branch.events[:at], event, *branch.events[at:]))
 
 
 def _likely(branch: Branch, probability: float) -> Branch:

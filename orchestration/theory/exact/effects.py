@@ -19,6 +19,7 @@ from orchestration.simulation.engines.channel import of_each
 from orchestration.systems.schedule.plan import Plan
 from orchestration.systems.system.connection import Connection, component_of, variable_of
 from orchestration.systems.system.model import System
+from orchestration.theory.exact.branch import BranchEvent
 from orchestration.theory.exact.flows import Flows
 from orchestration.theory.exact.initial_state import InitialState
 from orchestration.theory.exact.linear import Components, Continuous, SampledSystem
@@ -168,15 +169,23 @@ class LoopEffects(ABC):
 
     # -- events ---------------------------------------------------------------------------------------------------
 
-    def send(self, piece: Piece, link: int) -> Piece:
+    def start(self, in_transit: Sequence[int]) -> Piece:
+        """As `Effects`."""
+        return Piece.start(self.size + sum(len(self.system.connections[i].start) for i in in_transit), self.costs)
+
+    def send(self, piece: Piece, link: int, at: int) -> Piece:
         """As `Effects`."""
         x = self.system.connections[link]
-        rows = np.array([x.scale * self._message_row(start) for start in x.start]).reshape(len(x.start), self.size)
-        size = len(piece.Z)
-        change = np.vstack([np.eye(size), np.hstack([rows, np.zeros((len(rows), size - self.size))])])
-        covariance = np.zeros((len(change), len(change)))
-        covariance[size:, size:] = np.diag(self._noise[x.name])
-        return piece.mapped(change, covariance)
+        rows, size, first = self._message_rows(x), len(piece.Z), self.size + at
+        message = np.hstack([rows, np.zeros((len(rows), size - self.size))])
+        change = np.vstack([np.eye(size)[:first], message, np.eye(size)[first:]])
+        noise = np.zeros(len(change))
+        noise[first : first + len(rows)] = self._noise[x.name]
+        return piece.mapped(change, np.diag(noise))
+
+    def _message_rows(self, x: Connection) -> Floats:
+        """The rows of a message as it is sent."""
+        return np.array([x.scale * self._message_row(start) for start in x.start]).reshape(len(x.start), self.size)
 
     def _message_row(self, start: str) -> Floats:
         """The row of an output as it is sent."""
@@ -188,11 +197,11 @@ class LoopEffects(ABC):
             else np.zeros(self.size)
         )
 
-    def receive(self, piece: Piece, link: int, at: int, since: int, gap: int | None) -> Piece:
+    def receive(self, piece: Piece, link: int, since: int, gap: int | None) -> Piece:
         """As `Effects`."""
         x = self.system.connections[link]
-        size, count = len(piece.Z), len(x.start)
-        message = np.eye(size)[at : at + count]
+        size, leaves = len(piece.Z), slice(self.size, self.size + len(x.start))
+        message = np.eye(size)[leaves]
         change = np.eye(size)
         change[self.places("received", x.name)] = message
         if x.hold == "first":
@@ -203,9 +212,9 @@ class LoopEffects(ABC):
             elif gap is not None:  # it replaces one that arrived at the same instant
                 change[slope] += (message - before) * (ATTOSECONDS / gap)
             change[last] = message
-        return piece.mapped(np.delete(change, slice(at, at + count), axis=0))
+        return piece.mapped(np.delete(change, leaves, axis=0))
 
-    def sample(self, piece: Piece, task: int, ages: Sequence[tuple[int, int | None]]) -> Piece:
+    def sample(self, piece: Piece, task: int) -> Piece:
         """As `Effects`."""
         name = self.tasks[task]
         part = self.sampled_parts[name]
@@ -223,6 +232,10 @@ class LoopEffects(ABC):
         """As `Effects`."""
 
     def tick(self, piece: Piece, grid: int) -> Piece:
+        """As `Effects`."""
+        return piece
+
+    def done(self, piece: Piece, event: BranchEvent, in_transit: Sequence[int]) -> Piece:
         """As `Effects`."""
         return piece
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -43,7 +43,7 @@ class Piece:
     def mapped(self, change: Floats, covariance: Floats | None = None) -> Piece:
         """After a linear map of the state, which may change its size, and noise of a covariance."""
         W = change @ self.W @ change.T
-        return Piece(change @ self.Z, W if covariance is None else W + covariance, self.M, self.c)
+        return replace(self, Z=change @ self.Z, W=W if covariance is None else W + covariance)
 
     def charged(self, Q: Floats) -> Piece:
         """With the costs z'Q z of the present state added, Q of its first numbers."""

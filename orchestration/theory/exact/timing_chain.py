@@ -10,6 +10,7 @@ import bisect
 import itertools
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from fractions import Fraction
 
 from orchestration.foundation.basics.errors import UsageError
@@ -34,8 +35,9 @@ class TimingChain:
         *,
         order: int,
         grids: Sequence[Fraction] = (),
+        cuts: Sequence[int] = (),
     ) -> None:
-        """`order` is that of Gauss's rule. `grids` are periods of points at which `effects` tick.
+        """`order` is that of Gauss's rule. `grids` are periods of points at which `effects` tick, `cuts` further cuts.
 
         Raises `UsageError` for periods without a hyperperiod, or for too many modes.
         """
@@ -48,7 +50,7 @@ class TimingChain:
             for i in range(len(tasks))
         ]
         """by task: how long before its sample it may measure"""
-        self._cut_actions = self._actions_by_cut()
+        self._cut_actions = {time: [] for time in cuts} | self._actions_by_cut()
         self.cuts = sorted(self._cut_actions)
         self._kinks = self._all_kinks()
         self._branching = Branching(
@@ -107,7 +109,7 @@ class TimingChain:
         """By cut, the passages from each mode there to those at the next cut; and the sizes of the states."""
         modes: list[dict[Mode, int]] = [{} for _ in self.cuts]
         stages: list[list[Passage]] = [[] for _ in self.cuts]
-        waiting = [(0, self._empty_mode())]
+        waiting = [(0, self._empty_mode)]
         modes[0][waiting[0][1]] = 0
         count = passages = 0
         while waiting:
@@ -125,11 +127,22 @@ class TimingChain:
                     f"more than {MOST_MODES} combinations of messages in transit, or {MOST_PASSAGES} passages from one "
                     "to the next: expected fewer random delays at once, or shorter ones"
                 )
-        sizes = [[self._effects.size + sum(mode[1]) for mode in known] for known in modes]
+        sizes = [[self._effects.size + sum(event.size for event in mode[0]) for mode in known] for known in modes]
         return list(stages), sizes
 
+    @property
     def _empty_mode(self) -> Mode:
-        return (), (), (False,) * len(self.links), tuple((0, None) for _ in self.links)
+        return (), (False,) * len(self.links), ((0, None),) * len(self.links)
+
+    def repeating(self) -> list[Piece]:
+        """By cut, the piece from there to the next one, of a loop without chance whose messages in transit repeat."""
+        mode, before, pieces = self._empty_mode, None, list[Piece]()
+        while mode != before:
+            before, pieces = mode, []
+            for i in range(len(self.cuts)):
+                ((mode, _, piece),) = self.passages_from(i, mode)
+                pieces.append(piece)
+        return pieces
 
     def cut_time(self, k: int) -> int:
         """The time of the k-th cut, counted from 0."""
@@ -150,11 +163,8 @@ class TimingChain:
                 )
         for bursts in itertools.product(*([False, True] if link.has_bursts else [False] for link in self.links)):
             shares = [x.loss if lost else 1.0 - x.loss for x, lost in zip(self.links, bursts) if x.has_bursts]
-            branch = Branch(
-                time=0, events=(), in_transit=(), bursts=bursts, holds=tuple((0, None) for _ in self.links), born=0,
-                probability=math.prod(shares), piece=Piece.start(self._effects.size, self._effects.costs),
-            )  # fmt: skip
-            branches = [branch]
+            begin = self._branching.branch_of(((), bursts, self._empty_mode[2]), 0)
+            branches = [replace(begin, probability=math.prod(shares))]
             for i, nominal, place in self._samples_read_before_zero():
                 branches = [
                     after for each in branches for after in self._branching.plan_nominal_sample(each, i, nominal, place)

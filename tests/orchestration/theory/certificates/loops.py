@@ -5,14 +5,13 @@ from fractions import Fraction
 import numpy as np
 
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.systems.schedule.plan import Plan
 from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.model import System
 from orchestration.theory.certificates.certificate import Cells, Certificate
 from orchestration.theory.certificates.family import Factor, Letter, LoopFamily
 from orchestration.theory.certificates.parts import CertifiedLoop
-from orchestration.theory.stability.matrices import Matrices
+from orchestration.theory.exact.linear import Components, Continuous, SampledSystem
 
 HOVER_A = np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 19.62, 0.0], [0.0, 0.0, 0.0, 0.5], [0.0, 0.0, 0.0, 0.0]])
 HOVER_B = np.array([[0.0], [0.0], [0.0], [1.0]])
@@ -64,12 +63,12 @@ def through_a_filter() -> CertifiedLoop:
     not in turn.
     """
 
-    def matrices(inputs: str, outputs: str, D: Floats) -> Matrices:
+    def static(inputs: str, outputs: str, D: Floats) -> SampledSystem:
         nothing = np.zeros((0, 0))
         B, C = np.zeros((0, len(inputs))), np.zeros((len(outputs), 0))
-        return Matrices(inputs=tuple(inputs), outputs=tuple(outputs), A=nothing, B=B, C=C, D=D)
+        return SampledSystem(inputs=tuple(inputs), outputs=tuple(outputs), A=nothing, B=B, C=C, D=D)
 
-    plant = Matrices(
+    plant = Continuous(
         inputs=("u",), outputs=("p", "v"), A=np.array([[0.0, 1.0], [-2.4, 0.15]]), B=np.array([[0.0], [1.0]]),
         C=np.eye(2), D=np.zeros((2, 1)),
     )  # fmt: skip
@@ -86,6 +85,6 @@ def through_a_filter() -> CertifiedLoop:
             Connection(name="command", start=("law.u",), end=("plant.u",)),
         ),
     )  # fmt: skip
-    law = matrices("xy", "u", np.array([[0.8, 0.05]]))
-    components = {"plant": plant, "filter": matrices("pv", "xy", np.eye(2)), "law": law}
-    return CertifiedLoop(system=system, components=components, period=Fraction(10**9), order=Plan(system).sampled)
+    law = static("xy", "u", np.array([[0.8, 0.05]]))
+    components: Components = {"plant": plant, "filter": static("pv", "xy", np.eye(2)), "law": law}
+    return CertifiedLoop(system=system, components=components, period=Fraction(10**9))

@@ -14,10 +14,10 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.certificates.breaking import unstable_sequence
-from orchestration.theory.certificates.events import BOXES, DELAY, JITTER, LATENCY, LOSS, SHIFT, Varying
 from orchestration.theory.certificates.family import LoopFamily
 from orchestration.theory.certificates.parts import CertifiedLoop, certified_loop
 from orchestration.theory.certificates.timeline import LoopTimeline
+from orchestration.theory.certificates.varying import BOXES, DELAY, JITTER, LATENCY, LOSS, SHIFT, Varying
 from orchestration.theory.stability.loop_at_rest import at_rest
 from orchestration.theory.stability.monodromy import growth_of_loop
 from tests.examples.common import example
@@ -202,6 +202,8 @@ def test_what_is_not_for_this_is_refused(system: System, instances: Instances) -
 
 def test_a_law_that_integrates_over_its_step_is_refused_with_late_samples(system: System, instances: Instances) -> None:
     of = loop(system, instances)
-    assert not of.step_dependent
+    assert not of.depends_on_step("controller")
+    law: Any = of.components["controller"]
+    integrates = {**of.components, "controller": dataclasses.replace(law, depends_on_step=True)}
     with pytest.raises(UsageError, match="samples of controller depend on the time to the next one"):
-        LoopTimeline(dataclasses.replace(of, step_dependent=frozenset(["controller"])), [SAMPLE])
+        LoopTimeline(dataclasses.replace(of, components=integrates), [SAMPLE])

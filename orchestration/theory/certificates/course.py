@@ -1,0 +1,220 @@
+"""The course of a loop's events, recorded as matrices: each event by a map of the state, with flows in between.
+
+The state of the family has places for the numbers of the loop, and for the messages of each link in transit, by age.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.model import System
+from orchestration.theory.certificates.family import Factor, Letter, LoopFamily
+from orchestration.theory.certificates.parts import CertifiedLoop
+from orchestration.theory.certificates.varying import Point
+from orchestration.theory.exact.branch import BranchEvent
+from orchestration.theory.exact.effects import ContinuousEffects, Places
+from orchestration.theory.exact.linear import Components
+from orchestration.theory.exact.links import ATTOSECONDS, RandomLink, SampledTask
+from orchestration.theory.exact.pieces import Piece
+from orchestration.theory.exact.timing_chain import TimingChain
+
+SAME = 1e-10
+"""of the largest number of a row: two maps that differ by less are the same"""
+VERBS = {"sample": "samples", "measure": "is measured", "arrive": "arrives"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Jump:
+    """The map of an event, from some places of the state to some."""
+
+    name: str
+    change: Floats
+    before: tuple[int, ...]
+    after: tuple[int, ...]
+
+    def matrix(self, size: int) -> Floats:
+        """The map of a whole state of `size` numbers."""
+        found: Floats = np.zeros((size, size))
+        found[np.ix_(self.after, self.before)] = self.change
+        return found
+
+    def is_same(self, other: Jump) -> bool:
+        """Whether another event has the same map."""
+        places = (self.before, self.after) == (other.before, other.after)
+        return places and np.array_equal(self.change, other.change)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Course(Piece):
+    """A piece with all that happens in it: events, and the time between them [attoseconds]."""
+
+    steps: tuple[Jump | int, ...] = ()
+    in_transit: tuple[int, ...]
+    """the links of messages after the last event, in the order of their numbers"""
+
+
+class RecordedEffects(ContinuousEffects):
+    """The effects of events, which are recorded.
+
+    All messages of the connection `lossy` are lost while `loses`: they bring what was sent before instead.
+    """
+
+    loses = False
+
+    def __init__(self, system: System, components: Components, tasks: Sequence[str], lossy: str | None) -> None:
+        self._lossy = lossy
+        super().__init__(system, components, tasks)
+        self._slots: dict[tuple[int, int], int] = {}
+        self.places_count = self.size
+        """of the whole state: it grows as further messages are seen in transit"""
+
+    def _add_more_places(self, places: Places) -> None:
+        for x in self.system.connections:
+            if x.name == self._lossy:
+                places.add("sent", x.name, len(x.start))
+
+    def start(self, in_transit: Sequence[int]) -> Course:
+        """As `Effects`."""
+        return Course(**vars(super().start(in_transit)), in_transit=tuple(in_transit))
+
+    def advance(self, piece: Piece, duration: int) -> Piece:
+        """As `Effects`."""
+        assert isinstance(piece, Course)
+        return replace(piece, steps=(*piece.steps, duration))
+
+    def send(self, piece: Piece, link: int, at: int) -> Piece:
+        """As `Effects`."""
+        x = self.system.connections[link]
+        if x.name == self._lossy and not self.loses:
+            change = np.eye(len(piece.Z))
+            change[self.places("sent", x.name), : self.size] = super()._message_rows(x)
+            piece = piece.mapped(change)
+        return super().send(piece, link, at)
+
+    def _message_rows(self, x: Connection) -> Floats:
+        if x.name == self._lossy:
+            return np.eye(self.size)[self.places("sent", x.name)]
+        return super()._message_rows(x)
+
+    def done(self, piece: Piece, event: BranchEvent, in_transit: Sequence[int]) -> Piece:
+        """As `Effects`: its map is recorded."""
+        assert isinstance(piece, Course)
+        subject = self.tasks[event.of] if event.kind == "sample" else self.system.connections[event.of].name
+        lost = ", lost" if self.loses and subject == self._lossy else ""
+        jump = Jump(
+            name=f"{subject} {VERBS[event.kind]}{lost}", change=piece.Z,
+            before=self._places_with(piece.in_transit), after=self._places_with(in_transit),
+        )  # fmt: skip
+        return replace(self.start(in_transit), steps=(*piece.steps, jump))
+
+    def _places_with(self, in_transit: Sequence[int]) -> tuple[int, ...]:
+        """The places of the numbers of the loop, and of messages of these links, the oldest of each first."""
+        found = [*range(self.size)]
+        for i, link in enumerate(in_transit):
+            key, count = (link, in_transit[:i].count(link)), len(self.system.connections[link].start)
+            if key not in self._slots:
+                self._slots[key] = self.places_count
+                self.places_count += count
+            found += range(self._slots[key], self._slots[key] + count)
+        return tuple(found)
+
+
+Steps = list[Jump | Point]
+"""Events, and the times between them: t[0] + t[1] τ₁ + … [attoseconds]"""
+Timing = Callable[[Point], tuple[Sequence[SampledTask], Sequence[RandomLink]]]
+"""Tasks and links where every draw has these values"""
+PieceAt = Callable[[Point], Steps]
+"""The steps of a piece of a period, by the values of draws"""
+
+
+def time_at(time: Point, point: Point) -> int:
+    """A time between events at values of the quantities."""
+    return time[0] + sum(s * x for s, x in zip(time[1:], point))
+
+
+class Courses:
+    """The courses of a period by the values of its draws, in pieces that begin at the same times."""
+
+    def __init__(self, loop: CertifiedLoop, timing: Timing, begins: Sequence[int], lossy: str | None) -> None:
+        self.begins, self._timing = begins, timing
+        tasks, _ = timing(())
+        self._effects = RecordedEffects(loop.system, loop.components, [task.name for task in tasks], lossy)
+        self._known: dict[tuple[Point, bool], list[Steps]] = {}
+        self._jumps: dict[str, Jump] = {}
+
+    def of(self, piece: int, *, lost: bool) -> PieceAt:
+        """A piece in which all messages are lost, or none."""
+        return lambda point: self._pieces(point, lost)[piece]
+
+    def _pieces(self, point: Point, lost: bool) -> list[Steps]:
+        if (point, lost) not in self._known:
+            self._effects.loses = lost
+            chain = TimingChain(*self._timing(point), self._effects, order=1, cuts=self.begins)
+            parts, first = chain.repeating(), [chain.cuts.index(begin) for begin in self.begins]
+            counts = [(b - a) % len(parts) or len(parts) for a, b in zip(first, [*first[1:], first[0]])]
+            self._known[point, lost] = [
+                _joined([parts[(a + k) % len(parts)] for k in range(count)]) for a, count in zip(first, counts)
+            ]
+        return self._known[point, lost]
+
+    def product(self, steps: Steps) -> tuple[Factor, ...]:
+        """The factors of steps."""
+        return tuple(
+            Factor(matrix=self._name_of(step)) if isinstance(step, Jump)
+            else Factor(matrix="flow", times=(step[0] / ATTOSECONDS, *map(float, step[1:])))
+            for step in steps
+        )  # fmt: skip
+
+    def _name_of(self, jump: Jump) -> str:
+        """The name of its matrix: that of the event, with a number where other maps have it."""
+        count, name = 1, jump.name
+        while not jump.is_same(self._jumps.setdefault(name, jump)):
+            count += 1
+            name = f"{jump.name} ({count})"
+        return name
+
+    def family(self, letters: Sequence[Letter]) -> LoopFamily:
+        """The family of letters with these products."""
+        size = self._effects.places_count
+        matrices = {"flow": self._flow} | {name: jump.matrix(size) for name, jump in self._jumps.items()}
+        return LoopFamily(matrices=matrices, kept=tuple(range(size)), letters=tuple(letters)).without_idle()
+
+    def same(self, one: Steps, other: Steps, point: Point) -> bool:
+        """Whether two courses have the same effect at a point."""
+        a, b = self._map(one, point), self._map(other, point)
+        return bool((np.abs(a - b) <= SAME * np.abs(b).max(axis=1, keepdims=True)).all())
+
+    def _map(self, steps: Steps, point: Point) -> Floats:
+        from scipy.linalg import expm
+
+        found = np.eye(self._effects.places_count)
+        for step in steps:
+            if isinstance(step, Jump):
+                found = step.matrix(len(found)) @ found
+            else:
+                found = expm(self._flow * (time_at(step, point) / ATTOSECONDS)) @ found
+        return found
+
+    @property
+    def _flow(self) -> Floats:
+        """The generator of the flow between events."""
+        more = self._effects.places_count - self._effects.size
+        return np.pad(self._effects.F, (0, more))
+
+
+def _joined(parts: Sequence[Piece]) -> Steps:
+    """The steps of courses one after the other, the times between two events added."""
+    found: Steps = []
+    for part in parts:
+        assert isinstance(part, Course)
+        for step in part.steps:
+            if isinstance(step, int) and found and isinstance(found[-1], tuple):
+                found[-1] = (found[-1][0] + step,)
+            else:
+                found.append((step,) if isinstance(step, int) else step)
+    return found
