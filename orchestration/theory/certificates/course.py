@@ -18,10 +18,10 @@ from orchestration.theory.certificates.parts import CertifiedLoop
 from orchestration.theory.certificates.varying import Point
 from orchestration.theory.exact.branch import BranchEvent
 from orchestration.theory.exact.effects import ContinuousEffects, Places
-from orchestration.theory.exact.linear import Components
 from orchestration.theory.exact.links import ATTOSECONDS, RandomLink, SampledTask
 from orchestration.theory.exact.pieces import Piece
 from orchestration.theory.exact.timing_chain import TimingChain
+from orchestration.theory.stability.matrices import Components
 
 SAME = 1e-10
 """of the largest number of a row: two maps that differ by less are the same"""

@@ -9,9 +9,10 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.systems.system.connection import Connection, variable_of
 from orchestration.systems.system.model import System
-from orchestration.theory.exact.linear import Components, Continuous, SampledSystem
 from orchestration.theory.stability.loop_at_rest import AtRest
 from orchestration.theory.stability.matrices import (
+    Components,
+    SampledSystem,
     depends_on_step,
     in_continuous_time,
     in_output_coordinates,
@@ -65,10 +66,10 @@ def certified_loop(rest: AtRest) -> CertifiedLoop:
             )
         else:
             assert component.step is not None
-            found, unfit = in_continuous_time(tangent, min(component.step, period))
-            if unfit is not None:
-                raise UsageError(f"{name}: {unfit}, so it is no linear system in continuous time")
-            components[name] = Continuous(**vars(in_output_coordinates(found, expm(found.A * period))))
+            matrices = in_continuous_time(tangent, min(component.step, period))
+            if matrices.unfit is not None:
+                raise UsageError(f"{name}: {matrices.unfit}, so it is no linear system in continuous time")
+            components[name] = in_output_coordinates(matrices, expm(matrices.A * period))
     for x in system.connections:
         for start, end in zip(x.start, x.end):
             known = (components[x.sender].outputs, components[x.receiver].inputs)

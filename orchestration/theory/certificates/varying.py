@@ -41,7 +41,7 @@ class Draws:
         bend = min(max(self.largest_sum - self.largest[1], 0), self.largest[0])
         return [(x, y) for x in (0, bend, self.largest[0]) for y in (0, self._largest_second(x))]
 
-    def boxes(self) -> list[tuple[Point, Point]]:
+    def boxes(self) -> list[tuple[tuple[int, int], ...]]:
         """The ends, along each quantity, of boxes that cover all draws of two of them."""
         first, second = self.largest
         count = 1 if self.largest_sum >= first + second else BOXES

@@ -15,10 +15,10 @@ from orchestration.systems.system.connection import component_of
 from orchestration.systems.system.model import System
 from orchestration.theory.exact.effects import LoopEffects, Places
 from orchestration.theory.exact.flows import Flows
-from orchestration.theory.exact.linear import Components, Continuous
 from orchestration.theory.exact.links import ATTOSECONDS, RandomLink, SampledTask
 from orchestration.theory.exact.objectives import Mean
 from orchestration.theory.exact.pieces import Piece
+from orchestration.theory.stability.matrices import Components, Continuous
 
 
 class SimulatedEffects(LoopEffects):

@@ -8,17 +8,18 @@ from __future__ import annotations
 
 import json
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
 from orchestration.foundation.basics.errors import SimulatorError, UsageError
 from orchestration.foundation.basics.times import NANOSECONDS
-from orchestration.theory.exact.linear import Continuous, SampledSystem
 from orchestration.theory.stability.linearised_component import Tangent
 from orchestration.theory.stability.loop_at_rest import AtRest
 from orchestration.theory.stability.matrices import (
     INEXACT,
+    Continuous,
+    SampledSystem,
     depends_on_step,
     in_continuous_time,
     of_samples,
@@ -90,8 +91,8 @@ def _identified(loop: AtRest, name: str) -> IdentifiedComponent:
     if component.sampling is not None:
         part = SampledSystem(**vars(of_samples(tangent, step)), depends_on_step=depends_on_step(tangent, step))
     else:
-        matrices, unfit = in_continuous_time(tangent, step, DIFFERS if is_linear else INEXACT)
-        part = Continuous(**vars(matrices), step=tangent.derivatives, unfit=unfit)
+        matrices = in_continuous_time(tangent, step, DIFFERS if is_linear else INEXACT)
+        part = replace(matrices, step=tangent.derivatives)
     method = "saved states, to rounding" if is_linear else "saved states, by differences"
     return IdentifiedComponent(part=part, method=method, accuracy=max(ROUNDING, discrepancy), tangent=tangent)
 

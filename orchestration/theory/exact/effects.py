@@ -22,10 +22,10 @@ from orchestration.systems.system.model import System
 from orchestration.theory.exact.branch import BranchEvent
 from orchestration.theory.exact.flows import Flows
 from orchestration.theory.exact.initial_state import InitialState
-from orchestration.theory.exact.linear import Components, Continuous, SampledSystem
 from orchestration.theory.exact.links import ATTOSECONDS
 from orchestration.theory.exact.objectives import Mean
 from orchestration.theory.exact.pieces import Piece
+from orchestration.theory.stability.matrices import Components, Continuous, SampledSystem
 
 
 class Places:

@@ -14,9 +14,9 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
-from orchestration.theory.exact.linear import Components
 from orchestration.theory.stability.linearised_component import Tangent
 from orchestration.theory.stability.loop_at_rest import AtRest, tracing_loader
+from orchestration.theory.stability.matrices import Components
 from orchestration.theory.stability.operating_point import deterministic
 
 

@@ -29,7 +29,6 @@ from orchestration.theory.exact.components import ComponentIdentifier
 from orchestration.theory.exact.effects import ContinuousEffects, LoopEffects
 from orchestration.theory.exact.horizon import costs_until
 from orchestration.theory.exact.initial_state import InitialState, initial_state_of
-from orchestration.theory.exact.linear import Components, Continuous, SampledSystem
 from orchestration.theory.exact.links import ATTOSECONDS, RandomLink, SampledTask
 from orchestration.theory.exact.moments import JumpLinear
 from orchestration.theory.exact.objective_means import ObjectiveMeans
@@ -38,6 +37,7 @@ from orchestration.theory.exact.scheduled import without_scheduler
 from orchestration.theory.exact.timing import links_of, sampled_tasks
 from orchestration.theory.exact.timing_chain import TimingChain
 from orchestration.theory.stability.loop_at_rest import ExtraSignals, at_rest
+from orchestration.theory.stability.matrices import Components, Continuous, SampledSystem
 from orchestration.theory.stability.operating_point import true_period
 
 T = TypeVar("T")

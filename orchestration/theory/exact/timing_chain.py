@@ -50,7 +50,7 @@ class TimingChain:
             for i in range(len(tasks))
         ]
         """by task: how long before its sample it may measure"""
-        self._cut_actions = {time: [] for time in cuts} | self._actions_by_cut()
+        self._cut_actions = self._actions_by_cut(cuts)
         self.cuts = sorted(self._cut_actions)
         self._kinks = self._all_kinks()
         self._branching = Branching(
@@ -59,8 +59,8 @@ class TimingChain:
 
     # -- cuts and kinks ------------------------------------------------------------------------------------------
 
-    def _actions_by_cut(self) -> dict[int, list[tuple[str, int, int]]]:
-        found: dict[int, list[tuple[str, int, int]]] = {}
+    def _actions_by_cut(self, cuts: Sequence[int]) -> dict[int, list[tuple[str, int, int]]]:
+        found: dict[int, list[tuple[str, int, int]]] = {time: [] for time in cuts}
         for i, task in enumerate(self.tasks):
             for time, place in self._times(task.period, task.offsets):
                 found.setdefault((time - self._lead_times[i]) % self.length, []).append(("sample", i, place))

@@ -13,6 +13,7 @@ from orchestration.systems.system.request import errors_in_own_terms
 from orchestration.theory.stability.known_loops import rested
 from orchestration.theory.stability.linear_simulator import OpenPort
 from orchestration.theory.stability.loop_at_rest import AtRest, at_rest
+from orchestration.theory.stability.matrices import of_samples
 from orchestration.theory.stability.operating_point import true_period
 from orchestration.theory.stability.period_map import period_map
 from orchestration.theory.stability.state_space import StateSpace, reduced
@@ -67,14 +68,9 @@ def _cut_open(loop: AtRest, name: str) -> Linearised:
     whole = period_map(loop, {name: port})
     size = len(whole) - len(port.inputs)
     A, B, C = reduced(whole[:size, :size], whole[:size, size:], whole[size:, :size])
-    by_state, by_input = tangent.derivatives(sampling.period)
-    cut = len(port.outputs)
     return Linearised(
         name=name,
-        component=StateSpace(
-            A=by_state[cut:], B=by_input[cut:], C=by_state[:cut], D=by_input[:cut], dt=dt, inputs=port.inputs,
-            outputs=port.outputs,
-        ),
+        component=StateSpace(**vars(of_samples(tangent, sampling.period)), dt=dt),
         rest=StateSpace(
             A=A, B=B, C=C, D=np.array(whole[size:, size:]), dt=dt, inputs=port.outputs, outputs=port.inputs
         ),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -23,9 +25,14 @@ INDEPENDENT = (0.1, 1e-3, 1e-5, 1e-8)
 """relative part of a coordinate outside of the span of those before it, at least; tried in turn"""
 
 
+Derivatives = Callable[[float], tuple[Floats, Floats]]
+"""Of a step length [s]: the derivatives of the outputs and, below, the state after it, by the state before and by the
+inputs"""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Matrices:
-    """y = C x + D u; ẋ = A x + B u of a component in continuous time, x⁺ = A x + B u of a sampled one."""
+    """A linear system, by the names of its inputs and outputs."""
 
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
@@ -33,6 +40,28 @@ class Matrices:
     B: Floats
     C: Floats
     D: Floats
+
+
+@dataclass(frozen=True, kw_only=True)
+class Continuous(Matrices):
+    """A component in continuous time: ẋ = A x + B u, y = C x + D u."""
+
+    step: Derivatives | None = None
+    """the step of the simulated component, where that differs from the matrices"""
+    unfit: str | None = None
+    """why the matrices do not describe the component; None: they do"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SampledSystem(Matrices):
+    """A sampled component: at each sample y = C x + D u, and then x becomes A x + B u."""
+
+    depends_on_step: bool = False
+    """whether a sample depends on the time to the next one"""
+
+
+M = TypeVar("M", bound=Matrices)
+Components = dict[str, Continuous | SampledSystem]
 
 
 def of_samples(tangent: Tangent, period: float) -> Matrices:
@@ -45,8 +74,8 @@ def of_samples(tangent: Tangent, period: float) -> Matrices:
     )  # fmt: skip
 
 
-def in_continuous_time(tangent: Tangent, first: float, differs: float = INEXACT) -> tuple[Matrices, str | None]:
-    """The matrices of a component in continuous time, and why they do not describe it; None: they do.
+def in_continuous_time(tangent: Tangent, first: float, differs: float = INEXACT) -> Continuous:
+    """The matrices of a component in continuous time.
 
     `first` is a step [s] that it takes; two steps may differ from one of twice the length by `differs`, relative.
     """
@@ -64,7 +93,7 @@ def in_continuous_time(tangent: Tangent, first: float, differs: float = INEXACT)
         B = np.asarray(np.linalg.solve(_mean_exponential(A * h), moved)) / h
         C = by_state[:count] @ np.linalg.inv(state)
         D = _feedthrough(by_input[:count], C @ moved)
-    return Matrices(inputs=tangent.inputs, outputs=tangent.outputs, A=A, B=B, C=C, D=D), unfit
+    return Continuous(inputs=tangent.inputs, outputs=tangent.outputs, A=A, B=B, C=C, D=D, unfit=unfit)
 
 
 def depends_on_step(tangent: Tangent, period: float) -> bool:
@@ -73,7 +102,7 @@ def depends_on_step(tangent: Tangent, period: float) -> bool:
     return bool(np.abs(usual - sooner).max(initial=0.0) > INEXACT * np.abs(usual).max(initial=1.0))
 
 
-def in_output_coordinates(of: Matrices, after: Floats) -> Matrices:
+def in_output_coordinates(of: M, after: Floats) -> M:
     """In coordinates that are outputs, now or, by `after`, periods later with inputs at rest: the first independent."""
     rows, power = [], np.eye(len(of.A))
     for _ in range(max(len(of.A), 1)):

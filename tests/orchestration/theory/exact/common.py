@@ -9,11 +9,11 @@ from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.model import System
 from orchestration.theory.exact.effects import ContinuousEffects
-from orchestration.theory.exact.linear import Components, Continuous, SampledSystem
 from orchestration.theory.exact.moments import JumpLinear
 from orchestration.theory.exact.objectives import Mean
 from orchestration.theory.exact.timing import links_of, sampled_tasks
 from orchestration.theory.exact.timing_chain import TimingChain
+from orchestration.theory.stability.matrices import Components, Continuous, SampledSystem
 
 GAIN = 3.0 - math.sqrt(3.0)
 

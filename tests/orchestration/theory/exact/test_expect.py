@@ -16,9 +16,9 @@ from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.source import Source
 from orchestration.theory.exact.expect import Expected, expect, expected_of
-from orchestration.theory.exact.linear import SampledSystem
 from orchestration.theory.exact.loops import Loops, expect_same_steps
 from orchestration.theory.exact.timing import sampled_tasks
+from orchestration.theory.stability.matrices import SampledSystem
 from quadcosim import UsageError, limit
 from tests.commands import Main
 from tests.examples.common import native_example as example

@@ -15,10 +15,10 @@ from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import Criterion, System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.exact.expect import expect
-from orchestration.theory.exact.linear import Components, SampledSystem
 from orchestration.theory.exact.loops import expect_same_steps
 from orchestration.theory.exact.repeating import periodic_schedule
 from orchestration.theory.exact.timing import sampled_tasks
+from orchestration.theory.stability.matrices import Components, SampledSystem
 from quadcosim import run
 from tests.examples.common import native_example as example
 from tests.places import EXAMPLES

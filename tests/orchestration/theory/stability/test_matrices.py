@@ -28,9 +28,9 @@ def tangents() -> Iterator[dict[str, Any]]:
 
 
 def test_a_double_integrator_has_its_matrices(tangents: dict[str, Tangent]) -> None:
-    found, unfit = in_continuous_time(tangents["plant"], 0.05)
+    found = in_continuous_time(tangents["plant"], 0.05)
     found = in_output_coordinates(found, expm(0.05 * found.A))
-    assert unfit is None
+    assert found.unfit is None
     assert pytest.approx(np.array([[0.0, 1.0], [0.0, 0.0]]), abs=1e-9) == found.A
     assert pytest.approx(np.array([[0.0], [1.0]]), abs=1e-9) == found.B
     assert pytest.approx(np.eye(2), abs=1e-12) == found.C
@@ -65,9 +65,9 @@ OSCILLATOR = np.array([[0.0, 3.0, 0.0], [-3.0, -0.2, 1.0], [0.0, 0.0, 0.0]])
 
 def test_a_state_that_an_output_does_not_show_is_shown_a_period_later() -> None:
     tangent: Any = Stepped(OSCILLATOR, feedthrough=0.5)
-    found, unfit = in_continuous_time(tangent, 0.1)
+    found = in_continuous_time(tangent, 0.1)
     found = in_output_coordinates(found, expm(0.3 * found.A))
-    assert unfit is None
+    assert found.unfit is None
     assert pytest.approx(np.array([[1.0, 0.0]]), abs=1e-9) == found.C
     assert pytest.approx(np.array([[0.5]]), abs=1e-9) == found.D
     assert found.C @ expm(0.3 * found.A) == pytest.approx(np.array([[0.0, 1.0]]), abs=1e-9)
@@ -76,6 +76,6 @@ def test_a_state_that_an_output_does_not_show_is_shown_a_period_later() -> None:
 
 def test_steps_that_are_no_flow_are_refused_with_the_reason() -> None:
     tangent: Any = Stepped(OSCILLATOR, euler=True)
-    _, unfit = in_continuous_time(tangent, 0.1)
+    unfit = in_continuous_time(tangent, 0.1).unfit
     assert unfit is not None
     assert unfit.startswith("a step of 0.2 s differs from two of 0.1 s by ")
