@@ -3,12 +3,17 @@
 import math
 from typing import Any
 
+import numpy as np
 import pytest
 
 from orchestration.foundation.basics.bisection import bisected
+from orchestration.systems.system.component import Component, Sampling
+from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.distribution import Distribution
+from orchestration.systems.system.model import System
 from orchestration.theory.exact import random_times
-from tests.orchestration.theory.exact.common import GAIN, SERVO_PERIOD, integrator, servo
+from orchestration.theory.stability.matrices import Components, Continuous, SampledSystem
+from tests.orchestration.theory.exact.common import GAIN, SERVO_PERIOD, integrator, loop, servo
 
 
 def test_the_cost_of_minimum_variance_control_is_that_of_theory() -> None:
@@ -100,3 +105,31 @@ def test_twice_the_order_of_gauss_s_rule_changes_nothing_where_no_message_can_ov
     assert low.radius == pytest.approx(high.radius, rel=1e-10)
     if low.radius < 1.0:
         assert low.costs()[0] == pytest.approx(high.costs()[0], rel=1e-10)
+
+
+def test_a_command_that_arrives_at_a_sample_acts_on_what_is_measured_at_the_next_one() -> None:
+    """x' = u with y = x + D u under u = -k y, a period late: y of a sample has the command before the one arriving."""
+    k, D = 0.3, 0.5
+    system = System(
+        stop_time=10.0,
+        components={
+            "plant": Component(fmu="plant.fmu", step=0.1),
+            "law": Component(fmu="law.fmu", sampling=Sampling(period=1.0)),
+        },
+        connections=(
+            Connection(name="measurement", start=("plant.y",), end=("law.y",)),
+            Connection(name="command", start=("law.u",), end=("plant.u",), delay=1.0),
+        ),
+    )
+    empty = np.zeros((0, 0))
+    components: Components = {
+        "plant": Continuous(
+            inputs=("u",), outputs=("y",), A=np.zeros((1, 1)), B=np.eye(1), C=np.eye(1), D=np.full((1, 1), D)
+        ),
+        "law": SampledSystem(
+            inputs=("y",), outputs=("u",), A=empty, B=np.zeros((0, 1)), C=np.zeros((1, 0)), D=np.array([[-k]])
+        ),
+    }
+    by_hand = np.array([[1.0, 1.0, 0.0], [-k, 0.0, -k * D], [0.0, 1.0, 0.0]])  # of x, u one period ago, and two
+    radius = np.abs(np.linalg.eigvals(by_hand)).max()
+    assert loop(system, components, {}, ("plant.u",), nodes=1).radius == pytest.approx(radius**2, rel=1e-9)
