@@ -62,7 +62,7 @@ def bare_step(shape: Shape, batch: Batch, period: float, stop_time: float) -> tu
     What the calls themselves take comes second, and is to be taken off.
     """
     plant, law = (shape.kernels[name] for name in ("plant", "controller"))
-    memory = dict(zip(shape.names, batch.memories))
+    memory = dict(zip(shape.names, batch.arrays.memories))
     lanes, steps, each = shape.lanes, round(stop_time / 0.001), round(period / 0.001)
     active, status = np.full(lanes, 2**64 - 1, dtype=np.uint64), np.zeros(lanes, dtype=np.int32)
     times, step, longer = np.zeros(lanes), np.full(lanes, 0.001), np.full(lanes, period)

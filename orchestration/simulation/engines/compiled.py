@@ -7,7 +7,7 @@ C processes some instants at a time, so that interruptions are noticed in betwee
 import ctypes
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -23,9 +23,10 @@ from orchestration.simulation.engines.backlog import Backlog
 from orchestration.simulation.engines.condition import Step
 from orchestration.simulation.engines.loop import Operation, library
 from orchestration.simulation.engines.memory import Allocator, SharedTables, allocated_loop
-from orchestration.simulation.engines.running_system import RunningSystem, SampledComponent, Terminated
+from orchestration.simulation.engines.run_structures import RunStructures
+from orchestration.simulation.engines.running_system import RunningSystem, Terminated
 from orchestration.simulation.engines.sources import SourceValues
-from orchestration.simulation.engines.structures import ONE_LANE, RunStructures, address
+from orchestration.simulation.engines.structures import ONE_LANE, address
 from orchestration.simulation.engines.wires import Board
 from orchestration.systems.schedule.schedule import Schedule
 
@@ -68,9 +69,8 @@ class CompiledLoop:
         self._shared: list[_MessagesInFlight] = []
         self._run = library()
         self._failure: BaseException | None = None
-        names = running.wires.names
-        instances = cast(Mapping[str, NativeInstance], running.simulators)
-        self._structures = structures = RunStructures([instances[name] for name in names])
+        self._structures = structures = RunStructures(running)
+        self._channels, self._components = structures.channels, structures.components
         self._loop = loop = allocated_loop(allocate)
         self._tables = SharedTables(running, loop, allocate)
         self.backlog = Backlog(running, self._tables, recorder)
@@ -78,34 +78,22 @@ class CompiledLoop:
         self._watched = list(watched)
         if self._watched == [values for _, values in running.sources]:
             loop.in_rows = sum(len(signals) for signals, _ in running.sources)
-        self._feed_table = (ONE_LANE.Feed * len(running.feeds))(
-            *(structures.feed(names.index(feed.component), feed) for feed in running.feeds)
-        )
-        self._channel_table = (ONE_LANE.Channel * len(running.channels))(
-            *map(self._channel_of, range(len(running.channels)))
-        )
-        self._components = (ONE_LANE.Component * len(names))(*map(self._component_of, range(len(names))))
-        self._reached: Integers = np.zeros(len(names), dtype=np.int64)
+        self._reached: Integers = np.zeros(len(structures.instances), dtype=np.int64)
         self._track = ONE_LANE.Track(lanes=1, stop=running.stop, now=address(self._reached))
-        fields: dict[str, Any] = {
-            "components": ctypes.addressof(self._components),
-            "channels": ctypes.addressof(self._channel_table),
-            "feeds": ctypes.addressof(self._feed_table),
-            "continuous": structures.indices(running.wires.continuous),
-            "sampled": structures.indices(running.wires.sampled),
-            "tracks": ctypes.addressof(self._track),
-            "track_count": 1,
-            "channel_count": len(running.channels),
-            "alive": 1,
-            "some_by_themselves": running.some_by_themselves,
-            "settles": running.settles,
-            "look": _Look(self._look_for_c),
-            "stopped": _Stopped(self._stopped_for_c),
-            "collect": _Collect(lambda index: structures.instances[index].collect_warnings()),
-            "calling": -1,
-        }
-        for name, value in fields.items():
-            setattr(loop, name, value)
+        structures.fill(
+            loop,
+            components=self._components,
+            channels=self._channels,
+            feeds=ctypes.addressof(structures.feeds),
+            tracks=self._track,
+            track_count=1,
+            alive=1,
+            settles=running.settles,
+            look=_Look(self._look_for_c),
+            stopped=_Stopped(self._stopped_for_c),
+            collect=_Collect(lambda index: structures.instances[index].collect_warnings()),
+            calling=-1,
+        )
         if program is not None:
             self._program = (Operation * len(program))(*(Operation(*step) for step in program))
             loop.condition, loop.condition_length = ctypes.addressof(self._program), len(program)
@@ -210,7 +198,7 @@ class CompiledLoop:
         loop.now, loop.steps[0] = running.now, running.steps
         rest = schedule.part(track.at)
         self._shared = [
-            _MessagesInFlight(channel, self._channel_table[i], *rest.of(i, running.wires.table(i)))
+            _MessagesInFlight(channel, self._channels[i], *rest.of(i, running.wires.table(i)))
             for i, channel in enumerate(running.channels)
         ]
 
@@ -225,34 +213,10 @@ class CompiledLoop:
     def _share_sources(self, t: Floats) -> None:
         self._fed = [np.ascontiguousarray(feed.each(t), dtype=np.float64) for feed in self._running.feeds]
         for place, values in enumerate(self._fed):
-            self._feed_table[place].values = address(values)
+            self._structures.feeds[place].values = address(values)
         if self._watched:
             self._seen = np.ascontiguousarray(np.column_stack([values.over(t) for values in self._watched]))
             self._loop.watched, self._loop.watched_size = address(self._seen), self._seen.shape[1]
-
-    # -- construction --------------------------------------------------------------------------------------------
-
-    def _channel_of(self, index: int) -> Any:
-        running = self._running
-        x = running.system.connections[index]
-        places = [running.board.place[start] for start in x.start]
-        receiver = running.wires.names.index(x.receiver)
-        channel = self._structures.channel(x, running.channels[index], receiver, running.board.row, places)
-        channel.read_ahead = index in running.wires.plan.read_ahead
-        return channel
-
-    def _component_of(self, index: int) -> Any:
-        running, structures, name = self._running, self._structures, self._running.wires.names[index]
-        component, into = running.component(index), running.wires.into(name)
-        structure = structures.component(index, component.read, running.outputs(name), len(component.outputs))
-        structure.rank = running.wires.rank(index)
-        structure.feeds = structures.indices([running.feeds.index(feed) for feed in component.feeds])
-        structure.held, structure.ahead, structure.behind = map(
-            structures.indices, (into.held, into.ahead, into.behind)
-        )
-        if isinstance(component, SampledComponent):
-            structure.ratio, structure.by_itself = structures.address(np.array([component.ratio])), component.by_itself
-        return structure
 
 
 class _MessagesInFlight:

@@ -8,10 +8,11 @@ import numpy as np
 
 from orchestration.components.fmi.model import read_model
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.foundation.basics.times import nanoseconds, seconds
-from orchestration.simulation.engines.batch.batch import NO_COLUMNS, Batch, BatchResult, Group, ParameterColumns
+from orchestration.foundation.basics.times import seconds
+from orchestration.simulation.engines.batch.batch import Batch, BatchResult, Group
 from orchestration.simulation.engines.batch.combining import combined
 from orchestration.simulation.engines.batch.kernels import preferred_lanes
+from orchestration.simulation.engines.batch.run_numbers import NO_COLUMNS, ParameterColumns, end_of
 from orchestration.simulation.engines.batch.shape import Shape, outline
 from orchestration.simulation.engines.condition import watch
 from orchestration.simulation.engines.structures import structures
@@ -106,13 +107,13 @@ def _summaries(
     shape: Shape, batch: Batch, result: BatchResult, systems: Sequence[System]
 ) -> Iterator[RunSummary | None]:
     count, c = len(systems), structures(shape.lanes)
-    numbers = batch.numbers(systems)
+    numbers = batch.numbers.over(systems)
     values = zip(shape.nodes, combined([*shape.nodes.values()], result.reductions, numbers, count))
     metric_values = {name: ((np.isfinite(value) & ~none).tolist(), value.tolist()) for name, (value, none) in values}
     for lane, system in enumerate(systems):
         steps = int(result.steps[lane])
         if result.outcome[lane] == c.RUNNING and not result.doubtful[lane]:
-            end = seconds(nanoseconds(system.stop_time))
+            end = end_of(system)
             metrics = {name: value[lane] if valid[lane] else None for name, (valid, value) in metric_values.items()}
             yield RunSummary(
                 metrics=metrics_of(
@@ -133,7 +134,7 @@ def _summaries(
 
 def _divergence_message(shape: Shape, batch: Batch, system: System, lane: int, t: float) -> str | None:
     """How the values of a lane have diverged, as reported by the monitor of a single run; None if it disagrees."""
-    streams, parameters = Streams(system.seed, system.streams), batch.parameters(lane, system)
+    streams, parameters = Streams(system.seed, system.streams), batch.numbers.parameters(lane, system)
     sources = {name: source_values(system, name, parameters, streams) for name in system.sources}
     signals = {name: system.sources[name].signals(name) for name in sources}
     monitor = watch(system.criterion.diverged, shape.board, sources, signals, parameters)

@@ -27,9 +27,9 @@ class Rows:
     mask: str
     """Mask of the lanes that have such a row now"""
     first: list[str] = field(default_factory=list)
-    """lines of the first row alone"""
+    """Lines of the first row alone"""
     next: list[str] = field(default_factory=list)
-    """Statements for all other lanes"""
+    """Lines of all rows after the first"""
     always: list[str] = field(default_factory=list)
 
 

@@ -16,7 +16,6 @@ from orchestration.simulation.engines import initial
 from orchestration.simulation.engines.batch.code import ExpressionCode, expression_code
 from orchestration.simulation.engines.batch.kernels import Kernel, batch, component, preferred_lanes
 from orchestration.simulation.engines.batch.writing import Kind, Leaf
-from orchestration.simulation.engines.channel import of_each
 from orchestration.simulation.engines.structures import ONE_LANE
 from orchestration.simulation.engines.wires import Board, Wires
 from orchestration.simulation.results.objectives import GOOD
@@ -150,10 +149,21 @@ class Shape:
         is_read[[int(place) for owner, place in _SIGNAL.findall(self.expressions.text) if int(owner) == index]] = True
         return is_read
 
-    @property
-    def fed_changes(self) -> bool:
-        """Whether an input from a source may change in a run."""
-        return any(source.to and source.constant is None for source in self.system.sources.values())
+    @cached_property
+    def seen_count(self) -> int:
+        """The number of values of sources that expressions read."""
+        return sum(map(len, self.seen.values()))
+
+    @cached_property
+    def given_count(self) -> int:
+        """The number of values of sources that inputs get; 0 if none of them changes in a run."""
+        changing = any(source.to and source.constant is None for source in self.system.sources.values())
+        return sum(len(source.to) for source in self.system.sources.values()) if changing else 0
+
+    @cached_property
+    def ends(self) -> Sequence["Ends"]:
+        """The ends of each connection."""
+        return [_ends_of(self, x) for x in self.system.connections]
 
     # -- expressions -----------------------------------------------------------------------------------------------
 
@@ -232,8 +242,8 @@ class Shape:
         )
 
     @cached_property
-    def texts(self) -> Mapping[str, str]:
-        """The texts that are generated for it, by the names that batch.c includes."""
+    def library(self) -> Any:
+        """The functions that run its systems in SIMD lanes."""
         bits = ", ".join(f"1ull << {lane}" for lane in range(self.lanes))
         sizes = {  # rounded up, so that similar systems share a library
             "COMPONENTS": -8 * (-len(self.names) // 8), "CHANNELS": -8 * (-len(self.system.connections) // 8) or 8,
@@ -241,12 +251,7 @@ class Shape:
             "LANE_BITS": f"{{{bits}}}",
         }  # fmt: skip
         lines = "".join(f"#define {name} {value}\n" for name, value in sizes.items())
-        return {"sizes.h": lines, "expressions.h": self.expressions.text}
-
-    @cached_property
-    def library(self) -> Any:
-        """The functions that run its systems in SIMD lanes."""
-        return batch(self.texts["sizes.h"], self.texts["expressions.h"], self.lanes)
+        return batch(lines, self.expressions.text, self.lanes)
 
     @cached_property
     def _expression_names(self) -> set[str]:
@@ -316,8 +321,7 @@ class Ends:
     high: npt.NDArray[np.float64]
 
 
-def ends_of(shape: Shape, x: Connection) -> Ends:
-    """The ends of a connection."""
+def _ends_of(shape: Shape, x: Connection) -> Ends:
     receivers = [shape.variable(end) for end in x.end]
     bounds = np.iinfo(np.int32)
     return Ends(
@@ -326,11 +330,6 @@ def ends_of(shape: Shape, x: Connection) -> Ends:
         kinds=np.array([_TAKES.get(v.kind, ONE_LANE.REAL) for v in receivers], dtype=np.int64),
         low=np.full(len(receivers), float(bounds.min)), high=np.full(len(receivers), float(bounds.max)),
     )  # fmt: skip
-
-
-def changes_of(x: Connection) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Standard deviations of the noise and quanta, of each variable."""
-    return of_each(x, x.noise), of_each(x, x.quantisation)
 
 
 def expect_lanes(system: System, models: Mapping[str, Model]) -> None:
