@@ -41,9 +41,9 @@ REPETITIONS = 7
 CASES = {"1 kHz both": (0.001, 20.0), "10 ms / 1 ms": (0.01, 20.0), "20 ms / 1 ms": (0.02, 20.0)}
 """Period and stop time [s]"""
 RUNS = 2048
-"""of the sweeps"""
+"""Runs of the sweeps"""
 FEWER_RUNS = 256
-"""of the sweeps that separate the fixed cost of a sweep from the cost of each run"""
+"""Runs of the sweeps that separate the fixed cost of a sweep from the cost of each run"""
 X = "components.plant.parameters.initial.position.x"
 
 

@@ -14,7 +14,7 @@ from orchestration.simulation.workers.task import Runner, RunTask
 from orchestration.systems.system.files import files_of, with_files
 
 RUNS, SECONDS = 200, 10.0
-"""of the study with which two workers are compared"""
+"""Runs and duration of the study with which two workers are compared"""
 MANY = 2000
 """runs over which memory is measured"""
 

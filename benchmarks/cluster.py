@@ -24,7 +24,7 @@ RUNS = 400
 WORKERS = 2
 ENGINES: dict[str, EngineChoice] = {"one by one": "compiled", "in lanes": "batch"}
 STOP_TIME = 10.0
-"""[s] of a flight"""
+"""Stop time of a flight [s]"""
 
 
 def study(runs: int) -> Study:

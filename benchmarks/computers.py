@@ -24,7 +24,7 @@ from orchestration.systems.system.paths import changed
 
 REPETITIONS = 9
 DURATION = Distribution(uniform=(0.001, 0.002))
-"""of a delay, or of the execution of a task [s]"""
+"""Duration of a delay, or of the execution of a task [s]"""
 DELAY, TASK, LOADED = "a delay", "a task", "a task beside two of load"
 
 

@@ -21,7 +21,7 @@ from tests.fmu_kit.compiler.embedded import M4F, M7
 
 FOLDER = Path(__file__).parents[1] / "examples" / "autopilot" / "execution"
 CYCLES = 1.0
-"""per instruction; the M7 executes up to two per cycle, and waits for its memory"""
+"""Cycles per instruction; the M7 executes up to two per cycle, and waits for its memory"""
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Processor:
 
     flags: tuple[str, ...]
     clock: float
-    """[Hz]"""
+    """Clock [Hz]"""
     single: bool
     """whether the law is computed in single precision"""
 

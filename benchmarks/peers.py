@@ -22,9 +22,9 @@ from orchestration.simulation.runs.prepared import prepared
 from orchestration.systems.system.model import System
 
 STEP = 0.01
-"""[s]"""
+"""Step [s]"""
 STOPS = (5.0, 25.0)
-"""[s]"""
+"""Stop times [s]"""
 REPETITIONS = 3
 LEFT_OUT = {
     "PyFMI, OMSimulator": "pip found neither where this was measured; OMSimulator reads the SSP",

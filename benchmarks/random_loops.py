@@ -27,9 +27,9 @@ from orchestration.theory.exact.expect import Expected, expect
 EXAMPLES = Path(__file__).parents[1] / "examples"
 LARGEST_FOURTH = 0.95
 STEPS = 8
-"""of a plant in a period"""
+"""Steps of a plant in a period"""
 PERIODS = 500
-"""of a run"""
+"""Periods of a run"""
 SETTLED = 0.3
 """fraction of a run that is left out, since runs begin at rest"""
 

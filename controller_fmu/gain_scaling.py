@@ -20,9 +20,9 @@ class Feedback(NamedTuple):
     """The feedback terms of the torque, and the momentum in the kinetic energy."""
 
     damping: Vec3
-    """[N·m]"""
+    """Torque of the damping [N·m]"""
     restoring: Vec3
-    """[N·m]"""
+    """Restoring torque [N·m]"""
     momentum: Vec3
     """½ rate·momentum is the kinetic energy [J]; per unit inertia [1/s²] where the gains are"""
 

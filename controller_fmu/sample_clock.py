@@ -14,9 +14,9 @@ class SampleClock:
     """Due times offset + k·period, k = 0, 1, …; a sample is taken at the first communication point from then on."""
 
     period: float
-    """[s]; 0: every communication point from the offset on is a sample"""
+    """Period [s]; 0: every communication point from the offset on is a sample"""
     offset: float
-    """[s]"""
+    """Offset [s]"""
     next_index: int = 0
     """k of the next due time"""
 

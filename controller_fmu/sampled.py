@@ -16,7 +16,7 @@ from fmu_kit.saved_state import State
 from fmu_kit.trajectory import Reference, Trajectory
 
 SHORTEST_PERIOD = 1e-9
-"""[s]; sample times further apart than a nanosecond stay distinct floats for days"""
+"""Shortest period [s]; sample times further apart than a nanosecond stay distinct floats for days"""
 
 
 class SampledController(ControllerInterface):

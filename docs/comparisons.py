@@ -65,7 +65,7 @@ WIDE = replace(DOCS, width=254.0)
 REPORTED = ("settling_time", "residual", "position_rmse", "torque_max", "total_variation.torque")
 WORKERS = 2
 HORIZONS = (20.0, 30.0, 40.0, 60.0)
-"""[s], times up to which runs are counted, to see whether the shares still change"""
+"""Times up to which runs are counted [s], to see whether the shares still change"""
 COLORS = {
     "unified": RED,
     "unified, no coupling": BLUE,

@@ -19,7 +19,7 @@ from quadcosim import run
 
 FIGURES = Path(__file__).parent / "figures"
 MILLISECONDS = 1e-6
-"""of a nanosecond"""
+"""Milliseconds of a nanosecond"""
 
 
 def main() -> None:

@@ -57,9 +57,9 @@ GAINS = {
 RANDOM = {"loss": 0.25, "jitter": 0.0095, "position_noise": 0.0017, "inertia_factor": 1.0}
 """The axes of the Monte Carlo study, each with its middle"""
 CONTINUOUS = (0.00005, 0.0001)
-"""[s], periods that approximate continuous time, if both have the same outcomes"""
+"""Periods that approximate continuous time [s], if both have the same outcomes"""
 DESIGNS = 4
-"""of Sobol indices"""
+"""Designs of Sobol indices"""
 
 
 def main() -> None:

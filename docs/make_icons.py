@@ -13,7 +13,7 @@ from orchestration.simulation.figures.palette import BLUE, ORANGE
 ROOT = Path(__file__).parent.parent
 PIXELS = 256
 COLOURS = 64
-"""of the palette: enough for smooth edges, and a file of a few kilobytes"""
+"""Colours of the palette: enough for smooth edges, and a file of a few kilobytes"""
 PALE, DARK = "#f3f7fa", "#33414d"
 
 

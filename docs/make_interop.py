@@ -20,7 +20,7 @@ from tests.fmus.verdicts import Verdict
 
 DOCS = Path(__file__).parent
 INTERVAL = 0.01
-"""[s], communication step; that of the FMUs' default experiment"""
+"""Communication step [s]; that of the FMUs' default experiment"""
 
 
 def main() -> None:

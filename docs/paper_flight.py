@@ -17,7 +17,7 @@ from orchestration.simulation.runs.draw import runs_of
 from orchestration.simulation.runs.result import Result
 
 BELOW = (0.05, 0.01)
-"""[m]"""
+"""Bounds of the position error [m]"""
 
 
 def figure_3(result: Result, style: Style) -> Figure:

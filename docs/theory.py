@@ -41,11 +41,11 @@ LAYER = 1e-3
 EXPONENTS = (1.0, 0.99, 0.95, 0.9, 0.85, 0.8, 0.7, 0.5)
 """β_t"""
 DECAY_PERIODS = (0.001, 0.01, 0.05)
-"""[s]"""
+"""Periods [s]"""
 BOUNDS = (0.1, 0.01, LAYER, 1e-4, 1e-5)
-"""[m], bounds of the largest position error of the axes; the first two decades are outside of the boundary layer"""
+"""Bounds of the largest position error of the axes [m]; the first two decades are outside of the boundary layer"""
 STAYS = 2.0
-"""[s], for which an error must stay below a bound, so that a zero crossing at the end does not count"""
+"""Time for which an error must stay below a bound [s], so that a zero crossing at the end does not count"""
 DECAY_STARTS = 20
 """initial conditions 1 m from the path in random directions, beside the paper's"""
 _ERROR = "max({})".format(", ".join(f"abs(plant.position.{axis} - reference.position.{axis})" for axis in "xyz"))
@@ -175,7 +175,7 @@ def exponent_of(factors: Array, values: Array) -> tuple[float, float, float]:
 # -- tolerated delays -----------------------------------------------------------------------------------------------
 
 MARGIN_PERIODS = (0.005, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07)
-"""[s]"""
+"""Periods [s]"""
 
 
 # -- the exact cost of wind about hover -----------------------------------------------------------------------------
@@ -184,7 +184,7 @@ WIND = 1e-6
 """Intensity of a white force along each axis [N² s], so that the error stays within the boundary layer of 1 mm"""
 WIND_PERIODS = tuple(0.005 * k for k in range(1, 21))
 WIND_DELAYS = tuple(0.0025 * k for k in range(21))
-"""[s]"""
+"""Delays [s]"""
 WIND_RUNS = ((0.01, 0.0), (0.06, 0.02))
 """Periods and delays of runs for comparison [s]"""
 WIND_COSTS = ("position_rmse", "torque_rms")

@@ -24,7 +24,7 @@ from orchestration.theory.exact.loops import Loops
 
 HERE = Path(__file__).resolve().parent
 SMALL = (7.0, 3.2)
-"""[inch]"""
+"""Size of a small figure [inch]"""
 
 
 def simulate(name: str, **changes: Any) -> Result:
@@ -178,7 +178,7 @@ def distributed_servo() -> Figure:
 NO_END = 1e9
 """replaces a cost that is not finite, for the contours beside it"""
 PERIOD = ("sampling.period", "parameters.period")
-"""of the PD controller: that of its samples, and that for which it is programmed"""
+"""Keys of the PD controller: the period of its samples, and that for which it is programmed"""
 
 
 FIGURES: dict[str, Callable[[], Figure]] = {

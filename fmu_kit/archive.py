@@ -16,10 +16,10 @@ ICONS = {2: "model.png", 3: "terminalsAndIcons/icon.png"}
 """The path of an FMU's icon, by version of FMI (2.0.4, section 2.3; 3.0, section 2.5)."""
 
 NATIVE_TABLES = "sources/tables.h"
-"""In an FMU without Python inside: the source file that has the GUID."""
+"""Source file that has the GUID in an FMU without Python inside"""
 SOURCE_HASH_FILE = "resources/source_hash.txt"
 VARIANT_FILE = "resources/variant.json"
-"""In the FMU of a variant: the slave, and its fixed values."""
+"""File of the slave and its fixed values in the FMU of a variant"""
 _STAMP = (1980, 1, 1, 0, 0, 0)
 
 

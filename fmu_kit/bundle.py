@@ -31,7 +31,7 @@ class Target:
     root: Path | None = None
     """the folder that is searched for modules first; None: only `sys.path` is searched"""
     variant: Variant | None = None
-    """of the slave, with fixed values; None: the slave itself"""
+    """Variant of the slave, with fixed values; None: the slave itself"""
 
     @classmethod
     def parse(cls, text: str, root: Path | None = None) -> "Target":

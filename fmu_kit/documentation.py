@@ -28,7 +28,7 @@ class BuildNotes:
     """What the page says of how an FMU was built."""
 
     version: int = 2
-    """of FMI"""
+    """Version of FMI"""
     needs: Path
     """the template of its requirements and of where its sources are"""
     source: str

@@ -29,9 +29,9 @@ class Mixer:
     """The positions of the motors, (±arm_x, ±arm_y), and the drag of their propellers."""
 
     arm_x: float = 0.0
-    """[m], from the centre to a motor along x of the body; 0 means unknown, here and below"""
+    """Distance from the centre to a motor along x of the body [m]; 0 means unknown, here and below"""
     arm_y: float = 0.0
-    """[m], along y"""
+    """Distance from the centre to a motor along y [m]"""
     drag_to_thrust: float = 0.0
     """κ_τ [m], torque about z per thrust of a propeller"""
 

@@ -73,7 +73,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     fixed: ClassVar[Mapping[str, Value]] = {}
     """Parameters that are constants of the FMU, by their FMI names."""
     description: ClassVar[str]
-    """Of the FMU, in one line; default: the first sentence of the docstring."""
+    """Description of the FMU, in one line; default: the first sentence of the docstring."""
     initial_outputs_depend_on_inputs: ClassVar[bool | None] = None
     """Whether the outputs at the end of initialisation depend on the inputs; later ones never do directly.
     Default: they do if the model defines `initialise`."""

@@ -64,13 +64,13 @@ class Trajectory:
     frequency: float = 0.15
     """ω [rad/s]"""
     start_z: float = 2.0
-    """[m]"""
+    """Start of z [m]"""
     rate_z: float = 0.1
-    """[m/s]"""
+    """Rate of z [m/s]"""
     yaw: float = 0.0
-    """[rad]"""
+    """Yaw [rad]"""
     yaw_rate: float = 0.0
-    """[rad/s]"""
+    """Rate of the yaw [rad/s]"""
 
     def position(self, t: Scalar, ops: ScalarOps = FLOAT) -> Vec3:
         """P_d [m] at `t` [s]."""

@@ -27,13 +27,13 @@ class Box:
     """Limits of thrust and of each torque, then a first-order lag of each, without motors."""
 
     thrust_max: float = 1e6
-    """[N]; thrust is limited to [thrust_min, thrust_max]"""
+    """Largest thrust [N]; thrust is limited to [thrust_min, thrust_max]"""
     thrust_min: float = 0.0
-    """[N]; negative where propellers can push downwards"""
+    """Least thrust [N]; negative where propellers can push downwards"""
     torque_max: float = 1e6
-    """[N·m]; each torque is limited to ±torque_max"""
+    """Largest torque [N·m]; each torque is limited to ±torque_max"""
     time_constant: float = 0.0
-    """[s]; 0: no lag"""
+    """Time constant of the lag [s]; 0: no lag"""
 
     def limited(self, command: Wrench) -> Wrench:
         """`command` within the limits."""
@@ -68,16 +68,16 @@ class Motors(Mixer):
     """
 
     thrust_max: float = 0.0
-    """[N] of one motor; 0: no motors, only the box acts"""
+    """Largest thrust of one motor [N]; 0: no motors, only the box acts"""
     thrust_min: float = 0.0
-    """[N] of one motor"""
+    """Least thrust of one motor [N]"""
     arm_x: float = 0.1
     arm_y: float = 0.1
     drag_to_thrust: float = 0.016
     up: float = 0.0
-    """[s], time constant of increasing thrust; 0: no lag"""
+    """Time constant of increasing thrust [s]; 0: no lag"""
     down: float = 0.0
-    """[s], time constant of decreasing thrust; 0: no lag"""
+    """Time constant of decreasing thrust [s]; 0: no lag"""
 
     def limited(self, command: Wrench) -> Channels:
         """The thrusts for `command`, each within its limits."""

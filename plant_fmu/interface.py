@@ -14,7 +14,7 @@ PAPER_ATTITUDE = Quaternion.from_xyzw(0.1699, 0.3058, 0.1699, 0.9212)
 """Q(0) of section V; normalised at initialisation."""
 
 LARGEST_INTERNAL_STEP = 0.002
-"""[s]"""
+"""Largest internal step [s]"""
 
 _BODY, _WIND, _BOX, _MOTORS = Body(), Wind(), Box(), Motors()
 _HOVER = _BODY.mass * _BODY.gravity

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from fmu_kit.scalar import FLOAT, Scalar, ScalarOps
 
 AT_ONCE = 1e-9
-"""[s]; a drop this close to the beginning or the end of a step takes place there"""
+"""Tolerance of times [s]; a drop this close to the beginning or the end of a step takes place there"""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -13,9 +13,9 @@ class Payload:
     """A point mass: it adds to the mass but not to the inertia, and is dropped with the velocity of the vehicle."""
 
     mass: float = 0.0
-    """[kg]"""
+    """Mass [kg]"""
     drop_time: float = 0.0
-    """[s], from which on it is gone; 0: never"""
+    """Time from which on it is gone [s]; 0: never"""
 
     def carried(self, t: Scalar, ops: ScalarOps = FLOAT) -> Scalar:
         """The mass [kg] of the payload still carried at `t` [s]."""

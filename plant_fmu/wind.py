@@ -11,9 +11,9 @@ class Wind:
     """F_d = amplitude cos(frequency t) (section V)."""
 
     amplitude: Vec3 = Vec3(0.01, 0.01, 0.01)
-    """[N], inertial"""
+    """Amplitude of the force [N], inertial"""
     frequency: float = 0.1
-    """[rad/s]"""
+    """Frequency [rad/s]"""
 
     def force(self, t: Scalar, ops: ScalarOps = FLOAT) -> Vec3:
         """F_d [N], inertial, at `t` [s]."""

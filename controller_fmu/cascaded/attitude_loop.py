@@ -11,7 +11,7 @@ from fmu_kit.algebra import Quaternion, Vec3
 from fmu_kit.scalar import FLOAT
 
 SMALLEST_SINE = 1e-5
-"""Below it, thrust axes are opposite, and there is no shortest rotation between them."""
+"""Sine below which thrust axes are opposite: there is no shortest rotation between them."""
 SMALLEST_WEIGHT = 1e-4
 """A yaw weight up to it counts as zero."""
 
@@ -25,7 +25,7 @@ class AttitudeLoop:
     yaw_weight: float = 0.4
     """w [1], in [0, 1] (MC_YAW_WEIGHT)"""
     rate_limit: Vec3 = Vec3(math.radians(220.0), math.radians(220.0), math.radians(200.0))
-    """[rad/s], body (MC_ROLLRATE_MAX, MC_PITCHRATE_MAX, MC_YAWRATE_MAX)"""
+    """Largest desired angular velocity [rad/s], body (MC_ROLLRATE_MAX, MC_PITCHRATE_MAX, MC_YAWRATE_MAX)"""
 
     def angular_velocity(self, attitude: Quaternion, desired: Quaternion, yaw_rate: float) -> Vec3:
         """The desired angular velocity [rad/s], body: 2 K ∘ q of Q⁻¹ ⊙ Q_d with its yaw weighted, within the limits.

@@ -11,9 +11,9 @@ from fmu_kit.algebra import ZERO
 from fmu_kit.interface import FixedParameter, Local, Parameter
 
 VELOCITY_RATIO, ATTITUDE_RATIO = 20, 4
-"""With a `sample_period` of 1 ms these give PX4's 50 and 250 Hz, for a rate loop of 1000 Hz."""
+"""Ratios of periods; with a `sample_period` of 1 ms these give PX4's 50 and 250 Hz, for a rate loop of 1000 Hz."""
 STEEPEST = 89.0 / 90.0 * 1.5707963267948966
-"""[rad], bound of the tilt limit, as in PX4"""
+"""Bound of the tilt limit [rad], as in PX4"""
 
 _POSITION, _VELOCITY, _ATTITUDE, _RATE, _FRAME = PositionLoop(), VelocityLoop(), AttitudeLoop(), RateLoop(), Airframe()
 

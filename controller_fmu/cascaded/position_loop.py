@@ -8,7 +8,7 @@ from fmu_kit.algebra import Vec3
 from fmu_kit.scalar import FLOAT
 
 SMALLEST_SPEED = 1e-12
-"""[m/s]; a speed below it has no direction"""
+"""Speed below which there is no direction [m/s]"""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -18,11 +18,11 @@ class PositionLoop:
     gain: Vec3 = Vec3(0.95, 0.95, 1.0)
     """K_p [1/s] (MPC_XY_P, MPC_Z_P)"""
     horizontal_limit: float = 12.0
-    """[m/s] (MPC_XY_VEL_MAX)"""
+    """Largest horizontal speed that is asked for [m/s] (MPC_XY_VEL_MAX)"""
     upward_limit: float = 3.0
-    """[m/s] (MPC_Z_VEL_MAX_UP)"""
+    """Largest upward speed that is asked for [m/s] (MPC_Z_VEL_MAX_UP)"""
     downward_limit: float = 1.5
-    """[m/s] (MPC_Z_VEL_MAX_DN)"""
+    """Largest downward speed that is asked for [m/s] (MPC_Z_VEL_MAX_DN)"""
 
     def velocity(self, position: Vec3, desired: Vec3, feedforward: Vec3) -> Vec3:
         """The desired velocity [m/s], inertial: K_p ∘ (P_d - P) + V_d within the limits.

@@ -13,10 +13,11 @@ from fmu_kit.algebra import ZERO, Inertia, Vec3
 from fmu_kit.scalar import FLOAT
 
 LARGE_ERROR = math.radians(400.0)
-"""[rad/s]; the integral weights an error less the nearer it is to this, and ignores it beyond"""
+"""Rate error [rad/s]; the integral weights an error less the nearer it is to this, and ignores it beyond"""
 
 _PER_COMMAND = Airframe().full_torque
-"""[rad/s²] for a full command with J = I₃ kg·m²: PX4's gains give commands, those here angular accelerations"""
+"""Angular acceleration of a full command with J = I₃ kg·m² [rad/s²]: PX4's gains give commands, those here angular
+accelerations"""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -30,22 +31,22 @@ class RateLoop:
     derivative: Vec3 = _PER_COMMAND * Vec3(0.003, 0.003, 0.0)
     """D [1] (MC_ROLLRATE_D, MC_PITCHRATE_D, MC_YAWRATE_D)"""
     feedforward: Vec3 = ZERO
-    """of the desired angular velocity [1/s] (MC_ROLLRATE_FF, MC_PITCHRATE_FF, MC_YAWRATE_FF)"""
+    """Feedforward of the desired angular velocity [1/s] (MC_ROLLRATE_FF, MC_PITCHRATE_FF, MC_YAWRATE_FF)"""
     integral_limit: Vec3 = Vec3(0.3, 0.3, 0.3)
-    """of a full command [1] (MC_RR_INT_LIM, MC_PR_INT_LIM, MC_YR_INT_LIM)"""
+    """Largest integral as a share of a full command [1] (MC_RR_INT_LIM, MC_PR_INT_LIM, MC_YR_INT_LIM)"""
     derivative_cutoff: float = 2.0 * math.pi * 30.0
-    """[rad/s] (IMU_DGYRO_CUTOFF: 30 Hz)"""
+    """Cutoff of the low-pass of the rate derivative [rad/s] (IMU_DGYRO_CUTOFF: 30 Hz)"""
     yaw_cutoff: float = 2.0 * math.pi * 2.0
-    """[rad/s], of the yaw command (MC_YAW_TQ_CUTOFF: 2 Hz)"""
+    """Cutoff of the low-pass of the yaw command [rad/s] (MC_YAW_TQ_CUTOFF: 2 Hz)"""
 
 
 class RateState(NamedTuple):
     """The state of the rate loop between runs."""
 
     integral: Vec3
-    """[rad/s²], body"""
+    """Integral of the rate error [rad/s²], body"""
     angular_velocity: Vec3
-    """as measured at the last run [rad/s], body"""
+    """Angular velocity as measured at the last run [rad/s], body"""
     angular_acceleration: Vec3
     """filtered derivative of the measured angular velocity [rad/s²], body"""
     yaw_command: float

@@ -24,24 +24,24 @@ class VelocityLoop:
     derivative: Vec3 = Vec3(0.2, 0.2, 0.0)
     """D [1] (MPC_XY_VEL_D_ACC, MPC_Z_VEL_D_ACC)"""
     derivative_cutoff: float = 2.0 * math.pi * 5.0
-    """[rad/s] (MPC_VELD_LP: 5 Hz)"""
+    """Cutoff of the low-pass of the velocity derivative [rad/s] (MPC_VELD_LP: 5 Hz)"""
     tilt_limit: float = math.radians(45.0)
-    """[rad] (MPC_TILTMAX_AIR)"""
+    """Largest tilt [rad] (MPC_TILTMAX_AIR)"""
     least_thrust: float = 0.12
-    """[1], of full thrust (MPC_THR_MIN)"""
+    """Least thrust as a share of full thrust [1] (MPC_THR_MIN)"""
     most_thrust: float = 1.0
-    """[1], of full thrust (MPC_THR_MAX)"""
+    """Largest thrust as a share of full thrust [1] (MPC_THR_MAX)"""
     horizontal_margin: float = 0.3
-    """[1], of full thrust: reserved for the horizontal force at the thrust limit (MPC_THR_XY_MARG)"""
+    """Share of full thrust reserved for the horizontal force at the thrust limit [1] (MPC_THR_XY_MARG)"""
 
 
 class VelocityState(NamedTuple):
     """The state of the velocity loop between runs."""
 
     integral: Vec3
-    """[m/s²], inertial"""
+    """Integral of the velocity error [m/s²], inertial"""
     velocity: Vec3
-    """as measured at the last run [m/s], inertial"""
+    """Velocity as measured at the last run [m/s], inertial"""
     acceleration: Vec3
     """filtered derivative of the measured velocity [m/s²], inertial"""
 

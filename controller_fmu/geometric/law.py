@@ -24,9 +24,9 @@ from fmu_kit.scalar import FLOAT, Scalar, ScalarOps
 from fmu_kit.trajectory import Reference
 
 SMALLEST_ACCELERATION = 1e-9
-"""Below this, |A|/m [m/s²] counts as zero, and b3c as undefined."""
+"""Acceleration |A|/m [m/s²] below which it counts as zero, and b3c as undefined."""
 SMALLEST_SINE = 1e-9
-"""Below this, |b3c × b1d| counts as zero, and b2c as undefined."""
+"""Value of |b3c × b1d| below which it counts as zero, and b2c as undefined."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -54,9 +54,9 @@ class Heading(NamedTuple):
     direction: Vec3 = Vec3(1.0, 0.0, 0.0)
     """b1d [1], inertial"""
     direction_dot: Vec3 = ZERO
-    """[1/s]"""
+    """First derivative of the direction [1/s]"""
     direction_ddot: Vec3 = ZERO
-    """[1/s²]"""
+    """Second derivative of the direction [1/s²]"""
 
     @classmethod
     def at(cls, yaw: Scalar, rate: Scalar, ops: ScalarOps = FLOAT) -> "Heading":
@@ -90,9 +90,9 @@ class Evaluation(NamedTuple):
     force: Vec3
     """-A/m [m/s²], inertial"""
     force_dot: Vec3
-    """[m/s³]"""
+    """First derivative of the force by the mass [m/s³]"""
     force_ddot: Vec3
-    """[m/s⁴]"""
+    """Second derivative of the force by the mass [m/s⁴]"""
     desired_quaternion: Quaternion
     """Q_d with R(Q_d)ᵀ = R_c"""
     desired_angular_velocity: Vec3

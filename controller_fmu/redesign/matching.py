@@ -11,10 +11,10 @@ from fmu_kit.scalar import FLOAT, Scalar, ScalarOps, repeat
 ITERATIONS = 4
 """Iterations of Gauss-Newton: see `matched_command`."""
 DIFFERENCE, ROUNDINGS = 1e-5, 200.0
-"""[m/s²], [rad/s²]: difference of the commands for the Jacobian; in coarser numbers it is this many times the root of
+"""Difference of the commands for the Jacobian [m/s²], [rad/s²]; in coarser numbers it is `ROUNDINGS` times the root of
 their resolution, so that the states after a period of milliseconds still differ."""
 COUNTS_AS_ZERO = 1e-150
-"""[1]: below this, the vector part of a quaternion counts as zero."""
+"""Length of the vector part of a quaternion below which it counts as zero [1]."""
 
 
 class _Candidate(NamedTuple):

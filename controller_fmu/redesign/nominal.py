@@ -34,7 +34,7 @@ class StateAndImpulse:
     def __init__(self, state: RigidState, impulse: Wrench) -> None:
         self.state = state
         self.impulse = impulse
-        """[N·s, N·m·s]"""
+        """Impulse of thrust and torque [N·s, N·m·s]"""
 
     def plus(self, factor: Scalar, rate: "StateAndImpulse") -> "StateAndImpulse":
         """self + factor * rate, componentwise."""

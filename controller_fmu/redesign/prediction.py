@@ -15,7 +15,7 @@ class SentCommand(NamedTuple):
     """A command that is pending, or acts."""
 
     time: Scalar
-    """[s], when it was sent; with a delay d it acts from time + d on"""
+    """Time when it was sent [s]; with a delay d it acts from time + d on"""
     command: Wrench
 
 

@@ -20,7 +20,7 @@ from fmu_kit.scalar import FLOAT, Scalar, ScalarOps, repeat
 from fmu_kit.trajectory import Reference
 
 SMALLEST_ACCELERATION = 1e-9
-"""Below this, n [m/s²] or n + g - F_z [m/s²] counts as zero and (12) as unsolvable."""
+"""Acceleration n or n + g - F_z below which it counts as zero [m/s²] and (12) as unsolvable."""
 NEWTON_STEPS = 8
 """Iterations of `implicit_sliding`: enough for all digits where time k is up to 100 m/s."""
 

@@ -30,11 +30,11 @@ MAX_INITIAL = {"y": 40.0, "vy": 40.0, "φ": 3.1, "p": 80.0, "z": 40.0, "vz": 40.
 STARTS = 400
 """initial values along each coordinate"""
 FLIGHT = 60.0
-"""[s]"""
+"""Duration of a flight [s]"""
 LOST = 1e3
-"""[m, m/s, rad, rad/s], bound of every coordinate at all times"""
+"""Bound of every coordinate at all times [m, m/s, rad, rad/s]"""
 RESTS = 1e-3
-"""[m, m/s, rad, rad/s], bound of all coordinates at the end"""
+"""Bound of all coordinates at the end [m, m/s, rad, rad/s]"""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -27,11 +27,11 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.theory.certificates.checker import is_positive
 
 HALVINGS = 9
-"""of the box around the ellipsoid, before the inner box is given up"""
+"""Halvings of the box around the ellipsoid, before the inner box is given up"""
 FALL = 1e-9
 """least decrease of V in a period: more than the rounding of all constants of the equations"""
 MIN_RADIUS = 1e-5
-"""of y: smaller boxes are not halved"""
+"""Least radius of a box in y: smaller boxes are not halved"""
 AT_ONCE = 2048
 """boxes in one evaluation"""
 SHORT = 0.1

@@ -19,13 +19,13 @@ from orchestration.foundation.basics.simulator import Floats
 POINTS = 3000
 """directions"""
 DEPTHS = np.array([0.03, 0.06, 0.12, 0.25, 0.4, 0.55, 0.7, 0.8, 0.9, 1.0])
-"""of the points along each direction, as shares of the ellipsoid"""
+"""Depths of the points along each direction, as shares of the ellipsoid"""
 STEEPEST = 1.0
-"""[rad], largest roll in an ellipsoid that is considered"""
+"""Largest roll in an ellipsoid that is considered [rad]"""
 RATE = 0.5
-"""[1/s], least rate at which V decreases at every point"""
+"""Least rate at which V decreases at every point [1/s]"""
 WEIGHTS = np.log([1.0, 0.1, 0.1, 0.001])
-"""of y, vy, φ and p in the equation, at the start of the search"""
+"""Weights of y, vy, φ and p in the equation, at the start of the search"""
 VERTICAL = np.log(0.5)
 """size of the vertical part relative to the lateral one, at the start of the search"""
 

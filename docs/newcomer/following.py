@@ -13,7 +13,7 @@ from typing import IO
 from docs.newcomer.blocks import OUTPUT, Block
 
 TIMEOUT = 1800.0
-"""[s], timeout of a line"""
+"""Time limit of a line [s]"""
 SHOWN = 3000
 """Number of characters shown of the output of a failed block"""
 KEPT = ("HOME", "LANG", "TMPDIR", "http_proxy", "https_proxy", "no_proxy", "PIP_INDEX_URL", "PIP_CONFIG_FILE")

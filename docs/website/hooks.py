@@ -19,7 +19,7 @@ CONTINUED: dict[str, Callable[[], str]] = {
     "keys.md": keys.section,
     "validation.md": rules.section,
 }
-"""What is generated from the code at the end of pages in `docs/`, by address."""
+"""Sections generated from the code at the end of pages in `docs/`, by address."""
 BEHIND = 1e-6
 """Search weight of sources relative to pages, so that pages are found first even if the title of a source matches"""
 

@@ -21,22 +21,22 @@ from quadcosim import FmuChoice, Linearised, Scenario, StateSpace, Timing
 
 HERE = Path(__file__).resolve().parent
 PERIOD = 0.01
-"""[s] of the design, the default of scenarios"""
+"""Period of the design [s], the default of scenarios"""
 GRAVITY = 9.81
 ACCEPTABLE_ERRORS = {"position": 0.5, "velocity": 1.0, "quaternion": 0.1, "angular_velocity": 2.0}
 """Acceptable sizes, by which errors are weighed against commands (Bryson's rule)"""
 ACCEPTABLE_COMMANDS = {"thrust": 4.0, "torque": 6.0}
 INTEGRAL = 0.5
-"""[m.s], acceptable size of the integral"""
+"""Acceptable size of the integral [m.s]"""
 ATTITUDE, POSITION = (12.0, 60.0), (2.5, 45.0)
 """Crossover [rad/s] and phase margin [degrees] of the PID's loops"""
 SLOW = POSITION[0] / 5.0
-"""[1/s], corner of its integral"""
+"""Corner of its integral [1/s]"""
 PULLED_BY = {"x": ("torque.y", -1.0 / GRAVITY), "y": ("torque.x", 1.0 / GRAVITY), "z": ("thrust", -1.0)}
 """The command that moves the vehicle along an axis, and the attitude or thrust commanded for 1 m/s² (of 1 kg)"""
 
 FREQUENCIES = np.geomspace(0.3, 0.99 * np.pi / PERIOD, 400)
-"""[rad/s], of figures and margins"""
+"""Frequencies of figures and margins [rad/s]"""
 
 Matrix = npt.NDArray[np.float64]
 Gains = dict[str, list[float]]

@@ -24,13 +24,13 @@ from orchestration.theory.exact.loops import Loops
 
 HERE = Path(__file__).resolve().parent
 OMEGA, PERIOD = 3.0, 0.1
-"""of the pendulum [1/s], and of the controller [s]"""
+"""Natural frequency of the pendulum [1/s], and period of the controller [s]"""
 PRICE = 0.1
 """weight of u² relative to the square of the angle"""
 DISTURBANCE, NOISE = 0.01, 0.01
 """its intensity [rad²/s³]; standard deviation of a measurement [rad]"""
 GAINS = ("k_angle", "k_rate", "k_u", "l_angle", "l_rate")
-"""of the command, and of the correction by a measurement"""
+"""Gains of the command, and of the correction by a measurement"""
 PARAMETERS = "components.controller.parameters"
 RUNS = (0.0, 0.04, 0.08)
 """delays [s] of runs in the figure"""
@@ -38,7 +38,7 @@ RUNS = (0.0, 0.04, 0.08)
 Matrix = npt.NDArray[np.float64]
 
 A = np.array([[0.0, 1.0, 0.0, 0.0], [OMEGA**2, 0.0, -(OMEGA**2), 0.0], [0.0] * 4, [0.0] * 4])
-"""of angle, rate, the held command, and the pending one"""
+"""Matrix of angle, rate, the held command, and the pending one"""
 ARRIVES = np.eye(4)[[0, 1, 3, 3]]
 W = np.diag([0.0, DISTURBANCE, 0.0, 0.0])
 Q = np.diag([1.0, 0.0, PRICE, 0.0])
@@ -50,7 +50,7 @@ class Design:
     """The optimal design for a delay."""
 
     gains: dict[str, float]
-    """by the parameters of the controller"""
+    """Gains by the parameters of the controller"""
     cost: float
     """J"""
 

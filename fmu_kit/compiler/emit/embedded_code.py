@@ -26,9 +26,9 @@ class MessageTable:
     """The numbers of messages, which replace texts at run time."""
 
     errors: list[str] = field(default_factory=list)
-    """by status, from 1 on"""
+    """Texts of errors by status, from 1 on"""
     warnings: dict[str, str] = field(default_factory=dict)
-    """by key"""
+    """Texts of warnings by key"""
 
     def status(self, text: str) -> int:
         """The status of a text."""

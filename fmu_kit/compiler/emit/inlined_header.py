@@ -76,7 +76,7 @@ def _one_lane(lines: Iterable[str]) -> list[str]:
     """The lines of a header that remain for one lane without libm."""
     found: list[str] = []
     conditions: list[bool | None] = []
-    """of each #if around a line: whether its lines are included; None: unknown here"""
+    """Conditions of each #if around a line: whether its lines are included; None: unknown here"""
     for line in lines:
         if line.startswith("#if"):
             conditions.append(True if _GUARD.match(line) else _KNOWN.get(line))

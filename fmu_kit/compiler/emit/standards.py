@@ -25,7 +25,7 @@ class Standard:
     calls: Mapping[str, str]
     """the functions that a phase may refuse, by their names in instance.h"""
     types: Mapping[str, str]
-    """by type of FMI 2.0: the type in the names of the functions that get and set its values"""
+    """Type in the names of the functions that get and set its values, by type of FMI 2.0"""
 
 
 def _build_description(model: str, main: str) -> Element:
@@ -88,4 +88,4 @@ STANDARDS = {
         },
     ),
 }
-"""By version of FMI"""
+"""Standards by version of FMI"""

@@ -139,10 +139,10 @@ class _Frame:
         self.line = line
         self.arguments = [_as(parameter, value) for parameter, value in zip(function.parameters, arguments)]
         self.memories = {0: dict(line.memory)}
-        """by version: at the beginning of the call, and after each call in it"""
+        """Memories by version: at the beginning of the call, and after each call in it"""
         self.results: dict[int, list[Symbol]] = {}
         self.rounds: dict[int, tuple[int, list[Symbol]]] = {}
-        """of loops, by their depth: the current round, and the values of their variables"""
+        """Rounds of loops, by their depth: the current round, and the values of their variables"""
         self.outcomes: dict[Statement, list[Symbol]] = {}
         self.chosen: dict[Symbol, Symbol] = {}
         """the values of symbols that are assigned in branches"""

@@ -57,13 +57,13 @@ class Memory:
         self.places: dict[str, Place] = {}
         self._names: dict[Path, str] = {}
         self._kinds = kinds
-        """of places, as far as known from an earlier trace"""
+        """Kinds of places, as far as known from an earlier trace"""
         self.first_kinds: dict[str, Kind] = {}
-        """of places, when first seen"""
+        """Kinds of places when first seen"""
         self.written: dict[str, Symbol] = {}
         """the current value of each place, as far as it has been written"""
         self.version = 0
-        """of the memory; each call makes a new one"""
+        """Version of the memory; each call makes a new one"""
         self.versions: dict[tuple[int, Statement], int] = {}
         """version after each call, by the one before it and the call"""
         self._joined: dict[tuple[int, int, int], int] = {}

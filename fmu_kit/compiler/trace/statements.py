@@ -106,7 +106,7 @@ class Function:
     name: str
     parameters: tuple[Symbol, ...]
     names: tuple[str, ...]
-    """of the parameters"""
+    """Names of the parameters"""
     body: Block
     results: int
     """number of values that it returns"""

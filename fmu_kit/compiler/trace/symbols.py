@@ -446,7 +446,7 @@ def _as_compared_with_float(value: Any) -> Symbol:
 # -- whole numbers: stored ones are exact real numbers in C; within an expression they may be larger -----------------
 
 _spans: dict[int, integers.Span] = {}
-"""of whole numbers computed within expressions; all others are stored ones"""
+"""Spans of whole numbers computed within expressions; all others are stored ones"""
 
 
 def whole_number(op: str, *values: Any) -> Symbol:

@@ -55,7 +55,7 @@ class Program:
     warnings: tuple[str, ...]
     """keys of the warnings that are given once"""
     versions: Mapping[tuple[int, Statement], int]
-    """of the memory, after a call, by the one before it and the call"""
+    """Version of the memory after a call, by the one before it and the call"""
 
 
 def trace(slave: type[Slave], modules: list[types.ModuleType], *, digits: int = 53) -> Program:
