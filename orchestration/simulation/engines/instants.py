@@ -3,7 +3,7 @@
 In this order: components in continuous time are stepped to it; arriving messages are delivered, then those that such
 components send now; values for later samples are measured; sampled components that are due read their inputs, step and
 send, and messages without delay are delivered; the row is recorded. So a row has the values just after its instant, and
-nothing samples at the end. For users: docs/timing.md, "Order of events".
+nothing samples at the end. For users: docs/timing.md, "At one instant".
 """
 
 from collections.abc import Callable, Sequence
