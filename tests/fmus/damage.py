@@ -29,6 +29,8 @@ class Mutant:
     words: tuple[str, ...]
     """What the text of the finding must name"""
     damage: Damage
+    rule_3: str | None = None
+    """The rule that is meant for it in FMI 3.0, if that is another one"""
     model: str = "QuadrotorPlant"
     damage_3: Damage | None = None
     """What does the same to an FMU of FMI 3.0, if that takes another damage"""
@@ -42,6 +44,10 @@ class Mutant:
     """Damage to the archive itself"""
     time_limit: float = 20.0
     """[s]; a mutant takes one or two"""
+
+    def rule_of(self, version: int) -> str:
+        """The rule that is meant for it, in a version of FMI."""
+        return self.rule if version == 2 or self.rule_3 is None else self.rule_3
 
     def words_of(self, version: int) -> tuple[str, ...]:
         """What the text of the finding must name, in a version of FMI."""

@@ -46,6 +46,8 @@ static int instances, resets, steps;
 static bool initialised, rounded, set, ended;
 static double reached, thrust, torque;
 
+Status fmi3SetFloat64(void *c, References vr, size_t n, const double *value, size_t values);
+
 static Status refuse(Text why)
 {
     tell(teller, ERROR, "logStatusError", why);
@@ -156,23 +158,29 @@ Status fmi3GetFloat64(void *c, References vr, size_t n, double *value, size_t va
     return status;
 }
 
+static Status set_one(void *c, unsigned vr, double value)
+{
+    if (vr == MASS && ((is("unbounded") && value <= 0.0) || (is("never fixed") && initialised)))
+        return OK;
+    if (is("not a number") && !isfinite(value))
+        return OK;
+    if (vr == TORQUE_X)
+        torque = value;
+    if (vr == THRUST) {
+        thrust = value;
+        if (is("adds") && set)
+            value += 1.0;
+        set = initialised;
+    }
+    return SOUND(fmi3SetFloat64)(c, &vr, 1, &value, 1);
+}
+
 Status fmi3SetFloat64(void *c, References vr, size_t n, const double *value, size_t values)
 {
-    double changed;
-    if (n == 1 && vr[0] == MASS && ((is("unbounded") && *value <= 0.0) || (is("never fixed") && initialised)))
-        return OK;
-    if (is("not a number") && n == 1 && !isfinite(*value))
-        return OK;
-    if (n == 1 && vr[0] == TORQUE_X)
-        torque = *value;
-    if (n == 1 && vr[0] == THRUST) {
-        thrust = changed = *value;
-        if (is("adds") && set)
-            changed += 1.0;
-        set = initialised;
-        return SOUND(fmi3SetFloat64)(c, vr, n, &changed, values);
-    }
-    return SOUND(fmi3SetFloat64)(c, vr, n, value, values);
+    Status status = OK;
+    for (size_t i = 0; i < n && status == OK; i++)
+        status = set_one(c, vr[i], value[i]);
+    return status;
 }
 
 Status fmi3SetFMUState(void *c, void *state)

@@ -289,7 +289,7 @@ VARIABLES = (
         damage=_dimension("velocity.y", start="0"),
     ),
     Mutant(
-        name="as many elements as a number", rule="arrays", words=("velocity.y", "mass", "of Float64"), versions=(3,),
+        name="as many elements as a number", rule="indices", words=("velocity.y", "mass", "of Float64"), versions=(3,),
         damage=_dimension("velocity.y", of="mass"),
     ),
     Mutant(
@@ -297,11 +297,11 @@ VARIABLES = (
         damage=variable("mass", start="1.0 1.0"),
     ),
     Mutant(
-        name="value reference twice", rule="value-references", words=("velocity.y", "10"),
+        name="value reference twice", rule="value-references", rule_3="indices", words=("velocity.y", "10"),
         damage=variable("velocity.y", valueReference="10"),
     ),
     Mutant(
-        name="value reference of two inputs", rule="aliases", words=("torque.x, torque.y",),
+        name="value reference of two inputs", rule="aliases", rule_3="indices", words=("torque.x, torque.y",),
         damage=variable("torque.y", valueReference="1"),
     ),
     Mutant(

@@ -19,17 +19,17 @@ from orchestration.components.checks.validation.fmu import Fmu
 from orchestration.components.checks.validation.own_description import differences, elements
 from orchestration.components.checks.validation.probe import Probe
 from orchestration.components.checks.validation.progress import Frame, ReceivedReport, Reporter
-from orchestration.components.checks.validation.reading import read_co_simulation, read_fmu
 from orchestration.components.checks.validation.structure import initial_unknowns, known_dependencies, outputs
 from orchestration.components.checks.validation.units import dimensions, unit_meaning
 from orchestration.components.checks.validation.validator import validate
 from orchestration.components.checks.validation.variables import aliases, names
-from orchestration.components.fmi.archive import Archive
+from orchestration.components.fmi.model import attribute, scalars_of
+from orchestration.components.fmi.values import start_value
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.processes.child import Child, Ending
 from orchestration.foundation.processes.limits import Limits
-from tests.fmus.archive import files_of
-from tests.fmus.damage import DESCRIPTION, Damage, description, root, source, without, write_fmu
+from tests.fmus.archive import files_of, view_of
+from tests.fmus.damage import Damage, description, root, source, without, write_fmu
 from tests.fmus.foreign import lag, needs_compiler
 from tests.fmus.process import run
 from tests.places import ROOT
@@ -310,12 +310,7 @@ def fmu(variables: str, structure: str = "", units: str = "", tool: str = "anoth
         <CoSimulation modelIdentifier="M"/><UnitDefinitions>{units}</UnitDefinitions>
         <ModelVariables>{variables}</ModelVariables><ModelStructure>{structure}</ModelStructure>
     </fmiModelDescription>"""
-    return read(text)
-
-
-def read(text: str) -> Fmu:
-    archive = Archive(Path("m.fmu"), (), {DESCRIPTION: text.encode()})
-    return read_fmu(archive, read_co_simulation(archive))
+    return view_of(text)
 
 
 def named(convention: str | None, *names: str) -> Element:
@@ -331,7 +326,7 @@ def named(convention: str | None, *names: str) -> Element:
 
 
 def illegal(convention: str | None, *given: str) -> list[str]:
-    return list(names(read_fmu(Archive(Path("m.fmu"), (), {}), named(convention, *given))))
+    return list(names(view_of(tostring(named(convention, *given), encoding="unicode"))))
 
 
 STRUCTURED = ["mass", "_1", "a.b[1,2].c", "der(x)", "der(a.b[1].c)", "der(x,2)", "'odd name'.x", "'a'[3]", "der"]
@@ -375,7 +370,7 @@ def scalar(name: str, reference: int, attributes: str = "", real: str = "") -> s
         (('variability="constant"', 'start="1"'), ('variability="constant"', 'start="1"'), None),
         (('variability="constant"', 'start="1"'), ('variability="constant"', 'start="2"'), "different starts"),
         (('variability="constant"', 'start="1"'), ("", ""), "only some are constants"),
-        (('causality="input"', 'start="0"'), ('causality="parameter"', 'start="0"'), "set from outside"),
+        (('causality="input"', 'start="0"'), ('causality="input"', 'start="0"'), "set from outside"),
         (('initial="exact"', 'start="0"'), ('initial="exact"', 'start="0"'), "more than one of them has a start"),
         (("", 'unit="m"'), ("", 'unit="s"'), "their units are m, s"),
     ],
@@ -411,7 +406,7 @@ def lists(outputs: str, derivatives: str, initial: str) -> str:
     ("structure", "texts"),
     [
         (lists("3", "2", "2 3 4"), []),
-        (lists("3", "6", "3 4 6"), []),  # x is no state: its derivative is not under Derivatives
+        (lists("3", "3", "3 4"), []),  # x is no state: its derivative is not under Derivatives
         (lists("3", "", "3 4"), []),  # without derivatives there are no states to speak of
         (lists("3", "2", "3 2 4"), ["InitialUnknowns: expected the entries in the order of their indices"]),
         (lists("3", "2", "2 3"), ["InitialUnknowns: p is there 0 times, expected once"]),
@@ -450,16 +445,18 @@ def test_others_may_take_the_radian_for_one() -> None:
 
 
 def test_types_give_variables_their_attributes() -> None:
-    text = """<fmiModelDescription fmiVersion="2.0" guid="g"><CoSimulation/><TypeDefinitions>
+    text = """<fmiModelDescription fmiVersion="2.0" guid="g"><CoSimulation modelIdentifier="M"/><TypeDefinitions>
         <SimpleType name="Angle"><Real unit="rad" min="-1" max="1"/></SimpleType>
         <SimpleType name="Gear"><Enumeration><Item name="r" value="-1"/><Item name="d" value="1"/></Enumeration>
         </SimpleType></TypeDefinitions><ModelVariables>
         <ScalarVariable name="a" valueReference="0"><Real declaredType="Angle" max="2"/></ScalarVariable>
         <ScalarVariable name="g" valueReference="0"><Enumeration declaredType="Gear" start="1"/></ScalarVariable>
         </ModelVariables></fmiModelDescription>"""
-    a, g = read(text).variables
-    assert (a.unit, a.minimum, a.maximum) == ("rad", "-1", "2")
-    assert (g.items, g.start_value) == ((-1, 1), 1)
+    a, g = view_of(text).variables
+    assert [attribute(a, name) for name in ("unit", "min", "max")] == ["rad", "-1", "2"]
+    (angle,), (gear,) = scalars_of(a), scalars_of(g)
+    assert (angle.unit, angle.minimum, angle.maximum) == ("rad", -1.0, 2.0)
+    assert (gear.choices, start_value(gear)) == ({"r": -1, "d": 1}, 1)
 
 
 # -- two descriptions -----------------------------------------------------------------------------------

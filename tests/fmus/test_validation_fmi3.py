@@ -1,6 +1,7 @@
 """Validation of FMUs of FMI 3.0: those that are sound, and rules that FMI 2.0 has not."""
 
 from pathlib import Path
+from xml.etree.ElementTree import fromstring
 
 import pytest
 
@@ -8,12 +9,13 @@ from orchestration.components.building import fmus
 from orchestration.components.checks.validation.description import capabilities
 from orchestration.components.checks.validation.finding import Finding, Rule, check
 from orchestration.components.checks.validation.fmu import Fmu
-from orchestration.components.checks.validation.reading import read_co_simulation, read_fmu
-from orchestration.components.checks.validation.structure import RULES, known_dependencies
+from orchestration.components.checks.validation.structure import RULES, indices, known_dependencies
 from orchestration.components.checks.validation.validator import validate
-from orchestration.components.checks.validation.variables import aliases, arrays, bounds, names
-from orchestration.components.fmi.archive import Archive, UnreadableFmuError
-from tests.fmus.archive import files_of
+from orchestration.components.checks.validation.variables import arrays, bounds, names
+from orchestration.components.fmi.archive import UnreadableFmuError
+from orchestration.components.fmi.model import scalars_of
+from orchestration.components.fmi.values import start_value
+from tests.fmus.archive import files_of, view_of
 from tests.fmus.damage import DESCRIPTION, write_fmu
 from tests.fmus.making import PAIR
 from tests.orchestration.components.fmi.small import CLOCK, needs_compiler, small
@@ -124,13 +126,16 @@ STATE = """<Float64 name="time" valueReference="9" causality="independent"/>
 <Int32 name="n" valueReference="6" initial="exact" start="0"/>"""
 
 
-def fmu(variables: str, structure: str = "", interface: str = "") -> Fmu:
-    """The view of a description with these elements."""
-    text = f"""<fmiModelDescription fmiVersion="3.0" instantiationToken="t" variableNamingConvention="structured">
+def text_of(variables: str, structure: str = "", interface: str = "") -> str:
+    """A description with these elements."""
+    return f"""<fmiModelDescription fmiVersion="3.0" instantiationToken="t" variableNamingConvention="structured">
         <CoSimulation modelIdentifier="M" {interface}/><ModelVariables>{variables}</ModelVariables>
         <ModelStructure>{structure}</ModelStructure></fmiModelDescription>"""
-    archive = Archive(Path("m.fmu"), (), {DESCRIPTION: text.encode()})
-    return read_fmu(archive, read_co_simulation(archive))
+
+
+def fmu(variables: str, structure: str = "", interface: str = "") -> Fmu:
+    """The view of a description with these elements."""
+    return view_of(text_of(variables, structure, interface))
 
 
 def listed(**references: str) -> str:
@@ -149,15 +154,34 @@ def listed(**references: str) -> str:
             listed(Output="2 4", InitialUnknown="2 2 3"),
             ["Output: u is there, expected it not to be", "InitialUnknown: y is there 2 times, expected once"],
         ),
-        (
-            listed(Output="2", InitialUnknown="2 3", EventIndicator="77", ClockedState="78"),
-            ["ClockedState: valueReference 78, expected that of a variable",
-             "EventIndicator: valueReference 77, expected that of a variable"],
-        ),
     ],
 )  # fmt: skip
 def test_the_structure_holds_what_fmi_asks_for(structure: str, texts: list[str]) -> None:
     assert [finding.text for finding in check(RULES, fmu(STATE, structure))] == texts
+
+
+@pytest.mark.parametrize(
+    ("variables", "structure", "texts"),
+    [
+        (STATE, listed(Output="2", InitialUnknown="2 3", EventIndicator="77", ClockedState="78"),
+         ["EventIndicator: valueReference 77, expected that of a variable",
+          "ClockedState: valueReference 78, expected that of a variable"]),
+        ('<Int32 name="n" valueReference="0" clocks="9"/>', "",
+         ["n: clocks of valueReference 9, expected that of a variable"]),
+        ('<Int32 name="n" valueReference="0" previous="9"/>', "",
+         ["n: previous of valueReference 9, expected that of a variable"]),
+        ('<Float64 name="a" valueReference="0"><Dimension valueReference="9"/></Float64>', "",
+         ["a: dimension of valueReference 9, expected that of a variable"]),
+        ('<Float64 name="a" valueReference="0" start="1"><Dimension valueReference="0"/></Float64>', "",
+         ["a: its dimension is a of Float64: expected a structural or constant UInt64"]),
+        ('<Float64 name="a" valueReference="0"/><Int32 name="b" valueReference="0"/>', "",
+         ["a, b: value reference 0 for all of them, but FMI 3.0 has one for each variable"]),
+        ('<Float64 name="d" valueReference="0" derivative="9"/>', "",
+         ["d: derivative of valueReference 9, expected that of a variable"]),
+    ],
+)  # fmt: skip
+def test_every_reference_is_that_of_a_variable(variables: str, structure: str, texts: list[str]) -> None:
+    assert list(indices(fromstring(text_of(variables, structure)))) == texts
 
 
 @pytest.mark.parametrize(
@@ -183,16 +207,6 @@ def test_an_output_that_ticks_may_be_an_initial_unknown_and_need_not() -> None:
 @pytest.mark.parametrize(
     ("rule", "variables", "text"),
     [
-        (RULES[0], '<Int32 name="n" valueReference="0" clocks="9"/>',
-         "n: clocks of valueReference 9, expected that of a variable"),
-        (RULES[0], '<Int32 name="n" valueReference="0" previous="9"/>',
-         "n: previous of valueReference 9, expected that of a variable"),
-        (RULES[0], '<Float64 name="a" valueReference="0"><Dimension valueReference="9"/></Float64>',
-         "a: dimension of valueReference 9, expected that of a variable"),
-        (RULES[0], '<Float64 name="d" valueReference="0" derivative="9"/>',
-         "d: derivative of valueReference 9, expected that of a variable"),
-        (aliases, '<Float64 name="a" valueReference="0"/><Int32 name="b" valueReference="0"/>',
-         "a, b: value reference 0 for all of them, but FMI 3.0 has one for each variable"),
         (names, '<Float64 name="a" valueReference="0"><Alias name="a b"/></Float64>',
          "'a b': expected a name by the convention structured"),
         (arrays, '<Int32 name="n" valueReference="0" start="2" causality="parameter"/>'
@@ -234,10 +248,10 @@ def test_arrays_have_the_size_that_a_variable_starts_with() -> None:
         '<Start value="one"/><Start value="two words"/></String>'
         '<Binary name="b" valueReference="3" causality="input"><Start value="00ff"/></Binary>'
     )
-    starts = {v.name: v.start_value for v in view.elements}
+    starts = {v.name: start_value(v) for declared in view.variables for v in scalars_of(declared)}
     assert starts == {
         "n": 2, "A[1,1]": 1.0, "A[1,2]": 2.0, "A[1,3]": 3.0, "A[2,1]": 4.0, "A[2,2]": 5.0, "A[2,3]": 6.0,
-        "s[1]": "one", "s[2]": "two words", "b": b"\x00\xff",
+        "s[1]": "", "s[2]": "", "b": b"\x00\xff",
     }  # fmt: skip
 
 

@@ -86,5 +86,5 @@ def _cells(verdict: Verdict | None) -> list[str]:
     """Whether each notices it; empty for what cannot be done to FMUs of that version."""
     if verdict is None:
         return [""] * 3
-    found = any(finding.rule == verdict.mutant.rule for finding in verdict.quadcosim)
+    found = any(finding.rule in (verdict.mutant.rule, verdict.mutant.rule_3) for finding in verdict.quadcosim)
     return ["yes" if each else "-" for each in (found, verdict.fmpy, verdict.fmutool)]

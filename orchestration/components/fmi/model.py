@@ -56,8 +56,14 @@ class Variable:
     """Number of elements of that array; 0 for a scalar"""
     minimum: float | None
     maximum: float | None
+    nominal: float | None
     choices: Mapping[str, int]
     """items of an Enumeration, by name"""
+
+    @property
+    def whole(self) -> str:
+        """The name of the array that it is an element of; its own name if it is none."""
+        return self.name.rpartition("[")[0] if self.length else self.name
 
     @property
     def is_settable(self) -> bool:
@@ -223,7 +229,7 @@ def _read_model(path: Path, changed: int, size: int) -> Model:
         if not 0 <= declared.valueReference < 2**32:
             what = f"{declared.name}: valueReference = {declared.valueReference}"
             raise UsageError(f"{path}: {what}: expected a whole number of 32 bits without a sign")
-    scalars = [scalar for declared in description.modelVariables for scalar in _scalars(declared)]
+    scalars = [scalar for declared in description.modelVariables for scalar in scalars_of(declared)]
     variables = {v.name: v for v in scalars}
     if len(variables) < len(scalars):
         name = Counter(v.name for v in scalars).most_common(1)[0][0]
@@ -242,29 +248,52 @@ _KINDS: dict[str, Kind] = {
 }  # fmt: skip
 
 
-def _scalars(declared: ModelVariable) -> list[Variable]:
+def kind_of(declared: ModelVariable) -> Kind:
+    """The type of a variable by its FMI 2.0 name."""
+    return _KINDS.get(declared.type, "Integer")
+
+
+def attribute(declared: ModelVariable, name: str) -> str | None:
+    """The unit, min, max or nominal of a variable as it is written: its own, or that of its declared type."""
+    own: str | None = getattr(declared, name)
+    return getattr(declared.declaredType, name, None) if own is None else own
+
+
+def starts_of(declared: ModelVariable) -> list[str]:
+    """The start values of a variable as they are written: none, one, or one for each element of an array.
+
+    Those of an array of texts are unknown: fmpy reads the first only.
+    """
+    if declared.start is None:
+        return []
+    if kind_of(declared) in ("String", "Binary"):
+        return [] if declared.shape else [declared.start]
+    return declared.start.split() or [""]
+
+
+def scalars_of(declared: ModelVariable) -> list[Variable]:
     """The elements of a variable: itself, or every `name[i,j]`, counted from 1, the last index varying fastest."""
-    kind: Kind = _KINDS.get(declared.type, "Integer")
     shape = tuple(declared.shape or ())
-    starts = (declared.start or "").split() if shape else [declared.start]
+    starts = starts_of(declared)
     variables = []
     for element, index in enumerate(itertools.product(*(range(1, n + 1) for n in shape))):
         start = starts[element] if element < len(starts) else (starts[-1] if starts else None)
         variables.append(
             Variable(
                 name=declared.name + (f"[{','.join(map(str, index))}]" if shape else ""),
-                kind=kind,
+                kind=kind_of(declared),
                 type=declared.type,
                 causality=declared.causality or "local",
                 variability=declared.variability or "continuous",
-                unit=declared.unit or getattr(declared.declaredType, "unit", None),
+                unit=attribute(declared, "unit"),
                 description=declared.description,
                 start=start,
                 reference=declared.valueReference,
                 element=element,
                 length=math.prod(shape) if shape else 0,
-                minimum=_number(declared.min),
-                maximum=_number(declared.max),
+                minimum=_number(attribute(declared, "min")),
+                maximum=_number(attribute(declared, "max")),
+                nominal=_number(attribute(declared, "nominal")),
                 choices={i.name: int(i.value) for i in getattr(declared.declaredType, "items", ())},
             )
         )

@@ -54,7 +54,8 @@ class NativeInstance(Instance):
     behaviour undefined.
     """
 
-    def __init__(self, path: Path, instance_name: str) -> None:
+    def __init__(self, path: Path, instance_name: str, unpacked: Path | None = None) -> None:
+        """`unpacked`: the folder in which the FMU is unpacked already; None: it is unpacked for this instance."""
         self.path = path
         self.name = instance_name
         self.warnings: list[str] = []
@@ -74,10 +75,7 @@ class NativeInstance(Instance):
         except QuadcosimError as error:
             raise QuadcosimError(f"{path}: {error}") from None
         try:
-            self._folder = scratch.temporary()
-            fmpy.extract(str(path), str(self._folder.path), include=_is_used if self.model.is_of_this_kit else None)
-            pythonfmu.expect_readable_place(self._folder.path)
-            self._fmu = self._instantiate(self._folder.path)
+            self._fmu = self._instantiate(unpacked or self._unpacked())
             self.restore_globals()
         except Exception as error:
             self.failed = True
@@ -85,8 +83,7 @@ class NativeInstance(Instance):
             if isinstance(error, OSError) and error.errno is not None:  # of the disk: of a library it has no number
                 what = f"cannot be unpacked in {tempfile.gettempdir()}, which TMPDIR names: {error.strerror}"
                 raise QuadcosimError(f"{path}: {what}") from error
-            message, _ = failure_text(self._messages, str(error))
-            raise QuadcosimError(f"{path}: expected a co-simulation FMU that loads here: {message}") from error
+            raise self.no_instance(failure_text(self._messages, str(error))[0]) from error
         self._component = ctypes.c_void_p(self._fmu.component)
 
     # -- what differs between versions ---------------------------------------------------------------------------
@@ -243,11 +240,15 @@ class NativeInstance(Instance):
         self._expect_alive()
         variable = self.variable(name)
         if variable.kind == "String":
-            text = self._call("getString", [variable.reference])[0]
-            return text.decode("utf-8", "replace") if isinstance(text, bytes) else str(text)
+            return self.content(variable).decode("utf-8", "replace")
         value = np.zeros(1)
         self.reader((name,), value)()
         return bool(value[0]) if variable.kind == "Boolean" else float(value[0])
+
+    def content(self, variable: Variable) -> bytes:
+        """The bytes of a String or Binary variable, or of an element of an array of them."""
+        counts = {"nValues": variable.length} if variable.length else {}
+        return bytes(self._call(f"get{variable.kind}", [variable.reference], **counts)[variable.element] or b"")
 
     # -- global state of this process ------------------------------------------------------------------------------
 
@@ -296,6 +297,17 @@ class NativeInstance(Instance):
         return transfer
 
     # -- inside --------------------------------------------------------------------------------------------------
+
+    def _unpacked(self) -> Path:
+        """A folder with what the FMU needs to run, until it is closed."""
+        self._folder = scratch.temporary()
+        fmpy.extract(str(self.path), str(self._folder.path), include=_is_used if self.model.is_of_this_kit else None)
+        pythonfmu.expect_readable_place(self._folder.path)
+        return self._folder.path
+
+    def no_instance(self, why: str) -> QuadcosimError:
+        """The error for an FMU that cannot be loaded or instantiated."""
+        return QuadcosimError(f"{self.path}: expected a co-simulation FMU that loads here: {why}")
 
     def _instantiate(self, folder: Path) -> Any:
         """fmpy's instance of the FMU unpacked in `folder`, which logs to `_messages`."""
@@ -382,9 +394,11 @@ class NativeInstance(Instance):
         summary, details = failure_text(diverged or self._messages, otherwise or silent)
         if not diverged and self._names_initial_value(summary):
             return RefusedValueError(f"{self.name}.{summary}", details=details)
-        return SimulatorError(
-            f"{self.name} ({self.model.name}): {function}: {summary}", divergence=bool(diverged), details=details
-        )
+        return SimulatorError(self.reported(function, summary), divergence=bool(diverged), details=details)
+
+    def reported(self, function: str, what: str) -> str:
+        """The text of an error of a call."""
+        return f"{self.name} ({self.model.name}): {function}: {what}"
 
     def _stopped_step(self, function: str, end: float, *, reached: float, ends: bool) -> StoppedStepError:
         """The error for a step to `end` [s] of an FMU that stopped at `reached` [s]."""
@@ -394,7 +408,7 @@ class NativeInstance(Instance):
         summary, details = failure_text(self._messages, "")
         self.collect_warnings()
         return StoppedStepError(
-            f"{self.name} ({self.model.name}): {function}: {what}" + (f": {summary}" if summary else ""),
+            self.reported(function, f"{what}: {summary}" if summary else what),
             ends=ends, whole=math.isclose(reached, end, rel_tol=_AT_END, abs_tol=_AT_END), details=details,
         )  # fmt: skip
 

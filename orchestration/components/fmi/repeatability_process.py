@@ -16,7 +16,7 @@ import numpy as np
 from orchestration.components.fmi.instances import open_here
 from orchestration.components.fmi.model import Variable
 from orchestration.components.fmi.native import NativeInstance
-from orchestration.components.fmi.values import Value, number_of
+from orchestration.components.fmi.values import Value, number_of, within
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.processes.channel import Parent
 from orchestration.foundation.processes.limits import Limits, restrict
@@ -179,7 +179,7 @@ def _moving(variable: Variable, k: int, phase: float) -> float:
         return float(int(k + phase) % 2)
     if variable.kind != "Real":
         return _start(variable)
-    return _within(variable, _start(variable) + 0.1 * math.sin(0.7 * k + phase))
+    return within(variable, _start(variable) + 0.1 * math.sin(0.7 * k + phase))
 
 
 def _moved(variable: Variable) -> Value:
@@ -187,16 +187,11 @@ def _moved(variable: Variable) -> Value:
     if variable.kind == "Boolean":
         return start == 0.0
     if variable.kind == "Real":
-        return _within(variable, start * _FACTOR if start else _FACTOR - 1.0)
+        return within(variable, start * _FACTOR if start else _FACTOR - 1.0)
     if variable.kind == "Enumeration":
         others = [number for number in variable.choices.values() if number != start]
         return others[0] if others else int(start)
-    return int(_within(variable, start + 1.0))
-
-
-def _within(variable: Variable, value: float) -> float:
-    low, high = variable.minimum, variable.maximum
-    return max(-math.inf if low is None else low, min(math.inf if high is None else high, value))
+    return int(within(variable, start + 1.0))
 
 
 if __name__ == "__main__":

@@ -67,6 +67,32 @@ def number_of(variable: Variable, value: object) -> float:
         ) from None
 
 
+def start_value(variable: Variable) -> Value | bytes:
+    """The start value of a variable in its type; zero, false or an empty text if it has none.
+
+    Raises `UsageError` for a start value that is none of its type.
+    """
+    start = variable.start or ""
+    if variable.kind == "String":
+        return start
+    if variable.kind == "Binary":
+        return bytes.fromhex(start)
+    number = number_of(variable, start) if start else 0.0
+    if variable.kind == "Real":
+        return float(np.float32(number)) if variable.type == "Float32" else number
+    return bool(number) if variable.kind == "Boolean" else int(number)
+
+
+def within(variable: Variable, value: float) -> float:
+    """The value that the variable may take, by its bounds and its type, nearest to `value`."""
+    low = -math.inf if variable.minimum is None else variable.minimum
+    high = math.inf if variable.maximum is None else variable.maximum
+    if variable.type in INTEGERS:
+        of = np.iinfo(INTEGERS[variable.type])
+        low, high = max(low, of.min), min(high, of.max)
+    return min(max(value, low), high)
+
+
 def same(variable: Variable, value: Value, read: Value) -> bool:
     """Whether the value that is read is the one that was set, up to the precision of the type."""
     if isinstance(value, str) or isinstance(read, str):

@@ -11,17 +11,22 @@ import tempfile
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from orchestration.components.checks.validation import confined_process, description, rules, run_rules
+from orchestration.components.checks.validation import confined_process, description, rules, run_rules, structure
 from orchestration.components.checks.validation.finding import Rule, Subject, name_of
 from orchestration.components.checks.validation.progress import Frame, ReceivedReport, Reporter
-from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.processes.limits import Limits
 from tests.fmus.damage import Mutant
 from tests.fmus.mutants import MUTANTS
 from tests.fmus.process import in_a_copy
 
-STATIC: list[Callable[..., object]] = [*rules.OF_ARCHIVES, description.standard, *rules.OF_DESCRIPTIONS]
-WITHOUT_INSTANCES = {confined_process.READABLE, *map(name_of, [*STATIC, *rules.OUR_DESCRIPTIONS])}
+STATIC: list[Callable[..., object]] = [
+    *rules.OF_ARCHIVES,
+    description.standard,
+    structure.indices,
+    *rules.OF_DESCRIPTIONS,
+    *rules.OUR_DESCRIPTIONS,
+]
+WITHOUT_INSTANCES = {confined_process.READABLE, *map(name_of, STATIC)}
 """Rules that look at the archive and the description: for their mutants nothing needs to run"""
 FindingRow = tuple[str, str, bool]
 """Rule, text and whether it is a note"""
@@ -35,9 +40,9 @@ class Narrowed(Reporter):
         super().__init__(send)
         self._chosen = {*_ALWAYS, rule}
 
-    def try_rules(self, chosen: Iterable[Rule[Subject]], subject: Subject, refusal: type[QuadcosimError]) -> int:
+    def try_rules(self, chosen: Iterable[Rule[Subject]], subject: Subject) -> int:
         """Only the chosen ones."""
-        return super().try_rules([rule for rule in chosen if name_of(rule) in self._chosen], subject, refusal)
+        return super().try_rules([rule for rule in chosen if name_of(rule) in self._chosen], subject)
 
 
 def found(mutant: Mutant, path: Path) -> list[FindingRow]:

@@ -12,15 +12,16 @@ import fmpy
 from orchestration.components.checks.validation import rules, run_rules
 from orchestration.components.checks.validation.archive_rules import can_be_unpacked
 from orchestration.components.checks.validation.description import standard
-from orchestration.components.checks.validation.fmu import Fmu
-from orchestration.components.checks.validation.instance import RefusedError
+from orchestration.components.checks.validation.fmu import Fmu, read_fmu
 from orchestration.components.checks.validation.own_description import own_description
 from orchestration.components.checks.validation.probe import Probe
 from orchestration.components.checks.validation.progress import Reporter
-from orchestration.components.checks.validation.reading import read_co_simulation, read_fmu
-from orchestration.components.fmi.archive import UnreadableFmuError, read_archive
+from orchestration.components.checks.validation.structure import indices
+from orchestration.components.fmi.archive import DESCRIPTION, UnreadableFmuError, read_archive, read_root
+from orchestration.components.fmi.model import Model, read_model
 from orchestration.components.fmi.pythonfmu import expect_readable_place
 from orchestration.components.fmi.slaves import FOLDERS
+from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.processes.channel import Parent
 from orchestration.foundation.processes.limits import Limits, restrict
 
@@ -38,10 +39,11 @@ def check(path: Path, folder: Path, limits: Limits, report: Reporter) -> None:
     restrict(limits.size)
     try:
         fmu = check_description(path, limits.size, report)
-        if fmu is not None and can_be_unpacked(fmu.archive):
+        model = None if fmu is None else _model_of(fmu, report)
+        if fmu is not None and model is not None and can_be_unpacked(fmu.archive):
             fmpy.extract(str(path), str(folder))
             expect_readable_place(folder)
-            _run(Probe(fmu, folder, limits.time, report.beat), report)
+            _run(Probe(fmu, model, folder, limits.time, report.beat), report)
         report.end()
     except Exception as error:
         report.failed(error)
@@ -53,36 +55,50 @@ def check_description(path: Path, size_limit: float, report: Reporter) -> Fmu | 
     report.begin(READABLE)
     try:
         archive = read_archive(path, size_limit)
-        report.try_rules(rules.OF_ARCHIVES, archive, RefusedError)
-        root = read_co_simulation(archive)
-        report.try_rules((standard,), archive, RefusedError)
+        report.try_rules(rules.OF_ARCHIVES, archive)
+        root = read_root(archive)
+        if root.find("CoSimulation") is None:
+            raise UnreadableFmuError(f"{DESCRIPTION}: expected a CoSimulation element, nothing else was checked")
+        report.try_rules((standard,), archive)
+        if report.try_rules((indices,), root):
+            return None
         fmu = read_fmu(archive, root)
     except UnreadableFmuError as error:
         report.begin(READABLE)
         report.finding(str(error))
         return None
-    report.try_rules((*rules.OF_DESCRIPTIONS, *(rules.OUR_DESCRIPTIONS if fmu.is_ours else ())), fmu, RefusedError)
+    report.try_rules((*rules.OF_DESCRIPTIONS, *(rules.OUR_DESCRIPTIONS if fmu.is_ours else ())), fmu)
     return fmu
+
+
+def _model_of(fmu: Fmu, report: Reporter) -> Model | None:
+    """The FMU as the master reads it; None if it refuses that."""
+    try:
+        return read_model(fmu.archive.path)
+    except UsageError as error:
+        report.begin(READABLE)
+        report.finding(str(error).removeprefix(f"{fmu.archive.path}: "))
+        return None
 
 
 def _run(probe: Probe, report: Reporter) -> None:
     fmu = probe.fmu
     if fmu.is_ours:
-        report.try_rules((own_description,), probe, RefusedError)
+        report.try_rules((own_description,), probe)
     here, platforms = FOLDERS[fmu.version], fmu.platforms
     if not set(here) & set(platforms):
         report.begin(PLATFORM)
         missing = f"expected a binary for {' or '.join(here)}, found {', '.join(platforms) or 'none'}"
         report.finding(f"the behaviour of the FMU was not checked: {missing}")
         return
-    if any(report.try_rules([rule], probe, RefusedError) for rule in run_rules.FIRST):
+    if any(report.try_rules([rule], probe) for rule in run_rules.FIRST):
         return
-    report.try_rules(rules.OF_RUNS, probe, RefusedError)
+    report.try_rules(rules.OF_RUNS, probe)
     if probe.repeats is None:
-        report.try_rules(rules.OF_EQUAL_RUNS, probe, RefusedError)
-    report.try_rules(rules.LAST_OF_RUNS, probe, RefusedError)
+        report.try_rules(rules.OF_EQUAL_RUNS, probe)
+    report.try_rules(rules.LAST_OF_RUNS, probe)
     if fmu.is_ours:
-        report.try_rules(rules.OUR_RUNS, probe, RefusedError)
+        report.try_rules(rules.OUR_RUNS, probe)
 
 
 if __name__ == "__main__":

@@ -6,11 +6,15 @@ from collections import defaultdict, deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
-from orchestration.components.checks.validation.declared import Unknown, Variable
+from fmpy.model_description import Unknown
+
 from orchestration.components.checks.validation.excitation import ExcitationPlan
-from orchestration.components.checks.validation.fmu import Fmu
-from orchestration.components.checks.validation.instance import CheckedInstance, RefusedError, Row, Value, Values, same
+from orchestration.components.checks.validation.instance import CheckedInstance, Row, Value, Values
 from orchestration.components.checks.validation.probe import Probe
+from orchestration.components.checks.validation.run_comparison import same
+from orchestration.components.fmi.model import Variable
+from orchestration.components.fmi.values import start_value
+from orchestration.foundation.basics.errors import SimulatorError
 
 MAX_SWITCHES = 16
 """Boolean parameters that are inverted, each with all inputs moved"""
@@ -66,10 +70,10 @@ def _modes(probe: Probe) -> Iterator[Mode]:
     At a communication point FMI allows no reading between setting an input and the next step; FMUs of this project
     support it nevertheless, as they declare.
     """
-    initial = Mode("in initialisation mode", _declared(probe.fmu, probe.fmu.initial_unknowns))
-    later = Mode("at a communication point", _declared(probe.fmu, probe.fmu.outputs))
+    initial = Mode("in initialisation mode", _declared(probe.fmu.description.initialUnknowns))
+    later = Mode("at a communication point", _declared(probe.fmu.description.outputs))
     for values in _configurations(probe):
-        with contextlib.suppress(RefusedError):  # a refused configuration shows nothing
+        with contextlib.suppress(SimulatorError):  # a refused configuration shows nothing
             _move(probe, probe.inputs, values, None, initial.moved)
             parameters = [v for v in _parameters(probe) if v.name not in values]
             _move(probe, parameters, values, None, initial.moved, most_refused=MAX_REFUSED)
@@ -86,12 +90,12 @@ def _configurations(probe: Probe) -> Iterator[dict[str, Value]]:
     yield inputs
     switches = [v for v in probe.elements_of("parameter") if v.kind == "Boolean"]
     for v in switches[:MAX_SWITCHES]:
-        yield {**inputs, v.name: not v.start_value}
+        yield {**inputs, v.name: not start_value(v)}
 
 
 def _parameters(probe: Probe) -> list[Variable]:
     """Parameters that may be set in initialisation mode and moved a little; a text may be a path, which cannot."""
-    found = [v for v in probe.elements_of("parameter") if v.initial == "exact" and v.kind not in ("String", "Binary")]
+    found = [v for v in probe.elements_of("parameter") if v.kind not in ("String", "Binary")]
     return found[:MAX_PARAMETERS]
 
 
@@ -112,8 +116,8 @@ def _move(
         refused += 1
         with probe.instance() as instance:
             _prepare(probe, instance, values, steps)
-            before = instance.get(probe.outputs)
-            with contextlib.suppress(RefusedError):
+            before = instance.row(probe.outputs)
+            with contextlib.suppress(SimulatorError):
                 while waiting:
                     v = waiting.popleft()
                     moved[v.whole] |= _moving(probe, instance, v, before)
@@ -124,9 +128,9 @@ def _moving(probe: Probe, instance: CheckedInstance, v: Variable, before: Row) -
     value, *near = probe.around(v)
     outputs = set()
     for other in near:
-        instance.set({v.name: other})
-        outputs |= _changed(probe, before, instance.get(probe.outputs))
-    instance.set({v.name: value})
+        instance.put({v.name: other})
+        outputs |= _changed(probe, before, instance.row(probe.outputs))
+    instance.put({v.name: value})
     return outputs
 
 
@@ -134,12 +138,12 @@ def _moving_far(probe: Probe, v: Variable) -> set[str]:
     """The outputs that move in initialisation mode with a Real input that is moved far: a switch has a threshold."""
     outputs: set[str] = set()
     for move in _FAR if v.kind == "Real" else ():
-        with probe.instance() as instance, contextlib.suppress(RefusedError):
+        with probe.instance() as instance, contextlib.suppress(SimulatorError):
             values = probe.inputs_at(0)
             instance.begin(values, probe.start)
-            before = instance.get(probe.outputs)
-            instance.set({v.name: float(values[v.name]) + move})
-            outputs |= _changed(probe, before, instance.get(probe.outputs))
+            before = instance.row(probe.outputs)
+            instance.put({v.name: float(values[v.name]) + move})
+            outputs |= _changed(probe, before, instance.row(probe.outputs))
     return outputs
 
 
@@ -152,20 +156,17 @@ def _prepare(probe: Probe, instance: CheckedInstance, values: Values, steps: int
     if steps is None:
         instance.begin(values, probe.start)
         return
-    instance.initialise(values, probe.start)
+    instance.start(values, probe.start)
     for t, h in probe.points(ExcitationPlan(steps=steps))[:steps]:
-        instance.step(t, h)
+        instance.advance(t, h)
 
 
-def _declared(fmu: Fmu, unknowns: Iterable[Unknown]) -> dict[str, set[str] | None]:
-    declared: dict[str, set[str] | None] = {}
-    for unknown in unknowns:
-        output = fmu.variable(unknown.handle)
-        if output is not None and output.causality == "output":
-            listed = unknown.dependencies
-            known = None if listed is None else {v.name for v in map(fmu.variable, listed) if v is not None}
-            declared[output.name] = known
-    return declared
+def _declared(unknowns: Iterable[Unknown]) -> dict[str, set[str] | None]:
+    return {
+        unknown.variable.name: None if unknown.dependencies is None else {v.name for v in unknown.dependencies}
+        for unknown in unknowns
+        if unknown.variable.causality == "output"
+    }
 
 
 RULES = (undeclared_dependency, idle_dependency)

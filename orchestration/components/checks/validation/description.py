@@ -8,6 +8,8 @@ from fmu_kit.archive import NATIVE_TABLES
 from orchestration.components.checks.validation.fmu import LIBRARIES, Fmu
 from orchestration.components.fmi.archive import Archive
 
+TOKENS = {2: "guid", 3: "instantiationToken"}
+"""Attribute by which a library identifies its description, by version of FMI."""
 SLAVE_MODULE = "resources/slavemodule.txt"
 """contains the name of the script that pythonfmu runs"""
 
@@ -29,8 +31,8 @@ def standard(archive: Archive) -> list[str]:
 
 def guid(fmu: Fmu) -> Iterator[str]:
     """It is not empty: the schema allows that, but a library identifies its description by it."""
-    if not fmu.guid.strip():
-        yield f"{fmu.standard.token} = {fmu.guid!r}: expected a text that is not empty"
+    if not fmu.description.guid.strip():
+        yield f"{TOKENS[fmu.version]} = {fmu.description.guid!r}: expected a text that is not empty"
 
 
 def model_identifier(fmu: Fmu) -> Iterator[str]:
@@ -41,13 +43,13 @@ def model_identifier(fmu: Fmu) -> Iterator[str]:
 
 def capabilities(fmu: Fmu) -> Iterator[str]:
     """Serialising a state requires saving it; in FMI 3.0 clocks require event mode, early return updates."""
-    if fmu.serialises and not fmu.saves:
-        yield f"{fmu.standard.saves} = false: expected true, since {fmu.standard.serialises} is"
-    early, updates = "canReturnEarlyAfterIntermediateUpdate", "providesIntermediateUpdate"
-    if fmu.can(early) and not fmu.can(updates):
-        yield f"{updates} = false: expected true, since {early} is"
-    clocks = [v.name for v in fmu.variables if v.kind == "Clock"]
-    if clocks and not fmu.can("hasEventMode"):
+    interface, state = fmu.interface, "FMUstate" if fmu.version == 2 else "FMUState"
+    if interface.canSerializeFMUstate and not interface.canGetAndSetFMUstate:
+        yield f"canGetAndSet{state} = false: expected true, since canSerialize{state} is"
+    if interface.canReturnEarlyAfterIntermediateUpdate and not interface.providesIntermediateUpdate:
+        yield "providesIntermediateUpdate = false: expected true, since canReturnEarlyAfterIntermediateUpdate is"
+    clocks = [v.name for v in fmu.variables if v.type == "Clock"]
+    if clocks and not interface.hasEventMode:
         yield f"hasEventMode = false: expected true, for the clocks {', '.join(clocks)}"
 
 

@@ -1,15 +1,12 @@
 """Plans of runs, and the values of inputs and parameters in them."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-import numpy as np
-
-from orchestration.components.checks.validation.declared import Variable
 from orchestration.components.checks.validation.instance import Value, Values
-from orchestration.components.checks.validation.variables import limits
-from orchestration.components.fmi.values import INTEGERS
+from orchestration.components.fmi.model import Variable
+from orchestration.components.fmi.values import start_value, within
 
 STEPS = 100
 """communication steps of a run"""
@@ -35,19 +32,19 @@ PLAIN = ExcitationPlan()
 """At start values, by the default experiment"""
 
 
-def inputs_at(inputs: Sequence[Variable], k: int) -> dict[str, Value]:
+def inputs_at(inputs: Iterable[Variable], k: int) -> dict[str, Value]:
     """Values of the Real inputs at step `k`: each oscillates about its own offset from its start."""
     values: dict[str, Value] = {}
     for i, v in enumerate(inputs):
         if v.kind == "Real":
             away = 0.05 * (i % 7 + 1) + 0.1 * math.sin(0.7 * k + i)
-            values[v.name] = _within(v, float(v.start or 0.0) + _scale(v) * away)
+            values[v.name] = within(v, _start(v) + _scale(v) * away)
     return values
 
 
 def around(v: Variable, values: Values) -> list[Value]:
     """The value of a variable, or its start if it is not among `values`, and nearby values that it may take."""
-    value = v.start_value
+    value = start_value(v)
     if v.kind == "Boolean":
         return [value, not value]
     if isinstance(value, str):
@@ -55,28 +52,24 @@ def around(v: Variable, values: Values) -> list[Value]:
     if isinstance(value, bytes):
         return [value, value + b"+"]
     if v.kind == "Enumeration":
-        return [value, *(item for item in v.items if item != value)]
+        return [value, *(item for item in v.choices.values() if item != value)]
     if v.kind == "Real":
         value = float(values.get(v.name, value))
-        return [value, *(_within(v, value + sign * _scale(v) / 16.0) for sign in (1.0, -1.0))]
-    return [value, *(int(_within(v, value + sign)) for sign in (1, -1))]
+        return [value, *(within(v, value + sign * _scale(v) / 16.0) for sign in (1.0, -1.0))]
+    return [value, *(int(within(v, value + sign)) for sign in (1, -1))]
 
 
 def moved(v: Variable) -> float:
     """A value a little away from the start of a variable."""
-    start = float(v.start or 0.0)
+    start = _start(v)
     step = 0.05 * (start or _scale(v))
-    up = _within(v, start + step)
-    return up if up != start else _within(v, start - step)
+    up = within(v, start + step)
+    return up if up != start else within(v, start - step)
+
+
+def _start(v: Variable) -> float:
+    return float(start_value(v))
 
 
 def _scale(v: Variable) -> float:
-    return abs(float(v.nominal)) if v.nominal is not None else max(1.0, abs(float(v.start or 0.0)))
-
-
-def _within(v: Variable, value: float) -> float:
-    low, high = limits(v)
-    if v.type in INTEGERS:
-        of = np.iinfo(INTEGERS[v.type])
-        low, high = max(low, of.min), min(high, of.max)
-    return min(max(value, low), high)
+    return abs(v.nominal) if v.nominal is not None else max(1.0, abs(_start(v)))

@@ -1,15 +1,19 @@
 """The view of an FMU that rules check, for either version of FMI: its archive and description."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 from xml.etree.ElementTree import Element
 
-from fmu_kit.archive import SOURCE_HASH_FILE
-from orchestration.components.checks.validation.declared import Unknown, Variable
-from orchestration.components.checks.validation.standards import Standard
-from orchestration.components.fmi.archive import Archive
+from fmpy.model_description import ModelDescription, ModelVariable
 
+from fmu_kit.archive import SOURCE_HASH_FILE
+from orchestration.components.fmi.archive import Archive, UnreadableFmuError
+from orchestration.components.fmi.model import attribute, kind_of, read_description, starts_of
+from orchestration.foundation.basics.errors import UsageError
+
+NUMBERS = ("Real", "Integer", "Enumeration")
 OUR_TOOL = "quadcosim"
 LIBRARIES = (".so", ".dll", ".dylib")
 """suffixes of libraries"""
@@ -19,38 +23,32 @@ LIBRARIES = (".so", ".dll", ".dylib")
 class Fmu:
     """An FMU for co-simulation by FMI 2.0 or 3.0."""
 
-    standard: Standard
     archive: Archive
     root: Element
-    variables: tuple[Variable, ...]
-    """as declared: an array is one"""
-    outputs: tuple[Unknown, ...]
-    derivatives: tuple[Unknown, ...]
-    initial_unknowns: tuple[Unknown, ...]
-    further_lists: Mapping[str, tuple[Unknown, ...]]
-    build: Element | None = None
-    """how it is compiled, which FMI 3.0 has in a separate file"""
+    """of its model description"""
+    description: ModelDescription
+    """as fmpy reads it"""
 
     @property
     def version(self) -> int:
         """Of FMI: 2 or 3."""
-        return self.standard.version
+        return int(self.description.fmiMajorVersion)
 
     @property
     def is_ours(self) -> bool:
         """Whether quadcosim built it, so that the rules of this project apply, too."""
-        tool, _, _ = self.root.get("generationTool", "").partition(" ")
+        tool, _, _ = (self.description.generationTool or "").partition(" ")
         return tool == OUR_TOOL or SOURCE_HASH_FILE in self.archive.files
 
     @property
-    def guid(self) -> str:
-        """The GUID; in FMI 3.0 the instantiation token."""
-        return self.root.get(self.standard.token, "")
+    def interface(self) -> Any:
+        """The capabilities for co-simulation, by their names in FMI 2.0."""
+        return self.description.coSimulation
 
     @property
     def model_identifier(self) -> str:
         """The model identifier for co-simulation."""
-        return self._co_simulation.get("modelIdentifier", "")
+        return str(self.interface.modelIdentifier)
 
     @property
     def experiment(self) -> dict[str, float]:
@@ -59,35 +57,14 @@ class Fmu:
         return {} if element is None else {name: float(value) for name, value in element.items()}
 
     @property
-    def fixed_step(self) -> float | None:
-        """Its fixed internal step size [s], if declared (FMI 3.0)."""
-        text = self._co_simulation.get("fixedInternalStepSize")
-        return None if text is None else float(text)
-
-    def can(self, capability: str) -> bool:
-        """A capability flag for co-simulation."""
-        return self._co_simulation.get(capability) in ("true", "1")
-
-    @property
-    def saves(self) -> bool:
-        """Whether its state can be saved and restored."""
-        return self.can(self.standard.saves)
-
-    @property
-    def serialises(self) -> bool:
-        """Whether its state can be serialised."""
-        return self.can(self.standard.serialises)
-
-    @property
     def source_files(self) -> list[str]:
         """The files to be compiled, relative to `sources/`."""
-        if self.version == 2:
-            return [e.get("name", "") for e in self._co_simulation.iterfind("SourceFiles/File")]
         return [
-            e.get("name", "")
-            for built in ([] if self.build is None else self.build.iterfind("BuildConfiguration"))
-            if built.get("modelIdentifier") == self.model_identifier
-            for e in built.iterfind("SourceFileSet/SourceFile")
+            name
+            for built in self.description.buildConfigurations
+            if built.modelIdentifier == self.model_identifier
+            for files in built.sourceFileSets
+            for name in files.sourceFiles
         ]
 
     @property
@@ -97,44 +74,60 @@ class Fmu:
         found = {part[1] for part in parts if part[0] == "binaries" and len(part) > 2 and part[-1][-2:] != ".c"}
         return [*(["c-code"] if any(part[0] == "sources" for part in parts) else []), *sorted(found)]
 
-    @property
-    def lists(self) -> Iterator[tuple[str, tuple[Unknown, ...]]]:
-        """The lists of the model structure, by their names."""
-        called = self.standard.lists
-        yield called.outputs[0], self.outputs
-        yield called.derivatives[0], self.derivatives
-        yield called.initial_unknowns[0], self.initial_unknowns
-        yield from self.further_lists.items()
-
-    def of_causality(self, *causalities: str) -> tuple[Variable, ...]:
-        """The variables of these causalities."""
-        return tuple(v for v in self.variables if v.causality in causalities)
-
-    def variable(self, handle: int) -> Variable | None:
-        """The variable of a handle; None if there is none."""
-        return self._by_handle.get(handle)
+    @cached_property
+    def variables(self) -> tuple[ModelVariable, ...]:
+        """The variables as declared, an array as one, without further names of them (FMI 3.0)."""
+        return tuple(v for v in self.description.modelVariables if v.alias is None)
 
     @cached_property
-    def elements(self) -> tuple[Variable, ...]:
-        """All that has a value at any time: scalars and the elements of arrays, without clocked ones."""
-        return tuple(element for v in self.variables if not v.is_clocked for element in v.elements)
+    def places(self) -> dict[ModelVariable, int]:
+        """The place of each variable in the list, from 0."""
+        return {v: place for place, v in enumerate(self.variables)}
 
     @cached_property
-    def elements_by_name(self) -> dict[str, Variable]:
-        """`elements` by their names."""
-        return {v.name: v for v in self.elements}
+    def states(self) -> frozenset[ModelVariable]:
+        """The variables whose derivative is another variable."""
+        return frozenset(v.derivative for v in self.variables if v.derivative is not None)
 
-    @cached_property
-    def lengths(self) -> dict[str, int]:
-        """The number of values of each variable, by its name."""
-        return {v.name: len(v.elements) for v in self.variables}
 
-    @cached_property
-    def _by_handle(self) -> dict[int, Variable]:
-        return {v.handle: v for v in self.variables}
+def is_clocked(v: ModelVariable) -> bool:
+    """Whether a variable is a clock, or has a value only at ticks of one."""
+    return v.type == "Clock" or bool(v.clocks)
 
-    @property
-    def _co_simulation(self) -> Element:
-        element = self.root.find("CoSimulation")
-        assert element is not None  # of an Fmu that was read
-        return element
+
+def read_fmu(archive: Archive, root: Element) -> Fmu:
+    """The view of an archive and its description; raises `UnreadableFmuError` for an invalid one."""
+    try:
+        fmu = Fmu(archive=archive, root=root, description=read_description(archive.path))
+    except UsageError as error:
+        raise UnreadableFmuError(str(error).removeprefix(f"{archive.path}: ")) from error
+    _expect_numbers(fmu)
+    return fmu
+
+
+def _expect_numbers(fmu: Fmu) -> None:
+    """Raise `UnreadableFmuError` for an attribute that rules take for a number or bytes and that is none."""
+    for where, key, text in _numbers(fmu):
+        try:
+            float(text)
+        except ValueError:
+            raise UnreadableFmuError(f"{where}: {key} = {text}, expected a number") from None
+    for v in fmu.variables:
+        for start in starts_of(v) if v.type == "Binary" else ():
+            try:
+                bytes.fromhex(start)
+            except ValueError:
+                raise UnreadableFmuError(f"{v.name}: start = {start}, expected hexadecimal bytes") from None
+
+
+def _numbers(fmu: Fmu) -> Iterator[tuple[str, str, str]]:
+    for element in fmu.root.iterfind("DefaultExperiment"):
+        yield from (("DefaultExperiment", key, text) for key, text in element.items())
+    fixed_step = fmu.interface.fixedInternalStepSize
+    if fixed_step is not None:
+        yield "CoSimulation", "fixedInternalStepSize", fixed_step
+    for v in fmu.variables:
+        if kind_of(v) in NUMBERS:
+            declared = ((key, attribute(v, key)) for key in ("min", "max", "nominal"))
+            yield from ((v.name, key, text) for key, text in declared if text is not None)
+            yield from ((v.name, "start", text) for text in starts_of(v))

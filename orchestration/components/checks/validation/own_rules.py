@@ -3,13 +3,16 @@
 import datetime
 from collections.abc import Iterator
 
+from fmpy.model_description import ModelVariable
+
 from fmu_kit.archive import ICONS, NATIVE_TABLES, content_guid
 from fmu_kit.loader import GUID_FILE
 from orchestration.components.building.models import MODELS
-from orchestration.components.checks.validation.declared import Variable
+from orchestration.components.checks.validation.description import TOKENS
 from orchestration.components.checks.validation.fmu import Fmu
 from orchestration.components.checks.validation.roles import ROLES
-from orchestration.components.checks.validation.units import base_units, dimensions
+from orchestration.components.checks.validation.units import dimensions
+from orchestration.components.fmi.model import attribute, kind_of, starts_of
 
 PAGE = "documentation/index.html"
 _PNG = b"\x89PNG\r\n\x1a\n"
@@ -19,18 +22,19 @@ _DATE = "%Y-%m-%dT%H:%M:%SZ"
 def guid_of_content(fmu: Fmu) -> Iterator[str]:
     """The GUID is a hash of the content of all files."""
     expected = content_guid(dict(fmu.archive.files))
-    if fmu.guid != expected:
-        yield f"{fmu.standard.token} = {fmu.guid}: expected {expected}, that of the content"
+    guid = fmu.description.guid
+    if guid != expected:
+        yield f"{TOKENS[fmu.version]} = {guid}: expected {expected}, that of the content"
     if NATIVE_TABLES in fmu.archive.files:
         return
     known = fmu.archive.files.get(GUID_FILE, b"").decode(errors="replace")
-    if known != fmu.guid:
-        yield f"{GUID_FILE} = {known}: expected {fmu.guid}, the guid"
+    if known != guid:
+        yield f"{GUID_FILE} = {known}: expected {guid}, the guid"
 
 
 def date(fmu: Fmu) -> Iterator[str]:
     """The date is in UTC, as the text of FMI requires; the schema allows any time."""
-    text = fmu.root.get("generationDateAndTime", "none")
+    text = fmu.description.generationDateAndTime or "none"
     try:
         sound = datetime.datetime.strptime(text, _DATE).strftime(_DATE) == text
     except ValueError:
@@ -41,38 +45,39 @@ def date(fmu: Fmu) -> Iterator[str]:
 
 def execution_tool(fmu: Fmu) -> Iterator[str]:
     """No tool is required: some masters refuse such an FMU."""
-    if fmu.can("needsExecutionTool"):
+    if fmu.interface.needsExecutionTool:
         yield "needsExecutionTool = true: expected false"
 
 
 def value_references(fmu: Fmu) -> Iterator[str]:
     """A value reference is the place in the list: unique, and the same for every build of the same sources."""
-    for v in fmu.variables:
-        if v.reference != v.place - 1:
-            yield f"{v.name}: valueReference = {v.reference}, expected {v.place - 1}, its place in the list"
+    for place, v in enumerate(fmu.variables):
+        if v.valueReference != place:
+            yield f"{v.name}: valueReference = {v.valueReference}, expected {place}, its place in the list"
 
 
 def start_text(fmu: Fmu) -> Iterator[str]:
     """A start is the shortest text for its bits, so that two builds cannot differ in it."""
     for v in fmu.variables:
-        for start in v.starts if v.kind == "Real" else ():
+        for start in starts_of(v) if kind_of(v) == "Real" else ():
             if start != repr(float(start)):
                 yield f"{v.name}: start = {start}, expected {float(start)!r}, the shortest text for the same bits"
 
 
 def units(fmu: Fmu) -> Iterator[str]:
     """Every Real has a unit, and every unit a definition by SI base units and a corresponding name."""
-    used = {v.unit for v in fmu.variables if v.unit is not None}
+    used = {attribute(v, "unit") for v in fmu.variables}
     for v in fmu.variables:
-        if v.kind == "Real" and v.unit is None and v.causality != "independent":  # which is in seconds without one
+        has_unit = v.causality == "independent" or attribute(v, "unit") is not None  # that one is in seconds without
+        if kind_of(v) == "Real" and not has_unit:
             yield f"{v.name}: expected a unit, found none"
-    for name, base in base_units(fmu).items():
-        if base is None:
-            yield f"unit {name}: expected its base units, found none"
-        if dimensions(name) is None:
-            yield f"unit {name}: expected a name made of SI symbols, as N.m.s or m/s3"
-        if name not in used:
-            yield f"unit {name}: expected a variable that has it, found none"
+    for unit in fmu.description.unitDefinitions:
+        if unit.baseUnit is None:
+            yield f"unit {unit.name}: expected its base units, found none"
+        if dimensions(unit.name) is None:
+            yield f"unit {unit.name}: expected a name made of SI symbols, as N.m.s or m/s3"
+        if unit.name not in used:
+            yield f"unit {unit.name}: expected a variable that has it, found none"
 
 
 def documentation(fmu: Fmu) -> Iterator[str]:
@@ -81,13 +86,13 @@ def documentation(fmu: Fmu) -> Iterator[str]:
     if not files.get(PAGE, b"").strip():
         yield f"{PAGE}: expected a page, found {'an empty file' if PAGE in files else 'none'}"
     icon = ICONS[fmu.version]
-    if fmu.root.get("modelName") in MODELS and not files.get(icon, b"").startswith(_PNG):
+    if fmu.description.modelName in MODELS and not files.get(icon, b"").startswith(_PNG):
         yield f"{icon}: expected an icon in PNG, found {'another file' if icon in files else 'none'}"
 
 
 def ports(fmu: Fmu) -> Iterator[str]:
     """A controller or plant has all variables to be connected, with the names and units of the wiring."""
-    outputs, by_name = {v.name for v in fmu.of_causality("output")}, {v.name: v for v in fmu.variables}
+    outputs, by_name = {v.name for v in fmu.variables if v.causality == "output"}, {v.name: v for v in fmu.variables}
     role = next((role for role in ROLES if outputs.intersection(role.identified_by)), None)
     if role is None:
         return
@@ -102,8 +107,8 @@ def ports(fmu: Fmu) -> Iterator[str]:
             yield f"{port.name}: expected {expected}, found {found}"
 
 
-def _as_port(v: Variable) -> str:
-    return _described(v.kind, v.causality, v.unit)
+def _as_port(v: ModelVariable) -> str:
+    return _described(kind_of(v), v.causality, attribute(v, "unit"))
 
 
 def _described(kind: str, causality: str, unit: str | None) -> str:

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from orchestration.components.checks.validation.declared import Variable
 from orchestration.components.checks.validation.excitation import (
     PLAIN,
     STEPS,
@@ -17,10 +16,12 @@ from orchestration.components.checks.validation.excitation import (
     inputs_at,
     moved,
 )
-from orchestration.components.checks.validation.fmu import Fmu
-from orchestration.components.checks.validation.instance import CheckedInstance, RefusedError, Row, Value, instance_of
+from orchestration.components.checks.validation.fmu import Fmu, is_clocked
+from orchestration.components.checks.validation.instance import CheckedInstance, Row, Value, instance_of
 from orchestration.components.checks.validation.run_comparison import deviations, difference
 from orchestration.components.fmi.messages import Message
+from orchestration.components.fmi.model import Model, Variable
+from orchestration.foundation.basics.errors import SimulatorError
 from orchestration.foundation.processes.waiting import own_clock
 
 MIN_STEPS = 3
@@ -47,6 +48,8 @@ class Probe:
     """An FMU and the folder that it is unpacked in."""
 
     fmu: Fmu
+    model: Model
+    """of the same file, as the master reads it"""
     folder: Path
     budget: float
     """[s] for the whole validation"""
@@ -56,7 +59,7 @@ class Probe:
 
     def instance(self) -> CheckedInstance:
         """A fresh instance with a unique name."""
-        return instance_of(self.fmu, self.folder, f"{self.fmu.model_identifier} {next(self._numbers)}", self.beat)
+        return instance_of(self.model, self.folder, f"{self.fmu.model_identifier} {next(self._numbers)}", self.beat)
 
     # -- time -----------------------------------------------------------------------------------------------
 
@@ -73,7 +76,7 @@ class Probe:
         """
         experiment = self.fmu.experiment
         share = (experiment.get("stopTime", self.start + 1.0) - self.start) / STEPS
-        step = experiment.get("stepSize", self.fmu.fixed_step or share)
+        step = experiment.get("stepSize", float(self.fmu.interface.fixedInternalStepSize or share))
         return step if math.isfinite(step) and step > 0.0 else 0.01
 
     def points(self, plan: ExcitationPlan) -> list[tuple[float, float]]:
@@ -96,9 +99,15 @@ class Probe:
 
     # -- values ---------------------------------------------------------------------------------------------
 
+    @functools.cached_property
+    def elements(self) -> tuple[Variable, ...]:
+        """All that has a value at any time: scalars and the elements of arrays, without clocked ones."""
+        names = {v.name for v in self.fmu.variables if not is_clocked(v)}
+        return tuple(v for v in self.model.variables.values() if v.whole in names)
+
     def elements_of(self, causality: str) -> tuple[Variable, ...]:
         """Scalars and elements of arrays of this causality."""
-        return tuple(v for v in self.fmu.elements if v.causality == causality)
+        return tuple(v for v in self.elements if v.causality == causality)
 
     @functools.cached_property
     def inputs(self) -> tuple[Variable, ...]:
@@ -129,7 +138,7 @@ class Probe:
     @functools.cached_property
     def watched(self) -> tuple[Variable, ...]:
         """Variables that are compared between runs: all, or of very many the outputs and some of the others."""
-        every = self.fmu.elements
+        every = self.elements
         if len(every) <= MAX_WATCHED or self.fmu.is_ours:
             return every
         some = every[:: math.ceil(len(every) / MAX_WATCHED)]
@@ -139,7 +148,7 @@ class Probe:
 
     @functools.cached_property
     def first(self) -> FirstRun:
-        """The first run, which determines the number of steps for the others; raises `RefusedError`."""
+        """The first run, which determines the number of steps for the others; raises `SimulatorError`."""
         started = own_clock()
         points = self._points(PLAIN)
         with self.instance() as instance:
@@ -148,7 +157,7 @@ class Probe:
             for t, h in points:
                 if done >= MIN_STEPS and own_clock() - started > SHARE * self.budget:
                     break
-                goes_on = instance.step(t, h)
+                goes_on = instance.advance(t, h)
                 done += 1
                 if not goes_on:
                     break
@@ -162,7 +171,7 @@ class Probe:
 
     def begin(self, instance: CheckedInstance, plan: ExcitationPlan) -> None:
         """Initialise an instance."""
-        instance.initialise({**plan.parameters, **(self.inputs_at(0) if plan.moving else {})}, self.start)
+        instance.start({**plan.parameters, **(self.inputs_at(0) if plan.moving else {})}, self.start)
 
     def run_steps(
         self, instance: CheckedInstance, plan: ExcitationPlan, first: int = 0, last: int | None = None
@@ -171,10 +180,10 @@ class Probe:
         rows = []
         for k, (t, h) in list(enumerate(self.points(plan)))[first:last]:
             for _ in range(plan.times_set if plan.moving else 0):
-                instance.set(self.inputs_at(k))
-            if not instance.step(t, h):
+                instance.put(self.inputs_at(k))
+            if not instance.advance(t, h):
                 break
-            rows.append(instance.get(self.watched))
+            rows.append(instance.row(self.watched))
         return rows
 
     def run(self, plan: ExcitationPlan) -> list[Row]:
@@ -186,7 +195,7 @@ class Probe:
     @functools.cached_property
     def full_plan(self) -> ExcitationPlan:
         """Parameters near their starts, moving inputs, and uneven steps if the FMU declares that it takes them."""
-        uneven = self.fmu.can("canHandleVariableCommunicationStepSize")
+        uneven = bool(self.fmu.interface.canHandleVariableCommunicationStepSize)
         return ExcitationPlan(parameters=self.general_parameters, moving=True, uneven=uneven, steps=40)
 
     @functools.cached_property
@@ -196,7 +205,7 @@ class Probe:
         for candidate in (plan, at_starts, replace(at_starts, uneven=False), replace(at_starts, moving=False)):
             try:
                 return candidate, self.run(candidate)
-            except RefusedError:
+            except SimulatorError:
                 continue
         plain = ExcitationPlan(steps=plan.steps)
         return plain, self.run(plain)

@@ -6,7 +6,7 @@ from itertools import islice
 from typing import Any
 
 from orchestration.components.checks.validation.finding import Finding, Note, Rule, Subject, name_of
-from orchestration.foundation.basics.errors import QuadcosimError
+from orchestration.foundation.basics.errors import SimulatorError
 
 MAX_FINDINGS = 100
 """Findings of one rule that are listed"""
@@ -49,15 +49,15 @@ class Reporter:
         """All rules have been tried."""
         self._send(("end",))
 
-    def try_rules(self, chosen: Iterable[Rule[Subject]], subject: Subject, refusal: type[QuadcosimError]) -> int:
-        """Try rules; the number of problems that they find. A `refusal` raised by one counts, too."""
+    def try_rules(self, chosen: Iterable[Rule[Subject]], subject: Subject) -> int:
+        """Try rules; the number of problems that they find. A refused call of the FMU counts, too."""
         count = 0
         for rule in chosen:
             self.begin(name_of(rule))
-            count += self._try(rule, subject, refusal)
+            count += self._try(rule, subject)
         return count
 
-    def _try(self, rule: Callable[[Subject], Iterable[str]], subject: Subject, refusal: type[QuadcosimError]) -> int:
+    def _try(self, rule: Callable[[Subject], Iterable[str]], subject: Subject) -> int:
         count = 0
         try:
             texts = iter(rule(subject))
@@ -66,7 +66,7 @@ class Reporter:
                 count += not isinstance(text, Note)
             if next(texts, None) is not None:
                 self.finding(Note(f"there are more; {MAX_FINDINGS} are listed"))
-        except refusal as error:
+        except SimulatorError as error:
             self.finding(str(error))
             count += 1
         return count

@@ -3,33 +3,34 @@
 import math
 from collections.abc import Callable, Iterator
 
-from orchestration.components.checks.validation.declared import Variable
 from orchestration.components.checks.validation.excitation import PLAIN
-from orchestration.components.checks.validation.instance import RefusedError, Value
+from orchestration.components.checks.validation.instance import Value
 from orchestration.components.checks.validation.probe import Probe
-from orchestration.components.checks.validation.variables import limits
+from orchestration.components.fmi.model import Variable
+from orchestration.components.fmi.values import start_value
+from orchestration.foundation.basics.errors import SimulatorError
 
 
 def general_run(probe: Probe) -> Iterator[str]:
     """Parameters near their starts, moving inputs and uneven steps are accepted; other runs rely on that."""
     try:
         probe.run(probe.full_plan)
-    except RefusedError as error:
+    except SimulatorError as error:
         yield f"with parameters near their starts, moving inputs and uneven steps: {error}"
 
 
 def fixed_parameters(probe: Probe) -> Iterator[str]:
     """A fixed parameter cannot be set after initialisation, not even to its value."""
     for v in probe.elements_of("parameter"):
-        if v.variability == "fixed" and _continues_with(probe, v, v.start_value, initialised=True):
+        if v.variability == "fixed" and _continues_with(probe, v, start_value(v), initialised=True):
             yield f"{v.name}: set after initialisation, expected a fixed parameter to be refused"
 
 
 def bounds_enforced(probe: Probe) -> Iterator[str]:
     """A parameter outside its bounds is refused at initialisation, a tunable one at the next step, at the latest."""
     for v in probe.elements_of("parameter"):
-        for bound, sign in zip(limits(v), (-1.0, 1.0)):
-            if math.isinf(bound):
+        for bound, sign in ((v.minimum, -1.0), (v.maximum, 1.0)):
+            if bound is None:
                 continue
             outside = bound + sign * max(1.0, abs(bound))
             value = outside if v.kind == "Real" else int(outside)
@@ -61,8 +62,8 @@ def consecutive_steps(probe: Probe) -> Iterator[str]:
         with probe.instance() as instance:
             probe.begin(instance, PLAIN)
             (t, h), *_ = probe.points(PLAIN)
-            instance.step(t, h)
-            if _succeeds(lambda: instance.step(t + h + shift * h, h)):  # noqa: B023
+            instance.advance(t, h)
+            if _succeeds(lambda: instance.advance(t + h + shift * h, h)):  # noqa: B023
                 yield f"a second step begins {where}: expected it refused"
 
 
@@ -86,7 +87,7 @@ def _succeeds(call: Callable[[], object]) -> bool:
     """Whether the FMU carries out a call."""
     try:
         call()
-    except RefusedError:
+    except SimulatorError:
         return False
     return True
 
@@ -97,12 +98,12 @@ def _continues_with(probe: Probe, v: Variable, value: Value, *, initialised: boo
         with probe.instance() as instance:
             if initialised:
                 probe.begin(instance, PLAIN)
-                instance.set({v.name: value})
-                instance.step(probe.start, probe.step)
+                instance.put({v.name: value})
+                instance.advance(probe.start, probe.step)
             else:
-                instance.set({v.name: value})
+                instance.put({v.name: value})
                 probe.begin(instance, PLAIN)
-    except RefusedError:
+    except SimulatorError:
         return False
     return True
 
@@ -113,8 +114,8 @@ def _can_set(probe: Probe, v: Variable, value: Value, *, initialised: bool) -> b
         if initialised:
             probe.begin(instance, PLAIN)
         try:
-            instance.set({v.name: value})
-        except RefusedError:
+            instance.put({v.name: value})
+        except SimulatorError:
             return False
     return True
 

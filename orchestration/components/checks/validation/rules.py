@@ -28,6 +28,7 @@ OUR_RUNS = refusals.RULES
 STANDARD = (
     *OF_ARCHIVES,
     description.standard,
+    structure.indices,
     *OF_DESCRIPTIONS,
     *run_rules.FIRST,
     *OF_RUNS,

@@ -1,9 +1,10 @@
 """Comparison of runs that should be equal."""
 
+import struct
 from collections.abc import Iterator
 
 from orchestration.components.checks.validation.finding import Note
-from orchestration.components.checks.validation.instance import Row, Value, same
+from orchestration.components.checks.validation.instance import Row, Value
 
 TOLERANCE = 1e-4
 """Between runs of an FMU that is not ours, relative to the largest value of a variable in the run"""
@@ -41,6 +42,13 @@ def difference(found: list[Row], expected: list[Row], tolerance: float = 0.0) ->
             if not (same(value, b[name]) or _near(value, b[name], tolerance * largest.get(name, 0.0))):
                 return f"{name} = {value!r} after step {k + 1} of {len(found)}, expected {b[name]!r}"
     return None
+
+
+def same(a: Value, b: Value) -> bool:
+    """Whether two values have the same bits."""
+    if isinstance(a, float) and isinstance(b, float):
+        return struct.pack("d", a) == struct.pack("d", b)
+    return a == b
 
 
 def _near(a: Value, b: Value, distance: float) -> bool:

@@ -5,12 +5,16 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 
-from orchestration.components.checks.validation.declared import Variable
 from orchestration.components.checks.validation.excitation import PLAIN, ExcitationPlan
 from orchestration.components.checks.validation.finding import Note
-from orchestration.components.checks.validation.instance import RefusedError, Row, Value, same
+from orchestration.components.checks.validation.fmu import is_clocked
+from orchestration.components.checks.validation.instance import Row, Value
 from orchestration.components.checks.validation.probe import MIN_STEPS, Probe
+from orchestration.components.checks.validation.run_comparison import same
 from orchestration.components.fmi.messages import WARNING
+from orchestration.components.fmi.model import Variable
+from orchestration.components.fmi.values import start_value
+from orchestration.foundation.basics.errors import SimulatorError
 
 _DIGITS = 5e-15
 """relative error of a number in a text of 15 digits"""
@@ -21,7 +25,7 @@ def runs(probe: Probe) -> Iterator[str]:
     first = probe.first
     if not first.is_complete:
         yield Note(f"slow: {first.steps} steps take {first.seconds:.2g} s; no run has more steps")
-    clocked = [v.name for v in probe.fmu.variables if v.is_clocked]
+    clocked = [v.name for v in probe.fmu.variables if is_clocked(v)]
     if clocked:
         yield Note(f"{', '.join(clocked)}: not checked, as clocks tick in event mode only, in which it does not run")
     for status, message in dict.fromkeys((status, message) for status, _, message in first.messages):
@@ -35,14 +39,14 @@ def getters(probe: Probe) -> Iterator[str]:
     try:
         with probe.instance() as instance:
             probe.begin(instance, PLAIN)
-            instance.get(probe.fmu.elements)
-    except RefusedError:
-        for v in probe.fmu.elements:
+            instance.row(probe.elements)
+    except SimulatorError:
+        for v in probe.elements:
             with probe.instance() as instance:
                 probe.begin(instance, PLAIN)
                 try:
-                    instance.get([v])
-                except RefusedError as error:
+                    instance.row([v])
+                except SimulatorError as error:
                     yield f"{v.name}: declared as {v.type}, but {error}"
 
 
@@ -51,17 +55,22 @@ def start_values(probe: Probe) -> Iterator[str]:
 
     FMI 2.0 allows no reading before initialisation; FMUs of this project support it nevertheless.
     """
-    declared = [v for v in probe.fmu.elements if v.keeps_start]
+    declared = [v for v in probe.elements if _keeps_start(v)]
     is_readable = probe.fmu.is_ours or probe.fmu.version > 2
     with probe.instance() as instance:
-        moments = {"freshly instantiated": instance.get(declared)} if is_readable else {}
-        instance.initialise({}, probe.start)
-        moments["after initialisation"] = instance.get(declared)
+        moments = {"freshly instantiated": instance.row(declared)} if is_readable else {}
+        instance.start({}, probe.start)
+        moments["after initialisation"] = instance.row(declared)
     for v in declared:
         for moment, row in moments.items():
-            if not _starts(row[v.name], v.start_value, exactly=probe.fmu.is_ours):
+            if not _starts(row[v.name], start_value(v), exactly=probe.fmu.is_ours):
                 yield f"{v.name}: start = {v.start}, but {moment} it is {row[v.name]!r}"
                 break
+
+
+def _keeps_start(v: Variable) -> bool:
+    """Whether it has its start value after initialisation unless set: the model cannot change it."""
+    return (v.is_settable or v.variability == "constant") and v.start is not None
 
 
 def _starts(found: Value, declared: Value, *, exactly: bool) -> bool:
@@ -77,7 +86,7 @@ def finite_outputs(probe: Probe) -> Iterator[str]:
     for plan in (PLAIN, probe.general_plan):
         with probe.instance() as instance:
             probe.begin(instance, plan)
-            rows = [instance.get(probe.outputs), *probe.run_steps(instance, plan)]
+            rows = [instance.row(probe.outputs), *probe.run_steps(instance, plan)]
         for k, row in enumerate(rows):
             for name, value in _not_finite(row, probe.outputs):
                 if name not in named:
@@ -92,7 +101,7 @@ def _not_finite(row: Row, outputs: tuple[Variable, ...]) -> list[tuple[str, floa
 
 def variable_steps(probe: Probe) -> Iterator[str]:
     """An FMU that declares variable step sizes takes them, and a step is as long as its halves."""
-    if not probe.fmu.can("canHandleVariableCommunicationStepSize"):
+    if not probe.fmu.interface.canHandleVariableCommunicationStepSize:
         return
     whole = probe.points(ExcitationPlan(uneven=True, steps=20))
     halves = [(t + i * 0.5 * h, 0.5 * h) for t, h in whole for i in (0, 1)]
@@ -101,9 +110,9 @@ def variable_steps(probe: Probe) -> Iterator[str]:
         with probe.instance() as instance:
             probe.begin(instance, PLAIN)
             for t, h in points:
-                if not instance.step(t, h):
+                if not instance.advance(t, h):
                     return
-            ends.append(instance.get(probe.fmu.elements))
+            ends.append(instance.row(probe.elements))
     for end in ends:
         for name, value in _not_finite(end, probe.outputs):
             yield f"{name} = {value} after steps of different lengths: expected it finite"
@@ -150,7 +159,7 @@ def reset(probe: Probe) -> Iterator[str]:
 
 def instances(probe: Probe) -> Iterator[str]:
     """A run is the same beside another instance."""
-    if probe.fmu.can("canBeInstantiatedOnlyOncePerProcess"):
+    if probe.fmu.interface.canBeInstantiatedOnlyOncePerProcess:
         return
     plan, other = probe.general_plan, ExcitationPlan(steps=probe.general_plan.steps)
     rows = []
@@ -165,7 +174,7 @@ def instances(probe: Probe) -> Iterator[str]:
 
 def saved_state(probe: Probe) -> Iterator[str]:
     """A run from a restored state continues as it did from the saved one."""
-    if not probe.fmu.saves:
+    if not probe.fmu.interface.canGetAndSetFMUstate:
         return
     plan, half = probe.general_plan, len(probe.expected_rows) // 2
     with probe.instance() as instance:
@@ -176,22 +185,22 @@ def saved_state(probe: Probe) -> Iterator[str]:
         yield from probe.deviations(
             after, probe.expected_rows[half:], f"after the state was taken at step {half}: {{}}"
         )
-        instance.restore(state)
+        instance.restore_state(state)
         after = probe.run_steps(instance, plan, half)
     yield from probe.deviations(after, probe.expected_rows[half:], f"from the state of step {half}: {{}}")
 
 
 def serialised_state(probe: Probe) -> Iterator[str]:
     """Another instance continues from a serialised state as the first one did."""
-    if not (probe.fmu.serialises and probe.fmu.saves):
+    if not probe.model.saves_state:
         return
     plan, half = probe.general_plan, len(probe.expected_rows) // 2
     with probe.instance() as instance:
         probe.begin(instance, plan)
         probe.run_steps(instance, plan, 0, half)
-        content = instance.serialised()
+        content = instance.save()
     with probe.instance() as other:
-        other.restore_bytes(content)
+        other.restore(content)
         after = probe.run_steps(other, plan, half)
     text = f"another instance, from the bytes of the state of step {half}: {{}}"
     yield from probe.deviations(after, probe.expected_rows[half:], text)
@@ -203,11 +212,11 @@ def stop_time(probe: Probe) -> Iterator[str]:
     if not allowed:
         return
     with probe.instance() as instance:
-        instance.initialise({}, probe.start, stop=t)
-        if not all(instance.step(*point) for point in allowed):
+        instance.start({}, probe.start, stop=t)
+        if not all(instance.advance(*point) for point in allowed):
             return
-        with contextlib.suppress(RefusedError):
-            if instance.step(t, h):
+        with contextlib.suppress(SimulatorError):
+            if instance.advance(t, h):
                 yield f"a step from {t} to {t + h} is done, though stopTime = {t}: expected it refused"
 
 

@@ -1,32 +1,60 @@
-"""Rules on the model structure (FMI 2.0.4, section 2.2.8; FMI 3.0, section 2.4.8)."""
+"""Rules on the model structure (FMI 2.0.4, section 2.2.8; FMI 3.0, section 2.4.8).
+
+fmpy checks the lists, too, but does not name what is missing or listed twice.
+"""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from xml.etree.ElementTree import Element
 
-from orchestration.components.checks.validation.declared import Unknown, Variable
-from orchestration.components.checks.validation.fmu import Fmu
+from fmpy.model_description import ModelVariable, Unknown
+
+from orchestration.components.checks.validation.fmu import Fmu, is_clocked
+from orchestration.components.fmi.archive import version_of
 
 
-def indices(fmu: Fmu) -> Iterator[str]:
-    """Every index, in FMI 3.0 every value reference, is that of a variable."""
-    handle = fmu.standard.handle
-    expected = f"1 to {len(fmu.variables)}" if fmu.version == 2 else "that of a variable"
-    for where, unknowns in fmu.lists:
-        for unknown in unknowns:
-            for found in (unknown.handle, *(unknown.dependencies or ())):
-                if fmu.variable(found) is None:
-                    yield f"{where}: {handle} {found}, expected {expected}"
-    for v in fmu.variables:
-        derivative = {} if v.derivative_of is None else {"derivative": (v.derivative_of,)}
-        for what, named in {**derivative, **v.others}.items():
-            for found in named:
-                if fmu.variable(found) is None:
-                    yield f"{v.name}: {what} of {handle} {found}, expected {expected}"
+def indices(root: Element) -> Iterator[str]:
+    """Every index, in FMI 3.0 every value reference, is that of one variable, for a dimension of a whole number.
+
+    A description in which one is not cannot be read further.
+    """
+    variables = root.findall("ModelVariables/*")
+    if version_of(root) == 2:
+        key, entries, expected = "index", "ModelStructure/*/Unknown", f"1 to {len(variables)}"
+        known = {str(place): v for place, v in enumerate(variables, start=1)}
+        parents = {entry: parent.tag for parent in root.iterfind("ModelStructure/*") for entry in parent}
+    else:
+        key, entries, expected = "valueReference", "ModelStructure/*", "that of a variable"
+        known = {v.get(key, ""): v for v in variables}
+        parents = {}
+        for reference, count in Counter(v.get(key) for v in variables).items():
+            if count > 1:
+                names = ", ".join(v.get("name", "") for v in variables if v.get(key) == reference)
+                yield f"{names}: value reference {reference} for all of them, but FMI 3.0 has one for each variable"
+    for entry in root.iterfind(entries):
+        for found in (entry.get(key, ""), *entry.get("dependencies", "").split()):
+            if found not in known:
+                yield f"{parents.get(entry, entry.tag)}: {key} {found}, expected {expected}"
+    for v in variables:
+        for what, found in _named(v):
+            if found not in known:
+                yield f"{v.get('name')}: {what} of {key} {found}, expected {expected}"
+            elif what == "dimension" and "Int" not in known[found].tag:
+                size = f"{known[found].get('name')} of {known[found].tag}"
+                yield f"{v.get('name')}: its dimension is {size}: expected a structural or constant UInt64"
+
+
+def _named(v: Element) -> Iterator[tuple[str, str]]:
+    """What a variable says of others, and by which index or value reference."""
+    for element in (v, *v):
+        for what in ("derivative", "clocks", "previous"):
+            yield from ((what, found) for found in element.get(what, "").split())
+    yield from (("dimension", found) for each in v.iterfind("Dimension") if (found := each.get("valueReference")))
 
 
 def outputs(fmu: Fmu) -> Iterator[str]:
     """Outputs lists each output once, and nothing else."""
-    yield from _compared(fmu, fmu.standard.lists.outputs[0], fmu.outputs, fmu.of_causality("output"))
+    yield from _compared(_list(fmu, "Output"), fmu.description.outputs, (v for v in fmu.variables if _is_output(v)))
 
 
 def initial_unknowns(fmu: Fmu) -> Iterator[str]:
@@ -35,22 +63,17 @@ def initial_unknowns(fmu: Fmu) -> Iterator[str]:
     Of variables with a derivative only those whose derivative is under Derivatives are states (FMI 2.0.4, section
     2.2.8). Clocked variables may be listed, and need not.
     """
-    where = fmu.standard.lists.initial_unknowns[0]
-    listed_derivatives = {unknown.handle for unknown in fmu.derivatives}
-    states = {v.derivative_of for v in map(fmu.variable, listed_derivatives) if v is not None}
+    where, unknowns = _list(fmu, "InitialUnknown"), fmu.description.initialUnknowns
+    derivatives = {unknown.variable for unknown in fmu.description.derivatives}
+    read = derivatives | {v.derivative for v in derivatives}
     expected = [
         v
         for v in fmu.variables
         if v.causality == "calculatedParameter"
-        or (
-            (v.initial in ("approx", "calculated"))
-            and (v.causality == "output" or v.handle in states or v.handle in listed_derivatives)
-            and not v.is_clocked
-        )
+        or (v.initial in ("approx", "calculated") and (_is_output(v) or v in read) and not is_clocked(v))
     ]
-    yield from _compared(fmu, where, fmu.initial_unknowns, expected, [v for v in fmu.variables if v.is_clocked])
-    order = [unknown.handle for unknown in fmu.initial_unknowns]
-    if fmu.version == 2 and order != sorted(order):
+    yield from _compared(where, unknowns, expected, [v for v in fmu.variables if is_clocked(v)])
+    if fmu.version == 2 and not _is_in_order(fmu, [unknown.variable for unknown in unknowns]):
         yield f"{where}: expected the entries in the order of their indices"
 
 
@@ -59,44 +82,48 @@ def known_dependencies(fmu: Fmu) -> Iterator[str]:
 
     Derivatives are not checked: for co-simulation they mean nothing, and the FMI project's own FMUs list parameters.
     """
-    called = fmu.standard.lists
-    states = {v.derivative_of for v in fmu.variables if v.derivative_of is not None}
-    for (where, _), unknowns in ((called.outputs, fmu.outputs), (called.initial_unknowns, fmu.initial_unknowns)):
-        initially = unknowns is fmu.initial_unknowns
+    description = fmu.description
+    for name, unknowns in (("Output", description.outputs), ("InitialUnknown", description.initialUnknowns)):
+        where, initially = _list(fmu, name), unknowns is description.initialUnknowns
         for unknown in unknowns:
-            listed = unknown.dependencies or ()
-            name = _name(fmu, unknown.handle)
-            if fmu.version == 2 and list(listed) != sorted(set(listed)):
-                yield f"{where}: {name}: expected its dependencies once each, in the order of their indices"
-            for known in filter(None, map(fmu.variable, listed)):
-                is_known = known.causality in ("input", "independent") or known.handle in states or known.is_clocked
+            listed, dependent = unknown.dependencies or (), unknown.variable.name
+            if fmu.version == 2 and (len(set(listed)) < len(listed) or not _is_in_order(fmu, listed)):
+                yield f"{where}: {dependent}: expected its dependencies once each, in the order of their indices"
+            for known in listed:
+                is_known = known.causality in ("input", "independent") or known in fmu.states or is_clocked(known)
                 if not (is_known or (known.initial == "exact" if initially else _is_kept(fmu, known))):
-                    yield f"{where}: {name} depends on {known.name}, a {known.causality}: expected an input"
+                    yield f"{where}: {dependent} depends on {known.name}, a {known.causality}: expected an input"
 
 
-def _is_kept(fmu: Fmu, variable: Variable) -> bool:
+def _list(fmu: Fmu, entry: str) -> str:
+    """The name of a list of the structure, by that of its entries in FMI 3.0."""
+    return f"{entry}s" if fmu.version == 2 else entry
+
+
+def _is_output(v: ModelVariable) -> bool:
+    return bool(v.causality == "output")
+
+
+def _is_in_order(fmu: Fmu, variables: Iterable[ModelVariable]) -> bool:
+    order = [fmu.places[v] for v in variables]
+    return order == sorted(order)
+
+
+def _is_kept(fmu: Fmu, variable: ModelVariable) -> bool:
     """Whether FMI 3.0 takes it for known at a communication point: parameters, and states in discrete time."""
     parameter = variable.causality in ("parameter", "structuralParameter")
     return fmu.version > 2 and (parameter or variable.variability == "discrete")
 
 
 def _compared(
-    fmu: Fmu, where: str, unknowns: Iterable[Unknown], expected: Iterable[Variable], allowed: Iterable[Variable] = ()
+    where: str, unknowns: Iterable[Unknown], expected: Iterable[ModelVariable], allowed: Iterable[ModelVariable] = ()
 ) -> Iterator[str]:
-    found = Counter(unknown.handle for unknown in unknowns)
-    needed = {v.handle: v.name for v in expected}
-    for handle, name in needed.items():
-        if found[handle] != 1:
-            yield f"{where}: {name} is there {found[handle]} times, expected once"
-    may_be = {v.handle for v in allowed}
-    for handle in found:
-        if handle not in needed and handle not in may_be and fmu.variable(handle) is not None:
-            yield f"{where}: {_name(fmu, handle)} is there, expected it not to be"
+    found, needed = Counter(unknown.variable for unknown in unknowns), dict.fromkeys(expected)
+    for v in needed:
+        if found[v] != 1:
+            yield f"{where}: {v.name} is there {found[v]} times, expected once"
+    may_be = {*needed, *allowed}
+    yield from (f"{where}: {v.name} is there, expected it not to be" for v in found if v not in may_be)
 
 
-def _name(fmu: Fmu, handle: int) -> str:
-    variable = fmu.variable(handle)
-    return f"{fmu.standard.handle} {handle}" if variable is None else variable.name
-
-
-RULES = (indices, outputs, initial_unknowns, known_dependencies)
+RULES = (outputs, initial_unknowns, known_dependencies)

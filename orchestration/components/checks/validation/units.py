@@ -1,7 +1,6 @@
 """Rules on units: their base units correspond to their names."""
 
 from collections.abc import Iterator, Mapping
-from xml.etree.ElementTree import Element
 
 from fmu_kit.units import BASE, SYMBOLS, base_unit_exponents
 from orchestration.components.checks.validation.fmu import Fmu
@@ -18,26 +17,20 @@ def dimensions(name: str) -> dict[str, int] | None:
         return None
 
 
-def base_units(fmu: Fmu) -> dict[str, Element | None]:
-    """The definition of each unit by base units; None for one without."""
-    return {e.get("name", ""): e.find("BaseUnit") for e in fmu.root.iterfind("UnitDefinitions/Unit")}
-
-
 def unit_meaning(fmu: Fmu) -> Iterator[str]:
     """A unit with a coherent name has the exponents of that name, a factor of 1 and no offset."""
-    for name, base in base_units(fmu).items():
-        expected = dimensions(name)
+    for unit in fmu.description.unitDefinitions:
+        base, expected = unit.baseUnit, dimensions(unit.name)
         if base is None or expected is None:
             continue
-        found = {symbol: int(base.get(symbol, "0")) for symbol in BASE}
+        found = {symbol: getattr(base, symbol) for symbol in BASE}
         wrong = [symbol for symbol in BASE if found[symbol] != expected.get(symbol, 0)]
         if wrong == ["rad"] and found["rad"] == 0 and not fmu.is_ours:
             wrong = []  # FMI allows a tool to take the radian for 1
         if wrong:
-            yield f"unit {name}: base units {_listed(found)}, expected {_listed(expected)}"
-        factor, offset = float(base.get("factor", "1")), float(base.get("offset", "0"))
-        if (factor, offset) != (1.0, 0.0):
-            yield f"unit {name}: factor = {factor:g} and offset = {offset:g}, expected 1 and 0"
+            yield f"unit {unit.name}: base units {_listed(found)}, expected {_listed(expected)}"
+        if (base.factor, base.offset) != (1.0, 0.0):
+            yield f"unit {unit.name}: factor = {base.factor:g} and offset = {base.offset:g}, expected 1 and 0"
 
 
 def _listed(exponents: Mapping[str, int]) -> str:

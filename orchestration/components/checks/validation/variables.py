@@ -5,8 +5,10 @@ import re
 from collections import defaultdict
 from collections.abc import Iterator
 
-from orchestration.components.checks.validation.declared import NUMBERS, Variable
-from orchestration.components.checks.validation.fmu import Fmu
+from fmpy.model_description import ModelVariable
+
+from orchestration.components.checks.validation.fmu import NUMBERS, Fmu
+from orchestration.components.fmi.model import attribute, kind_of, starts_of
 
 _QUOTED = r"""'(?:[0-9A-Za-z_!#$%&()*+,\-./:;<>=?@\[\]^{}|~ ]|\\['"?\\abfnrtv])+'"""
 _PART = rf"(?:[A-Za-z_][0-9A-Za-z_]*|{_QUOTED})(?:\[[0-9]+(?:,[0-9]+)*\])?"
@@ -20,48 +22,43 @@ _NAMES = {
 
 def names(fmu: Fmu) -> Iterator[str]:
     """Names follow the convention that the FMU declares (FMI 2.0.4, section 2.2.9; FMI 3.0, section 2.4.7)."""
-    convention = fmu.root.get("variableNamingConvention", "flat")
+    convention = fmu.description.variableNamingConvention
     legal = _NAMES.get(convention, _NAMES["flat"])  # any other one violates the schema
-    for v in fmu.variables:
-        for name in (v.name, *v.further_names):
-            if not legal.fullmatch(name):
-                yield f"{name!r}: expected a name by the convention {convention}"
+    for v in fmu.description.modelVariables:
+        if not legal.fullmatch(v.name):
+            yield f"{v.name!r}: expected a name by the convention {convention}"
 
 
 def bounds(fmu: Fmu) -> Iterator[str]:
     """min, start and max are in this order."""
     for v in fmu.variables:
-        if v.kind not in NUMBERS:
+        if kind_of(v) not in NUMBERS:
             continue
-        low, high = limits(v)
+        minimum, maximum = attribute(v, "min"), attribute(v, "max")
+        low = -math.inf if minimum is None else float(minimum)
+        high = math.inf if maximum is None else float(maximum)
         if not low <= high:
-            yield f"{v.name}: min = {v.minimum} is above max = {v.maximum}"
-        for start in v.starts:
-            if v.kind == "Real" and not math.isfinite(float(start)):
+            yield f"{v.name}: min = {minimum} is above max = {maximum}"
+        for start in starts_of(v):
+            if kind_of(v) == "Real" and not math.isfinite(float(start)):
                 yield f"{v.name}: start = {start}, expected a finite value"
             if float(start) < low:
-                yield f"{v.name}: start = {start}, expected at least min = {v.minimum}"
+                yield f"{v.name}: start = {start}, expected at least min = {minimum}"
             if float(start) > high:
-                yield f"{v.name}: start = {start}, expected at most max = {v.maximum}"
-
-
-def limits(variable: Variable) -> tuple[float, float]:
-    """The smallest and the largest declared value of a variable."""
-    low = -math.inf if variable.minimum is None else float(variable.minimum)
-    return low, math.inf if variable.maximum is None else float(variable.maximum)
+                yield f"{v.name}: start = {start}, expected at most max = {maximum}"
 
 
 def arrays(fmu: Fmu) -> Iterator[str]:
     """An array has dimensions above 0 and a start for all of it, or one for each element (FMI 3.0, section 2.4.7)."""
     for v in fmu.variables:
-        count = 1 if v.shape is None else math.prod(v.shape)
-        if len(v.starts) not in (0, 1, count):
-            yield f"{v.name}: it starts with {len(v.starts)} values, expected {'1' if count == 1 else f'1 or {count}'}"
-        if v.shape is not None and v.causality == "structuralParameter":
+        count, starts = math.prod(v.shape), starts_of(v)
+        if len(starts) not in (0, 1, count):
+            yield f"{v.name}: it starts with {len(starts)} values, expected {'1' if count == 1 else f'1 or {count}'}"
+        if v.shape and v.causality == "structuralParameter":
             yield f"{v.name}: a structural parameter with dimensions, expected a scalar"
-        if not all(n > 0 for n in v.shape or ()):
-            yield f"{v.name}: dimensions {', '.join(map(str, v.shape or ()))}, expected each above 0"
-        for size in filter(None, map(fmu.variable, v.others.get("dimension", ()))):
+        if not all(n > 0 for n in v.shape):
+            yield f"{v.name}: dimensions {', '.join(map(str, v.shape))}, expected each above 0"
+        for size in (dimension.variable for dimension in v.dimensions if dimension.variable is not None):
             if size.type != "UInt64" or not (size.causality == "structuralParameter" or size.variability == "constant"):
                 found = f"a {size.variability} {size.causality} of {size.type}"
                 yield f"{v.name}: its dimension is {size.name}, {found}: expected a structural or constant UInt64"
@@ -70,20 +67,21 @@ def arrays(fmu: Fmu) -> Iterator[str]:
 def aliases(fmu: Fmu) -> Iterator[str]:
     """Variables with one value reference are one value under several names (FMI 2.0.4, section 2.2.7).
 
-    FMI 3.0 counts references over all types, and has its aliases inside of their variable (section 2.4.7).
+    FMI 3.0 has its aliases inside of their variable: `structure.indices`.
     """
-    sets: dict[tuple[str, int], list[Variable]] = defaultdict(list)
+    if fmu.version > 2:
+        return
+    sets: dict[tuple[str, int], list[ModelVariable]] = defaultdict(list)
     for v in fmu.variables:
-        sets["" if fmu.version > 2 else fmu.standard.access[v.type], v.reference].append(v)
+        sets["Integer" if v.type == "Enumeration" else v.type, v.valueReference].append(v)
     for (_, reference), members in sets.items():
         if len(members) > 1:
             names = ", ".join(v.name for v in members)
-            wrong = ["FMI 3.0 has one for each variable"] if fmu.version > 2 else _alias_problems(members)
-            for problem in wrong:
+            for problem in _alias_problems(members):
                 yield f"{names}: value reference {reference} for all of them, but {problem}"
 
 
-def _alias_problems(members: list[Variable]) -> Iterator[str]:
+def _alias_problems(members: list[ModelVariable]) -> Iterator[str]:
     constants = [v for v in members if v.variability == "constant"]
     if constants:
         if len(constants) < len(members):
@@ -95,8 +93,9 @@ def _alias_problems(members: list[Variable]) -> Iterator[str]:
         yield "more than one of them is set from outside"
     elif sum(v.start is not None for v in members) > 1:
         yield "more than one of them has a start"
-    if len({v.unit for v in members}) > 1:
-        yield f"their units are {', '.join(str(v.unit) for v in members)}"
+    units = [attribute(v, "unit") for v in members]
+    if len(set(units)) > 1:
+        yield f"their units are {', '.join(map(str, units))}"
 
 
 RULES = (names, bounds, arrays, aliases)
