@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from orchestration.foundation.basics.bisection import Range
@@ -41,26 +41,22 @@ class Evaluation:
     """the part of the criterion that this seed did not meet, in words; None: it was met, or the run diverged"""
 
 
+@dataclass(kw_only=True)
 class Evaluator:
     """Evaluates values of a quantity, each with all seeds, and keeps the evaluations."""
 
-    def __init__(
-        self,
-        varied: Varied,
-        span: Range,
-        seeds: int,
-        confidence: float | None,
-        units: Mapping[str, str],
-        pool: RunEvaluator,
-        announce: Callable[[str], None],
-        progress: Callable[[float], None],
-    ) -> None:
-        self._varied, self._span, self._seeds = varied, span, seeds
-        self._confidence, self._pool, self._announce, self._progress = confidence, pool, announce, progress
-        self._units = units
-        self._done = self._remaining = 0
-        self.tolerance = span.tolerance
-        self.tried: dict[float, Evaluation] = {}
+    varied: Varied
+    span: Range
+    seeds: int
+    confidence: float | None
+    units: Mapping[str, str]
+    """Units of the metrics"""
+    pool: RunEvaluator
+    announce: Callable[[str], None]
+    progress: Callable[[float], None]
+    tried: dict[float, Evaluation] = field(default_factory=dict)
+    _done: int = 0
+    _remaining: int = 0
 
     def expect_remaining(self, count: int) -> None:
         """Set how many values may follow the next one, for the progress as a share of all of them."""
@@ -74,31 +70,31 @@ class Evaluator:
     def is_refuted(self, value: float) -> bool:
         """Whether so many of all seeds are not good that `RELIABILITY` is refuted at the confidence."""
         done = self._run(value, stop=lambda metrics: False)
-        return self._confidence is not None and refutes(done.flew, done.runs, RELIABILITY, self._confidence)
+        return self.confidence is not None and refutes(done.flew, done.runs, RELIABILITY, self.confidence)
 
     def _run(self, value: float, stop: Callable[[Any], bool]) -> Evaluation:
-        system = self._varied.at(value)
-        runs = [replace(system, seed=system.seed + i) for i in range(self._seeds)]
+        system = self.varied.at(value)
+        runs = [replace(system, seed=system.seed + i) for i in range(self.seeds)]
         all_values = self._done + 1 + self._remaining
-        metrics = self._pool.run_until(
-            runs, stop=stop, report=lambda seeds: self._progress((self._done + seeds / len(runs)) / all_values)
+        metrics = self.pool.run_until(
+            runs, stop=stop, report=lambda seeds: self.progress((self._done + seeds / len(runs)) / all_values)
         )
         self._done += 1
         failed = next((one for one in metrics if not is_good(one)), None)
         good = sum(map(is_good, metrics))
         measured = metrics[0 if failed is None else metrics.index(failed)].get(judged_objective(system) or "")
-        known = self._confidence is not None and len(metrics) == self._seeds
+        known = self.confidence is not None and len(metrics) == self.seeds
         evaluation = self.tried[value] = Evaluation(
             value=value,
             outcome=system.criterion.outcomes[0] if failed is None else failed["outcome"],
             divergence_time=None if failed is None else failed["divergence_time"],
             flew=good,
             runs=len(metrics),
-            share=wilson(good, len(metrics), self._confidence) if known and self._confidence is not None else None,
+            share=wilson(good, len(metrics), self.confidence) if known and self.confidence is not None else None,
             measured=measured if isinstance(measured, float) and math.isfinite(measured) else None,
-            unmet=None if failed is None else unmet(system, failed, self._units),
+            unmet=None if failed is None else unmet(system, failed, self.units),
         )
-        self._announce(f"{self._varied.of} {value:.6g}{self._span.unit}: {describe(evaluation)}")
+        self.announce(f"{self.varied.of} {value:.6g}{self.span.unit}: {describe(evaluation)}")
         return evaluation
 
 

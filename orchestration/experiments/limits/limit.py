@@ -80,7 +80,10 @@ def find(
         announce = announce or (lambda line: None)
         if engine == "auto":
             announce(str(execution))
-        trials = Evaluator(varied, span, seeds, confidence if random else None, units, pool, announce, report)
+        trials = Evaluator(
+            varied=varied, span=span, seeds=seeds, confidence=confidence if random else None, units=units, pool=pool,
+            announce=announce, progress=report,
+        )  # fmt: skip
         values = span.values()
         bracket = first_failure(
             trials.fails,
@@ -176,7 +179,9 @@ def _refuted(trials: Evaluator, bracket: Bracket | None, above: list[float]) -> 
         if trials.is_refuted(value):
             if below is None:
                 return value
-            return bisected(trials.is_refuted, below, value, trials.tolerance, remaining=trials.expect_remaining).bad
+            return bisected(
+                trials.is_refuted, below, value, trials.span.tolerance, remaining=trials.expect_remaining
+            ).bad
         below = value
     return None
 

@@ -1,6 +1,6 @@
 """The report of a comparison: cells with their shares, their runs, and signals of some of these."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,8 +10,7 @@ from orchestration.experiments.comparison.design import START, Comparison
 from orchestration.experiments.report.model import ComparisonCells, Report, ReportCell, ReportShare
 from orchestration.experiments.report.number_format import number
 from orchestration.experiments.report.of_study import Stored, axes_of, read, study_report
-from orchestration.experiments.report.reruns import Progress
-from orchestration.experiments.report.subset import evenly
+from orchestration.experiments.report.subset import Wanted, evenly
 from orchestration.experiments.report.tables import ColumnAxis
 from orchestration.experiments.studies.table import frame
 from orchestration.simulation.results import display_names as labels
@@ -21,20 +20,12 @@ SIZE = "size of the initial error"
 """A column of the table: the size of each initial condition, as a share of the largest"""
 
 
-def comparison_report(
-    comparison: Comparison,
-    path: Path,
-    command: str,
-    *,
-    required: Sequence[int],
-    most: int | None,
-    progress: Progress | None,
-) -> Report:
+def comparison_report(comparison: Comparison, path: Path, command: str, wanted: Wanted) -> Report:
     """The report of a comparison with its store at `path`: that of its study, and its cells."""
     study = comparison.study
     stored = _with_sizes(read(path, study), comparison)
     of_study = study_report(
-        comparison.name, stored, study, command, required=required, most=most, progress=progress,
+        comparison.name, stored, study, command, wanted,
         axes=[*axes_of(stored, study), ColumnAxis(name=SIZE, quantity=Quantity(name=SIZE))],
         choose=_from_each_cell(comparison, stored),
     )  # fmt: skip

@@ -12,8 +12,8 @@ import numpy as np
 from orchestration.experiments.report.blobs import Blobs
 from orchestration.experiments.report.model import Report, ReportRun, ReportShare, Setting
 from orchestration.experiments.report.number_format import percent
-from orchestration.experiments.report.reruns import Progress, Rerun, fastest, rerun
-from orchestration.experiments.report.subset import MAX_IN_BATCHES, MAX_SINGLY, points_for, select
+from orchestration.experiments.report.reruns import Rerun, fastest, rerun
+from orchestration.experiments.report.subset import MAX_IN_BATCHES, MAX_SINGLY, Wanted, points_for, select
 from orchestration.experiments.report.tables import ColumnAxis, Row, is_good, report_table, share_of, shares_along
 from orchestration.experiments.report.tracks import Tracks
 from orchestration.experiments.studies.axis_labels import quantity_of
@@ -79,26 +79,21 @@ def study_report(
     stored: Stored,
     study: Study | None,
     command: str,
+    wanted: Wanted,
     *,
-    required: Sequence[int] = (),
-    most: int | None = None,
-    progress: Progress | None = None,
     axes: Sequence[ColumnAxis] | None = None,
     choose: Choose | None = None,
 ) -> Report:
     """The report of a store; if the `study` is known, runs are simulated again for their signals.
 
-    `required` are included in any case, up to `most` others are selected by `choose`. `axes` are by default those of
-    the study. Raises `UsageError` for a run that the study does not have.
+    Runs that are not required are selected by `choose`. `axes` are by default those of the study. Raises `UsageError`
+    for a run that the study does not have.
     """
     blobs = Blobs()
     tracks = Tracks(blobs)
     axes = axes_of(stored, study) if axes is None else axes
     metric = metric_of(stored, study)
-    indices = [row["design_index"] for row in stored.rows if row["status"] == "done"]
-    embedded = embed(
-        study, stored, indices, tracks, required=required, most=most, metric=metric, progress=progress, choose=choose
-    )
+    embedded = embed(study, stored, tracks, wanted, metric, choose)
     by_chance = is_sample(stored, study)
     overall = share_of("all runs", None, stored.rows, by_chance=by_chance)
     words = words_of(stored, study)
@@ -197,20 +192,11 @@ def messages_of(rows: Sequence[Row], places: Mapping[int, int]) -> dict[int, str
 
 
 def embed(
-    study: Study | None,
-    stored: Stored,
-    indices: Sequence[int],
-    tracks: Tracks,
-    *,
-    required: Sequence[int],
-    most: int | None,
-    metric: str,
-    progress: Progress | None,
-    choose: Choose | None,
+    study: Study | None, stored: Stored, tracks: Tracks, wanted: Wanted, metric: str, choose: Choose | None
 ) -> Embedded:
-    """Rerun some of the runs with these indices, and keep the signals that the page needs."""
+    """Rerun some of the runs that are done, and keep the signals that the page needs."""
     known = {row["design_index"]: row for row in stored.rows}
-    for index in required:
+    for index in wanted.required:
         if index not in known:
             raise UsageError(f"--run {index}: expected the number of a run that is in the store")
     if study is None:
@@ -219,13 +205,17 @@ def embed(
             contents=["This file has no signals: a store has none. Make the report from the study file to see some."],
         )  # fmt: skip
     variant, files, lanes = fastest(study)
-    limit = (MAX_IN_BATCHES if lanes else MAX_SINGLY) if most is None else most
-    selected = select(indices, required, limit) if choose is None else sorted({*required, *choose(limit)})
+    limit = (MAX_IN_BATCHES if lanes else MAX_SINGLY) if wanted.most is None else wanted.most
+    if choose is None:
+        done = [row["design_index"] for row in stored.rows if row["status"] == "done"]
+        selected = select(done, wanted.required, limit)
+    else:
+        selected = sorted({*wanted.required, *choose(limit)})
     runs: list[ReportRun] = []
     places: dict[int, int] = {}
     differing = 0
     points = points_for(len(selected), COLUMNS)
-    for again in rerun(variant, files, selected, lanes=lanes, progress=progress):
+    for again in rerun(variant, files, selected, lanes=lanes, progress=wanted.progress):
         note = _difference(again, known[again.index], metric)
         differing += note is not None
         about = column_infos(again.system, files.models_of(variant.origin), again.signals)

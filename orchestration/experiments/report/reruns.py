@@ -1,10 +1,11 @@
 """Reruns runs of a study for their signals, which a store does not keep: in SIMD batches where possible."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from orchestration.components.fmi.model import Model
 from orchestration.experiments.report.known_layouts import layout_for
+from orchestration.experiments.report.subset import Progress
 from orchestration.experiments.report.tracks import Signals
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import QuadcosimError
@@ -23,8 +24,6 @@ BATCH = 64
 """Runs at once, which limits the memory for their signals"""
 MAX_COLUMNS = 24
 """Most columns of a system other than a quadrotor"""
-Progress = Callable[[float], None]
-"""Receives the share of the reruns that is done"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,50 +55,49 @@ def rerun(
 ) -> Iterator[Rerun]:
     """Simulate runs of a study again by their indices; a run that fails is omitted."""
     starts, paths = files.start_values_of(study.origin), {**files.fmus, **files.tables}
-    batches = Batches() if lanes else None
-    for first in range(0, len(indices), BATCH if lanes else 1):
-        some = indices[first : first + (BATCH if lanes else 1)]
+    batches, size = (Batches(), BATCH) if lanes else (None, 1)
+    for first in range(0, len(indices), size):
+        some = indices[first : first + size]
         listed = [study.system(i, starts) for i in some]
         known = [connect_references(system, files.models_of(system)) for system in listed]
-        systems = all_with_files(known, paths)
-        for index, system, data in zip(some, systems, _simulated(systems, starts, batches, _columns(known, files))):
-            if data is not None:
-                signals, metrics, message = data
-                yield Rerun(index=index, system=system, signals=signals, metrics=metrics, message=message)
+        systems, names = dict(zip(some, all_with_files(known, paths))), _columns(known, files)
+        if batches is None:
+            again = {index: _single_run(index, system, names) for index, system in systems.items()}
+        else:
+            again = _in_lanes(systems, starts, batches, names)
+        yield from (one for index in some if (one := again[index]) is not None)
         if progress is not None:
             progress(min(1.0, (first + len(some)) / len(indices)))
 
 
-RunData = tuple[Signals, Metrics, str | None]
-"""Signals, metrics, and the reason of a divergence or termination"""
-
-
-def _simulated(
-    systems: Sequence[System], starts: Mapping[str, float], batches: Batches | None, names: Sequence[str]
-) -> Iterator[RunData | None]:
-    """The runs of systems in their order, with the columns of these names; None for one that fails."""
-    if batches is None:
-        yield from (_single_run(system, names) for system in systems)
-        return
-    columns = [name for name in names if name.partition(".")[0] in systems[0].components]
-    by_place: dict[int, RunData | None] = {}
-    for place, summary, rows in batches.each(systems, columns):
+def _in_lanes(
+    systems: Mapping[int, System], starts: Mapping[str, float], batches: Batches, names: Sequence[str]
+) -> dict[int, Rerun | None]:
+    """The runs of systems by their indices, with the columns of these names; None for one that fails."""
+    indices, listed = [*systems], [*systems.values()]
+    columns = [name for name in names if name.partition(".")[0] in listed[0].components]
+    runs: dict[int, Rerun | None] = {}
+    for place, summary, rows in batches.each(listed, columns):
+        index, system = indices[place], listed[place]
         if summary is None:
-            by_place[place] = _single_run(systems[place], names)
+            runs[index] = _single_run(index, system, names)
             continue
         signals = dict(zip(("time", *columns), rows.T.copy()))
-        sources = _of_sources(systems[place], starts, signals["time"])
-        by_place[place] = signals | sources, summary.metrics, summary.message
-    yield from (by_place[place] for place in range(len(systems)))
+        signals |= _of_sources(system, starts, signals["time"])
+        runs[index] = Rerun(
+            index=index, system=system, signals=signals, metrics=summary.metrics, message=summary.message
+        )
+    return runs
 
 
-def _single_run(system: System, names: Sequence[str]) -> RunData | None:
+def _single_run(index: int, system: System, names: Sequence[str]) -> Rerun | None:
     try:
         result = run(system)
     except QuadcosimError:
         return None
+    signals = {name: result.signals[name] for name in ("time", *names)}
     message = result.divergence or result.termination
-    return {name: result.signals[name] for name in ("time", *names)}, result.metrics, message
+    return Rerun(index=index, system=system, signals=signals, metrics=result.metrics, message=message)
 
 
 def _columns(systems: Sequence[System], files: Files) -> list[str]:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from orchestration.experiments.report import of_runs
 from orchestration.experiments.report.model import Report
-from orchestration.experiments.report.reruns import Progress
+from orchestration.experiments.report.subset import Wanted
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.runs.result import Result
@@ -18,16 +18,13 @@ STORE = "study.sqlite"
 def report_of(
     what: Sequence[Path],
     command: str,
+    wanted: Wanted,
     *,
     store: Path | None = None,
-    required: Sequence[int] = (),
-    most: int | None = None,
-    progress: Progress | None = None,
 ) -> Report:
     """The report of the runs, study or comparison at these paths; raises `UsageError` for anything else.
 
-    `store` is the folder of the store of a study or a comparison, default `results/NAME`. `required` and `most` are
-    for studies: runs whose signals are included, and the number of such runs.
+    `store` is the folder of the store of a study or a comparison, default `results/NAME`, whose runs are `wanted`.
     """
     if not what:
         raise UsageError(f"expected {EXPECTED}")
@@ -35,10 +32,10 @@ def report_of(
     if len(what) > 1 and set(kinds) != {"run"}:
         raise UsageError(f"{', '.join(map(str, what))}: expected directories of runs, or one study or comparison alone")
     if kinds[0] == "run":
-        if required or most is not None:
+        if wanted.required or wanted.most is not None:
             raise UsageError("--run and --flights: expected a study or a comparison with them")
         return of_runs.runs_report(dict(_runs(what)), command)
-    return _of_many(what[0], kinds[0], command, store=store, required=required, most=most, progress=progress)
+    return _of_many(what[0], kinds[0], command, wanted, store)
 
 
 def _kind(path: Path) -> str:
@@ -61,16 +58,7 @@ def _runs(paths: Sequence[Path]) -> Iterator[tuple[str, Result]]:
         yield (name if names.count(name) == 1 else str(path)), load_run(path)
 
 
-def _of_many(
-    path: Path,
-    kind: str,
-    command: str,
-    *,
-    store: Path | None,
-    required: Sequence[int],
-    most: int | None,
-    progress: Progress | None,
-) -> Report:
+def _of_many(path: Path, kind: str, command: str, wanted: Wanted, store: Path | None) -> Report:
     # reading stores needs an extra
     from orchestration.experiments.comparison.file import load_comparison
     from orchestration.experiments.report import of_comparison, of_study
@@ -80,13 +68,11 @@ def _of_many(
     if kind == "store":
         file = path / STORE if path.is_dir() else path
         name = file.resolve().parent.name
-        return of_study.study_report(name, of_study.read(file), None, command, required=required, most=most)
+        return of_study.study_report(name, of_study.read(file), None, command, wanted)
     if kind == "study":
         study = load_study(path)
         stored = of_study.read(store_path(study.name, store), study)
-        return of_study.study_report(
-            study.name, stored, study, command, required=required, most=most, progress=progress
-        )
+        return of_study.study_report(study.name, stored, study, command, wanted)
     comparison = load_comparison(path)
     file = store_path(comparison.name, store)
-    return of_comparison.comparison_report(comparison, file, command, required=required, most=most, progress=progress)
+    return of_comparison.comparison_report(comparison, file, command, wanted)

@@ -1,7 +1,8 @@
 """The runs of a study whose signals are in a report: those required, then others spread evenly over the design."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
 MAX_IN_BATCHES = 1000
 """default number of runs whose signals are in a report"""
@@ -13,6 +14,21 @@ MAX_POINTS, MIN_POINTS = 400, 40
 """Most and fewest points of a run"""
 _CODED = 2.0 * 4.0 / 3.0
 """Characters of a number"""
+
+
+Progress = Callable[[float], None]
+"""Receives the share of the reruns that is done"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wanted:
+    """The runs of a study whose signals a report is to include."""
+
+    required: Sequence[int] = ()
+    """Indices of runs that are included in any case"""
+    most: int | None = None
+    """Largest number of runs; None: that of the engine"""
+    progress: Progress | None = None
 
 
 def evenly(count: int, number: int) -> Iterator[int]:

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from orchestration.experiments.report import html, of_runs
-from orchestration.experiments.report.reruns import Progress
 from orchestration.experiments.report.sources import report_of
+from orchestration.experiments.report.subset import Progress, Wanted
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import needs
 from orchestration.simulation.runs.result import Result
@@ -47,7 +47,8 @@ def report(
             raise UsageError("report: expected results or paths, not both")
         named = {f"run {number}" if len(results) > 1 else "run": one for number, one in enumerate(results, start=1)}
         return html.write(of_runs.runs_report(named, "quadcosim.report(...) in Python"), to)
-    return html.write(report_of(paths, command, store=folder, required=runs, most=flights, progress=progress), to)
+    wanted = Wanted(required=runs, most=flights, progress=progress)
+    return html.write(report_of(paths, command, wanted, store=folder), to)
 
 
 def _command(what: Sequence[Path], folder: Path | None, flights: int | None, runs: Sequence[int]) -> str:

@@ -38,19 +38,16 @@ def compute(
     One that an FMU has `terminated` has those of the time that it lasted, and is not good for the same reason.
     Raises `UsageError`, naming it, for an objective that cannot be evaluated.
     """
-    if divergence_time is not None:
-        return metrics_of(
-            system, None, end=end, stop_time=system.stop_time, divergence_time=divergence_time, steps=steps
-        )
-    nodes = {name: parse(text) for name, text in system.objectives.items()}
-    if system.criterion.good is not None:
-        nodes[GOOD] = parse(system.criterion.good)
+    values = None
+    if divergence_time is None:
+        good = {} if system.criterion.good is None else {GOOD: system.criterion.good}
+        values = evaluate({name: parse(text) for name, text in {**system.objectives, **good}.items()}, spans)
     return metrics_of(
         system,
-        evaluate(nodes, spans),
+        values,
         end=end,
         stop_time=system.stop_time,
-        divergence_time=None,
+        divergence_time=divergence_time,
         steps=steps,
         terminated=terminated,
     )
