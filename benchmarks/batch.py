@@ -29,8 +29,8 @@ from orchestration.simulation.engines.batch.batch import Batch, Group
 from orchestration.simulation.engines.batch.batches import Batches
 from orchestration.simulation.engines.batch.kernels import preferred_lanes
 from orchestration.simulation.engines.batch.shape import Shape
+from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.simulation.engines.structures import address
-from orchestration.simulation.engines.wiring import check_against_fmus
 from orchestration.simulation.runs.many_runs import located, run_many
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.systems.schedule.schedule_cache import ScheduleCache, schedule_key

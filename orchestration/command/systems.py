@@ -97,7 +97,7 @@ def _from_fmus(system: "System") -> tuple[dict[str, str], str]:
     from orchestration.components.building import fmus
     from orchestration.components.fmi.model import read_model
     from orchestration.foundation.basics.errors import QuadcosimError
-    from orchestration.simulation.engines.wiring import check_against_fmus
+    from orchestration.simulation.engines.resolved import check_against_fmus
 
     try:
         paths = {name: fmus.look_up(fmu, inform) for name, fmu in system.fmus.items()}

@@ -18,7 +18,7 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing, needs
 from orchestration.foundation.basics.progress import CountProgress
 from orchestration.foundation.basics.terminal import inform
-from orchestration.simulation.engines.wiring import check_against_fmus
+from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.simulation.results import html
 from orchestration.simulation.runs.run_directory import keep_run
 from orchestration.simulation.runs.simulation import run as fly

@@ -13,7 +13,7 @@ from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.progress import ShareProgress, share_reporter
 from orchestration.foundation.basics.terminal import inform
 from orchestration.simulation.engines.engine import Engine
-from orchestration.simulation.engines.wiring import check_against_fmus
+from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.simulation.requests.ranges import Varied, default_quantity, search_range
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.results.criterion import bound_of, judged_objective

@@ -7,7 +7,7 @@ from orchestration.experiments.report.known_layouts import layout_for
 from orchestration.experiments.report.model import Line, Panel, ReportLayout
 from orchestration.simulation.figures.palette import MAX_LINES, MAX_PANELS
 from orchestration.simulation.results import display_names as labels
-from orchestration.simulation.results.column_info import ColumnInfo
+from orchestration.simulation.results.units import ColumnInfo
 from orchestration.systems.system.connection import component_of
 from orchestration.systems.system.model import System
 

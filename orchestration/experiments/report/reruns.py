@@ -11,14 +11,13 @@ from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.engines.batch.batches import Batches
-from orchestration.simulation.engines.wiring import columns_of, source_signals
+from orchestration.simulation.engines.resolved import columns_of, source_signals
 from orchestration.simulation.results.objectives import Metrics
 from orchestration.simulation.runs.simulation import run
 from orchestration.simulation.workers.choice import choose_execution
-from orchestration.systems.system.check import recorded_variables
+from orchestration.systems.system.check import connect_references, recorded_variables
 from orchestration.systems.system.files import Files, all_with_files
 from orchestration.systems.system.model import System
-from orchestration.systems.system.references import connect_references
 
 BATCH = 64
 """Runs at once, which limits the memory for their signals"""

@@ -7,14 +7,13 @@ from orchestration.experiments.studies.store_columns import expect_columns
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.engines.batch.shape import outline
-from orchestration.simulation.engines.wiring import check_against_fmus, table_columns
+from orchestration.simulation.engines.resolved import check_against_fmus, table_columns
 from orchestration.systems.signals.table_file import read_table
 from orchestration.systems.signals.waypoints import read_waypoints
-from orchestration.systems.system.check import check_parameter
+from orchestration.systems.system.check import check_parameter, connect_references
 from orchestration.systems.system.files import Files
 from orchestration.systems.system.input_files import distributions_in
 from orchestration.systems.system.model import System
-from orchestration.systems.system.references import connect_references
 from orchestration.systems.system.request import errors_in_own_terms
 
 

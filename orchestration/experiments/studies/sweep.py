@@ -22,7 +22,7 @@ from orchestration.foundation.basics.interrupt import Interrupted
 from orchestration.foundation.basics.progress import CountProgress, runs_reporter
 from orchestration.foundation.basics.terminal import Count, inform
 from orchestration.simulation.engines.engine import Engine
-from orchestration.simulation.engines.wiring import check_against_fmus
+from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.simulation.requests.ranges import paths_in, unit_at
 from orchestration.simulation.results.own_metrics import metrics_from_sources
 from orchestration.simulation.runs.result import Result

@@ -21,8 +21,8 @@ from orchestration.simulation.results import html
 from orchestration.simulation.workers.choice import EngineChoice, choose_execution, single_run_execution
 from orchestration.simulation.workers.executors import RunEvaluator
 from orchestration.simulation.workers.provenance import versions
+from orchestration.systems.system.check import describe_references
 from orchestration.systems.system.files import Files
-from orchestration.systems.system.references import describe_references
 
 if TYPE_CHECKING:
     import pandas as pd

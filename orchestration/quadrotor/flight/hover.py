@@ -14,9 +14,9 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.quadrotor.scenarios import wiring
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.quadrotor.scenarios.signals import DisturbanceChoice, ReferenceChoice
+from orchestration.systems.system.check import AT_REST
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
-from orchestration.systems.system.references import AT_REST
 
 STEP = 1e-6
 """Step of each coordinate in a difference; a thousandth of a boundary layer that is smaller than 1 mm"""

@@ -15,8 +15,8 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.quadrotor.flight.hover import COORDINATES, STEP, displaced, initialise
 from orchestration.quadrotor.scenarios import wiring
 from orchestration.quadrotor.scenarios.scenario import Scenario
+from orchestration.simulation.engines.resolved import resolve
 from orchestration.simulation.runs.prepared import set_parameters
-from orchestration.simulation.runs.resolved import resolve
 
 INSTANT = 1e-12
 """Span that counts as zero [s], as do shorter ones"""

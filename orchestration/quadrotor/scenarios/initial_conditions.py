@@ -10,7 +10,7 @@ from fmu_kit.trajectory import Trajectory
 from orchestration.components.fmi.kit import TRAJECTORY
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.quadrotor.scenarios.wiring import REFERENCE
-from orchestration.simulation.engines.wiring import source_values
+from orchestration.simulation.engines.resolved import source_values
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.system.model import System
 from orchestration.systems.system.starts import InitialConditions, Starts

@@ -7,7 +7,7 @@ import numpy as np
 from orchestration.foundation.basics.errors import UsageError, expected_name
 from orchestration.foundation.basics.times import seconds
 from orchestration.systems.computers.results import Frames, Jobs, Timeline
-from orchestration.systems.expressions.over_run import evaluate
+from orchestration.systems.expressions.over_run import evaluate, job_terms
 from orchestration.systems.expressions.over_span import Recorded
 from orchestration.systems.expressions.syntax import (
     Call,
@@ -17,9 +17,6 @@ from orchestration.systems.expressions.syntax import (
     Operation,
     Sampled,
     children,
-    names,
-    names_job_measure,
-    parse,
     parse_job_measures,
     text,
 )
@@ -34,9 +31,7 @@ def job_numbers(system: System) -> dict[str, float]:
 
     Raises `UsageError` for an unknown task, and for a term with jobs of several tasks.
     """
-    terms = dict.fromkeys(
-        name for _, expression in expressions(system) for name in names(parse(expression)) if names_job_measure(name)
-    )
+    terms = job_terms(expression for _, expression in expressions(system))
     if not terms:
         return {}
     timeline = timeline_of(system)

@@ -11,7 +11,7 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import seconds
 from orchestration.foundation.recording.recording import Events, Recording, events_of, rows_of
 from orchestration.simulation.figures.palette import CYCLE, DASHES
-from orchestration.simulation.results.column_info import ColumnInfo
+from orchestration.simulation.results.units import ColumnInfo
 from orchestration.systems.system.model import System
 
 Window: TypeAlias = tuple[float, float]

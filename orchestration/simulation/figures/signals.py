@@ -10,7 +10,7 @@ from orchestration.simulation.figures.lines import TIME, abreast, name_runs, qua
 from orchestration.simulation.figures.palette import CYCLE, DASHES, MAX_LINES, MAX_PANELS
 from orchestration.simulation.figures.style import Style
 from orchestration.simulation.results import display_names as labels
-from orchestration.simulation.results.column_info import ColumnInfo
+from orchestration.simulation.results.units import ColumnInfo
 from orchestration.systems.system.connection import component_of
 from orchestration.systems.system.model import System
 

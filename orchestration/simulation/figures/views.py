@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from orchestration.simulation.figures.drawn_run import DrawnRun
     from orchestration.simulation.figures.style import Style
-    from orchestration.simulation.results.column_info import ColumnInfo
+    from orchestration.simulation.results.units import ColumnInfo
     from orchestration.systems.system.model import System
 
     Maker = Callable[[Sequence[DrawnRun], Style], Figure | None]

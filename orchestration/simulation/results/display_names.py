@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping
 
-from orchestration.simulation.results.column_info import ColumnInfo
+from orchestration.simulation.results.units import ColumnInfo
 from orchestration.systems.system.connection import component_of, variable_of
 
 METRICS: Mapping[str, tuple[str, str | None]] = {

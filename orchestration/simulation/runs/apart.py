@@ -16,8 +16,8 @@ from orchestration.foundation.recording.recording import Chunk, Recorder
 from orchestration.simulation.engines.backlog import RunEvents
 from orchestration.simulation.engines.engine import Engine
 from orchestration.simulation.engines.memory import Unrecorded, read_unrecorded
+from orchestration.simulation.engines.resolved import ResolvedRequest
 from orchestration.simulation.runs.outcome import Course, Progress, RunLost, RunOutcome, result_of
-from orchestration.simulation.runs.resolved import ResolvedRequest
 from orchestration.simulation.runs.result import Result
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.system.request import Request

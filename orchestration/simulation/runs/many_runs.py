@@ -15,15 +15,14 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.engines.batch.batch import MAX_ROWS
 from orchestration.simulation.engines.batch.batches import Batches
 from orchestration.simulation.engines.batch.shape import expect_lanes
-from orchestration.simulation.engines.wiring import check_against_fmus, columns_of, source_signals
+from orchestration.simulation.engines.resolved import check_against_fmus, columns_of, source_signals
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.results.objectives import FIXED, Metrics
 from orchestration.simulation.runs.columns import Columns, columns
 from orchestration.simulation.runs.simulation import run
-from orchestration.systems.system.check import check, recorded_variables
+from orchestration.systems.system.check import check, connect_references, recorded_variables
 from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import System
-from orchestration.systems.system.references import connect_references
 from orchestration.systems.system.request import errors_in_own_terms
 
 BATCH = "batch"

@@ -8,11 +8,9 @@ from typing import Any
 from orchestration.foundation.basics.errors import SimulatorError
 from orchestration.foundation.basics.interrupt import Interrupted
 from orchestration.foundation.recording.recording import Recorder
-from orchestration.simulation.engines.job_numbers import job_numbers
-from orchestration.simulation.engines.wiring import uneven_steps
+from orchestration.simulation.engines.resolved import ResolvedRequest, uneven_steps
 from orchestration.simulation.results import objectives
-from orchestration.simulation.results.column_info import column_infos
-from orchestration.simulation.runs.resolved import ResolvedRequest
+from orchestration.simulation.results.units import column_infos
 from orchestration.simulation.runs.result import Provenance, Result
 from orchestration.systems.expressions.over_span import Recorded
 
@@ -61,7 +59,7 @@ def result_of(
     Raises `RunInterrupted` with it for a run that was `interrupted`, or the failure with it for one that has failed.
     """
     recording = recorder.finish()
-    numbers = {**resolved.parameters, **job_numbers(resolved.system)}
+    numbers = {**resolved.parameters, **resolved.of_jobs}
 
     def spans() -> Iterator[Recorded]:
         return objectives.spans(resolved.system, recording, numbers, outcome.end)

@@ -14,10 +14,10 @@ from orchestration.foundation.processes.limits import Limits
 from orchestration.foundation.recording.recording import InMemory, Recorder
 from orchestration.foundation.recording.tables import InFolder, ToFolder
 from orchestration.simulation.engines.engine import Engine
+from orchestration.simulation.engines.resolved import Announce
 from orchestration.simulation.requests.request import RequestLike, load_request, request_of
 from orchestration.simulation.runs.outcome import Progress
 from orchestration.simulation.runs.prepared import PreparedRun
-from orchestration.simulation.runs.resolved import Announce
 from orchestration.simulation.runs.result import Result
 from orchestration.simulation.runs.run_directory import METRICS, SCENARIO, STATE, keep_run
 from orchestration.simulation.runs.simulation import simulate

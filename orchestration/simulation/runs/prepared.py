@@ -27,10 +27,9 @@ from orchestration.simulation.engines.engine import Engine, create_master
 from orchestration.simulation.engines.feeds import Feed
 from orchestration.simulation.engines.master import Master
 from orchestration.simulation.engines.memory import Allocator, process_memory
+from orchestration.simulation.engines.resolved import Announce, ResolvedRequest, fixed_steps, resolve
 from orchestration.simulation.engines.sources import SourceValues
-from orchestration.simulation.engines.wiring import fixed_steps
 from orchestration.simulation.runs.outcome import Course, Progress, RunOutcome, result_of
-from orchestration.simulation.runs.resolved import Announce, ResolvedRequest, resolve
 from orchestration.simulation.runs.result import Provenance, Result
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable

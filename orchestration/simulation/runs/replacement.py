@@ -2,14 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 from orchestration.components.building import fmus
 from orchestration.components.fmi.model import Model, read_model
 from orchestration.foundation.basics.errors import UsageError, expected_name
-from orchestration.simulation.engines.wiring import check_against_fmus
-from orchestration.simulation.runs.resolved import ResolvedRequest
+from orchestration.simulation.engines.resolved import ResolvedRequest, check_against_fmus
 from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
@@ -23,7 +21,6 @@ class Replacement:
     request: Request
     component: str
     system: System
-    paths: Mapping[str, Path]
     models: Mapping[str, Model]
     """Models, that of the replaced component without the variables that have no value after initialisation"""
     measured: tuple[str, ...]
@@ -39,10 +36,7 @@ class Replacement:
             if system.fmus != self.system.fmus:
                 raise UsageError("values: expected those of a run of the same FMUs; others are another Simulation")
             fits = check_against_fmus(system, self.models)
-        return ResolvedRequest(
-            request=self.request, system=fits.system, paths=self.paths, models=self.models, parameters=fits.parameters,
-            units=fits.units, follows=fits.follows,
-        )  # fmt: skip
+        return ResolvedRequest(request=self.request, models=self.models, **vars(fits))
 
 
 def replace_component(request: Request, component: str | None) -> Replacement:
@@ -53,13 +47,11 @@ def replace_component(request: Request, component: str | None) -> Replacement:
         _expect_no_clock(system, name)
         measured, commanded = _ends(system, name)
         whole = replace(system, components={**system.components, name: replace(system.components[name], record=None)})
-        paths = fmus.of_components(system.fmus)
-        models = {each: read_model(path) for each, path in paths.items()}
+        models = {each: read_model(path) for each, path in fmus.of_components(system.fmus).items()}
     models[name] = _initialising(models[name], commanded)
     return Replacement(
-        request=request, component=name, system=whole, paths=paths, models=models, measured=measured,
-        commanded=commanded,
-    )  # fmt: skip
+        request=request, component=name, system=whole, models=models, measured=measured, commanded=commanded
+    )
 
 
 def component_named(system: System, component: str | None, to: str) -> str:

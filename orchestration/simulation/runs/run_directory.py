@@ -12,10 +12,10 @@ from orchestration.foundation.basics.documents import read_json
 from orchestration.foundation.basics.errors import SimulatorError, UsageError, one_line, shown
 from orchestration.foundation.recording import tables
 from orchestration.foundation.recording.tables import ToFolder
-from orchestration.simulation.engines.wiring import columns_of
+from orchestration.simulation.engines.resolved import columns_of
 from orchestration.simulation.figures.views import files, view_of
 from orchestration.simulation.requests.request import load_request
-from orchestration.simulation.results.column_info import ColumnInfo
+from orchestration.simulation.results.units import ColumnInfo
 from orchestration.simulation.runs.folder import NewFolder, new_folder
 from orchestration.simulation.runs.outcome import RunInterrupted
 from orchestration.simulation.runs.result import Provenance, Result

@@ -7,9 +7,9 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.processes.limits import Limits
 from orchestration.foundation.recording.recording import InMemory, Recorder
 from orchestration.simulation.engines.engine import Engine
+from orchestration.simulation.engines.resolved import Announce, resolve
 from orchestration.simulation.runs.outcome import Course, Progress
 from orchestration.simulation.runs.prepared import PreparedRun, prepared
-from orchestration.simulation.runs.resolved import Announce, resolve
 from orchestration.simulation.runs.result import Result
 from orchestration.systems.system.request import Request
 

@@ -8,7 +8,7 @@ from orchestration.components.building.fmus import native_twins
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError, expected_name
 from orchestration.simulation.engines.batch.shape import expect_lanes
 from orchestration.simulation.engines.engine import Engine
-from orchestration.simulation.engines.wiring import check_against_fmus
+from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.systems.system.files import Files, files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Twin, system_of

@@ -2,7 +2,7 @@
 
 import functools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 
 import numpy as np
@@ -19,6 +19,8 @@ from orchestration.systems.expressions.syntax import (
     children,
     is_over_run,
     names,
+    names_job_measure,
+    parse,
     text,
 )
 
@@ -98,6 +100,11 @@ def _depth(node: Node) -> int:
 
 def _finite(value: float | None) -> float | None:
     return None if value is None or not math.isfinite(value) else float(value)
+
+
+def job_terms(expressions: Iterable[str]) -> dict[str, None]:
+    """The terms about jobs in expressions: numbers of a run that do not depend on signals."""
+    return dict.fromkeys(name for text in expressions for name in names(parse(text)) if names_job_measure(name))
 
 
 def expect_names(node: Node, valid: set[str], place: str) -> None:

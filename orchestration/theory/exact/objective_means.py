@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from orchestration.components.fmi.model import Model
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.systems.expressions.syntax import Call, names
+from orchestration.systems.system.check import AT_REST
 from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import System
-from orchestration.systems.system.references import AT_REST
 from orchestration.systems.system.source import Source
 from orchestration.theory.exact.objectives import Mean, evaluated, inlined_objectives, integrand, means_of, quadratic
 from orchestration.theory.stability.loop_at_rest import AtRest

@@ -17,8 +17,8 @@ from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats, Transfer
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
+from orchestration.simulation.engines.resolved import resolve_with_models
 from orchestration.simulation.runs.prepared import PreparedRun, prepared
-from orchestration.simulation.runs.resolved import resolve_with_models
 from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System

@@ -17,7 +17,7 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
 from orchestration.foundation.recording.recording import Chunk, InMemory
 from orchestration.simulation.engines.master import Master
-from orchestration.simulation.engines.wiring import fixed_steps
+from orchestration.simulation.engines.resolved import fixed_steps
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.component import Component

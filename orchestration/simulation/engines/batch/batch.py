@@ -17,9 +17,9 @@ from orchestration.simulation.engines.batch.combining import combined
 from orchestration.simulation.engines.batch.initialisation import Initialisation
 from orchestration.simulation.engines.batch.run_numbers import NO_COLUMNS, ParameterColumns, RunNumbers, end_of
 from orchestration.simulation.engines.batch.shape import Shape
+from orchestration.simulation.engines.resolved import source_values
 from orchestration.simulation.engines.sources import SourceValues
 from orchestration.simulation.engines.structures import address, structures
-from orchestration.simulation.engines.wiring import source_values
 from orchestration.systems.expressions.over_span import STOP_TIME
 from orchestration.systems.expressions.syntax import Call
 from orchestration.systems.schedule.schedule_cache import RunSchedule, ScheduleCache, ScheduleKey

@@ -15,13 +15,13 @@ from orchestration.simulation.engines.batch.kernels import preferred_lanes
 from orchestration.simulation.engines.batch.run_numbers import NO_COLUMNS, ParameterColumns, end_of
 from orchestration.simulation.engines.batch.shape import Shape, outline
 from orchestration.simulation.engines.condition import watch
+from orchestration.simulation.engines.resolved import check_against_fmus, source_values
 from orchestration.simulation.engines.structures import structures
-from orchestration.simulation.engines.wiring import check_against_fmus, source_values
 from orchestration.simulation.results.objectives import Metrics, metrics_of
 from orchestration.systems.schedule.schedule_cache import ScheduleCache, schedule_key
 from orchestration.systems.schedule.streams import Streams
+from orchestration.systems.system.check import connect_references
 from orchestration.systems.system.model import System
-from orchestration.systems.system.references import connect_references
 
 
 @dataclass(frozen=True, kw_only=True)

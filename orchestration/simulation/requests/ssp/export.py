@@ -8,14 +8,13 @@ from orchestration.components.building import fmus
 from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.components.fmi.model import Model, Variable, read_model
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.simulation.engines.wiring import source_values
+from orchestration.simulation.engines.resolved import source_values
 from orchestration.systems.schedule.plan import Plan
 from orchestration.systems.schedule.streams import Streams
-from orchestration.systems.system.check import check
+from orchestration.systems.system.check import AT_REST, check, connect_references
 from orchestration.systems.system.component import Component, Parameter, Sampling
 from orchestration.systems.system.connection import Connection, component_of, variable_of
 from orchestration.systems.system.model import System
-from orchestration.systems.system.references import AT_REST, connect_references
 from orchestration.systems.system.request import Request, errors_in_own_terms
 from orchestration.systems.system.source import Source
 

@@ -15,7 +15,7 @@ from orchestration.quadrotor.flight.layout import POSITION_ERROR, FlightLayout
 from orchestration.quadrotor.scenarios.translation import quadrotor
 from orchestration.quadrotor.scenarios.wiring import POSITION_REFERENCE
 from orchestration.simulation.figures.palette import MAX_LINES, MAX_PANELS
-from orchestration.simulation.results.column_info import ColumnInfo
+from orchestration.simulation.results.units import ColumnInfo
 from orchestration.systems.system.paths import changed
 from tests.orchestration.experiments.report.test_blobs import read
 

@@ -4,7 +4,7 @@ import pytest
 
 import quadcosim
 from orchestration.simulation.results import display_names as labels
-from orchestration.simulation.results.column_info import ColumnInfo
+from orchestration.simulation.results.units import ColumnInfo
 from quadcosim import Scenario
 from tests.places import ROOT
 

@@ -23,7 +23,7 @@ from orchestration.quadrotor.flight.names import FIGURES as FLIGHT
 from orchestration.simulation.figures.names import WRITTEN
 from orchestration.simulation.figures.style import SCREEN, save
 from orchestration.simulation.figures.views import VIEWS
-from orchestration.simulation.results.column_info import ColumnInfo
+from orchestration.simulation.results.units import ColumnInfo
 from orchestration.simulation.runs import draw as drawing
 from orchestration.simulation.runs.run_directory import keep_run
 from quadcosim import (  # fmt: skip

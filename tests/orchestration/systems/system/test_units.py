@@ -9,7 +9,7 @@ from orchestration.components.building import fmus
 from orchestration.components.fmi.model import read_model
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.quadrotor.scenarios.translation import quadrotor
-from orchestration.simulation.engines.wiring import check_against_fmus
+from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.systems.system.file import load_system
 from tests.commands import Main
 from tests.orchestration.systems.system.described import described

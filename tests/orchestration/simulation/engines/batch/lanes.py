@@ -8,8 +8,8 @@ from orchestration.components.building import fmus
 from orchestration.components.fmi.model import read_model
 from orchestration.simulation.engines.batch.batch import Batch, BatchResult, Group
 from orchestration.simulation.engines.batch.shape import Shape, outline
+from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.simulation.engines.structures import structures
-from orchestration.simulation.engines.wiring import check_against_fmus
 from orchestration.simulation.runs.result import Result
 from orchestration.systems.schedule.schedule_cache import ScheduleCache, schedule_key
 from orchestration.systems.system.model import System

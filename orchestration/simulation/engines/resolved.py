@@ -1,12 +1,14 @@
-"""Prepares a system for any engine: checks it against its FMUs, and provides its sources and its columns."""
+"""A request resolved against its FMUs, for any engine: its system checked, its sources, and its columns."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from pathlib import Path
 
 from fmu_kit.trajectory import Trajectory
+from orchestration.components.building import fmus
 from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD, TRAJECTORY
-from orchestration.components.fmi.model import NUMERIC, Model
+from orchestration.components.fmi.model import NUMERIC, Model, read_model
 from orchestration.components.fmi.values import number_of
 from orchestration.foundation.basics.errors import UsageError, at_place
 from orchestration.foundation.basics.simulator import Floats
@@ -26,18 +28,22 @@ from orchestration.simulation.engines.sources import (
     spline_values,
 )
 from orchestration.simulation.results import objectives
-from orchestration.simulation.results.units import units
+from orchestration.simulation.results.units import ColumnInfo, column_infos, units
+from orchestration.systems.expressions.over_run import job_terms
 from orchestration.systems.schedule.fixed_step import FixedStep
 from orchestration.systems.schedule.streams import VALUE, Streams
 from orchestration.systems.signals.library import make_signal
 from orchestration.systems.signals.table_file import read_table
 from orchestration.systems.signals.waypoints import read_waypoints
-from orchestration.systems.system.check import check, recorded_variables
+from orchestration.systems.system.check import check, connect_references, describe_references, recorded_variables
 from orchestration.systems.system.component import Component, has_scheduled_instants
 from orchestration.systems.system.connection import variable_of
-from orchestration.systems.system.model import System
-from orchestration.systems.system.references import connect_references, describe_references
+from orchestration.systems.system.model import System, expressions
+from orchestration.systems.system.request import Request, errors_in_own_terms
 from orchestration.systems.system.source import MOTION, Source
+
+Announce = Callable[[str], None]
+"""Receives a line for each thing that is done before the run begins."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,6 +59,57 @@ class CheckedSystem:
     """Units of the metrics that have one"""
     follows: str
     """Text of which component follows which reference; empty where none does"""
+    of_jobs: Mapping[str, float]
+    """Numbers of the run that do not depend on signals: terms about jobs in expressions, by their text"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResolvedRequest(CheckedSystem):
+    """A request whose system has been checked against its FMUs."""
+
+    request: Request
+    """Request as the user wrote it"""
+    models: Mapping[str, Model]
+    """Models of the FMUs, by component"""
+
+    @property
+    def paths(self) -> dict[str, Path]:
+        """The paths of the FMUs, by component."""
+        return {name: model.path for name, model in self.models.items()}
+
+    @property
+    def foreign(self) -> list[str]:
+        """Components whose FMUs are not built on this project's kit."""
+        return [name for name, model in self.models.items() if not model.is_of_this_kit]
+
+    @property
+    def described(self) -> dict[str, ColumnInfo]:
+        """The unit and the description of each column."""
+        return column_infos(self.system, self.models, ("time", *signals_of(self.system, self.models)))
+
+    def sources(self, streams: Streams) -> dict[str, SourceValues]:
+        """The values of the sources in a run, by name."""
+        return {name: source_values(self.system, name, self.parameters, streams) for name in self.system.sources}
+
+
+def resolve(request: Request, announce: Announce | None = None) -> ResolvedRequest:
+    """Find the FMUs of a request, build them if need be, and check its system against them.
+
+    Raises `UsageError` for what the FMUs do not have.
+    """
+    with errors_in_own_terms(request):
+        system = request.as_system()
+        if not system.components:
+            raise UsageError("components = none: expected at least one to run; computers and networks alone have none")
+        paths = fmus.of_components(system.fmus, announce)
+    return resolve_with_models(request, {name: read_model(path) for name, path in paths.items()})
+
+
+def resolve_with_models(request: Request, models: Mapping[str, Model]) -> ResolvedRequest:
+    """As `resolve`, with FMUs whose models have been read."""
+    with errors_in_own_terms(request):
+        fits = check_against_fmus(request.as_system(), models)
+    return ResolvedRequest(request=request, models=models, **vars(fits))
 
 
 def check_against_fmus(system: System, models: Mapping[str, Model]) -> CheckedSystem:
@@ -62,9 +119,12 @@ def check_against_fmus(system: System, models: Mapping[str, Model]) -> CheckedSy
     for name, component in system.components.items():
         _expect_clock(name, component, models[name])
     parameters = _parameters(system, models)
-    of_jobs = job_numbers(system)
+    terms = job_terms(text for _, text in expressions(system))
+    of_jobs = job_numbers(system) if terms else {}
     system = objectives.with_available_objectives(system, signals_of(system, models), {*parameters, *of_jobs})
-    return CheckedSystem(system=system, parameters=parameters, units=units(system, models), follows=words)
+    return CheckedSystem(
+        system=system, parameters=parameters, units=units(system, models), follows=words, of_jobs=of_jobs
+    )
 
 
 def columns_of(system: System) -> tuple[str, ...]:
