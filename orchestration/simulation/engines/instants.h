@@ -452,14 +452,14 @@ static void settle(Loop *l, Rows *stepped, const Instant *now) {
     }
 }
 
-/* -- an instant ---------------------------------------------------------------------------------------------------- */
+/* -- an instant: (1) to (5) of instants.py; (6) and (7) are those of each loop -------------------------------------- */
 
 static void pass(Loop *l, Instant *now) {
     Rows stepped = now->stepped;
-    step_continuous(l, &stepped, now);
-    arrive(l, &now->arrivals, now); /* before messages sent now, which are delivered last if they arrive at once */
+    step_continuous(l, &stepped, now); /* (1) */
+    arrive(l, &now->arrivals, now);    /* (2), before messages sent now, which are delivered last if without delay */
     post(l, &now->posted, now);
-    measure(l, &now->measured, now);
-    sample_each(l, &now->samples, now);
-    if (l->settles) settle(l, &now->stepped, now);
+    measure(l, &now->measured, now);               /* (3) */
+    sample_each(l, &now->samples, now);            /* (4) */
+    if (l->settles) settle(l, &now->stepped, now); /* (5) */
 }

@@ -1,9 +1,41 @@
-"""What happens at an instant, in Python: the reference that the loops in C follow.
+"""What happens at an instant, in Python: the reference that the loops in C follow (`instants.h`).
 
-In this order: components in continuous time are stepped to it; arriving messages are delivered, then those that such
-components send now; values for later samples are measured; sampled components that are due read their inputs, step and
-send, and messages without delay are delivered; the row is recorded. So a row has the values just after its instant, and
-nothing samples at the end. For users: docs/timing.md, "At one instant".
+Component i has the state x_i, inputs u_i and outputs y_i. ⁻ marks a value as the instant t begins, ⁺ as it ends; what
+nothing below sets stays: x_i⁺ = x_i⁻. A component in continuous time is stepped to t, from the time t_i⁻ that it has
+reached; a sampled one with the clock ratio r from t, to its next sample t_i⁺. m is a message, w(t) a value of a source.
+
+    (1) for each i in continuous time that has a communication point at t > t_i⁻, in order:    _step_continuous
+            u_i ← y_j⁺, over each wire from a j that is stepped before i                       component.ahead
+            x_i⁺, y_i⁺ ← step(x_i⁻, u_i, from t_i⁻ to t); t_i⁺ ← t
+            y_i⁺ is not finite: the run ends
+        the row so far satisfies the condition of divergence, and some i was stepped: the run ends
+    (2) for each m that arrives at t, in the order of sending:                                 _arrive
+            u_i ← m
+        for each m that a j in continuous time sends at t, in the order of sending:            _post
+            m ← y_j⁺, unless it is lost
+            u_i ← m, if it arrives at t
+    (3) for each m that is measured at t for a later sample:                                   _measure
+            m ← y_j⁺, unless it is lost
+    (4) for each sampled i that is due at t, in order:                                         _sample
+            u_i ← y_j⁺, or m from an earlier (3), over each connection, unless it is lost      _sense
+            u_i ← the line through its last two m, at t, where the hold is of first order      component.held
+            u_i ← w(t)                                                                         component.feeds
+            x_i⁺, y_i⁺ ← step(x_i⁻, u_i, from r t to r min(t_i⁺, stop))                        _step_task
+            y_i⁺ is not finite: the run ends
+            for each m that i sends for this sample, unless it is lost:                        _send
+                m ← y_i⁺
+                u_k ← m, if it arrives at t
+    (5) for each i in continuous time that has a communication point at t:                     _settle
+            u_i ← the line through its last two m, at t, where the hold is of first order      component.held
+            u_i ← y_j⁺, over each other wire                                                   component.behind
+            u_i ← w(t)                                                                         component.feeds
+    (6) the row of t has u_i⁺ of components in continuous time, and y_i⁺ of all                _record
+    (7) an FMU ended the run: it ends; Ctrl-C or a pause: it stops here
+
+So u_i in (1) is u_i⁻, but over the wires ahead. y⁺ becomes m with noise, quantisation, scale and offset
+(`Channel.take`), over a wire with scale and offset alone. A component with its own clock is stepped at each instant
+before the end, to the next one: where it is not due, (4) leaves out what it reads, w(t) and what it sends. Nothing
+samples at the end. For users: docs/timing.md, "At one instant".
 """
 
 from collections.abc import Callable, Sequence
@@ -39,23 +71,23 @@ class PythonLoop:
         running, stop = self._running, self._stop
         for count, (time, next_time, stepped, arrivals, posted, measured, samples) in enumerate(self._instants, 1):
             running.now = time
-            if stepped:
+            if stepped:  # (1)
                 self._step_continuous(time, stepped)
-            if arrivals:  # before messages without delay, which are sent now and delivered last
+            if arrivals:  # (2), before messages without delay, which are sent now and delivered last
                 self._arrive(arrivals, time)
             if posted:
                 self._post(posted, time)
-            if measured:
+            if measured:  # (3)
                 self._measure(measured)
-            if running.some_by_themselves:
+            if running.some_by_themselves:  # (4)
                 self._sample_in_turn(samples, time, next_time)
             else:
                 for due in samples:
                     self._sample(due, time, due.next_time)
-            if running.settles:
+            if running.settles:  # (5)
                 self._settle(time, stepped)
-            self._record(time)
-            if running.termination is not None:
+            self._record(time)  # (6)
+            if running.termination is not None:  # (7)
                 raise Terminated(running.termination)
             if running.interrupted() and time < stop:
                 running.interrupted_at = time
