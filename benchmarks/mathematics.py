@@ -1,7 +1,7 @@
 """The accuracy and speed of the functions of native slaves: `python -m benchmarks.mathematics [--page PAGE]`.
 
 Errors are the largest of many samples, computed with 150 bits; times are CPU time per number of an array that stays in
-the cache, the smallest of several repetitions, all in one run. With `--page` the tables are written there.
+the cache, the smallest of several repetitions, all in one run. With `--page` the table of the accuracy is written there.
 """
 
 import argparse
@@ -72,16 +72,15 @@ def speeds(folder: Path) -> str:
 
 
 def main() -> None:
-    """Print both tables, or write them into a page."""
+    """Print both tables, and write that of the accuracy into a page if there is one."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--page", type=Path, help="write the tables there")
+    parser.add_argument("--page", type=Path, help="write the table of the accuracy there")
     page = parser.parse_args().page
     with tempfile.TemporaryDirectory() as scratch:
-        tables = {"errors": errors(Path(scratch)), "speeds": speeds(Path(scratch))}
+        accuracy = errors(Path(scratch))
+        print(accuracy, speeds(Path(scratch)), sep="\n\n")
     if page:
-        fill(page, tables)
-    else:
-        print(*tables.values(), sep="\n\n")
+        fill(page, {"errors": accuracy})
 
 
 if __name__ == "__main__":
