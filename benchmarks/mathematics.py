@@ -1,7 +1,7 @@
 """The accuracy and speed of the functions of native slaves: `python -m benchmarks.mathematics [--page PAGE]`.
 
 Errors are the largest of many samples, computed with 150 bits; times are CPU time per number of an array that stays in
-the cache, the smallest of several repetitions, all in one run. With `--page` the table of the accuracy is written there.
+the cache, the smallest of several repetitions, all in one run. With `--page` the table of accuracy is written there.
 """
 
 import argparse
