@@ -70,7 +70,7 @@ class ControllerInterface(Framed):
     thrust = Output("total thrust, upward in the body, held between samples", "N", nominal=_HOVER, terminal="command")
     torque = Output("body torque, body frame, held between samples", "N.m", ZERO, frame=frames.body, terminal="command")
     motor_thrust = Output(
-        "what thrust and torque ask of each of four motors on an X frame, limited by nothing; 0 where motor.arm.* or "
+        "thrust asked of each of four motors on an X frame, limited by nothing; 0 where motor.arm.* or "
         "motor.drag_to_thrust are not known",
         "N",
         Thrusts(0.0, 0.0, 0.0, 0.0),
@@ -107,25 +107,35 @@ class ControllerInterface(Framed):
         name="trajectory.rate_z",
     )
     trajectory_yaw = FixedParameter(
-        "of the nose at time 0, along the built-in trajectory", "rad", _TRAJECTORY.yaw, name="trajectory.yaw"
+        "yaw of the nose at time 0, along the built-in trajectory", "rad", _TRAJECTORY.yaw, name="trajectory.yaw"
     )
-    trajectory_yaw_rate = FixedParameter("rate of that", "rad/s", _TRAJECTORY.yaw_rate, name="trajectory.yaw_rate")
+    trajectory_yaw_rate = FixedParameter(
+        "rate of the yaw along the built-in trajectory", "rad/s", _TRAJECTORY.yaw_rate, name="trajectory.yaw_rate"
+    )
     mass = FixedParameter("nominal mass m", "kg", _BODY.mass, above=0.0)
     gravity = FixedParameter("nominal gravity g", "m/s2", _BODY.gravity, minimum=0.0)
     inertia = FixedParameter(
         "entry of the nominal inertia matrix J, body frame", "kg.m2", _BODY.inertia, frame=frames.body_matrix
     )
     motor_arm_x = FixedParameter(
-        "from the centre to each motor along x of the body; 0: not known", "m", 0.0, name="motor.arm.x", minimum=0.0
+        "distance from the centre to each motor along x of the body; 0: not known",
+        "m",
+        0.0,
+        name="motor.arm.x",
+        minimum=0.0,
     )
     motor_arm_y = FixedParameter(
-        "from the centre to each motor along y of the body; 0: not known", "m", 0.0, name="motor.arm.y", minimum=0.0
+        "distance from the centre to each motor along y of the body; 0: not known",
+        "m",
+        0.0,
+        name="motor.arm.y",
+        minimum=0.0,
     )
     motor_drag_to_thrust = FixedParameter(
         "torque about z by thrust of a propeller; 0: not known", "m", 0.0, name="motor.drag_to_thrust", minimum=0.0
     )
     sample_period = FixedParameter(
-        "of the FMU's own clock; 0: sample at every communication point from sample_offset on",
+        "period of the FMU's own clock; 0: sample at every communication point from sample_offset on",
         "s",
         0.01,
         minimum=0.0,
@@ -149,8 +159,8 @@ class ScaledGains(ControllerInterface):
     """A controller whose attitude gains are absolute or per unit inertia."""
 
     gain_scaling = FixedParameter(
-        "of the attitude's gains: as they are, or per unit inertia (in 1/s2 and 1/s), times the inertia matrix; "
-        "energy is per unit inertia then, in 1/s2",
+        "scaling of the attitude's gains: as they are, or per unit inertia (in 1/s2 and 1/s), times the inertia "
+        "matrix; energy is per unit inertia then, in 1/s2",
         start=GainScaling.ABSOLUTE,
     )
 

@@ -3,7 +3,7 @@
     class Feedback(Slave):
         x = Input("measured state", "1")
         u = Output("command", "1/s")
-        gain = Parameter("of the feedback", "1/s", 1.0)
+        gain = Parameter("gain of the feedback", "1/s", 1.0)
 
         def step(self, t, h):
             self.u = -self.gain * self.x

@@ -76,9 +76,11 @@ class PlantInterface(Framed):
         nominal=_WIND.frequency,
         quantity="AngularFrequency",
     )
-    thrust_max = FixedParameter("thrust is limited to [thrust_min, thrust_max]", "N", _BOX.thrust_max, minimum=0.0)
+    thrust_max = FixedParameter(
+        "largest thrust; thrust is limited to [thrust_min, thrust_max]", "N", _BOX.thrust_max, minimum=0.0
+    )
     thrust_min = FixedParameter("least thrust; negative: propellers can push downwards", "N", _BOX.thrust_min)
-    torque_max = FixedParameter("each torque is limited to +-torque_max", "N.m", _BOX.torque_max, minimum=0.0)
+    torque_max = FixedParameter("largest torque; each is limited to +-torque_max", "N.m", _BOX.torque_max, minimum=0.0)
     actuator_time_constant = FixedParameter(
         "first-order lag of thrust and torques, or of the motors, after the limits; 0: none",
         "s",
@@ -98,10 +100,10 @@ class PlantInterface(Framed):
     )
     motor_thrust_min = FixedParameter("least thrust of each motor", "N", _MOTORS.thrust_min, name="motor.thrust_min")
     motor_arm_x = FixedParameter(
-        "from the centre to each motor along x of the body", "m", _MOTORS.arm_x, name="motor.arm.x", above=0.0
+        "distance from the centre to each motor along x of the body", "m", _MOTORS.arm_x, name="motor.arm.x", above=0.0
     )
     motor_arm_y = FixedParameter(
-        "from the centre to each motor along y of the body", "m", _MOTORS.arm_y, name="motor.arm.y", above=0.0
+        "distance from the centre to each motor along y of the body", "m", _MOTORS.arm_y, name="motor.arm.y", above=0.0
     )
     motor_drag_to_thrust = FixedParameter(
         "torque about z by thrust of a propeller", "m", _MOTORS.drag_to_thrust, name="motor.drag_to_thrust", above=0.0
@@ -124,7 +126,7 @@ class PlantInterface(Framed):
         "payload at the centre of gravity, added to the mass", "kg", 0.0, name="payload.mass", minimum=0.0
     )
     payload_drop_time = Parameter(
-        "when the payload is let go; 0: never", "s", 0.0, name="payload.drop_time", minimum=0.0
+        "time at which the payload is let go; 0: never", "s", 0.0, name="payload.drop_time", minimum=0.0
     )
 
     acceleration = Local("dV/dt, inertial frame", "m/s2", ZERO, variability="continuous", frame=frames.inertial)

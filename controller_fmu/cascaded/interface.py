@@ -25,65 +25,73 @@ class CascadeInterface(ControllerInterface):
         "largest thrust T_m of each motor", "N", _FRAME.thrust_max, name="motor.thrust_max", above=0.0
     )
     motor_arm_x = FixedParameter(
-        "from the centre to each motor along x of the body", "m", _FRAME.arm_x, name="motor.arm.x", above=0.0
+        "distance from the centre to each motor along x of the body", "m", _FRAME.arm_x, name="motor.arm.x", above=0.0
     )
     motor_arm_y = FixedParameter(
-        "from the centre to each motor along y of the body", "m", _FRAME.arm_y, name="motor.arm.y", above=0.0
+        "distance from the centre to each motor along y of the body", "m", _FRAME.arm_y, name="motor.arm.y", above=0.0
     )
     motor_drag_to_thrust = FixedParameter(
         "torque about z by thrust of a propeller", "m", _FRAME.drag_to_thrust, name="motor.drag_to_thrust", above=0.0
     )
 
     position_horizontal = Parameter(
-        "velocity by position error (MPC_XY_P)", "1/s", _POSITION.gain.x, name="gain.position.horizontal", minimum=0.0
+        "horizontal velocity by position error (MPC_XY_P)",
+        "1/s",
+        _POSITION.gain.x,
+        name="gain.position.horizontal",
+        minimum=0.0,
     )
     position_vertical = Parameter(
-        "velocity by position error (MPC_Z_P)", "1/s", _POSITION.gain.z, name="gain.position.vertical", minimum=0.0
+        "vertical velocity by position error (MPC_Z_P)",
+        "1/s",
+        _POSITION.gain.z,
+        name="gain.position.vertical",
+        minimum=0.0,
     )
     velocity_horizontal = Parameter(
-        "acceleration by velocity error (MPC_XY_VEL_P_ACC)",
+        "horizontal acceleration by velocity error (MPC_XY_VEL_P_ACC)",
         "1/s",
         _VELOCITY.proportional.x,
         name="gain.velocity.horizontal",
         above=0.0,
     )
     velocity_vertical = Parameter(
-        "acceleration by velocity error (MPC_Z_VEL_P_ACC)",
+        "vertical acceleration by velocity error (MPC_Z_VEL_P_ACC)",
         "1/s",
         _VELOCITY.proportional.z,
         name="gain.velocity.vertical",
         minimum=0.0,
     )
     velocity_integral_horizontal = Parameter(
-        "acceleration by integral of the velocity error (MPC_XY_VEL_I_ACC)",
+        "horizontal acceleration by integral of the velocity error (MPC_XY_VEL_I_ACC)",
         "1/s2",
         _VELOCITY.integral.x,
         name="gain.velocity_integral.horizontal",
         minimum=0.0,
     )
     velocity_integral_vertical = Parameter(
-        "acceleration by integral of the velocity error (MPC_Z_VEL_I_ACC)",
+        "vertical acceleration by integral of the velocity error (MPC_Z_VEL_I_ACC)",
         "1/s2",
         _VELOCITY.integral.z,
         name="gain.velocity_integral.vertical",
         minimum=0.0,
     )
     velocity_derivative_horizontal = Parameter(
-        "acceleration by derivative of the velocity (MPC_XY_VEL_D_ACC)",
+        "horizontal acceleration by derivative of the velocity (MPC_XY_VEL_D_ACC)",
         "1",
         _VELOCITY.derivative.x,
         name="gain.velocity_derivative.horizontal",
         minimum=0.0,
     )
     velocity_derivative_vertical = Parameter(
-        "acceleration by derivative of the velocity (MPC_Z_VEL_D_ACC)",
+        "vertical acceleration by derivative of the velocity (MPC_Z_VEL_D_ACC)",
         "1",
         _VELOCITY.derivative.z,
         name="gain.velocity_derivative.vertical",
         minimum=0.0,
     )
     velocity_derivative_cutoff = Parameter(
-        "of its low-pass (MPC_VELD_LP: 5 Hz)",
+        "cutoff of the low-pass of the velocity derivative (MPC_VELD_LP: 5 Hz)",
         "rad/s",
         _VELOCITY.derivative_cutoff,
         name="cutoff.velocity_derivative",
@@ -91,17 +99,36 @@ class CascadeInterface(ControllerInterface):
         quantity="AngularFrequency",
     )
     horizontal_limit = Parameter(
-        "(MPC_XY_VEL_MAX)", "m/s", _POSITION.horizontal_limit, name="limit.velocity.horizontal", above=0.0
+        "largest horizontal speed that the position loop asks for (MPC_XY_VEL_MAX)",
+        "m/s",
+        _POSITION.horizontal_limit,
+        name="limit.velocity.horizontal",
+        above=0.0,
     )
-    upward_limit = Parameter("(MPC_Z_VEL_MAX_UP)", "m/s", _POSITION.upward_limit, name="limit.velocity.up", minimum=0.0)
+    upward_limit = Parameter(
+        "largest upward speed that the position loop asks for (MPC_Z_VEL_MAX_UP)",
+        "m/s",
+        _POSITION.upward_limit,
+        name="limit.velocity.up",
+        minimum=0.0,
+    )
     downward_limit = Parameter(
-        "(MPC_Z_VEL_MAX_DN)", "m/s", _POSITION.downward_limit, name="limit.velocity.down", minimum=0.0
+        "largest downward speed that the position loop asks for (MPC_Z_VEL_MAX_DN)",
+        "m/s",
+        _POSITION.downward_limit,
+        name="limit.velocity.down",
+        minimum=0.0,
     )
     tilt_limit = Parameter(
-        "(MPC_TILTMAX_AIR)", "rad", _VELOCITY.tilt_limit, name="limit.tilt", minimum=0.0, maximum=STEEPEST
+        "largest tilt that the velocity loop asks for (MPC_TILTMAX_AIR)",
+        "rad",
+        _VELOCITY.tilt_limit,
+        name="limit.tilt",
+        minimum=0.0,
+        maximum=STEEPEST,
     )
     least_thrust = Parameter(
-        "of full thrust (MPC_THR_MIN)",
+        "least thrust, as a share of full thrust (MPC_THR_MIN)",
         "1",
         _VELOCITY.least_thrust,
         name="limit.thrust.least",
@@ -109,10 +136,15 @@ class CascadeInterface(ControllerInterface):
         maximum=1.0,
     )
     most_thrust = Parameter(
-        "of full thrust (MPC_THR_MAX)", "1", _VELOCITY.most_thrust, name="limit.thrust.most", above=0.0, maximum=1.0
+        "largest thrust, as a share of full thrust (MPC_THR_MAX)",
+        "1",
+        _VELOCITY.most_thrust,
+        name="limit.thrust.most",
+        above=0.0,
+        maximum=1.0,
     )
     horizontal_margin = Parameter(
-        "of full thrust: what the vertical leaves to the horizontal if need be (MPC_THR_XY_MARG)",
+        "share of full thrust that the vertical leaves to the horizontal if need be (MPC_THR_XY_MARG)",
         "1",
         _VELOCITY.horizontal_margin,
         name="limit.thrust.horizontal_margin",
@@ -127,9 +159,11 @@ class CascadeInterface(ControllerInterface):
         name="gain.attitude",
         minimum=0.0,
     )
-    yaw_weight = Parameter("of yaw beside tilt (MC_YAW_WEIGHT)", "1", _ATTITUDE.yaw_weight, minimum=0.0, maximum=1.0)
+    yaw_weight = Parameter(
+        "weight of yaw beside tilt (MC_YAW_WEIGHT)", "1", _ATTITUDE.yaw_weight, minimum=0.0, maximum=1.0
+    )
     rate_limit = Parameter(
-        "(MC_ROLLRATE_MAX, MC_PITCHRATE_MAX, MC_YAWRATE_MAX)",
+        "largest angular velocity that the attitude loop asks for (MC_ROLLRATE_MAX, MC_PITCHRATE_MAX, MC_YAWRATE_MAX)",
         "rad/s",
         _ATTITUDE.rate_limit,
         name="limit.angular_velocity",
@@ -143,7 +177,7 @@ class CascadeInterface(ControllerInterface):
         minimum=0.0,
     )
     rate_integral = Parameter(
-        "angular acceleration by integral of that error (MC_*RATE_I times full torque / inertia)",
+        "angular acceleration by integral of the rate error (MC_*RATE_I times full torque / inertia)",
         "1/s2",
         _RATE.integral,
         name="gain.rate_integral",
@@ -164,7 +198,7 @@ class CascadeInterface(ControllerInterface):
         minimum=0.0,
     )
     rate_derivative_cutoff = Parameter(
-        "of its low-pass (IMU_DGYRO_CUTOFF: 30 Hz)",
+        "cutoff of the low-pass of the rate derivative (IMU_DGYRO_CUTOFF: 30 Hz)",
         "rad/s",
         _RATE.derivative_cutoff,
         name="cutoff.rate_derivative",
@@ -172,7 +206,7 @@ class CascadeInterface(ControllerInterface):
         quantity="AngularFrequency",
     )
     rate_yaw_cutoff = Parameter(
-        "of the low-pass of the yaw command (MC_YAW_TQ_CUTOFF: 2 Hz)",
+        "cutoff of the low-pass of the yaw command (MC_YAW_TQ_CUTOFF: 2 Hz)",
         "rad/s",
         _RATE.yaw_cutoff,
         name="cutoff.yaw_torque",
@@ -180,7 +214,7 @@ class CascadeInterface(ControllerInterface):
         quantity="AngularFrequency",
     )
     rate_integral_limit = Parameter(
-        "of a full command (MC_RR_INT_LIM, MC_PR_INT_LIM, MC_YR_INT_LIM)",
+        "largest integral, as a share of a full command (MC_RR_INT_LIM, MC_PR_INT_LIM, MC_YR_INT_LIM)",
         "1",
         _RATE.integral_limit,
         name="limit.rate_integral",
@@ -193,7 +227,9 @@ class CascadeInterface(ControllerInterface):
     held_velocity_integral = Local(
         "integral of the velocity loop, inertial frame", "m/s2", ZERO, name="velocity_integral", frame=frames.inertial
     )
-    desired_angular_velocity = Local("of the attitude loop, body frame", "rad/s", ZERO, frame=frames.body)
+    desired_angular_velocity = Local(
+        "angular velocity that the attitude loop asks for, body frame", "rad/s", ZERO, frame=frames.body
+    )
     held_rate_integral = Local(
         "integral of the rate loop, body frame", "rad/s2", ZERO, name="rate_integral", frame=frames.body
     )

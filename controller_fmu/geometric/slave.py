@@ -38,7 +38,7 @@ class GeometricController(ScaledGains, RedesignedController):
     desired_angular_velocity = Local(
         "Omega_c as of the last sample, desired body frame", "rad/s", ZERO, frame=frames.body
     )
-    energy = Local("of position, velocity, attitude and angular velocity errors, at the last sample", "J")
+    energy = Local("energy of position, velocity, attitude and angular velocity errors at the last sample", "J")
 
     def read_parameters(self) -> None:
         """Read the gains."""

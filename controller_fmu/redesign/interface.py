@@ -32,14 +32,15 @@ class RedesignInterface(ControllerInterface):
         minimum=0.0,
     )
     weight = FixedParameter(
-        "w of discretisation match: of the attitude at the end of T, in (w/T)^2 |dtheta|^2", "1", 1.0, minimum=0.0
+        "weight w of discretisation match, of the attitude at the end of T in (w/T)^2 |dtheta|^2", "1", 1.0, minimum=0.0
     )
     prediction = FixedParameter(
         "delay to make up for, from sample to effect: the nominal model runs ahead; 0: none", "s", 0.0, minimum=0.0
     )
     discretisation = FixedParameter(
-        "what is held: the law at the sample (explicit), at the sliding variable that it leads to (semi_implicit), in "
-        "the middle of T (midpoint), its mean over T (mean), or what leads where the law leads (match)",
+        "command that is held: the law at the sample (explicit), at the sliding variable that it leads to "
+        "(semi_implicit), in the middle of T (midpoint), its mean over T (mean), or what leads where the law leads "
+        "(match)",
         start=Discretisation.EXPLICIT,
     )
     stages = FixedParameter("steps of the nominal model over T", None, 3, minimum=1, maximum=100)

@@ -10,12 +10,12 @@ class PidController(Slave):
     Integral by forward Euler, derivative of the output by backward difference with a filter.
     """
 
-    angle = Input("measured", "rad")
+    angle = Input("measured angle", "rad")
     reference = Input("desired angle", "rad")
     u = Output("command", "V")
     integral = Local("part of the command, after the last sample", "V")
     derivative = Local("part of the command at the last sample", "V")
-    last_angle = Local("at the last sample", "rad")
+    last_angle = Local("angle at the last sample", "rad")
     K = Parameter("gain", "V/rad", 0.96)
     Ti = Parameter("integral time", "s", 0.12, above=0.0)
     Td = Parameter("derivative time", "s", 0.049, minimum=0.0)

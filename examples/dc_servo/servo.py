@@ -13,10 +13,10 @@ class Servo(Slave):
     """
 
     u = Input("command", "V")
-    angle = State("of the shaft", "rad", 1.0)
-    speed = State("of the shaft", "rad/s")
+    angle = State("angle of the shaft", "rad", 1.0)
+    speed = State("speed of the shaft", "rad/s")
     gain = Parameter("speed per command at rest", "rad/(s.V)", 1000.0)
-    time_constant = Parameter("of the speed", "s", 1.0, above=0.0)
+    time_constant = Parameter("time constant of the speed", "s", 1.0, above=0.0)
 
     def step(self, t: float, h: float) -> None:
         """Advance by the exponential of the system matrix, which is triangular, over `h`."""

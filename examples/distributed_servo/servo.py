@@ -15,8 +15,8 @@ class DrivenServo(Slave):
 
     u = Input("command", None)
     w = Input("disturbance at the input", None)
-    angle = State("of the shaft", None)
-    speed = State("of the shaft", None)
+    angle = State("angle of the shaft", None)
+    speed = State("speed of the shaft", None)
     gain = Parameter("speed per command at rest", None, 1000.0)
 
     def step(self, t: float, h: float) -> None:

@@ -13,28 +13,28 @@ SIZE = 9
 class KalmanFilter(Slave):
     """Extended Kalman filter: inertial unit, compass and receiver in, motion out."""
 
-    specific_force = Input("measured, in the body", "m/s2", Vec3(0.0, 0.0, -9.81))
+    specific_force = Input("measured specific force in the body", "m/s2", Vec3(0.0, 0.0, -9.81))
     rate = Input("measured angular velocity, about the body's axes", "rad/s", ZERO)
-    north = Input("measured, where north is in the body", "1", Vec3(1.0, 0.0, 0.0))
-    fix_position = Input("of the receiver", "m", ZERO)
-    fix_velocity = Input("of the receiver", "m/s", ZERO)
-    fix = Input("how many there were", "1", 0.0)
+    north = Input("measured direction of north in the body", "1", Vec3(1.0, 0.0, 0.0))
+    fix_position = Input("position of the receiver", "m", ZERO)
+    fix_velocity = Input("velocity of the receiver", "m/s", ZERO)
+    fix = Input("number of fixes so far", "1", 0.0)
 
-    position = State("estimated: north, east, down", "m", ZERO)
-    velocity = State("estimated: north, east, down", "m/s", ZERO)
+    position = State("estimated position: north, east, down", "m", ZERO)
+    velocity = State("estimated velocity: north, east, down", "m/s", ZERO)
     quaternion = State("estimated attitude, scalar last", "1", Quaternion(ZERO, 1.0))
-    angular_velocity = State("as measured, about the body's axes", "rad/s", ZERO)
-    last_fix = Local("that it has taken", "1", 0.0)
+    angular_velocity = State("measured angular velocity, about the body's axes", "rad/s", ZERO)
+    last_fix = Local("number of the last fix taken", "1", 0.0)
 
-    force_noise = Parameter("of a sample, standard deviation", "m/s2", 0.1, above=0.0)
-    rate_noise = Parameter("of a sample, standard deviation", "rad/s", 0.01, above=0.0)
-    north_noise = Parameter("of a sample, standard deviation", "1", 0.02, above=0.0)
-    position_noise = Parameter("of a fix, standard deviation", "m", 0.5, above=0.0)
-    velocity_noise = Parameter("of a fix, standard deviation", "m/s", 0.05, above=0.0)
-    position_deviation = Parameter("at the start", "m", 0.5, above=0.0)
-    velocity_deviation = Parameter("at the start", "m/s", 0.1, above=0.0)
-    attitude_deviation = Parameter("at the start", "rad", 0.05, above=0.0)
-    gravity = Parameter("of the place", "m/s2", 9.81)
+    force_noise = Parameter("standard deviation of a sample of the force", "m/s2", 0.1, above=0.0)
+    rate_noise = Parameter("standard deviation of a sample of the rate", "rad/s", 0.01, above=0.0)
+    north_noise = Parameter("standard deviation of a sample of north", "1", 0.02, above=0.0)
+    position_noise = Parameter("standard deviation of the position of a fix", "m", 0.5, above=0.0)
+    velocity_noise = Parameter("standard deviation of the velocity of a fix", "m/s", 0.05, above=0.0)
+    position_deviation = Parameter("standard deviation of the position at the start", "m", 0.5, above=0.0)
+    velocity_deviation = Parameter("standard deviation of the velocity at the start", "m/s", 0.1, above=0.0)
+    attitude_deviation = Parameter("standard deviation of the attitude at the start", "rad", 0.05, above=0.0)
+    gravity = Parameter("gravity of the place", "m/s2", 9.81)
 
     initial_outputs_depend_on_inputs = False
 

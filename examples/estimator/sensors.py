@@ -11,19 +11,19 @@ class InertialUnit(Slave):
     The specific force is the mean since the last sample, as units that sum up velocity have it.
     """
 
-    velocity = Input("true: north, east, down", "m/s", ZERO)
+    velocity = Input("true velocity: north, east, down", "m/s", ZERO)
     quaternion = Input("true attitude, scalar last", "1", Quaternion(ZERO, 1.0))
     rate = Input("true angular velocity, about the body's axes", "rad/s", ZERO)
 
-    specific_force = Output("in the body: what an accelerometer feels", "m/s2", Vec3(0.0, 0.0, -9.81))
-    angular_velocity = Output("about the body's axes", "rad/s", ZERO)
-    north = Output("where north is, in the body", "1", Vec3(1.0, 0.0, 0.0))
+    specific_force = Output("specific force in the body: what an accelerometer feels", "m/s2", Vec3(0.0, 0.0, -9.81))
+    angular_velocity = Output("angular velocity about the body's axes", "rad/s", ZERO)
+    north = Output("direction of north in the body", "1", Vec3(1.0, 0.0, 0.0))
 
     force_bias = Parameter("constant error of the accelerometer", "m/s2", ZERO)
     rate_bias = Parameter("constant error of the gyroscope", "rad/s", ZERO)
-    gravity = Parameter("of the place", "m/s2", 9.81)
-    last_velocity = Local("at the last sample", "m/s", ZERO)
-    last_quaternion = Local("at the last sample", "1", Quaternion(ZERO, 1.0))
+    gravity = Parameter("gravity of the place", "m/s2", 9.81)
+    last_velocity = Local("velocity at the last sample", "m/s", ZERO)
+    last_quaternion = Local("attitude at the last sample", "1", Quaternion(ZERO, 1.0))
 
     def initialise(self, t: float) -> None:
         """Measure at rest until the first sample."""
@@ -46,11 +46,11 @@ class InertialUnit(Slave):
 class Receiver(Slave):
     """A receiver of satellites: each sample is a fix of position and velocity."""
 
-    true_position = Input("north, east, down", "m", ZERO)
-    true_velocity = Input("north, east, down", "m/s", ZERO)
-    position = Output("north, east, down", "m", ZERO)
-    velocity = Output("north, east, down", "m/s", ZERO)
-    fix = Output("how many there were", "1", 0.0)
+    true_position = Input("true position: north, east, down", "m", ZERO)
+    true_velocity = Input("true velocity: north, east, down", "m/s", ZERO)
+    position = Output("measured position: north, east, down", "m", ZERO)
+    velocity = Output("measured velocity: north, east, down", "m/s", ZERO)
+    fix = Output("number of fixes so far", "1", 0.0)
 
     initial_outputs_depend_on_inputs = False
 

@@ -12,11 +12,11 @@ class Car(Slave):
     mass · speed' = force + slope - drag · speed, with both forces held over a step.
     """
 
-    force = Input("of the engine at the wheels", "N")
+    force = Input("force of the engine at the wheels", "N")
     slope = Input("force of the road's slope, negative uphill", "N")
-    speed = State("of the car", "m/s", 20.0)
-    mass = Parameter("of the car", "kg", 1200.0, above=0.0)
-    drag = Parameter("per speed", "N.s/m", 40.0, above=0.0)
+    speed = State("speed of the car", "m/s", 20.0)
+    mass = Parameter("mass of the car", "kg", 1200.0, above=0.0)
+    drag = Parameter("drag per speed", "N.s/m", 40.0, above=0.0)
 
     def step(self, t: float, h: float) -> None:
         """Advance exactly."""

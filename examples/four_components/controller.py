@@ -10,13 +10,13 @@ class CruiseController(Slave):
     PI with an integral that stops where the engine is at its limit.
     """
 
-    speed = Input("measured", "m/s")
-    set_speed = Input("desired", "m/s")
-    force = Output("asked of the engine", "N")
+    speed = Input("measured speed", "m/s")
+    set_speed = Input("desired speed", "m/s")
+    force = Output("force asked of the engine", "N")
     integral = Local("part of the force, after the last sample", "N")
     k_p = Parameter("gain of the error", "N.s/m", 1200.0)
     k_i = Parameter("gain of its integral", "N/m", 300.0)
-    force_max = Parameter("that the engine has", "N", 4000.0, above=0.0)
+    force_max = Parameter("largest force of the engine", "N", 4000.0, above=0.0)
     first_force = Parameter("force before the first sample, and integral(0)", "N", 800.0, name="initial.force")
 
     initial_outputs_depend_on_inputs = False

@@ -10,8 +10,8 @@ class Engine(Slave):
     The force moves to what is asked, no faster than `rate_max`.
     """
 
-    asked = Input("force", "N")
-    force = State("at the wheels", "N", 800.0, variability="discrete")
+    asked = Input("force asked of it", "N")
+    force = State("force at the wheels", "N", 800.0, variability="discrete")
     rate_max = Parameter("largest change of the force", "N/s", 5000.0, above=0.0)
 
     def step(self, t: float, h: float) -> None:

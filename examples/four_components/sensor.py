@@ -12,9 +12,9 @@ class SpeedSensor(Slave):
     filtered' = (speed - filtered) / time_constant, a step at a time.
     """
 
-    speed = Input("measured", "m/s")
-    filtered = Output("speed", "m/s")
-    time_constant = Parameter("of the filter", "s", 0.05, above=0.0)
+    speed = Input("measured speed", "m/s")
+    filtered = Output("filtered speed", "m/s")
+    time_constant = Parameter("time constant of the filter", "s", 0.05, above=0.0)
 
     def initialise(self, t: float) -> None:
         """Start at the measured speed."""

@@ -16,17 +16,17 @@ class LqgController(Slave):
 
     y = Input("measured angle", "rad")
     u = Output("command", "rad")
-    angle = Output("estimated", "rad")
-    rate = Output("estimated", "rad/s")
+    angle = Output("estimated angle", "rad")
+    rate = Output("estimated rate", "rad/s")
     last_u = Local("command before the last one", "rad")
     k_angle = Parameter("gain of the angle", "1", 3.13789517792)
     k_rate = Parameter("gain of the rate", "s", 0.795214790285)
     k_u = Parameter("gain of the command before", "1", 0.0)
     l_angle = Parameter("correction of the angle by the measurement", "1", 0.599549261969)
     l_rate = Parameter("correction of the rate by the measurement", "1/s", 2.69065814218)
-    omega = Parameter("of the pendulum", "1/s", 3.0, above=0.0)
+    omega = Parameter("natural frequency of the pendulum", "1/s", 3.0, above=0.0)
     period = Parameter("h for which the controller is programmed", "s", 0.1, above=0.0)
-    delay = Parameter("of its commands, up to h, for which it is programmed", "s", 0.0, minimum=0.0)
+    delay = Parameter("delay of its commands, up to h, for which it is programmed", "s", 0.0, minimum=0.0)
 
     initial_outputs_depend_on_inputs = False
 

@@ -14,9 +14,9 @@ class Pendulum(Slave):
 
     u = Input("command: the angle at which it is in balance with the weight", "rad")
     w = Input("disturbance", "rad/s2")
-    angle = State("from upright", "rad")
-    rate = State("of the angle", "rad/s")
-    omega = Parameter("how fast it falls: sqrt(gravity / length)", "1/s", 3.0, above=0.0)
+    angle = State("angle from upright", "rad")
+    rate = State("rate of the angle", "rad/s")
+    omega = Parameter("rate at which it falls: sqrt(gravity / length)", "1/s", 3.0, above=0.0)
 
     def step(self, t: float, h: float) -> None:
         """Advance by the growing and the decaying mode, about the equilibrium angle under u and w."""

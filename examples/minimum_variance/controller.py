@@ -9,7 +9,7 @@ class Feedback(Slave):
 
     x = Input("measured state", "1")
     u = Output("command", "1/s")
-    gain = Parameter("of the feedback; 3 - sqrt(3) is best for x^2 at a period of 1 s", "1/s", 3 - 3**0.5)
+    gain = Parameter("gain of the feedback; 3 - sqrt(3) is best for x^2 at a period of 1 s", "1/s", 3 - 3**0.5)
 
     def initialise(self, t: float) -> None:
         """The command for the initial state."""

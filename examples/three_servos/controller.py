@@ -7,9 +7,9 @@ from fmu_kit.slave import Slave
 class PdController(Slave):
     """PD controller: angle in, command out; the derivative of the angle by backward difference."""
 
-    angle = Input("measured", "rad")
+    angle = Input("measured angle", "rad")
     u = Output("command", "V")
-    last_angle = Local("at the last sample", "rad")
+    last_angle = Local("angle at the last sample", "rad")
     K = Parameter("gain", "V/rad", 1.5)
     Td = Parameter("derivative time", "s", 0.035, minimum=0.0)
     period = Parameter("h for which the controller is programmed", "s", 0.006, above=0.0)

@@ -10,9 +10,9 @@ class TankController(Slave):
     Opens the valve from `maxlevel` on, closes it from `minlevel` down, and leaves it in between.
     """
 
-    level = Input("measured", "m")
-    maxlevel = Parameter("from which the valve is opened", "m", 2.0)
-    minlevel = Parameter("at which it is closed", "m", 1.0)
+    level = Input("measured level", "m")
+    maxlevel = Parameter("level from which the valve is opened", "m", 2.0)
+    minlevel = Parameter("level at which the valve is closed", "m", 1.0)
     valve = Output("whether the valve is to be open", start=False)
 
     def initialise(self, t: float) -> None:

@@ -7,8 +7,8 @@ from fmu_kit.slave import Slave
 class Tank(Slave):
     """Water tank: valve in, level out."""
 
-    valve_control = Input("0 closed, 1 open", "1")
-    level = State("of the water", "m")
+    valve_control = Input("position of the valve: 0 closed, 1 open", "1")
+    level = State("level of the water", "m")
     inflow = Parameter("rise of the level with the valve closed", "m/s", 1.0, minimum=0.0)
     outflow = Parameter("fall of the level by the open valve", "m/s", 2.0, minimum=0.0)
 

@@ -134,13 +134,12 @@ def signal(name: str, described: Mapping[str, ColumnInfo]) -> str:
     known, what = described.get(name), words(variable_of(name))
     text = (known.text or "").strip().rstrip(".") if known is not None else ""
     if text and len(text) <= MAX_LEGEND_LENGTH:
-        what = f"{what} {text}" if text.split()[0] in _GOES_ON else f"{what}, {text}"
+        what = text if re.search(rf"\b{re.escape(what)}\b", text) else f"{what}, {text}"
     return f"{words(component_of(name))}: {what}"
 
 
 MAX_LEGEND_LENGTH = 32
 """characters of a description that fit into a legend"""
-_GOES_ON = {"of", "at", "in", "on", "from", "to", "by", "for", "asked", "between"}
 
 
 def words(name: str) -> str:

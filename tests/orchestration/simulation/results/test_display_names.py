@@ -31,7 +31,7 @@ def test_units_are_written_as_people_write_them(unit: str | None, expected: str 
 
 def test_a_signal_goes_by_its_own_name_or_by_what_its_fmu_says_of_it() -> None:
     about = {
-        "tank.level": ColumnInfo(unit="m", text="of the water"),
+        "tank.level": ColumnInfo(unit="m", text="level of the water"),
         "ball.h": ColumnInfo(unit="m", text="Height of the ball."),
         "car.x1": ColumnInfo(text="a description that is too long for any legend of a figure"),
     }
