@@ -30,9 +30,9 @@ from orchestration.theory.certificates.timeline import LoopTimeline
 from orchestration.theory.certificates.varying import LOSS, Varying
 
 FALL = 1e-4
-"""by which a form falls at least, relative; it covers the radius of measured matrices"""
+"""Share by which a form falls at least; it covers the radius of measured matrices"""
 MOST_SIGNALS = 3
-"""of a command"""
+"""Most signals of a command"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +44,7 @@ class Basin:
     H: Floats
     """The auxiliary command, by signal: it stays within the limit in the set."""
     limit: float
-    """To which each signal of the command is cut, both ways."""
+    """Bound to which each signal of the command is cut, both ways."""
     certificate: str
     """The proof that the form falls, as the text of a file that `check` verifies."""
 

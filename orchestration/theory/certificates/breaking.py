@@ -18,10 +18,10 @@ LONGEST = 6
 SCAN = 24
 """values that are tried before the first unstable one is bisected"""
 FINE = 1e-4
-"""of the range: the tolerance of the bisection"""
+"""Tolerance of the bisection, as a share of the range"""
 
 Draw = tuple[int, tuple[float, ...]]
-"""Which letter, and the values of its parameters"""
+"""Letter, and the values of its parameters"""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -34,7 +34,7 @@ class Cause:
     key: str
     path: str
     period: float
-    """of that task or message [s]; the value is less"""
+    """Period of that task or message [s]; the value is less"""
 
     def with_draws_up_to(self, system: System, value: float) -> System:
         """The system with draws up to a value [s]."""

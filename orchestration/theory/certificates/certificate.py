@@ -31,9 +31,9 @@ class Cells:
     """The cells into which the values of a letter are divided."""
 
     edges: tuple[tuple[float, ...], ...]
-    """of the cells along each parameter, ascending"""
+    """Edges of the cells along each parameter, ascending"""
     labels: tuple[int, ...]
-    """of each cell, those of the last parameter next to each other"""
+    """Labels of each cell, those of the last parameter next to each other"""
 
     def boxes(self) -> Iterator[tuple[int, Box]]:
         """The label of each cell, and its ends along each parameter."""
@@ -51,9 +51,9 @@ class Certificate:
     """relative, by row, of measured matrices: the proof covers all matrices within it"""
     family: LoopFamily
     cells: tuple[Cells, ...]
-    """of each letter; a label belongs to one letter"""
+    """Cells of each letter; a label belongs to one letter"""
     coordinates: Floats
-    """of the forms, by the kept coordinates of the family"""
+    """Coordinates of the forms, by the kept coordinates of the family"""
     memory: int
     """the number of future labels that a form depends on"""
     forms: Mapping[Node, Floats]

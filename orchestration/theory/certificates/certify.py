@@ -26,9 +26,9 @@ FINER = {1: (2, 4, 8), 2: (2, 4)}
 """factors on the number of cells for the proof, by the number of parameters: cells are refined first, forms searched
 again second"""
 ROUNDS = 3
-"""of the search, each in the coordinates of the forms of the one before"""
+"""Rounds of the search, each in the coordinates of the forms of the one before"""
 COUPLED = 1e-7
-"""of the largest entry of a row: smaller entries count as 0 when parts are separated, not in the proof"""
+"""Share of the largest entry of a row: smaller entries count as 0 when parts are separated, not in the proof"""
 
 
 @dataclass(frozen=True, kw_only=True)

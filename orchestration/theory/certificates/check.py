@@ -20,7 +20,7 @@ from orchestration.theory.certificates.varying import LOSS, Varying
 from orchestration.theory.stability.known_loops import rested
 
 ROUNDING = 1e-12
-"""of the largest entry of a row: the largest value that counts as 0"""
+"""Largest value that counts as 0, as a share of the largest entry of a row"""
 
 
 class AnotherLoop(UsageError):
@@ -32,9 +32,9 @@ class Checked:
     """What a certificate proves, from its numbers."""
 
     ranges: dict[str, tuple[tuple[float, float], ...]]
-    """By letter, an event of a period: the ranges of its values [s]."""
+    """Ranges of the values of an event of a period, by its letter [s]."""
     runs: dict[str, int | None]
-    """By letter: how many times in a row it may come; None: any number."""
+    """Number of times in a row that a letter may come; None: any number."""
     states: int
     """The size of the state from period to period."""
     radius: float
@@ -42,7 +42,7 @@ class Checked:
     of: tuple[str, ...]
     """The paths that vary in the system that it was compared with; empty without a system."""
     up_to: float | None = None
-    """Of a path of a computer or a network: the largest value [s] that delays the loop no more than these ranges."""
+    """Largest value of a path of a computer or a network [s] that delays the loop no more than these ranges."""
 
 
 @needs("flint")

@@ -24,9 +24,9 @@ from orchestration.theory.certificates.certificate import Box, Certificate, Node
 from orchestration.theory.certificates.family import Factor, Letter
 
 BITS = 106
-"""of the arithmetic"""
+"""Bits of the arithmetic"""
 OF_THE_LARGEST = 1e-3
-"""of the radius: the share of the largest entry of a row that is added for the others"""
+"""Share of the largest entry of a row that is added to the radius for the others"""
 
 
 class NotProven(QuadcosimError):
@@ -38,9 +38,9 @@ class Proof:
     """What a certificate proves, from its numbers."""
 
     ranges: dict[str, tuple[tuple[float, float], ...]]
-    """by letter: of each of its parameters"""
+    """Ranges of each of its parameters, by letter"""
     runs: dict[str, int | None]
-    """by letter: how many times in a row it may come; None: any number"""
+    """Number of times in a row that a letter may come; None: any number"""
     states: int
     radius: float
 

@@ -24,7 +24,7 @@ from orchestration.theory.exact.timing_chain import TimingChain
 from orchestration.theory.stability.matrices import Components
 
 SAME = 1e-10
-"""of the largest number of a row: two maps that differ by less are the same"""
+"""Share of the largest number of a row: two maps that differ by less are the same"""
 VERBS = {"sample": "samples", "measure": "is measured", "arrive": "arrives"}
 
 
@@ -71,7 +71,7 @@ class RecordedEffects(ContinuousEffects):
         super().__init__(system, components, tasks)
         self._slots: dict[tuple[int, int], int] = {}
         self.places_count = self.size
-        """of the whole state: it grows as further messages are seen in transit"""
+        """Places of the whole state: they grow as further messages are seen in transit"""
 
     def _add_more_places(self, places: Places) -> None:
         for x in self.system.connections:

@@ -35,11 +35,11 @@ class Letter:
 
     name: str
     moves: tuple[tuple[int, int], ...] = ((0, 0),)
-    """from a mode to another"""
+    """Moves from a mode to another"""
     product: tuple[Factor, ...]
-    """in the order in which they are applied"""
+    """Factors in the order in which they are applied"""
     ranges: tuple[tuple[float, float], ...] = ()
-    """of each parameter"""
+    """Ranges of each parameter"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +47,7 @@ class LoopFamily:
     """All letters, with their matrices."""
 
     matrices: Mapping[str, Floats]
-    """by name, all of one size"""
+    """Matrices by name, all of one size"""
     kept: tuple[int, ...]
     """the coordinates that matter from one period to the next; nothing depends on earlier values of the others"""
     letters: tuple[Letter, ...]

@@ -37,9 +37,9 @@ from orchestration.theory.stability.loop_at_rest import at_rest
 MOST_LOST = 8
 """losses in a row that are considered"""
 SHARES = (0.95, 0.97, 0.98, 0.99, 1.0)
-"""of the breaking or the largest value: tried for a certificate, upward; below the first by bisection"""
+"""Shares of the breaking or the largest value: tried for a certificate, upward; below the first by bisection"""
 FINEST = 0.02
-"""of the breaking value: the tolerance of the bisection"""
+"""Tolerance of the bisection, as a share of the breaking value"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,13 +54,13 @@ class Certified:
     breaking: float | None
     """The least value at which a periodic sequence was found that makes it unstable; None: none was found."""
     breaking_sequence: tuple[tuple[str, tuple[float, ...]], ...]
-    """That sequence: the letter of each draw with its values, repeated."""
+    """Sequence that breaks the loop: the letter of each draw with its values, repeated."""
     small_gain: float | None
     """The small-gain bound of Kao and Lincoln; None where it does not apply."""
     largest: float
     """The largest value that was considered."""
     searched: str
-    """Which sequences were tried for `breaking`."""
+    """Sequences that were tried for `breaking`, as text."""
     states: int
     """The size of the state from period to period."""
     certificate: str | None

@@ -29,7 +29,7 @@ from orchestration.theory.certificates.varying import LOSS
 COLUMNS = 6
 """values of the first quantity, from 0 to the one that alone breaks the loop"""
 SHARES = (0.95, 0.98)
-"""of the breaking value: tried for a certificate, as of one quantity"""
+"""Shares of the breaking value: tried for a certificate, as of one quantity"""
 LONGEST = 4
 """draws after which the tried sequences repeat"""
 
@@ -47,7 +47,7 @@ class Region:
     breaking: tuple[Pair, ...]
     """Pairs at which a periodic sequence was found that makes the loop unstable, the second value being the least."""
     searched: str
-    """Which sequences were tried for `breaking`."""
+    """Sequences that were tried for `breaking`, as text."""
     states: int
     """The size of the state from period to period."""
     certificates: tuple[str, ...]

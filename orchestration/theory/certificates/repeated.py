@@ -30,10 +30,10 @@ from orchestration.theory.stability.operating_point import deterministic
 LONGEST = 4
 """turns after which a sequence repeats; a turn has as many jobs as there are in a period of the loop"""
 MOST_JOBS = 64
-"""after which a sequence repeats"""
+"""Most jobs after which a sequence repeats"""
 
 Word = tuple[int, ...]
-"""by turn, 0 or 1: nothing, or the value"""
+"""Choices by turn, 0 or 1: nothing, or the value"""
 
 
 @dataclass(frozen=True, kw_only=True)

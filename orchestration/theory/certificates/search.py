@@ -15,7 +15,7 @@ from orchestration.theory.certificates.certificate import Certificate, Node
 from orchestration.theory.certificates.checker import edges_of
 
 FALL = 1e-7
-"""of a form, at least, relative to the largest one: a smaller one counts as none"""
+"""Least fall of a form, relative to the largest one: a smaller one counts as none"""
 
 
 def forms_for(certificate: Certificate, parts: Sequence[Sequence[int]]) -> Mapping[Node, Floats] | None:

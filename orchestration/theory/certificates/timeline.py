@@ -23,7 +23,7 @@ from orchestration.theory.exact.timing import links_of, sampled_tasks
 Same = Callable[[Steps, Steps, Point], bool]
 """Whether two courses have the same effect at a point"""
 INSTANT = ATTOSECONDS // NANOSECONDS
-"""by which the events of a draw are over before those of the next one begin"""
+"""Time by which the events of a draw are over before those of the next one begin"""
 
 Box = tuple[tuple[int, int], ...]
 """The ends of a range, along each quantity"""

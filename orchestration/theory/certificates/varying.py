@@ -9,7 +9,7 @@ from dataclasses import dataclass
 JITTER, DELAY, LOSS = "jitter", "delay_jitter", "loss"
 SHIFT, LATENCY = "shift", "latency"
 BOXES = 6
-"""that cover two quantities with a limited sum"""
+"""Boxes that cover two quantities with a limited sum"""
 
 Point = tuple[int, ...]
 """A value of each quantity"""
@@ -23,7 +23,7 @@ class Varying:
     """`jitter` of a sampled component, which delays its messages, or its `shift`, which does not; the `latency` of all
     that it sends; `delay_jitter` or `loss` of a connection"""
     name: str
-    """of the component or connection"""
+    """Name of the component or connection"""
     path: str
 
 

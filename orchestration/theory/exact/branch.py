@@ -26,8 +26,8 @@ class BranchEvent(NamedTuple):
     size: int = 0
     """numbers of the message that arrives; 0: it brings none"""
     place: int = 0
-    """of a sample or a posted message: its index among the offsets of a period; of a measurement: the time until its
-    sample"""
+    """Index among the offsets of a period, of a sample or a posted message; of a measurement: the time until its sample
+    """
 
     def later(self, by: int) -> BranchEvent:
         """The event, later by a time."""
@@ -35,7 +35,7 @@ class BranchEvent(NamedTuple):
 
 
 Events = tuple[BranchEvent, ...]
-"""In order; the numbers of messages in transit are in the state in this order, too"""
+"""Events in order; the numbers of messages in transit are in the state in this order, too"""
 
 
 def place_in(events: Events, event: BranchEvent) -> int:
@@ -56,12 +56,12 @@ class Branch:
     events: Events
     """future ones"""
     bursts: tuple[bool, ...]
-    """by link: whether the last message was lost, in a burst"""
+    """Flags by link: whether the last message was lost, in a burst"""
     holds: tuple[tuple[int, int | None], ...]
-    """by link: the time of the last arrival, and its gap to the one before"""
+    """Times by link: that of the last arrival, and its gap to the one before"""
     piece: Piece
     probability: float = 1.0
 
 
 Mode = tuple[Events, tuple[bool, ...], tuple[tuple[int, int | None], ...]]
-"""What is known at a cut of the future: events, bursts and holds, in times from the cut"""
+"""Things known at a cut of the future: events, bursts and holds, in times from the cut"""

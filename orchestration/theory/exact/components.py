@@ -29,13 +29,13 @@ from orchestration.theory.stability.matrices import (
 LARGE_PULSE, SMALL_PULSE = 1.0, 1e-3
 """pulses with the same response of a linear component"""
 SAME = 1e-9
-"""of a response: the difference allowed between both pulses"""
+"""Difference allowed between both pulses, as a share of a response"""
 LARGER = 10.0
 """factor of the pulses that check small ones"""
 ROUNDING = 1e-11
-"""of a response: the least effect of rounding on a result"""
+"""Least effect of rounding on a result, as a share of a response"""
 DIFFERS = 1e-9
-"""of a step of 2h: the difference allowed to two of h, of a component that is identified to rounding"""
+"""Difference allowed of a step of 2h to two of h, of a component that is identified to rounding"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +46,7 @@ class IdentifiedComponent:
     method: str
     """it is identified"""
     accuracy: float
-    """of its responses, relative"""
+    """Accuracy of its responses, relative"""
     tangent: Tangent
     """whose coordinates its state has"""
 

@@ -23,7 +23,7 @@ class Expected:
     """Expectations of a linear loop, stationary or from its initial conditions to a horizon."""
 
     objectives: Mapping[str, float | None]
-    """By name; None: there is none."""
+    """Objectives by name; None: there is none."""
     reasons: Mapping[str, str]
     """Why there is none, by name."""
     mean_square_radius: float
@@ -32,13 +32,13 @@ class Expected:
     """Likewise of fourth moments; from 1 on no Monte-Carlo interval of a mean square means anything. None: too many to
     compute."""
     accuracy: float
-    """Of the results, relative: the change by the last refinement of the computation."""
+    """Accuracy of the results, relative: the change by the last refinement of the computation."""
     method: str
     """How the components were identified, and how the result was computed."""
     period: float
     """The hyperperiod of all that samples [s]."""
     horizon: float | None = None
-    """Over which the means are, from initial conditions [s]; None: stationary ones."""
+    """Time over which the means are, from initial conditions [s]; None: stationary ones."""
 
     def __repr__(self) -> str:
         listed = ", ".join(f"{name} {'-' if v is None else f'{v:.6g}'}" for name, v in self.objectives.items())

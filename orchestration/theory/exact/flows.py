@@ -17,7 +17,8 @@ from orchestration.foundation.basics.simulator import Floats
 SHORT = 0.25
 """norm of F h up to which the series is used"""
 TERMS = 18
-"""of the series: the next one is below rounding, also for the covariance, whose rate is twice that of the state"""
+"""Terms of the series: the next one is below rounding, also for the covariance, whose rate is twice that of the state
+"""
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,7 @@ class Flow:
     change: Floats
     """e^(Ft) - I, which keeps digits of slow modes that e^(Ft) loses"""
     covariance: Floats
-    """of the noise added"""
+    """Covariance of the noise added"""
     costs: Floats
     """M, shape (costs, n, n): the integral of each z'Q z is z(0)'M z(0) plus `extra`"""
     extra: Floats

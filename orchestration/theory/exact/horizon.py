@@ -12,8 +12,8 @@ from orchestration.theory.exact.pieces import Piece
 from orchestration.theory.exact.timing_chain import TimingChain
 
 Moments = dict[Mode, Floats]
-"""By mode: E[z z'] restricted to that mode; one number of z is 1: its row has the means, its square is the probability
-of the mode"""
+"""Moments by mode: E[z z'] restricted to that mode; one number of z is 1: its row has the means, its square is the
+probability of the mode"""
 
 
 def costs_until(chain: TimingChain, start: Floats, one: int, end: int) -> Floats:

@@ -16,7 +16,7 @@ from orchestration.theory.exact.objectives import inlined_objectives, means_of
 from orchestration.theory.stability.known_loops import LOOPS
 
 AGREE = 1e-3
-"""of a radius, from order to order: enough to know whether it is above 1"""
+"""Difference of a radius allowed from order to order: enough to know whether it is above 1"""
 MOST = 50
 """systems that are examined"""
 

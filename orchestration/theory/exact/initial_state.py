@@ -25,11 +25,11 @@ class InitialState:
     """Deviations from rest after the first exchange, which is never lost, late or noisy."""
 
     states: Mapping[str, Floats]
-    """by component"""
+    """States by component"""
     outputs: Mapping[str, Floats]
     """likewise"""
     received: Mapping[str, Floats]
-    """by connection"""
+    """Received values by connection"""
 
 
 def initial_state_of(

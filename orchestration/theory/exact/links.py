@@ -19,7 +19,7 @@ class SampledTask:
     name: str
     period: Fraction
     offsets: tuple[Fraction, ...] = (Fraction(0),)
-    """in ascending order"""
+    """Offsets in ascending order"""
     jitter: RandomTime = CERTAIN
 
 
@@ -37,10 +37,10 @@ class RandomLink:
     step: Fraction | None = None
     """period of the messages, where no task sends or receives"""
     send_offsets: tuple[Fraction, ...] = (Fraction(0),)
-    """of the messages in each step"""
+    """Offsets of the messages in each step"""
     transit_times: tuple[int | None, ...] = (0,)
-    """for each offset of its sender, or of `send_offsets`: the time in transit to which the delay is added; None:
-    nothing is sent"""
+    """Time in transit to which the delay is added, for each offset of its sender, or of `send_offsets`; None: nothing
+    is sent"""
     delay: int = 0
     delay_jitter: RandomTime = CERTAIN
     loss: float = 0.0

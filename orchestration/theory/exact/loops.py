@@ -43,9 +43,9 @@ from orchestration.theory.stability.operating_point import true_period
 T = TypeVar("T")
 
 ORDERS = (1, 2, 4, 8, 16, 32)
-"""of Gauss's rule, tried in turn until the next one changes nothing"""
+"""Orders of Gauss's rule, tried in turn until the next one changes nothing"""
 AGREE = 1e-10
-"""of a result: the difference allowed from order to order"""
+"""Difference of a result allowed from order to order"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,9 +54,9 @@ class Linear:
 
     parts: Components
     methods: Mapping[str, str]
-    """by which each is identified"""
+    """Methods by which each is identified"""
     accuracy: float
-    """of the responses of the least accurately identified one, relative"""
+    """Accuracy of the responses of the least accurately identified one, relative"""
     objectives: ObjectiveMeans
     noise: Mapping[str, float]
     """the intensities of white noise, by input"""
@@ -71,13 +71,13 @@ class Solution:
     linear: Linear
     loop: JumpLinear
     period: float
-    """[s]"""
+    """Period [s]"""
     means: Mapping[Call, float] | None
     """None: the second moments are unbounded"""
     difference: float
     """change by the last doubling of the nodes, relative"""
     order: int | None
-    """of Gauss's rule; None: all random times are enumerated"""
+    """Order of Gauss's rule; None: all random times are enumerated"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,7 +85,7 @@ class HorizonMeans:
     """The means of a loop from its initial state to a given time, as `Solution`."""
 
     means: Mapping[Call, float]
-    """over that time"""
+    """Means over that time"""
     difference: float
     order: int | None
 
@@ -94,7 +94,7 @@ class HorizonMeans:
 class _Converged(Generic[T]):
     result: T
     numbers: Floats
-    """of the result, that were compared"""
+    """Numbers of the result that were compared"""
     period: float
     difference: float
     order: int | None

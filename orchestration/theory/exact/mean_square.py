@@ -15,9 +15,9 @@ from orchestration.theory.exact.loops import Loops
 from orchestration.theory.stability.known_loops import rested
 
 FINER = 0.01
-"""of the tolerance of a measured limit"""
+"""Share of the tolerance of a measured limit"""
 AGREE = 1e-6
-"""of a radius, from order to order"""
+"""Difference of a radius allowed from order to order"""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -24,7 +24,7 @@ LARGEST = 100_000
 LARGEST_FOURTH = 1e8
 """products to propagate fourth moments over a period"""
 MOST_DOUBLINGS = 60
-"""of the number of periods in a sum"""
+"""Most doublings of the number of periods in a sum"""
 DENSE = 400
 """numbers up to which an operator is made a matrix"""
 
@@ -52,7 +52,7 @@ class JumpLinear:
         self._stages, self._sizes = _without_unused_numbers(self._stages, self._sizes)
         self._basis = _SymmetricBasis(self._sizes[0])
         self.numbers = self._basis.count
-        """in the second moments where the period begins"""
+        """Numbers in the second moments where the period begins"""
         if self.numbers > LARGEST:
             raise UsageError(
                 f"{len(self._sizes[0])} modes with {self.numbers} second moments, more than {LARGEST}: "

@@ -28,9 +28,9 @@ from orchestration.systems.expressions.syntax import (
 )
 
 STEP = 1.0
-"""of a signal: second differences of a quadratic polynomial are exact for any step"""
+"""Step of a signal: second differences of a quadratic polynomial are exact for any step"""
 NOT_QUADRATIC = 1e-9
-"""of a value: what a quadratic polynomial may miss it by"""
+"""Share of a value by which a quadratic polynomial may miss it"""
 TRIALS = 12
 
 

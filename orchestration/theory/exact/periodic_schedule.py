@@ -26,19 +26,19 @@ class PeriodicSchedule:
     """The events of each period, from some period on; or, up to a horizon, all events until then."""
 
     period: Fraction
-    """[s]"""
+    """Period [s]"""
     samples: Mapping[str, tuple[Fraction, ...]]
-    """by component, the times of its samples in a period [s]"""
+    """Times of the samples in a period [s], by component"""
     sent: Mapping[str, tuple[Fraction, ...]]
-    """by connection from continuous time over a network, the times at which messages are sent [s]"""
+    """Times at which messages are sent [s], by connection from continuous time over a network"""
     transit_times: Mapping[str, tuple[int | None, ...]]
-    """by connection, from its sample, or its sending, to its arrival [attoseconds]; None: it does not arrive"""
+    """Times from its sample, or its sending, to its arrival [attoseconds], by connection; None: it does not arrive"""
     with_own_delay: frozenset[str]
     """connections whose own delays and losses `transit_times` include"""
 
 
 NO_SCHEDULE = PeriodicSchedule(period=Fraction(1), samples={}, sent={}, transit_times={}, with_own_delay=frozenset())
-"""of a system without computers and networks"""
+"""Schedule of a system without computers and networks"""
 
 
 class ScheduleTrace:

@@ -29,7 +29,7 @@ class RandomTime:
     values: tuple[int, ...] = (0,)
     """all values, or the two ends of a density"""
     probabilities: tuple[float, ...] = (1.0,)
-    """of the values; empty for a density"""
+    """Probabilities of the values; empty for a density"""
     normal: tuple[float, float] | None = None
     """mean and standard deviation of a normal density, truncated to its ends; None: uniform"""
     added: RandomTime | None = None

@@ -44,9 +44,9 @@ from orchestration.theory.exact.periodic_schedule import NO_SCHEDULE, PeriodicSc
 from orchestration.theory.exact.scheduled import expect_certain
 
 MOST_JOBS = 200_000
-"""of all tasks and messages, that are simulated"""
+"""Most jobs of all tasks and messages that are simulated"""
 WINDOWS, MOST_WINDOWS = 12, 96
-"""that are compared at first, and at most"""
+"""Windows that are compared at first, and at most"""
 _WITH_TIMES = (RELEASED, SKIPPED, QUEUED, SAMPLED, ARRIVES)
 """Kinds of notes whose last number is a time"""
 _WORK = (SWITCHING, STARTED, RESUMED)

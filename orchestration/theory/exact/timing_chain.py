@@ -49,7 +49,7 @@ class TimingChain:
             max((x.longest_delay for x in links if x.is_read_ahead and x.receiver == i), default=0)
             for i in range(len(tasks))
         ]
-        """by task: how long before its sample it may measure"""
+        """Time before its sample at which it may measure, by task"""
         self._cut_actions = self._actions_by_cut(cuts)
         self.cuts = sorted(self._cut_actions)
         self._kinks = self._all_kinks()

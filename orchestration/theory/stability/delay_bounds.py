@@ -27,20 +27,20 @@ from orchestration.foundation.basics.simulator import Floats
 Complexes = npt.NDArray[np.complex128]
 
 FREQUENCIES = 800
-"""at which the bound is evaluated, from `LOWEST` to π by period"""
+"""Frequencies at which the bound is evaluated, from `LOWEST` to π by period"""
 LOWEST = 1e-4
 POORLY_DAMPED = 0.1
 """poles whose distance from the unit circle is less, relative to their angle: peaks too narrow for these frequencies"""
 AROUND = 40
 """frequencies to each side of such a peak"""
 ALIASES = 40
-"""to each side; those beyond are B/(jω), whose sum is known"""
+"""Aliases to each side; those beyond are B/(jω), whose sum is known"""
 LONGEST = 4
 """samples after which the tried sequences of delays repeat"""
 SCAN = 16
 """values of the jitter at which each of them is tried, before the first unstable one is bisected"""
 _INSTANT = 1e-9
-"""of a period"""
+"""Share of a period that counts as an instant"""
 
 
 @dataclass(frozen=True, kw_only=True)

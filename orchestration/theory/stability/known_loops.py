@@ -21,7 +21,7 @@ class LocalLimit:
 
     limit: float | None = None
     outside: float | None = None
-    """of the quadrotor: with the gain just outside of its boundary layer"""
+    """Limit of the quadrotor with the gain just outside of its boundary layer"""
     method: str | None = None
     accuracy: float | None = None
     reason: str

@@ -26,7 +26,7 @@ class Linearised:
     name: str
     """The component at which it is cut open."""
     component: StateSpace
-    """That component: inputs are its measurements, outputs its commands."""
+    """Loop of that component: inputs are its measurements, outputs its commands."""
     rest: StateSpace
     """The rest of the loop, from sample to sample: inputs are the commands, outputs the measurements at the next
     sample, with holds, delays and the other components in between."""

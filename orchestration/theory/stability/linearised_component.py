@@ -18,21 +18,21 @@ from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.theory.stability.linear_simulator import LinearSimulator
 
 PULSE = 1e-6
-"""of an input, both ways: of its value, or absolute where that is smaller than 1"""
+"""Size of a pulse of an input, both ways, by its value, or absolute where that is smaller than 1"""
 LARGEST = 1e4
-"""of an output by the pulse: the largest response; later outputs are ignored"""
+"""Largest response of an output to the pulse; later outputs are ignored"""
 NOISE = 100.0 * np.finfo(float).eps
-"""of an output, likewise: the effect of rounding"""
+"""Effect of rounding on an output, likewise"""
 OBSERVABLE = 1e-11
-"""of the largest singular value: smaller ones count as 0"""
+"""Share of the largest singular value: smaller ones count as 0"""
 TURN = 1e-3
-"""of the response to a pulse on all inputs: the difference allowed from sample to sample"""
+"""Difference of the response to a pulse on all inputs allowed from sample to sample"""
 FEWEST = 6
 """points of the ladder at which states are produced at least"""
 LATER = 4
 """steps over which responses to pulses of several sizes are compared"""
 LINEAR = 1e-6
-"""of the outputs from a state, or absolute where these are smaller than 1: the error allowed of the derivatives"""
+"""Error of the derivatives allowed, by the outputs from a state, or absolute where these are smaller than 1"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +47,7 @@ class Rest:
     outputs: tuple[str, ...]
     """Reals that a connection reads"""
     time: float
-    """of its next step, by its own clock [s]"""
+    """Time of its next step, by its own clock [s]"""
 
 
 @dataclass(frozen=True)

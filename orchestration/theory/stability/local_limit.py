@@ -16,7 +16,7 @@ from orchestration.theory.stability.perturbed_runs import growth_of
 
 LOOP = "spectral radius of the sampled loop about the operating point, by differences through saved states"
 LOOP_FINER, TWINS_FINER = 0.01, 0.2
-"""of the tolerance of the measured limit"""
+"""Tolerances as shares of the tolerance of the measured limit"""
 TWINS = "growth of the difference of twin runs from the operating point, one of them perturbed by a pulse"
 OTHER_PULSE = 4.0
 """factor of the second pulse, whose growth is compared"""

@@ -37,13 +37,13 @@ SETTLED = 6
 HELD = 2
 """messages that a first-order hold remembers"""
 RUNGS, FINEST = 12, 0.25
-"""of the ladder of a component in continuous time: points, each twice the one before; the first by the period"""
+"""Ladder of a component in continuous time: points, each twice the one before; the first as a share of the period"""
 LONGER = (1, 4, 16, 64)
 """factors of longer steps, tried in turn while they show more states: a fast loop leaves slow states no time"""
 RUNGS_OF_FIXED = 5
-"""where a component takes short steps of one length only"""
+"""Rungs where a component takes short steps of one length only"""
 RUNGS_OF_TASK = 32
-"""of a sampled component: samples"""
+"""Rungs of a sampled component: samples"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,9 +67,9 @@ class AtRest:
     pulse: float
     extra: ExtraSignals
     saved_states: Mapping[str, bytes]
-    """of the components at rest"""
+    """Saved states of the components at rest"""
     begin: Fraction
-    """of a period: a sample of the component that begins last [ns]"""
+    """Begin of a period: a sample of the component that begins last [ns]"""
     period: Fraction
     """the hyperperiod [ns]"""
 

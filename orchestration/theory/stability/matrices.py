@@ -13,21 +13,21 @@ from orchestration.foundation.basics.times import NANOSECONDS, nanoseconds
 from orchestration.theory.stability.linearised_component import Tangent
 
 NEAR, FAR = 0.1, 0.5
-"""of the norm of Φ(h) - I: between them its logarithm is most accurate"""
+"""Norms of Φ(h) - I between which its logarithm is most accurate"""
 HALVINGS = 40
 INEXACT = 1e-7
-"""of Φ(2h): the difference to Φ(h)² allowed, both by small differences; beyond it the component is no linear system in
+"""Difference of Φ(2h) to Φ(h)² allowed, both by small differences; beyond it the component is no linear system in
 continuous time"""
 NO_FEEDTHROUGH = 1e-6
-"""of the largest response of an output to an input in a step: smaller feedthrough is taken for rounding"""
+"""Share of the largest response of an output to an input in a step: smaller feedthrough is taken for rounding"""
 TERMS = 24
 INDEPENDENT = (0.1, 1e-3, 1e-5, 1e-8)
 """relative part of a coordinate outside of the span of those before it, at least; tried in turn"""
 
 
 Derivatives = Callable[[float], tuple[Floats, Floats]]
-"""Of a step length [s]: the derivatives of the outputs and, below, the state after it, by the state before and by the
-inputs"""
+"""Function of a step length [s] to the derivatives of the outputs and, below, the state after it, by the state before
+and by the inputs"""
 
 
 @dataclass(frozen=True, kw_only=True)

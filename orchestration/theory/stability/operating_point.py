@@ -19,7 +19,7 @@ from orchestration.systems.system.placement import punctual
 AT_REST = 1e-6
 """change allowed in the first periods of the unperturbed run"""
 LONGEST_HYPERPERIOD = 20
-"""of sampled components, in longest periods"""
+"""Longest hyperperiod of sampled components, in longest periods"""
 
 
 class NotAnEquilibriumError(UsageError):

@@ -36,17 +36,17 @@ from orchestration.theory.stability.operating_point import (
 )
 
 LARGE, SMALL = 1e3, 1e-7
-"""of the initial difference: sizes between which it is followed, linear and above rounding"""
+"""Factors on the initial difference: sizes between which it is followed, linear and above rounding"""
 FEWEST, MOST = 100, 400
 """instants of a run at which the twins are compared"""
 DELAYS = 24
 """values of each signal over which the law is fitted, in addition to those in transit"""
 NOISE = 1e-9
-"""of the largest singular value: smaller ones are taken for noise"""
+"""Share of the largest singular value: smaller ones are taken for noise"""
 SHORTEST = 8
 """instants to which a law is fitted; over fewer the growth is that from the first to the last"""
 _NOTHING, _TOO_MUCH = 1e-6, 1e3
-"""of the difference at the end: smaller modes are ignored, larger ones taken for errors of the fit"""
+"""Factors on the difference at the end: smaller modes are ignored, larger ones taken for errors of the fit"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,9 +54,9 @@ class Growth:
     """The growth of small deviations from an operating point."""
 
     rate: float
-    """[1/s], of their logarithm; negative: they decay"""
+    """Rate of their logarithm [1/s]; negative: they decay"""
     horizon: float
-    """[s] of the two runs"""
+    """Duration of the two runs [s]"""
 
 
 def growth_of(system: System, instances: Instances) -> Growth:

@@ -11,11 +11,11 @@ from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.simulator import Floats
 
 SAMPLES = (*range(32), 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024)
-"""of impulse responses, as long as they stay small"""
+"""Samples of impulse responses, as long as they stay small"""
 LARGEST = 1e6
-"""of a response, relative to the first"""
+"""Largest response, relative to the first"""
 MINIMAL = 1e-7
-"""of the largest singular value between inputs and outputs, each by its own unit: smaller ones count as 0"""
+"""Share of the largest singular value between inputs and outputs, each by its own unit: smaller ones count as 0"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +31,7 @@ class StateSpace:
     D: Floats
     """Outputs by the inputs of the same sample."""
     dt: float
-    """From sample to sample [s]."""
+    """Time from sample to sample [s]."""
     inputs: tuple[str, ...]
     """The entries of u, in the units of the FMU."""
     outputs: tuple[str, ...]

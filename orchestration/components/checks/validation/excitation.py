@@ -29,7 +29,7 @@ class ExcitationPlan:
 
 
 PLAIN = ExcitationPlan()
-"""At start values, by the default experiment"""
+"""Plan of start values, by the default experiment"""
 
 
 def inputs_at(inputs: Iterable[Variable], k: int) -> dict[str, Value]:

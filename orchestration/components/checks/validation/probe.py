@@ -27,7 +27,7 @@ from orchestration.foundation.processes.waiting import own_clock
 MIN_STEPS = 3
 """steps of a run of an FMU, however slow it is"""
 SHARE = 0.02
-"""of the time for an FMU that one run may take; a slow FMU gets fewer steps"""
+"""Share of the time for an FMU that one run may take; a slow FMU gets fewer steps"""
 MAX_WATCHED = 1000
 """variables that are compared between runs, of an FMU with more"""
 
@@ -52,7 +52,7 @@ class Probe:
     """of the same file, as the master reads it"""
     folder: Path
     budget: float
-    """[s] for the whole validation"""
+    """Time for the whole validation [s]"""
     beat: Callable[[], None] = lambda: None
     """called when a call of the FMU begins or returns"""
     _numbers: Iterator[int] = field(default_factory=itertools.count)

@@ -16,9 +16,9 @@ from orchestration.components.checks.validation.own_description import own_descr
 OF_ARCHIVES = archive_rules.RULES
 OF_DESCRIPTIONS = (*description.RULES, *variables.RULES, *units.RULES, *structure.RULES)
 OF_RUNS = run_rules.RULES
-"""After `run_rules.FIRST`, on which they rely."""
+"""Rules that rely on `run_rules.FIRST`"""
 OF_EQUAL_RUNS = (*run_rules.COMPARED, *dependencies.RULES)
-"""For FMUs whose runs can be repeated."""
+"""Rules for FMUs whose runs can be repeated"""
 LAST_OF_RUNS = run_rules.LAST
 """Only rules of this project come after."""
 
@@ -35,6 +35,6 @@ STANDARD = (
     *OF_EQUAL_RUNS,
     *LAST_OF_RUNS,
 )
-"""For every FMU."""
+"""Rules for every FMU"""
 OURS = (*OUR_DESCRIPTIONS, own_description, *OUR_RUNS)
-"""For those that quadcosim built."""
+"""Rules for those that quadcosim built"""

@@ -7,7 +7,7 @@ from orchestration.components.checks.validation.finding import Note
 from orchestration.components.checks.validation.instance import Row, Value
 
 TOLERANCE = 1e-4
-"""Between runs of an FMU that is not ours, relative to the largest value of a variable in the run"""
+"""Difference allowed between runs of an FMU that is not ours, relative to the largest value of a variable in the run"""
 
 
 def deviations(found: list[Row], expected: list[Row], text: str, *, is_ours: bool) -> Iterator[str]:

@@ -224,6 +224,6 @@ FIRST = (runs, getters)
 """the others rely on these"""
 RULES = (start_values, finite_outputs, variable_steps, repeatable)
 COMPARED = (inputs_set_twice, reset, instances, saved_state, serialised_state)
-"""for FMUs whose runs are repeatable"""
+"""Rules for FMUs whose runs are repeatable"""
 LAST = (stop_time,)
 """they leave a failed instance, which may disturb others"""
