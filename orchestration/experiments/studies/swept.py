@@ -25,9 +25,9 @@ class Swept:
     total: int
     """The number of runs of the study."""
     flown: int
-    """How many of them this sweep has run; the others were in the store."""
+    """Number of them that this sweep has run; the others were in the store."""
     failed: int
-    """How many runs in the store have failed, with `message` in their row; divergence is not a failure."""
+    """Number of runs in the store that have failed, with `message` in their row; divergence is not a failure."""
     study: Study
     """The study as it was run."""
     path: Path

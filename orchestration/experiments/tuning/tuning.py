@@ -99,9 +99,9 @@ class TuningResult(SearchResult):
     judged: int
     """number of other initial conditions that it is judged on"""
     survives: int
-    """how many of these do not diverge before the stop time"""
+    """Number of these that do not diverge before the stop time"""
     good: int
-    """how many of these meet the criterion of the base"""
+    """Number of these that meet the criterion of the base"""
     survivors_cost: float | None
     """mean cost of the surviving ones; None: none survives"""
 

@@ -21,7 +21,7 @@ _LIMITED = "L"
 _ROOM = "/" + 64 * "-"
 """Follows the names of a server that forks: room for one more"""
 _ROUNDS = 50
-"""How often the remaining processes are killed: they may start others meanwhile"""
+"""Most rounds in which the remaining processes are killed: they may start others meanwhile"""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -28,7 +28,7 @@ class Trace:
     first_exchange: dict[str, str]
     """The origin of these, for each component: exchanged (outputs of the others), start values or zeros."""
     steps: int
-    """How many steps the last component of the loop took."""
+    """Number of steps that the last component of the loop took."""
     drift: float
     """The largest distance of a communication point from a multiple of the step [s]."""
     end: float

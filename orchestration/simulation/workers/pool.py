@@ -30,7 +30,7 @@ from orchestration.simulation.workers.task import (
 from orchestration.systems.system.files import Files, all_with_files, with_files
 
 ATTEMPTS = 3
-"""How often a run is tried, from the second time in a new process, before the death of its worker is its result"""
+"""Number of tries of a run, from the second one in a new process, before the death of its worker is its result"""
 _FROM_OUTSIDE = {-getattr(signal, name) for name in ("SIGKILL", "SIGTERM", "SIGHUP") if hasattr(signal, name)}
 """Exit codes of processes ended from outside: by a user, or by the system when out of memory"""
 

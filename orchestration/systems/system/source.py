@@ -40,7 +40,7 @@ class Source:
     noise: float | None = None
     """The intensity [unit² s] of white noise: normal values with variance noise / period, each held over `period`."""
     period: float | None = None
-    """How long each value of the noise is held [s]."""
+    """The time for which each value of the noise is held [s]."""
     signal: str | None = None
     """The name of a motion (hover, step, circle, lemniscate, helix, paper), or of gusts of wind (dryden: north, east,
     down)."""

@@ -34,7 +34,7 @@ class Expected:
     accuracy: float
     """Accuracy of the results, relative: the change by the last refinement of the computation."""
     method: str
-    """How the components were identified, and how the result was computed."""
+    """Method by which the components were identified, and by which the result was computed."""
     period: float
     """The hyperperiod of all that samples [s]."""
     horizon: float | None = None

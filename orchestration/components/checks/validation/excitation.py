@@ -24,7 +24,7 @@ class ExcitationPlan:
     uneven: bool = False
     """whether the steps are of different lengths"""
     times_set: int = 1
-    """how many times the inputs are set before a step"""
+    """Number of times that the inputs are set before a step"""
     steps: int = STEPS
 
 

@@ -30,7 +30,7 @@ class RunSummary:
 
     metrics: Metrics
     message: str | None
-    """how it diverged; None if it did not"""
+    """Text of how it diverged; None if it did not"""
 
 
 BatchOutcome = tuple[int, RunSummary | None, Floats]

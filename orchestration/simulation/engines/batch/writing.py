@@ -10,7 +10,7 @@ from orchestration.systems.expressions.syntax import Call, Name, Node, Number, O
 
 Moment: TypeAlias = Literal["row", "end", "middle"]
 Kind: TypeAlias = Literal["number", "continuous", "held", "line"]
-"""How a value changes between rows: never in the run, continuously, not at all, or linearly"""
+"""Changes of a value between rows: never in the run, continuously, not at all, or linearly"""
 
 
 @dataclass(frozen=True, kw_only=True)
