@@ -35,9 +35,9 @@ class Study:
     together: tuple[LinkedSettings, ...] = ()
     """Settings linked to the values of the axes besides their own targets, each applied on top of the previous."""
     method: Method = "sobol"
-    """Method by which axes without values are sampled; morris and saltelli are for sensitivity."""
+    """The method by which axes without values are sampled; morris and saltelli are for sensitivity."""
     samples: int = 0
-    """Number of points that are sampled; a power of two for sobol."""
+    """The number of points that are sampled; a power of two for sobol."""
     design_seed: int = 0
     """The seed of the sampling."""
     vary_seed: bool = False

@@ -60,7 +60,7 @@ class StudyFile:
     axes: list[AxisTable] = field(default_factory=list)
     """The axes."""
     design: DesignTable = field(default_factory=DesignTable)
-    """Sampling of the axes without values."""
+    """The sampling of the axes without values."""
     keep_signals: list[int] | bool = False
     """The runs whose signals are kept, by their index in the design; true for all."""
 
