@@ -25,9 +25,9 @@ class Fmu:
 
     archive: Archive
     root: Element
-    """of its model description"""
+    """Root element of its model description"""
     description: ModelDescription
-    """as fmpy reads it"""
+    """Model description as fmpy reads it"""
 
     @property
     def version(self) -> int:

@@ -26,7 +26,7 @@ _CONVERT: Mapping[str, Callable[[float], Value]] = {
     "Enumeration": int,
     "Boolean": bool,
 }
-"""Of numbers, by kind"""
+"""Conversions of numbers, by kind"""
 
 
 class CheckedInstance(NativeInstance):

@@ -49,7 +49,7 @@ class Probe:
 
     fmu: Fmu
     model: Model
-    """of the same file, as the master reads it"""
+    """Model of the same file, as the master reads it"""
     folder: Path
     budget: float
     """Time for the whole validation [s]"""
