@@ -55,7 +55,7 @@ def test_motors_of_which_not_all_is_known_have_no_thrust(controller: type[Slave]
 
 
 @pytest.mark.parametrize("controller", CONTROLLERS)
-def test_it_is_of_the_initial_command_too(controller: type[Slave]) -> None:
+def test_motor_thrusts_make_up_the_initial_command_too(controller: type[Slave]) -> None:
     law = controller(instance_name="it")
     for name, value in KNOWN.items():
         setattr(law, name, value)

@@ -29,7 +29,7 @@ def stalled(system: System, seconds: float) -> System:
     return quadcosim.changed(system, {processor.STALLED: seconds})
 
 
-def test_it_flies_as_if_at_once(system: System) -> None:
+def test_the_law_as_a_task_beside_others_flies_as_if_at_once(system: System) -> None:
     here = quadcosim.run(system, engine="compiled").metrics
     alone = NATIVE.with_changes(
         stop_time=20.0, timing={"plant_interval": 0.005}, parameters={"plant.max_internal_step": 0.005}

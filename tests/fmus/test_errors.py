@@ -390,7 +390,9 @@ def test_behind_the_loader_any_temporary_folder_will_do(name: str, built: dict[s
 
 @pytest.mark.usefixtures("python_inside")
 @pytest.mark.parametrize("name", [b"a%20b", b"J\xfcrgen"])
-def test_but_for_two_that_pythonfmu_cannot_be_given(name: bytes, built: dict[str, Path], tmp_path: Path) -> None:
+def test_two_folders_that_pythonfmu_cannot_be_given_are_named_in_one_line(
+    name: bytes, built: dict[str, Path], tmp_path: Path
+) -> None:
     said = loaded_in(tmp_path / os.fsdecode(name), built[PLANT])
     assert "expected a path in UTF-8, without %20 and file:// in it" in said
     assert said.count("\n") == 1

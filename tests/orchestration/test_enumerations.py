@@ -95,7 +95,7 @@ def test_the_description_names_the_items_and_no_rule_is_broken(maker: Path, syst
         assert validate(path) == []
 
 
-def test_it_is_given_by_name_or_by_number_and_starts_as_declared(system: System) -> None:
+def test_an_item_is_given_by_name_or_by_number_and_starts_as_declared(system: System) -> None:
     assert made(system) == 2.0
     assert [made(system, shape=value) for value in ("flat", "line", 3)] == [0.0, 1.0, 2.0]
     assert made(system, shape_index=3) == made(system, shape="flat", shape_index=3) == 2.0
@@ -157,7 +157,7 @@ def test_the_axis_of_a_study_has_names_for_values_and_so_has_its_table(maker: Pa
 
 
 @of_one_making
-def test_it_goes_through_an_ssp_and_back(system: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_item_goes_through_an_ssp_and_back(system: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(package, "_cache", lambda: tmp_path / "cache")
     read = load_request(*writing.write_with_timing(system, tmp_path / "loop.ssp"))
     assert isinstance(read, System)

@@ -12,7 +12,7 @@ LOAD = {"payload.mass": 0.5, "payload.drop_time": 0.1037}
 PUSHED = {"thrust": 12.0, "torque.x": 0.4, "torque.z": -0.2, "external_force.y": 0.7}
 
 
-def test_it_is_carried_until_its_time_and_for_ever_without_one() -> None:
+def test_a_payload_is_carried_until_its_time_and_for_ever_without_one() -> None:
     payload = Payload(mass=0.5, drop_time=2.0)
     assert [payload.carried(t) for t in (0.0, 1.999999, 2.0 - 1e-10, 2.0, 3.0)] == [0.5, 0.5, 0.0, 0.0, 0.0]
     assert Payload(mass=0.5).carried(1e6) == 0.5
@@ -64,14 +64,14 @@ def test_at_the_drop_the_velocity_goes_on_and_the_acceleration_jumps_by_the_form
     assert after - acceleration == pytest.approx(forces * (1.0 / 1.0 - 1.0 / 1.5), abs=1e-4)
 
 
-def test_it_adds_to_the_mass_and_not_to_the_inertia() -> None:
+def test_a_payload_adds_to_the_mass_and_not_to_the_inertia() -> None:
     heavy, loaded = (started({**MOVING, **PUSHED, **load}) for load in ({"mass": 1.5}, {"payload.mass": 0.5}))
     for slave in (heavy, loaded):
         run_steps(slave, 0.01, 20)
     assert get(heavy, *MOTION) == get(loaded, *MOTION)
 
 
-def test_it_can_be_let_go_between_two_steps() -> None:
+def test_a_payload_can_be_let_go_between_two_steps() -> None:
     slave = started({**LEVEL, **NO_WIND, "payload.mass": 0.5, "thrust": 15.0 * 0.981})
     run_steps(slave, 0.1, 1)
     assert get(slave, "velocity.z") == close([0.0])

@@ -333,7 +333,7 @@ def test_one_point_of_a_batch_without_a_desired_attitude_is_an_error() -> None:
         )
 
 
-def test_it_hovers_upright_and_upside_down_where_asked_to() -> None:
+def test_the_geometric_law_hovers_upright_and_upside_down_where_asked_to() -> None:
     """Upside down, which the unified law cannot ask for: the reference falls faster than g."""
     model, at = Model(mass=2.0), Measurement(ZERO, ZERO, IDENTITY, ZERO)
     upright = evaluate(at, Reference(position=ZERO), Gains(), model)

@@ -86,7 +86,7 @@ def test_a_reference_in_free_fall_fails_by_name() -> None:
     assert_fails(slave.exit_initialization_mode, *words)
 
 
-def test_it_says_that_it_has_no_semi_implicit_form() -> None:
+def test_the_geometric_slave_says_that_it_has_no_semi_implicit_form() -> None:
     slave = GeometricController(instance_name="c")
     slave.set_integer([slave._index["discretisation"]], [2])
     slave.setup_experiment(0.0)

@@ -84,7 +84,7 @@ def test_derivatives_while_initialising_are_those_of_the_law_in_sixty_digits(con
     np.testing.assert_allclose(found / scale, exact / scale, rtol=0.0, atol=1e-12)
 
 
-def test_they_are_differences_of_the_outputs(controller: Path) -> None:
+def test_directional_derivatives_are_differences_of_the_outputs(controller: Path) -> None:
     found, step = jacobian(controller), 1e-6
 
     def outputs(name: str, change: float) -> Matrix:

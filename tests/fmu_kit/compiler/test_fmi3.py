@@ -76,7 +76,7 @@ def controller(tmp_path: Path) -> Iterator[Instance]:
 
 
 @pytest.mark.parametrize("name", PAIR)
-def test_it_has_the_variables_of_the_other(name: str) -> None:
+def test_an_fmu_of_fmi_3_has_the_variables_of_that_of_fmi_2(name: str) -> None:
     two, three = read(f"native/{name}"), read(f"native/fmi3/{name}")
     common = (
         "name",

@@ -123,7 +123,7 @@ def test_a_slave_may_call_its_own_what_it_likes(target: Target, tmp_path: Path) 
     assert answers(InC.made(cls, path), {}, [{}] * 3) == expected
 
 
-def test_so_it_may_for_a_microcontroller(target: Target, tmp_path: Path) -> None:
+def test_embedded_c_has_names_that_are_keywords_of_c(target: Target, tmp_path: Path) -> None:
     for single in (False, True):
         source = write(target, tmp_path, single=single)
         assert made(source, "cc", "-O0").is_file()

@@ -50,7 +50,9 @@ def run_of(controller: str, **parameters: float | str) -> Result:
     return run(scenario.with_changes(parameters=values, timing=TIMING))
 
 
-def test_it_flies_as_the_general_one_with_these_values_to_the_bit(fixed: Path, request: pytest.FixtureRequest) -> None:
+def test_a_variant_flies_as_the_general_fmu_with_its_values_to_the_bit(
+    fixed: Path, request: pytest.FixtureRequest
+) -> None:
     folder = MAKINGS[request.node.callspec.params["fixed"]].folder
     one, other = run_of(str(fixed)), run_of(str(Path(folder, "UnifiedController")), **REDESIGN)
     assert one.columns == other.columns

@@ -35,7 +35,7 @@ def unnameable() -> object:
     return lambda: None
 
 
-def test_it_is_computed_here_by_fmus_of_this_kit_alone(built: dict[str, Path], tmp_path: Path) -> None:
+def test_only_what_fmus_of_this_kit_compute_is_computed_in_this_process(built: dict[str, Path], tmp_path: Path) -> None:
     ours, other = next(iter(built.values())), small(tmp_path)
     assert isolated_call([ours], os.getpid) == os.getpid()
     assert isolated_call([ours, other], os.getpid) != os.getpid()

@@ -90,7 +90,9 @@ def test_an_instance_is_kept_only_where_its_reset_is_one(tmp_path: Path) -> None
         instances.close()
 
 
-def test_it_is_shown_once_on_a_machine(tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_repeatability_of_an_fmu_is_shown_once_on_a_machine(
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = build("BROKEN_RESET", tmp_path)
     first = repeatability.of(path)
     monkeypatch.setattr(repeatability, "_known", {})

@@ -132,7 +132,7 @@ def test_an_instance_that_has_ended_a_run_is_for_no_other(
     kept.close()
 
 
-def test_it_is_kept_and_told(tmp_path: Path, main: Main) -> None:
+def test_a_termination_is_kept_and_told(tmp_path: Path, main: Main) -> None:
     result = ran(judged(alone(small(tmp_path, "ENDS_AT=0.05"))))
     again = load_run(save_run(result, tmp_path / "kept", figures=False))
     assert again.termination == result.termination

@@ -49,7 +49,7 @@ def scenario(folder: Path) -> Scenario:
 
 
 @pytest.mark.parametrize("name", vehicle.names())
-def test_it_flies_each_vehicle(scenario: Scenario, name: str) -> None:
+def test_a_controller_as_written_flies_each_vehicle(scenario: Scenario, name: str) -> None:
     of_vehicle = scenario.with_changes(vehicle=load_vehicle(name, Path()))
     result = run(of_vehicle)
     assert result.parameters["controller.mass"] == result.parameters["plant.mass"]
@@ -59,7 +59,7 @@ def test_it_flies_each_vehicle(scenario: Scenario, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [None, *MOTIONS, "waypoints.csv"])
-def test_it_follows_each_reference(scenario: Scenario, folder: Path, name: str | None) -> None:
+def test_a_controller_as_written_follows_each_reference(scenario: Scenario, folder: Path, name: str | None) -> None:
     (folder / "waypoints.csv").write_text("x,y,z\n0,0,0\n1,0,-1\n")
     is_file = name is not None and name.endswith(".csv")
     choice = ReferenceChoice(file=folder / name) if name and is_file else ReferenceChoice(name=name)

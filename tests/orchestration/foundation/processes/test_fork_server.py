@@ -34,7 +34,7 @@ def servers(name: str) -> list[int]:
     return [server.pid for key, server in fork_server.servers.items() if key[0] == name]
 
 
-def test_it_has_its_own_arguments_folder_environment_and_session(tmp_path: Path) -> None:
+def test_a_forked_process_has_its_own_arguments_folder_environment_and_session(tmp_path: Path) -> None:
     other = seen(1, OF_ANOTHER="x")
     found = seen("two", tmp_path, folder=tmp_path, OF_ITS_OWN="y", TMPDIR=str(tmp_path))
     assert found["arguments"] == ("two", str(tmp_path))
@@ -117,7 +117,7 @@ def test_what_a_killed_server_has_forked_ends_and_it_is_replaced() -> None:
         assert servers(waiting.name) != [server]
 
 
-def test_it_ends_with_its_server_though_that_ended_before_it_looked() -> None:
+def test_a_forked_process_ends_with_its_server_though_that_ended_before_it_looked() -> None:
     child = Child(module("look late"))
     for server in servers(MODULE):
         os.kill(server, signal.SIGKILL)
@@ -170,7 +170,7 @@ def test_its_folder_is_not_on_a_safe_path(tmp_path: Path) -> None:
     assert seen(folder=tmp_path, PYTHONSAFEPATH="1")["path"] != str(tmp_path)
 
 
-def test_it_starts_where_the_system_shows_no_processes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_forked_process_starts_where_the_system_shows_no_processes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Path, "read_text", lambda _: Path("/no/proc").stat())
     assert seen()["imported by"] in servers(MODULE)
 

@@ -423,7 +423,7 @@ def test_an_instance_that_does_more_than_call_its_fmu_is_stepped_in_python(fmu: 
         assert Stepped.steps > 0
 
 
-def test_it_is_the_default_where_it_can_be_had(fmu: Path) -> None:
+def test_the_compiled_loop_is_the_default_where_it_can_be_had(fmu: Path) -> None:
     with prepared(of(LOOP, fmu)) as run:
         assert run.master.engine == "compiled"
         run.master.initialise()

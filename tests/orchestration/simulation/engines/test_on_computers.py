@@ -68,7 +68,7 @@ def test_random_systems_on_computers_run_the_same_in_schedules_of_any_length(
 @given(
     systems_on_computers(), st.floats(0.0, 1.0), st.tuples(ENGINES, ENGINES), st.sampled_from((5, schedule.INSTANTS))
 )
-def test_and_go_on_from_a_pause_as_if_there_was_none(
+def test_systems_on_computers_go_on_from_a_pause_as_if_there_was_none(
     fmu: Path, kept: Kept, what: System, share: float, engines: tuple[Any, Any], size: int
 ) -> None:
     expect_that_a_pause_changes_nothing(of(what, fmu), share, engines, size, kept.load)
@@ -241,7 +241,9 @@ def crowds(draw: st.DrawFn) -> list[System]:
 
 @settings(max_examples=30, derandomize=True, deadline=None)
 @given(crowds())
-def test_and_in_lanes_beside_others(fmu: Path, kept: Kept, crowd: list[System]) -> None:
+def test_systems_on_computers_have_the_same_bits_in_lanes_beside_others(
+    fmu: Path, kept: Kept, crowd: list[System]
+) -> None:
     simulated = [of(what, fmu) for what in crowd]
     shape = shape_of(simulated[0])
     found = in_lanes(shape, simulated)

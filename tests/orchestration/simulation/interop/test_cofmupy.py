@@ -62,7 +62,7 @@ def run_by(name: str, folder: Path) -> tuple[dict[str, Any], list[list[str]], An
 
 
 @pytest.mark.parametrize(("name", "method"), [("cofmupy", "jacobi"), ("cofmupy gauss_seidel", "gauss_seidel")])
-def test_it_is_given_the_whole_loop_and_steps_the_controller_first(name: str, method: str, tmp_path: Path) -> None:
+def test_cofmupy_is_given_the_whole_loop_and_steps_the_controller_first(name: str, method: str, tmp_path: Path) -> None:
     configuration, order, _ = run_by(name, tmp_path)
     assert configuration["cosim_method"] == method
     assert order == [["controller", "plant"]]

@@ -61,7 +61,7 @@ def test_a_resumed_run_has_the_bits_of_an_uninterrupted_one(timing: Timing, at: 
     assert resumed.metrics == whole.metrics
 
 
-def test_it_goes_on_in_another_process(tmp_path: Path) -> None:
+def test_a_paused_run_goes_on_in_another_process(tmp_path: Path) -> None:
     scenario = native(stop_time=0.3, timing=EVERYTHING)
     run_until(scenario, 0.15, tmp_path / "paused")
     code = "import sys, orchestration as q; q.save_run(q.resume(sys.argv[1]), sys.argv[2], figures=False)"

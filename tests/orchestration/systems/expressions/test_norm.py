@@ -45,7 +45,7 @@ def in_lanes(node: Node, values: tuple[float, ...]) -> float:
     "expression", ["norm(p)", "norm(v, p)", "norm(p, v)", "hypot(v, p.x)", "norm(p, 2 * p)", "norm(v)"]
 )
 @given(values=st.tuples(NUMBERS, NUMBERS, NUMBERS, NUMBERS))
-def test_it_has_the_same_bits_everywhere(expression: str, values: tuple[float, ...]) -> None:
+def test_the_norm_has_the_same_bits_everywhere(expression: str, values: tuple[float, ...]) -> None:
     node = parse(expression)
     at_once = compiled(node, PLACES)(values)
     assert at_once == over_rows(node, values)

@@ -37,7 +37,7 @@ def of(word: str, *operands: Node) -> Node:
 
 
 @given(a=st.floats(0.01, 0.99), b=st.floats(0.01, 0.99))
-def test_it_is_the_same_at_an_instant_and_over_a_run(a: float, b: float) -> None:
+def test_an_operator_is_the_same_at_an_instant_and_over_a_run(a: float, b: float) -> None:
     for word in OPERATORS:
         at_once, over_rows = both(of(word, Name("a"), Name("b")), a, b)
         assert at_once == pytest.approx(over_rows, rel=0.0 if word in EXACT else 1e-14, abs=0.0), word

@@ -116,7 +116,7 @@ def test_steps_rows_and_events_are_the_same_over_random_systems(what: System, si
 
 
 @given(systems_of_fixed_steps(), SIZES)
-def test_and_with_components_of_fixed_step_to_whose_points_instants_move(
+def test_both_clocks_agree_where_instants_move_to_the_points_of_fixed_steps(
     drawn: tuple[System, list[str]], size: int
 ) -> None:
     try:
@@ -132,14 +132,14 @@ SENSORS = st.dictionaries(st.sampled_from(NAMES), st.just(0.0) | st.floats(1e-3,
 
 
 @given(st.data())
-def test_and_over_random_timings_of_the_quadrotor(data: st.DataObject) -> None:
+def test_both_clocks_agree_over_random_timings_of_the_quadrotor(data: st.DataObject) -> None:
     sensors: dict[str, Any] = {"noise": data.draw(SENSORS), "quantisation": data.draw(SENSORS)}
     same(flight(data.draw(cases(**sensors, hold=data.draw(st.sampled_from(["zero", "first"]))))))
 
 
 @settings(max_examples=20)
 @given(st.data())
-def test_and_with_the_controllers_own_clock(data: st.DataObject) -> None:
+def test_both_clocks_agree_with_the_controllers_own_clock(data: st.DataObject) -> None:
     period = data.draw(st.sampled_from([0.01, 0.025, 0.1]))
     same(flight(data.draw(cases(clock="fmu", jitter=0.0, clock_ratio=1.0, period=period, offset=0.0))))
 
@@ -152,7 +152,9 @@ ALL: dict[str, Any] = {
 @pytest.mark.parametrize("burst_length", [None, 1.0, 4.0])
 @pytest.mark.parametrize("distribution", ["uniform", "normal"])
 @pytest.mark.parametrize("order", ["gauss-seidel", "jacobi"])
-def test_and_over_many_samples_with_every_cause_on(order: Any, distribution: Any, burst_length: float | None) -> None:
+def test_both_clocks_agree_over_many_samples_with_every_cause_on(
+    order: Any, distribution: Any, burst_length: float | None
+) -> None:
     timing = Timing(
         **ALL, order=order, jitter_distribution=distribution, burst_length=burst_length, hold="first",
         plant_interval=0.05, noise={"position": 0.01, "quaternion.w": 0.1}, quantisation={"velocity": 0.25},

@@ -54,7 +54,7 @@ def test_the_integral_is_least_where_the_next_four_derivatives_are_continuous_to
     assert ends == pytest.approx(begins, rel=1e-7, abs=1e-6)
 
 
-def test_it_is_at_rest_before_the_first_and_after_the_last_point() -> None:
+def test_a_curve_is_at_rest_before_its_first_and_after_its_last_point() -> None:
     found = through(TIMES, POINTS).at(np.array([-1.0, 0.0, 7.0, 9.0]))
     assert found[:, 0] == pytest.approx(POINTS[[0, 0, -1, -1]], abs=1e-9)
     assert not found[:, 1:].any()

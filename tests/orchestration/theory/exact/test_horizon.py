@@ -66,7 +66,7 @@ def test_a_horizon_within_a_period_ends_there() -> None:
     )
 
 
-def test_it_is_finite_where_the_stationary_cost_is_not() -> None:
+def test_a_cost_to_a_horizon_is_finite_where_the_stationary_one_is_not() -> None:
     lossy = at_zero(example("minimum_variance", {LOSS: 0.3, START: 3.0}))
     found = expect(lossy, horizon=20.0)
     assert found.mean_square_radius > 1.0

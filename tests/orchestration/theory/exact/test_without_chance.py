@@ -27,7 +27,7 @@ PERIOD, DELAY = "components.controller.sampling.period", "connections.command.de
     ],
     ids=["prompt", "late", "first", "measured", "measured first", "jacobi", "clock", "scale"],
 )
-def test_it_is_that_of_one_period_from_each_number(changes: dict[str, Any]) -> None:
+def test_the_mean_square_radius_is_that_of_one_period_from_each_number(changes: dict[str, Any]) -> None:
     """As simulated: a first-order hold goes in steps of the plant, which both take."""
     system = example("double_integrator", {PERIOD: 0.4, "components.plant.step": 0.01, **changes})
     found, instances = expect(system, as_simulated=True), Instances()

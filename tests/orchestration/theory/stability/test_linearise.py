@@ -125,7 +125,7 @@ def test_a_component_that_samples_more_often_than_another_is_refused(system: Sys
         linearise(both, "controller")
 
 
-def test_it_is_a_system_of_python_control_with_its_names(system: System) -> None:
+def test_a_linearised_loop_is_a_system_of_python_control_with_its_names(system: System) -> None:
     control = pytest.importorskip("control")
     rest = linearise(changed(system, {PERIOD: 0.5})).rest
     found = dataclasses.replace(rest, inputs=("torque.x",)).to_control()
