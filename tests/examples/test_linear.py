@@ -12,7 +12,7 @@ from orchestration.foundation.basics.documents import read_toml
 from orchestration.quadrotor.flight.hover import at_hover
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
 from orchestration.systems.system.component import Parameter
-from orchestration.theory.stability.monodromy import growth_of_loop
+from orchestration.theory.stability.period_map import growth_of_loop
 from quadcosim import Scenario, Timing
 from tests.native import native
 from tests.orchestration.components.fmi.small import needs_compiler

@@ -13,7 +13,7 @@ from orchestration.quadrotor.flight.hover import at_hover
 from orchestration.quadrotor.flight.hover_loop import HoverLoop
 from orchestration.quadrotor.scenarios.file import scenario_from_tables
 from orchestration.quadrotor.scenarios.scenario import Scenario
-from orchestration.theory.stability.monodromy import growth_of_loop
+from orchestration.theory.stability.period_map import growth_of_loop
 
 MEAN = {"discretisation": "mean", "stages": 3}
 

@@ -39,9 +39,9 @@ def _layout() -> KnownLayout:
 
 
 def _loop() -> KnownLoop:
-    from orchestration.quadrotor.flight.local_limit import AboutHover
+    from orchestration.quadrotor.flight.local_limit import ABOUT_HOVER
 
-    return AboutHover()
+    return ABOUT_HOVER
 
 
 def _crossover() -> Crossover:

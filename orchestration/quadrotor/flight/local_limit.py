@@ -13,10 +13,9 @@ from orchestration.quadrotor.scenarios.quantities import range_of
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.simulation.requests.ranges import Varied
 from orchestration.systems.system.distribution import lowest
-from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.systems.system.request import Request
-from orchestration.theory.stability.known_loops import LocalLimit
+from orchestration.theory.stability.known_loops import KnownLoop, LocalLimit
 from orchestration.theory.stability.local_limit import about_rest
 
 HOVER = "spectral radius of the sampled loop about hover, by differences through saved states"
@@ -26,35 +25,35 @@ KNOWN = ("period", "delay")
 """Quantities for which the loop about hover applies"""
 
 
-class AboutHover:
-    """The loop of a `Scenario` about hover."""
+def local_limits(varied: Varied, span: Range) -> LocalLimit:
+    """The local limit of a quantity: of the loop about hover where that applies, else as for any system."""
+    scenario = cast(Scenario, varied.request)
+    if varied.of in ("jitter", "loss"):
+        return LocalLimit(reason=f"linear theory has no local limit of {varied.of}")
+    why = "the loop about hover is for period and delay only"
+    try:
+        if varied.of in KNOWN:
+            return about_hover(scenario, varied.of)
+    except NotSmooth as error:
+        return LocalLimit(reason=f"no local limit: {error}")
+    except UsageError as error:
+        why = str(error)
+    return _without_hover_loop(scenario, varied, span, why)
 
-    def at_rest(self, request: Request) -> System:
-        """The system of a scenario at hover."""
-        return at_hover(cast(Scenario, request))
 
-    def local_limits(self, varied: Varied, span: Range) -> LocalLimit:
-        """The local limit of a quantity: of the loop about hover where that applies, else as for any system."""
-        scenario = cast(Scenario, varied.request)
-        if varied.of in ("jitter", "loss"):
-            return LocalLimit(reason=f"linear theory has no local limit of {varied.of}")
-        why = "the loop about hover is for period and delay only"
-        try:
-            if varied.of in KNOWN:
-                return about_hover(scenario, varied.of)
-        except NotSmooth as error:
-            return LocalLimit(reason=f"no local limit: {error}")
-        except UsageError as error:
-            why = str(error)
-        return _without_hover_loop(scenario, varied, span, why)
+def radius_over(request: Request, of: str) -> Callable[[float], float] | None:
+    """The spectral radius over a period or delay [s]; raises `UsageError` if there is no linear loop at hover."""
+    if of not in KNOWN:
+        return None
+    scenario = cast(Scenario, request)
+    loop = HoverLoop.of(scenario)
+    return lambda value: radius(loop, scenario, of, value)
 
-    def radius_over(self, request: Request, of: str) -> Callable[[float], float] | None:
-        """The spectral radius over a period or delay [s]; raises `UsageError` if there is no linear loop at hover."""
-        if of not in KNOWN:
-            return None
-        scenario = cast(Scenario, request)
-        loop = HoverLoop.of(scenario)
-        return lambda value: radius(loop, scenario, of, value)
+
+ABOUT_HOVER = KnownLoop(
+    at_rest=lambda request: at_hover(cast(Scenario, request)), local_limits=local_limits, radius_over=radius_over
+)
+"""The loop of a `Scenario` about hover"""
 
 
 def local_limit(loop: HoverLoop, scenario: Scenario, of: str) -> float | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from orchestration.foundation.basics.registry import Registry
 
@@ -27,17 +27,16 @@ class LocalLimit:
     reason: str
 
 
-class KnownLoop(Protocol):
+@dataclass(frozen=True, kw_only=True)
+class KnownLoop:
     """The linear loop of one kind of request about its operating point."""
 
-    def at_rest(self, request: Request) -> System:
-        """The system of a request at its operating point."""
-
-    def local_limits(self, varied: Varied, span: Range) -> LocalLimit:
-        """The local limit of a quantity."""
-
-    def radius_over(self, request: Request, of: str) -> Callable[[float], float] | None:
-        """The spectral radius as a function of a quantity; None for an unsupported quantity. Raises `UsageError`."""
+    at_rest: Callable[[Request], System]
+    """the system of a request at its operating point"""
+    local_limits: Callable[[Varied, Range], LocalLimit]
+    """the local limit of a quantity"""
+    radius_over: Callable[[Request, str], Callable[[float], float] | None]
+    """the spectral radius as a function of a quantity; None for an unsupported quantity; raises `UsageError`"""
 
 
 LOOPS: Registry[KnownLoop] = Registry()

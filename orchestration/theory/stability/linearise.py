@@ -1,5 +1,6 @@
 """A system about its operating point, cut open at one component: that component, and the rest of the loop."""
 
+from contextlib import closing
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,17 +45,13 @@ def linearise(request: RequestLike, component: str | None = None) -> Linearised:
     component that is not sampled, or is sampled more often than another one.
     """
     request = request_of(request)
-    instances = Instances()
-    try:
-        with errors_in_own_terms(request):
-            system = rested(request)
-            name = component_named(system, component, "at which to cut the loop open")
-            if system.components[name].sampling is None:
-                raise UsageError(f"component: {name}: expected a sampled component")
-            with at_rest(system, instances) as loop:
-                return _cut_open(loop, name)
-    finally:
-        instances.close()
+    with errors_in_own_terms(request), closing(Instances()) as instances:
+        system = rested(request)
+        name = component_named(system, component, "at which to cut the loop open")
+        if system.components[name].sampling is None:
+            raise UsageError(f"component: {name}: expected a sampled component")
+        with at_rest(system, instances) as loop:
+            return _cut_open(loop, name)
 
 
 def _cut_open(loop: AtRest, name: str) -> Linearised:

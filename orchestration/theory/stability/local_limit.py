@@ -1,6 +1,7 @@
 """Local limits: where small deviations from an operating point cease to decay."""
 
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import replace
 
 from orchestration.components.fmi.reuse import Instances
@@ -10,8 +11,8 @@ from orchestration.simulation.requests.ranges import Varied
 from orchestration.systems.system.model import System
 from orchestration.theory.stability.known_loops import LOOPS, LocalLimit
 from orchestration.theory.stability.linearised_component import PULSE
-from orchestration.theory.stability.monodromy import growth_of_loop
 from orchestration.theory.stability.operating_point import NotAnEquilibriumError
+from orchestration.theory.stability.period_map import growth_of_loop
 from orchestration.theory.stability.perturbed_runs import growth_of
 
 LOOP = "spectral radius of the sampled loop about the operating point, by differences through saved states"
@@ -40,22 +41,18 @@ def local_limits(varied: Varied, span: Range) -> LocalLimit:
 
 def about_rest(at: Callable[[float], System], span: Range) -> LocalLimit:
     """The local limit of any system; `at` makes the system for a value of the quantity."""
-    instances = Instances()
     try:
-        return _through_saved_states(at, span, instances)
+        with closing(Instances()) as instances:
+            return _through_saved_states(at, span, instances)
     except NotAnEquilibriumError as error:
         return LocalLimit(reason=f"no local limit: {error}")
     except (UsageError, SimulatorError) as error:
         why = str(error)
-    finally:
-        instances.close()
-    instances = Instances()
     try:
-        found = _by_twins(at, span, instances)
+        with closing(Instances()) as instances:
+            found = _first_growth(lambda value: growth_of(at(value), instances).rate, span, TWINS_FINER, TWINS)
     except (UsageError, SimulatorError) as error:
         return LocalLimit(reason=f"no local limit: {error}")
-    finally:
-        instances.close()
     return replace(found, method=f"{TWINS}, as saved states do not suffice: {why}")
 
 
@@ -74,10 +71,6 @@ def _through_saved_states(at: Callable[[float], System], span: Range, instances:
     slope = (growths[above] - growths[below]) / (above - below)
     difference = abs(growth_of_loop(at(below), instances, OTHER_PULSE * PULSE) - growths[below])
     return replace(found, accuracy=found.accuracy + difference / slope)
-
-
-def _by_twins(at: Callable[[float], System], span: Range, instances: Instances) -> LocalLimit:
-    return _first_growth(lambda value: growth_of(at(value), instances).rate, span, TWINS_FINER, TWINS)
 
 
 def _first_growth(growth: Growth, span: Range, finer: float, method: str) -> LocalLimit:

@@ -12,6 +12,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
@@ -21,11 +22,12 @@ from orchestration.simulation.engines.resolved import fixed_steps
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.component import Component
-from orchestration.systems.system.model import Criterion
+from orchestration.systems.system.model import Criterion, System
 from orchestration.theory.stability.linear_simulator import LinearSimulator, OpenPort
-from orchestration.theory.stability.loop_at_rest import AtRest
+from orchestration.theory.stability.linearised_component import PULSE
+from orchestration.theory.stability.loop_at_rest import AtRest, at_rest
 
-LARGEST = 400
+MAX_STATES = 400
 """states of a loop"""
 
 
@@ -42,8 +44,8 @@ def period_map(loop: AtRest, ports: Mapping[str, OpenPort] | None = None) -> Flo
     places = [*_state_parts(master, simulators), *(port.sent for port in ports.values())]
     received = [port.received for port in ports.values()]
     columns, rows = sum(map(len, places)), sum(map(len, [*_state_parts(master, simulators), *received]))
-    if columns > LARGEST:
-        raise UsageError(f"the loop has {columns} states, more than {LARGEST}")
+    if columns > MAX_STATES:
+        raise UsageError(f"the loop has {columns} states, more than {MAX_STATES}")
     result: Floats = np.zeros((rows, columns))
     for i, unit in enumerate(np.eye(columns)):
         _assign(unit, [*_state_parts(master, simulators), *(port.sent for port in ports.values())])
@@ -57,12 +59,22 @@ def period_map(loop: AtRest, ports: Mapping[str, OpenPort] | None = None) -> Flo
     return result
 
 
+def growth_of_loop(system: System, instances: Instances, pulse: float = PULSE) -> float:
+    """The growth rate [1/s] of small deviations from the operating point of `system`; negative: they decay.
+
+    Raises `UsageError` where the system does not rest there, or has no linear loop, saying why.
+    """
+    with at_rest(system, instances, pulse) as loop:
+        radius = float(np.abs(np.linalg.eigvals(period_map(loop))).max(initial=0.0))
+        return math.log(radius) / (float(loop.period) / NANOSECONDS) if radius > 0.0 else -math.inf
+
+
 def _master(loop: AtRest, simulators: Mapping[str, LinearSimulator]) -> Master:
     """A master of linear simulators, under the clock of the system, for a period for each possible state."""
     simulation = loop.simulation
     system = replace(
         simulation.system,
-        stop_time=float(loop.begin + (LARGEST + 2) * loop.period) / NANOSECONDS,
+        stop_time=float(loop.begin + (MAX_STATES + 2) * loop.period) / NANOSECONDS,
         components={
             name: _with_even_steps(component, loop.period)
             if simulation.instances[name].model.varies_step

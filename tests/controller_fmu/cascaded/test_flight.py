@@ -11,7 +11,7 @@ from orchestration.components.fmi.reuse import Instances
 from orchestration.quadrotor.flight.hover import at_hover
 from orchestration.quadrotor.flight.hover_loop import HoverLoop
 from orchestration.systems.system.model import System
-from orchestration.theory.stability.monodromy import growth_of_loop
+from orchestration.theory.stability.period_map import growth_of_loop
 from quadcosim import Result, Scenario, Timing, UsageError
 from tests.native import assert_the_same, natives
 

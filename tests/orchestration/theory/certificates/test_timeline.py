@@ -19,7 +19,7 @@ from orchestration.theory.certificates.parts import CertifiedLoop, certified_loo
 from orchestration.theory.certificates.timeline import LoopTimeline
 from orchestration.theory.certificates.varying import BOXES, DELAY, JITTER, LATENCY, LOSS, SHIFT, Varying
 from orchestration.theory.stability.loop_at_rest import at_rest
-from orchestration.theory.stability.monodromy import growth_of_loop
+from orchestration.theory.stability.period_map import growth_of_loop
 from tests.examples.common import example
 from tests.orchestration.theory.certificates.loops import through_a_filter
 

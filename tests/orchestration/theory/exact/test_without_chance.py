@@ -7,7 +7,7 @@ import pytest
 
 from orchestration.components.fmi.reuse import Instances
 from orchestration.theory.exact.expect import expect
-from orchestration.theory.stability.monodromy import growth_of_loop
+from orchestration.theory.stability.period_map import growth_of_loop
 from tests.examples.common import example
 
 PERIOD, DELAY = "components.controller.sampling.period", "connections.command.delay"

@@ -14,7 +14,7 @@ from orchestration.components.fmi.reuse import Instances
 from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
-from orchestration.theory.stability.monodromy import growth_of_loop
+from orchestration.theory.stability.period_map import growth_of_loop
 from orchestration.theory.stability.state_space import reduced
 from quadcosim import Linearised, QuadcosimError, StateSpace, Timing, UsageError, linearise
 from tests.commands import Main

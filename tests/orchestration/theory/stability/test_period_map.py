@@ -22,7 +22,7 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.stability import local_limit as local
 from orchestration.theory.stability.local_limit import LOOP, TWINS, local_limits
-from orchestration.theory.stability.monodromy import growth_of_loop
+from orchestration.theory.stability.period_map import growth_of_loop
 from orchestration.theory.stability.perturbed_runs import Growth, growth_of
 from quadcosim import Scenario, Timing, UsageError
 from tests.examples.common import example
