@@ -5,11 +5,12 @@ A digital task runs at every period of its own clock, as a task of a computer, o
 
 from collections.abc import Iterator, Mapping
 from dataclasses import field
+from fractions import Fraction
 from typing import Any
 
 from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.foundation.basics.records import Scalar, record
-from orchestration.foundation.basics.times import is_at_least
+from orchestration.foundation.basics.times import exact_nanoseconds, is_at_least
 from orchestration.systems.system.choices import Align, Clock, Spread
 from orchestration.systems.system.distribution import (
     Varying,
@@ -52,6 +53,16 @@ class Sampling:
             self.expect_jitter_within_period()
         if self.clock == "fmu":
             require_own_clock(self)
+
+    @property
+    def true_period(self) -> Fraction:
+        """The period by the true clock [ns]."""
+        return exact_nanoseconds(self.period) / Fraction(repr(float(self.clock_ratio)))
+
+    @property
+    def true_offset(self) -> Fraction:
+        """The time of the first instant by the true clock [ns]."""
+        return exact_nanoseconds(self.offset) / Fraction(repr(float(self.clock_ratio)))
 
     @property
     def is_random(self) -> bool:

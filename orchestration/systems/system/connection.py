@@ -1,7 +1,7 @@
 """A connection of a system: the signals that travel together from one component to another, and their faults."""
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import field, replace
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.records import record
@@ -67,6 +67,10 @@ class Connection:
     def is_random(self) -> bool:
         """Whether the seed changes which of its messages arrive, and when."""
         return is_random(self.delay) or spreads(self.delay_jitter) or spreads(self.loss)
+
+    def with_delay(self, delay: float) -> "Connection":
+        """The connection with one delay [s] for all messages, of which none is lost."""
+        return replace(self, delay=delay, delay_jitter=0.0, jitter_distribution="uniform", loss=0.0, burst_length=None)
 
     def __post_init__(self) -> None:
         require_varying(self, "delay", "delay_jitter")

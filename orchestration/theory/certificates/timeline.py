@@ -11,14 +11,15 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
+from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.theory.certificates.course import Courses, PieceAt, Steps, time_at
 from orchestration.theory.certificates.family import Letter, LoopFamily
 from orchestration.theory.certificates.parts import CertifiedLoop
 from orchestration.theory.certificates.varying import DELAY, JITTER, LATENCY, LOSS, SHIFT, Draws, Point, Varying
-from orchestration.theory.exact.links import ATTOSECONDS, RandomLink, SampledTask, attoseconds, hyperperiod
+from orchestration.theory.exact.links import ATTOSECONDS, RandomLink, SampledTask, attoseconds, exact_seconds
 from orchestration.theory.exact.random_times import RandomTime
 from orchestration.theory.exact.timing import links_of, sampled_tasks
+from orchestration.theory.stability.operating_point import hyperperiod
 
 Same = Callable[[Steps, Steps, Point], bool]
 """Whether two courses have the same effect at a point"""
@@ -54,8 +55,8 @@ class LoopTimeline:
 
         At most `run` messages are lost in a row. Raises `UsageError` where two draws would be open at once.
         """
-        limits = [_attoseconds(J) for J in largest]
-        draws = Draws(limits, sum(limits) if largest_sum is None else _attoseconds(largest_sum))
+        limits = [attoseconds(exact_seconds(J)) for J in largest]
+        draws = Draws(limits, sum(limits) if largest_sum is None else attoseconds(exact_seconds(largest_sum)))
         begin, end = self._extent(draws.corners())
         if end - begin > self._period:
             raise UsageError(
@@ -197,10 +198,6 @@ def _about(of: PieceAt, point: Point, varies: Sequence[bool]) -> Steps:
         else:
             found.append(step)
     return found
-
-
-def _attoseconds(seconds: float) -> int:
-    return attoseconds(exact_nanoseconds(seconds) / NANOSECONDS)
 
 
 def _moves(piece: tuple[int, int], run: int) -> tuple[tuple[tuple[int, int], ...], tuple[tuple[int, int], ...]]:

@@ -9,13 +9,12 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
 from orchestration.systems.schedule.plan import Plan
 from orchestration.systems.system.connection import component_of
 from orchestration.systems.system.model import System
 from orchestration.theory.exact.effects import LoopEffects, Places
 from orchestration.theory.exact.flows import Flows
-from orchestration.theory.exact.links import ATTOSECONDS, RandomLink, SampledTask
+from orchestration.theory.exact.links import ATTOSECONDS, RandomLink, SampledTask, exact_seconds
 from orchestration.theory.exact.objectives import Mean
 from orchestration.theory.exact.pieces import Piece
 from orchestration.theory.stability.matrices import Components, Continuous
@@ -48,8 +47,8 @@ class SimulatedEffects(LoopEffects):
     @property
     def grids(self) -> list[Fraction]:
         """The periods [s] of noise, in their order, followed by those of steps."""
-        periods = [_seconds(self.system.sources[name].period or 0.0) for name in self.noise]
-        return periods + sorted({_seconds(self.system.components[name].step or 0.0) for name in self.continuous})
+        periods = [exact_seconds(self.system.sources[name].period or 0.0) for name in self.noise]
+        return periods + sorted({exact_seconds(self.system.components[name].step or 0.0) for name in self.continuous})
 
     def charge(self, means: Sequence[Mean]) -> None:
         """As `LoopEffects`: by the trapezoidal rule from row to row, exactly where all signals are held."""
@@ -177,14 +176,10 @@ def _with_held_inputs(part: Continuous) -> tuple[Floats, Floats, Floats]:
     return F, np.zeros_like(F), np.zeros((0, n + m, n + m))
 
 
-def _seconds(seconds: float) -> Fraction:
-    return exact_nanoseconds(seconds) / NANOSECONDS
-
-
 def expect_rows(system: System, tasks: Sequence[SampledTask], links: Sequence[RandomLink]) -> None:
     """Raise `UsageError` for events between the steps of a component in continuous time."""
     continuous = [name for name, one in system.components.items() if one.sampling is None]
-    steps = {_seconds(system.components[name].step or 0.0) for name in continuous}
+    steps = {exact_seconds(system.components[name].step or 0.0) for name in continuous}
     if len(steps) > 1:
         raise UsageError(f"--as-simulated: {', '.join(continuous)} have different steps: expected one step")
     if not steps:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
 from orchestration.theory.exact.random_times import CERTAIN, RandomTime
 
 ATTOSECONDS = 10**18
@@ -71,12 +70,9 @@ class RandomLink:
         return self.burst_length is not None and 0.0 < self.loss < 1.0
 
 
-def hyperperiod(periods: Sequence[Fraction]) -> Fraction:
-    """The least common multiple of the periods; 1 s where there are none."""
-    if not periods:
-        return Fraction(1)
-    denominator = math.lcm(*(period.denominator for period in periods))
-    return Fraction(math.lcm(*(int(period * denominator) for period in periods)), denominator)
+def exact_seconds(seconds: float) -> Fraction:
+    """The rational number that the decimal form of `seconds` means."""
+    return exact_nanoseconds(seconds) / NANOSECONDS
 
 
 def attoseconds(seconds: Fraction) -> int:

@@ -16,7 +16,7 @@ from orchestration.components.fmi.model import Model
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
+from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.systems.expressions.syntax import Call
 from orchestration.systems.schedule.plan import Plan
 from orchestration.systems.system.component import Sampling, has_scheduled_instants
@@ -29,7 +29,7 @@ from orchestration.theory.exact.components import ComponentIdentifier
 from orchestration.theory.exact.effects import ContinuousEffects, LoopEffects
 from orchestration.theory.exact.horizon import costs_until
 from orchestration.theory.exact.initial_state import InitialState, initial_state_of
-from orchestration.theory.exact.links import ATTOSECONDS, RandomLink, SampledTask
+from orchestration.theory.exact.links import ATTOSECONDS, RandomLink, SampledTask, attoseconds, exact_seconds
 from orchestration.theory.exact.moments import JumpLinear
 from orchestration.theory.exact.objective_means import ObjectiveMeans
 from orchestration.theory.exact.repeating import periodic_schedule
@@ -38,7 +38,6 @@ from orchestration.theory.exact.timing import links_of, sampled_tasks
 from orchestration.theory.exact.timing_chain import TimingChain
 from orchestration.theory.stability.loop_at_rest import ExtraSignals, at_rest
 from orchestration.theory.stability.matrices import Components, Continuous, SampledSystem
-from orchestration.theory.stability.operating_point import true_period
 
 T = TypeVar("T")
 
@@ -200,7 +199,7 @@ class Loops:
         effects = self._effects(rests, linear, used, with_means=True)
         assert linear.initial is not None
         start, constant = effects.initial_vector(linear.initial), effects.places("constant", "").start
-        end = round(exact_nanoseconds(horizon) * (ATTOSECONDS // NANOSECONDS))
+        end = attoseconds(exact_seconds(horizon))
 
         def answer(chain: TimingChain) -> tuple[None, Floats]:
             return None, costs_until(chain, start, constant, end) / (end / ATTOSECONDS) if used else np.zeros(0)
@@ -286,7 +285,7 @@ def expect_same_steps(
                 f"components.{task.name}.sampling.jitter: the samples of {task.name} depend on the time to the "
                 "next one; expected none"
             )
-        step = true_period(_sampling(system, task.name)) / NANOSECONDS
+        step = _sampling(system, task.name).true_period / NANOSECONDS
         ends = [*task.offsets, *(task.period + offset for offset in task.offsets[:1] if repeating)]
         if any(then - now != step for now, then in itertools.pairwise(ends)):
             raise UsageError(
@@ -310,10 +309,7 @@ def _without_random_timing(system: System) -> System:
             name: one if one.sampling is None else replace(one, sampling=replace(one.sampling, jitter=0.0))
             for name, one in system.components.items()
         },
-        connections=tuple(
-            replace(x, delay=0.0, delay_jitter=0.0, jitter_distribution="uniform", loss=0.0, burst_length=None)
-            for x in system.connections
-        ),
+        connections=tuple(x.with_delay(0.0) for x in system.connections),
     )
 
 

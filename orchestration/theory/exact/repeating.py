@@ -35,13 +35,13 @@ from orchestration.systems.computers.parts import (
     SWITCHING,
     WRITTEN,
 )
-from orchestration.systems.system.component import has_scheduled_instants
+from orchestration.systems.system.component import Sampling, has_scheduled_instants
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import messages_by_connection, placed_messages, placed_tasks, released_by
-from orchestration.theory.exact.links import hyperperiod
 from orchestration.theory.exact.periodic_schedule import NO_SCHEDULE, PeriodicSchedule, ScheduleTrace
 from orchestration.theory.exact.scheduled import expect_certain
+from orchestration.theory.stability.operating_point import hyperperiod
 
 MOST_JOBS = 200_000
 """Most jobs of all tasks and messages that are simulated"""
@@ -67,12 +67,7 @@ def periodic_schedule(
     released = released_by(system)
     system = replace(
         system,
-        connections=tuple(
-            x
-            if x.name in released
-            else replace(x, delay=0.0, delay_jitter=0.0, jitter_distribution="uniform", loss=0.0, burst_length=None)
-            for x in system.connections
-        ),
+        connections=tuple(x if x.name in released else x.with_delay(0.0) for x in system.connections),
     )
     if horizon is not None:
         end = nanoseconds(horizon)
@@ -95,19 +90,16 @@ def periodic_schedule(
 def _instants(system: System) -> list[tuple[Fraction, Fraction]]:
     """The offset and the period [ns] of everything periodic that shares a resource."""
     over, releases = messages_by_connection(system), released_by(system)
-    found = []
+    senders = {x.sender for x in system.connections if x.name in over or x.name in releases}
+    samplings = (system.components[name].sampling for name in senders)
+    grids = [(x.true_offset, x.true_period) for x in samplings if x is not None and not has_scheduled_instants(x)]
     for task in placed_tasks(system.computers):
         if task.task.period is not None:
-            found.append((task.task.offset, task.task.period, task.computer.clock_ratio))
-    for message in placed_messages(system.networks):
-        if message.message.period is not None:
-            found.append((message.message.offset, message.message.period, 1.0))
-    for name in {x.sender for x in system.connections if x.name in over or x.name in releases}:
-        sampling = system.components[name].sampling
-        if sampling is not None and not has_scheduled_instants(sampling):
-            found.append((sampling.offset, sampling.period, sampling.clock_ratio))
-    ratios = [Fraction(repr(float(ratio))) for _, _, ratio in found]
-    grids = [(exact_nanoseconds(o) / r, exact_nanoseconds(p) / r) for (o, p, _), r in zip(found, ratios)]
+            clock = Sampling(period=task.task.period, offset=task.task.offset, clock_ratio=task.computer.clock_ratio)
+            grids.append((clock.true_offset, clock.true_period))
+    for of in placed_messages(system.networks):
+        if of.message.period is not None:
+            grids.append((exact_nanoseconds(of.message.offset), exact_nanoseconds(of.message.period)))
     cycles = [sum(map(exact_nanoseconds, each.slots), Fraction(0)) for each in system.networks.values() if each.slots]
     return grids + [(Fraction(0), cycle) for cycle in cycles]
 

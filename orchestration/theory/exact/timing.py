@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from fractions import Fraction
 
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
+from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.systems.schedule.plan import Plan
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.distribution import Distribution, Varying
 from orchestration.systems.system.model import System
-from orchestration.theory.exact.links import ATTOSECONDS, RandomLink, SampledTask
+from orchestration.theory.exact.links import ATTOSECONDS, RandomLink, SampledTask, attoseconds, exact_seconds
 from orchestration.theory.exact.periodic_schedule import NO_SCHEDULE, PeriodicSchedule
 from orchestration.theory.exact.random_times import CERTAIN, RandomTime, normal, table, uniform
 
@@ -30,11 +29,10 @@ def sampled_tasks(system: System, schedule: PeriodicSchedule = NO_SCHEDULE) -> l
             continue
         if sampling.clock == "fmu":
             raise UsageError(f"components.{name}.sampling.clock: fmu: expected the master's")
-        ratio = Fraction(repr(float(sampling.clock_ratio)))
         place = f"components.{name}.sampling.jitter"
         found.append(
             SampledTask(
-                name=name, period=_seconds(sampling.period) / ratio, offsets=(_seconds(sampling.offset) / ratio,),
+                name=name, period=sampling.true_period / NANOSECONDS, offsets=(sampling.true_offset / NANOSECONDS,),
                 jitter=_jitter(sampling.jitter, sampling.jitter_distribution, place),
             )
         )  # fmt: skip
@@ -72,10 +70,10 @@ def _link(x: Connection, tasks: list[str], system: System, *, wire: bool) -> Ran
         random_delay = _random_time(x.delay, f"{place}.delay")
         delay, jitter = 0, replace(random_delay, added=None if jitter == CERTAIN else jitter)
     else:
-        delay = round(_seconds(x.delay) * ATTOSECONDS)
+        delay = _attoseconds(x.delay)
     return RandomLink(
         name=place, size=len(x.start), sender=sender, receiver=receiver,
-        step=None if step is None else _seconds(step), delay=delay, delay_jitter=jitter, loss=_loss(x, place),
+        step=None if step is None else exact_seconds(step), delay=delay, delay_jitter=jitter, loss=_loss(x, place),
         burst_length=x.burst_length, jacobi=x.order == "jacobi" and sender is not None, first_order=x.hold == "first",
     )  # fmt: skip
 
@@ -102,11 +100,7 @@ def _random_time(of: Distribution, place: str) -> RandomTime:
 
 
 def _attoseconds(seconds: float) -> int:
-    return round(_seconds(seconds) * ATTOSECONDS)
-
-
-def _seconds(seconds: float) -> Fraction:
-    return exact_nanoseconds(seconds) / NANOSECONDS
+    return attoseconds(exact_seconds(seconds))
 
 
 def _jitter(largest: Varying, spread: str, place: str) -> RandomTime:

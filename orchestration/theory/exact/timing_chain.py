@@ -16,9 +16,10 @@ from fractions import Fraction
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.theory.exact.branch import Branch, Mode
 from orchestration.theory.exact.branching import Branching, Effects
-from orchestration.theory.exact.links import RandomLink, SampledTask, attoseconds, hyperperiod
+from orchestration.theory.exact.links import RandomLink, SampledTask, attoseconds
 from orchestration.theory.exact.moments import Passage, Stage
 from orchestration.theory.exact.pieces import Piece
+from orchestration.theory.stability.operating_point import hyperperiod
 
 MOST_MODES = 2000
 MOST_PASSAGES = 12_000

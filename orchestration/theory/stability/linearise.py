@@ -15,7 +15,6 @@ from orchestration.theory.stability.known_loops import rested
 from orchestration.theory.stability.linear_simulator import OpenPort
 from orchestration.theory.stability.loop_at_rest import AtRest, at_rest
 from orchestration.theory.stability.matrices import of_samples
-from orchestration.theory.stability.operating_point import true_period
 from orchestration.theory.stability.period_map import period_map
 from orchestration.theory.stability.state_space import StateSpace, reduced
 
@@ -57,7 +56,7 @@ def linearise(request: RequestLike, component: str | None = None) -> Linearised:
 def _cut_open(loop: AtRest, name: str) -> Linearised:
     sampling, tangent = loop.simulation.system.components[name].sampling, loop.tangents[name]
     assert sampling is not None
-    if true_period(sampling) != loop.period:
+    if sampling.true_period != loop.period:
         raise UsageError(
             f"component: {name}: expected the only rate of the system, or the slowest, which others divide"
         )

@@ -10,7 +10,7 @@ import numpy as np
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import exact_nanoseconds
-from orchestration.systems.system.component import Component, Sampling
+from orchestration.systems.system.component import Component
 from orchestration.systems.system.distribution import lowest
 from orchestration.systems.system.model import Criterion, System
 from orchestration.systems.system.paths import changed
@@ -33,17 +33,7 @@ def deterministic(system: System) -> System:
         chosen,
         components={name: _punctual(component) for name, component in chosen.components.items()},
         connections=tuple(
-            replace(
-                x,
-                delay=lowest(x.delay),
-                delay_jitter=0.0,
-                jitter_distribution="uniform",
-                loss=0.0,
-                burst_length=None,
-                noise={},
-                quantisation={},
-            )
-            for x in chosen.connections
+            replace(x.with_delay(lowest(x.delay)), noise={}, quantisation={}) for x in chosen.connections
         ),
         sources={
             name: replace(source, noise=0.0)
@@ -73,32 +63,26 @@ def longest_period(system: System) -> Fraction:
 def hyperperiod_of(system: System) -> Fraction | None:
     """The hyperperiod of all sampled components [ns]; None: none within `LONGEST_HYPERPERIOD`."""
     periods = _periods(system)
+    found = hyperperiod(periods)
+    return found if found <= LONGEST_HYPERPERIOD * max(periods) else None
+
+
+def hyperperiod(periods: Sequence[Fraction]) -> Fraction:
+    """The least common multiple of the periods; 1 where there are none."""
     denominator = math.lcm(*(period.denominator for period in periods))
-    hyperperiod = Fraction(math.lcm(*(int(period * denominator) for period in periods)), denominator)
-    return hyperperiod if hyperperiod <= LONGEST_HYPERPERIOD * max(periods) else None
+    return Fraction(math.lcm(*(int(period * denominator) for period in periods)), denominator)
 
 
 def _periods(system: System) -> list[Fraction]:
-    return [true_period(one.sampling) for one in system.components.values() if one.sampling is not None] or [
+    return [one.sampling.true_period for one in system.components.values() if one.sampling is not None] or [
         exact_nanoseconds(one.step) for one in system.components.values() if one.step is not None
     ]
 
 
-def true_period(sampling: Sampling) -> Fraction:
-    """The period of a component whose clock may be fast or slow [ns]."""
-    return exact_nanoseconds(sampling.period) / Fraction(repr(float(sampling.clock_ratio)))
-
-
 def latest_offset(system: System) -> Fraction:
     """True time of the first sample of the component that begins last [ns]."""
-    return max(
-        (
-            exact_nanoseconds(one.sampling.offset) / Fraction(repr(float(one.sampling.clock_ratio)))
-            for one in system.components.values()
-            if one.sampling is not None
-        ),
-        default=Fraction(0),
-    )
+    samplings = (one.sampling for one in system.components.values())
+    return max((each.true_offset for each in samplings if each is not None), default=Fraction(0))
 
 
 def exchanged_signals(system: System) -> Sequence[str]:
