@@ -167,7 +167,7 @@ class Branching:
     def _arrival(self, i: int, time: int) -> BranchEvent:
         """The arrival of a message at a time."""
         link = self.links[i]
-        return BranchEvent(time, ARRIVES if link.receiver is not None else SETTLES, i, "arrive", i, link.size)
+        return BranchEvent(time, SETTLES if link.settles else ARRIVES, i, "arrive", i, link.size)
 
     # -- events happen -------------------------------------------------------------------------------------------
 
@@ -256,7 +256,7 @@ class Branching:
             yield self._put_in_transit(branch, BranchEvent(NEVER, ARRIVES, i, "wait", i, link.size))
             return
         for arrival, likely in self._arrivals(branch, i, sent):
-            if arrival == branch.time and link.receiver is not None:
+            if arrival == branch.time and not link.settles:
                 yield self._deliver_now(likely, i)
             else:
                 yield self._put_in_transit(likely, self._arrival(i, arrival))

@@ -45,6 +45,8 @@ class RandomLink:
     loss: float = 0.0
     burst_length: float | None = None
     jacobi: bool = False
+    settles: bool = False
+    """whether it goes to a component in continuous time, on which it acts after the samples of the instant"""
     first_order: bool = False
     """whether its hold is of first order"""
 

@@ -74,7 +74,8 @@ def _link(x: Connection, tasks: list[str], system: System, *, wire: bool) -> Ran
     return RandomLink(
         name=place, size=len(x.start), sender=sender, receiver=receiver,
         step=None if step is None else exact_seconds(step), delay=delay, delay_jitter=jitter, loss=_loss(x, place),
-        burst_length=x.burst_length, jacobi=x.order == "jacobi" and sender is not None, first_order=x.hold == "first",
+        burst_length=x.burst_length, jacobi=x.order == "jacobi" and sender is not None, settles=receiver is None,
+        first_order=x.hold == "first",
     )  # fmt: skip
 
 
