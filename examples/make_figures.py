@@ -156,7 +156,7 @@ def distributed_servo() -> Figure:
         loops = Loops(files_of(system).models)
         for i, delay in enumerate(delays.tolist()):
             found = loops.solve(changed(varied, {"connections.command.delay": delay}))
-            radius[i, j] = found.loop.radius
+            radius[i, j] = found.loop.result.radius
             cost[i, j] = sum(found.means.values()) if found.means is not None else NO_END
     figure = Figure(figsize=(7.0, 4.2))
     axes = figure.subplots()

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orchestration.foundation.basics.bisection import bisected
+from orchestration.foundation.basics.bisection import first_failure
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.theory.certificates.family import LoopFamily
 
@@ -79,11 +79,8 @@ def least_breaking(
     """The least value up to `limit` at which the scan finds an unstable sequence."""
     found = functools.cache(lambda value: unstable_sequence(family_up_to(value), longest))
     rising = [min(limit, limit * i / SCAN) for i in range(SCAN + 1)]
-    first = next((i for i in range(1, SCAN + 1) if found(rising[i])), None)
-    if first is None:
-        return None
-    value = bisected(lambda v: found(v) is not None, rising[first - 1], rising[first], FINE * limit).bad
-    return breaking_at(family_up_to(value), value, longest)
+    bracket = first_failure(lambda value: value > 0.0 and found(value) is not None, rising, FINE * limit)
+    return None if bracket is None else breaking_at(family_up_to(bracket.bad), bracket.bad, longest)
 
 
 def breaking_at(family: LoopFamily, value: float, longest: int = LONGEST) -> BreakingSequence | None:

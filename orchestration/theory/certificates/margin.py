@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -48,14 +49,14 @@ class Certified:
 
     of: str
     """The path of the varying quantity: each draw is anywhere from 0 to the value."""
-    certified: float | None
+    certified: float | None = None
     """The largest value for which a proof was found that no sequence makes the loop unstable; None: the loop is
     unstable even for 0, or on its computer no proof was found for 0."""
-    breaking: float | None
+    breaking: float | None = None
     """The least value at which a periodic sequence was found that makes it unstable; None: none was found."""
-    breaking_sequence: tuple[tuple[str, tuple[float, ...]], ...]
+    breaking_sequence: tuple[tuple[str, tuple[float, ...]], ...] = ()
     """Sequence that breaks the loop: the letter of each draw with its values, repeated."""
-    small_gain: float | None
+    small_gain: float | None = None
     """The small-gain bound of Kao and Lincoln; None where it does not apply."""
     largest: float
     """The largest value that was considered."""
@@ -63,7 +64,7 @@ class Certified:
     """Sequences that were tried for `breaking`, as text."""
     states: int
     """The size of the state from period to period."""
-    certificate: str | None
+    certificate: str | None = None
     """The proof, as the text of a file that `check` verifies."""
 
     def save(self, path: str | Path) -> Path:
@@ -104,12 +105,11 @@ def linear_loop_of(request: Request) -> CertifiedLoop:
 
 
 def _linear_loop_of(request: Request) -> CertifiedLoop:
-    instances = Instances()
-    try:
-        with errors_in_own_terms(request), at_rest(without_scheduler(rested(request)), instances) as rest:
-            return certified_loop(rest)
-    finally:
-        instances.close()
+    with (
+        errors_in_own_terms(request), closing(Instances()) as instances,
+        at_rest(without_scheduler(rested(request)), instances) as rest,
+    ):  # fmt: skip
+        return certified_loop(rest)
 
 
 def expect_without_scheduler(request: Request) -> None:
@@ -154,7 +154,8 @@ def _of_times(timeline: LoopTimeline, varying: Varying, progress: Share) -> Cert
         f"draws at either end of each range, sequences that repeat after at most {LONGEST}, values up to {largest:g} s"
     )
     if breaking_at(up_to(0.0), 0.0) is not None:
-        return _unstable(varying, largest, searched, up_to(0.0))
+        states = len(up_to(0.0).kept)
+        return Certified(of=varying.path, breaking=0, largest=largest, searched=searched, states=states)
     broken = least_breaking(up_to, largest)
     top = largest if broken is None else broken.value
     value, certificate = largest_certified(up_to, [varying.path], top, progress)
@@ -171,7 +172,8 @@ def _of_losses(timeline: LoopTimeline, varying: Varying, progress: Share) -> Cer
 
     searched = f"sequences that repeat after at most the run and {LONGEST // 2} messages, runs up to {MOST_LOST}"
     if breaking_at(timeline.family(), 0.0) is not None:
-        return _unstable(varying, MOST_LOST, searched, timeline.family())
+        states = len(timeline.family().kept)
+        return Certified(of=varying.path, breaking=0, largest=MOST_LOST, searched=searched, states=states)
     broken: BreakingSequence | None = None
     value, certificate = None, None
     for run in range(MOST_LOST + 1):
@@ -185,7 +187,7 @@ def _of_losses(timeline: LoopTimeline, varying: Varying, progress: Share) -> Cer
             value, certificate = run, found.certificate.to_json()
     return Certified(
         of=varying.path, certified=value, breaking=None if broken is None else broken.value,
-        breaking_sequence=() if broken is None else broken.sequence, small_gain=None, largest=MOST_LOST,
+        breaking_sequence=() if broken is None else broken.sequence, largest=MOST_LOST,
         searched=searched, states=len(timeline.family(run=MOST_LOST).kept), certificate=certificate,
     )  # fmt: skip
 
@@ -203,16 +205,8 @@ def _of_cause(request: Request, cause: Cause, progress: Share) -> Certified:
         value, certificate = largest_certified(scheduled.family, [cause.path], top, progress)
     return Certified(
         of=cause.path, certified=value, breaking=search.breaking,
-        breaking_sequence=search.sequence,
-        small_gain=None, largest=largest, searched=search.searched, states=len(scheduled.family(0.0).kept),
-        certificate=certificate,
-    )  # fmt: skip
-
-
-def _unstable(varying: Varying, largest: float, searched: str, family: LoopFamily) -> Certified:
-    return Certified(
-        of=varying.path, certified=None, breaking=0, breaking_sequence=(), small_gain=None, largest=largest,
-        searched=searched, states=len(family.kept), certificate=None,
+        breaking_sequence=search.sequence, largest=largest, searched=search.searched,
+        states=len(scheduled.family(0.0).kept), certificate=certificate,
     )  # fmt: skip
 
 

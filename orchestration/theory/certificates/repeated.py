@@ -5,9 +5,8 @@ A task whose execution times repeat after n jobs is equivalent to n tasks, each 
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
@@ -25,6 +24,7 @@ from orchestration.theory.certificates.breaking import FINE, SCAN
 from orchestration.theory.certificates.causes import EXECUTION, Cause
 from orchestration.theory.exact.loops import Loops
 from orchestration.theory.exact.mean_square import AGREE
+from orchestration.theory.stability.delay_bounds import patterns
 from orchestration.theory.stability.operating_point import deterministic
 
 LONGEST = 4
@@ -60,7 +60,10 @@ def least_repeated(system: System, cause: Cause, models: Mapping[str, Model], pe
     jobs = math.ceil(period / NANOSECONDS / Fraction(repr(float(cause.period))))
     longest = 1 if of.task.component is not None else max(1, min(LONGEST, MOST_JOBS // jobs))
 
-    words, unknown = [*_words(longest)], dict[Word, UsageError]()
+    words, unknown = (
+        sorted(patterns(longest), key=lambda word: (len(word), [-share for share in word])),
+        dict[Word, UsageError](),
+    )
 
     def fails(value: float, word: Word) -> bool:
         system = _with_repeated(always, of, cause, [value * share for share in word for _ in range(jobs)])
@@ -88,15 +91,6 @@ def least_repeated(system: System, cause: Cause, models: Mapping[str, Model], pe
     least = bisected(lambda x: fails(x, worst), good, value, FINE * cause.period).bad
     sequence = tuple((f"{jobs} jobs" if jobs > 1 else "job", (least * share,)) for share in worst)
     return RepeatedSearch(breaking=least, sequence=sequence, searched=searched)
-
-
-def _words(longest: int) -> Iterator[Word]:
-    """Words that are no repetition of a shorter one, one of each rotation."""
-    for length in range(1, longest + 1):
-        for word in itertools.product((1, 0), repeat=length):
-            turned = [word[i:] + word[:i] for i in range(length)]
-            if any(word) and word == max(turned) and len(set(turned)) == length:
-                yield word
 
 
 def _with_longest_jobs(system: System) -> System:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from orchestration.components.fmi.foreign import isolated_call
 from orchestration.foundation.basics.errors import UsageError
@@ -13,7 +14,7 @@ from orchestration.systems.expressions.syntax import Call
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import errors_in_own_terms
-from orchestration.theory.exact.loops import Loops
+from orchestration.theory.exact.loops import Converged, Loops
 from orchestration.theory.exact.objective_means import ObjectiveMeans
 from orchestration.theory.stability.known_loops import LOOPS, rested
 
@@ -70,22 +71,22 @@ def expect(request: RequestLike, *, as_simulated: bool = False, horizon: float |
 def expected_of(system: System, loops: Loops, horizon: float | None = None) -> Expected:
     """As `expect`, of a system whose FMUs are loaded in this process."""
     solution = loops.solve(system)
-    linear, radius, means = solution.linear, solution.loop.radius, solution.means
-    difference, order = solution.difference, solution.order
+    linear, loop, means = solution.linear, solution.loop.result, solution.means
+    converged: Converged[Any] = solution.loop
     if horizon is not None:
-        to_horizon = loops.solve_to(system, horizon)
-        means, difference, order = to_horizon.means, to_horizon.difference, to_horizon.order
+        converged = loops.solve_to(system, horizon)
+        means = converged.result
     if means is None:
-        why = f"the mean-square radius is {radius:.6g}: the mean has no finite expectation"
+        why = f"the mean-square radius is {loop.radius:.6g}: the mean has no finite expectation"
         values: dict[str, float | None] = dict.fromkeys(system.objectives)
         reasons = {**linear.objectives.reasons, **dict.fromkeys(linear.objectives.calls, why)}
     else:
         values, reasons = _finite_values(linear.objectives, means), linear.objectives.reasons
     return Expected(
         objectives=values, reasons={name: reasons[name] for name in system.objectives if name in reasons},
-        mean_square_radius=radius, fourth_moment_radius=solution.loop.fourth_moment_radius,
-        accuracy=difference + linear.accuracy, period=solution.period,
-        method=_method(linear.methods, order, system, simulated=loops.simulated, horizon=horizon),
+        mean_square_radius=loop.radius, fourth_moment_radius=loop.fourth_moment_radius,
+        accuracy=converged.difference + linear.accuracy, period=solution.loop.period,
+        method=_method(linear.methods, converged.order, system, simulated=loops.simulated, horizon=horizon),
         horizon=horizon,
     )  # fmt: skip
 

@@ -64,15 +64,14 @@ class Linear:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Solution:
-    """A loop under its timing."""
+class Converged(Generic[T]):
+    """A result by the least order of Gauss's rule at which it converges."""
 
-    linear: Linear
-    loop: JumpLinear
+    result: T
+    numbers: Floats
+    """Numbers of the result that were compared"""
     period: float
     """Period [s]"""
-    means: Mapping[Call, float] | None
-    """None: the second moments are unbounded"""
     difference: float
     """change by the last doubling of the nodes, relative"""
     order: int | None
@@ -80,23 +79,13 @@ class Solution:
 
 
 @dataclass(frozen=True, kw_only=True)
-class HorizonMeans:
-    """The means of a loop from its initial state to a given time, as `Solution`."""
+class Solution:
+    """A loop under its timing."""
 
-    means: Mapping[Call, float]
-    """Means over that time"""
-    difference: float
-    order: int | None
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Converged(Generic[T]):
-    result: T
-    numbers: Floats
-    """Numbers of the result that were compared"""
-    period: float
-    difference: float
-    order: int | None
+    linear: Linear
+    loop: Converged[JumpLinear]
+    means: Mapping[Call, float] | None
+    """None: the second moments are unbounded"""
 
 
 class Loops:
@@ -177,21 +166,11 @@ class Loops:
 
         effects = self._effects(system, linear, used)
         converged = self._refined(self._tasks_and_links(system, linear, effects), effects, answer, AGREE)
-        loop, (_, *costs) = converged.result, converged.numbers
-        means = None
-        if loop.radius < 1.0:
-            means = {call: mean.c for call, mean in linear.objectives.means.items()}
-            means |= {call: means[call] + cost for call, cost in zip(used, costs)}
-        return Solution(
-            linear=linear,
-            loop=loop,
-            period=converged.period,
-            means=means,
-            difference=converged.difference,
-            order=converged.order,
-        )
+        costs = converged.numbers[1:].tolist()
+        means = _with_costs(linear, used, costs) if converged.result.radius < 1.0 else None
+        return Solution(linear=linear, loop=converged, means=means)
 
-    def solve_to(self, system: System, horizon: float) -> HorizonMeans:
+    def solve_to(self, system: System, horizon: float) -> Converged[Mapping[Call, float]]:
         """The means of a system from its initial state to `horizon` [s], as `solve`."""
         rests = changed(system, system.operating_point)
         linear = self.linear(rests, initial=system)
@@ -201,13 +180,11 @@ class Loops:
         start, constant = effects.initial_vector(linear.initial), effects.places("constant", "").start
         end = attoseconds(exact_seconds(horizon))
 
-        def answer(chain: TimingChain) -> tuple[None, Floats]:
-            return None, costs_until(chain, start, constant, end) / (end / ATTOSECONDS) if used else np.zeros(0)
+        def answer(chain: TimingChain) -> tuple[Mapping[Call, float], Floats]:
+            costs = costs_until(chain, start, constant, end) / (end / ATTOSECONDS) if used else np.zeros(0)
+            return _with_costs(linear, used, costs.tolist()), costs
 
-        converged = self._refined(self._tasks_and_links(rests, linear, effects, horizon), effects, answer, AGREE)
-        means = {call: mean.c for call, mean in linear.objectives.means.items()}
-        means |= {call: means[call] + cost for call, cost in zip(used, converged.numbers.tolist())}
-        return HorizonMeans(means=means, difference=converged.difference, order=converged.order)
+        return self._refined(self._tasks_and_links(rests, linear, effects, horizon), effects, answer, AGREE)
 
     def _refined(
         self,
@@ -215,8 +192,7 @@ class Loops:
         effects: LoopEffects,
         answer: Callable[[TimingChain], tuple[T, Floats]],
         agree: float,
-    ) -> _Converged[T]:
-        """An answer by the least order of Gauss's rule at which its numbers converge."""
+    ) -> Converged[T]:
         tasks, links = timing
         by_rule = any(x.delay_jitter.is_by_rule for x in links) or any(task.jitter.is_by_rule for task in tasks)
         found: list[tuple[T, Floats]] = []
@@ -235,7 +211,7 @@ class Loops:
                 difference = _relative_difference(found[-2][1], found[-1][1])
                 if difference <= agree:
                     break
-        return _Converged(
+        return Converged(
             result=found[-1][0], numbers=found[-1][1], period=period, difference=difference,
             order=order if by_rule else None,
         )  # fmt: skip
@@ -267,6 +243,12 @@ class Loops:
         if self.simulated:
             expect_rows(system, tasks, links)
         return tasks, links
+
+
+def _with_costs(linear: Linear, used: Sequence[Call], costs: Sequence[float]) -> dict[Call, float]:
+    """All means, some by their costs, the others constant."""
+    means = {call: mean.c for call, mean in linear.objectives.means.items()}
+    return means | {call: means[call] + cost for call, cost in zip(used, costs)}
 
 
 def expect_same_steps(

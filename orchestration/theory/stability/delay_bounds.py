@@ -15,13 +15,13 @@ P = (sI - A)⁻¹ B, S the sensitivity of the sampled loop with the delay d, and
 import functools
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from orchestration.foundation.basics.bisection import bisected
+from orchestration.foundation.basics.bisection import first_failure
 from orchestration.foundation.basics.simulator import Floats
 
 Complexes = npt.NDArray[np.complex128]
@@ -132,28 +132,26 @@ def breaking_jitter(loop: SampledLoop, limit: float) -> tuple[float, tuple[float
     Sequences of delays repeat after at most `LONGEST` samples, each delay d or d + J. None: none makes it unstable.
     """
     best, found = limit, None
-    for pattern in _patterns():
-        fails = functools.partial(_fails, loop, pattern)
+    for pattern in patterns(LONGEST):
         rising = [best * i / SCAN for i in range(SCAN + 1)]
-        first = next((i for i in range(1, SCAN + 1) if fails(rising[i])), None)
-        if first is not None:
-            best, found = bisected(fails, rising[first - 1], rising[first], 1e-4 * loop.period).bad, pattern
-    return None if found is None else (best, found)
+        fails = functools.partial(_fails, loop, pattern)
+        bracket = first_failure(fails, rising, 1e-4 * loop.period)
+        if bracket is not None:
+            best, found = bracket.bad, pattern
+    return None if found is None else (best, tuple(map(float, found)))
 
 
-def _fails(loop: SampledLoop, pattern: tuple[float, ...], jitter: float) -> bool:
-    return _radius(loop, [jitter * share for share in pattern]) >= 1.0
+def _fails(loop: SampledLoop, pattern: Sequence[int], jitter: float) -> bool:
+    return jitter > 0.0 and _radius(loop, [jitter * share for share in pattern]) >= 1.0
 
 
-def _patterns() -> list[tuple[float, ...]]:
+def patterns(longest: int) -> Iterator[tuple[int, ...]]:
     """Sequences of zeros and ones that repeat, none a rotation of another or a repetition of a shorter one."""
-    found = []
-    for length in range(1, LONGEST + 1):
-        for pattern in itertools.product((0.0, 1.0), repeat=length):
+    for length in range(1, longest + 1):
+        for pattern in itertools.product((0, 1), repeat=length):
             turns = [pattern[i:] + pattern[:i] for i in range(length)]
             if any(pattern) and pattern == max(turns) and turns.count(pattern) == 1:
-                found.append(pattern)
-    return found
+                yield pattern
 
 
 def _radius(loop: SampledLoop, late: Sequence[float]) -> float:

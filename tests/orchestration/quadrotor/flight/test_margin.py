@@ -68,7 +68,7 @@ def test_a_loop_that_is_unstable_without_jitter_stands_none() -> None:
 
 
 def test_sequences_are_tried_once_each() -> None:
-    assert [len(p) for p in delay_bounds._patterns()] == [1, 2, 3, 3, 4, 4, 4]
+    assert [len(p) for p in delay_bounds.patterns(4)] == [1, 2, 3, 3, 4, 4, 4]
 
 
 def margin(capsys: pytest.CaptureFixture[str], *flags: str) -> dict[str, float]:
