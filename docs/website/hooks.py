@@ -6,7 +6,7 @@ from typing import Any
 
 from mkdocs.structure.files import File, Files, InclusionLevel
 
-from docs.website import commands, fmus, keys, rules
+from docs.website import answers, commands, fmus, keys, rules
 from docs.website.links import ROOT, Links, pages_elsewhere
 from docs.website.markdown import for_the_site
 
@@ -18,6 +18,7 @@ CONTINUED: dict[str, Callable[[], str]] = {
     "commands.md": commands.section,
     "keys.md": keys.section,
     "validation.md": rules.section,
+    **answers.SECTIONS,
 }
 """Sections generated from the code at the end of pages in `docs/`, by address."""
 BEHIND = 1e-6

@@ -52,7 +52,7 @@ class Responses:
     """the demanded share of the time of the processor or link: the mean demand of one, divided by the mean time
     between them"""
     response: Spread | None
-    """Time from the nominal release to the end, of those that are done"""
+    """the time from the nominal release to the end, of those that are done"""
     bound: float | None
     """the bound of theory on the response; None where there is none"""
     start_jitter: float | None
@@ -60,12 +60,15 @@ class Responses:
     end_jitter: float | None
     """the range of those to the end"""
     latency: Spread | None
-    """Time of a task from reading its inputs to writing its outputs"""
+    """the time of a task from reading its inputs to writing its outputs"""
     deadline: float | None
+    """the time from the nominal release by which it should be done"""
     missed: float | None
     """the share not done by its deadline, of those whose deadline is within the run; None if there are none"""
     skipped: int
+    """the number of releases that made no job"""
     aborted: int
+    """the number that was ended at its deadline"""
     unfinished: int
     """the number waiting or under way at the end"""
 

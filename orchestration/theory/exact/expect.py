@@ -24,16 +24,18 @@ class Expected:
     """Expectations of a linear loop, stationary or from its initial conditions to a horizon."""
 
     objectives: Mapping[str, float | None]
-    """Objectives by name; None: there is none."""
+    """The expectation of each objective that consists of `mean(…)` and `rms(…)` of polynomials of degree two in
+    signals, by name; None: there is none. `rms(x)` is the root of the expected mean of x²."""
     reasons: Mapping[str, str]
-    """Why there is none, by name."""
+    """The reasons why there is none, by name."""
     mean_square_radius: float
-    """The growth factor of second moments over a hyperperiod; from 1 on no mean of squares is finite."""
+    """The growth factor of second moments over a hyperperiod; from 1 on no mean of squares is finite, whatever a
+    run prints."""
     fourth_moment_radius: float | None
     """Likewise of fourth moments; from 1 on no Monte-Carlo interval of a mean square means anything. None: too many to
     compute."""
     accuracy: float
-    """Accuracy of the results, relative: the change by the last refinement of the computation."""
+    """Accuracy of the results, relative: the change by the last refinement, and the accuracy of the components."""
     method: str
     """Method by which the components were identified, and by which the result was computed."""
     period: float
