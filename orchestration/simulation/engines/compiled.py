@@ -6,7 +6,7 @@ C processes some instants at a time, so that interruptions are noticed in betwee
 
 import ctypes
 import time as clock
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -20,14 +20,11 @@ from orchestration.foundation.basics.simulator import Floats, Integers, Simulato
 from orchestration.foundation.basics.times import seconds
 from orchestration.foundation.recording.recording import Recorder
 from orchestration.simulation.engines.backlog import Backlog
-from orchestration.simulation.engines.condition import Step
 from orchestration.simulation.engines.loop import Operation, library
 from orchestration.simulation.engines.memory import Allocator, SharedTables, allocated_loop
 from orchestration.simulation.engines.run_structures import RunStructures
 from orchestration.simulation.engines.running_system import RunningSystem, Terminated
-from orchestration.simulation.engines.sources import SourceValues
 from orchestration.simulation.engines.structures import ONE_LANE, address
-from orchestration.simulation.engines.wires import Board
 from orchestration.systems.schedule.schedule import Schedule
 
 SLICE = 0.05
@@ -35,9 +32,6 @@ SLICE = 0.05
 _Look, _Stopped, _Collect = (dict(ONE_LANE.Loop._fields_)[name] for name in ("look", "stopped", "collect"))
 _EXACT = 2**53
 """Up to here a float represents every integer"""
-
-Condition = Callable[[Board], tuple[Sequence[Step] | None, Sequence[SourceValues]]]
-"""The program of the condition of divergence, None if there is none, and the sources in it"""
 
 
 def reason_unavailable(simulators: Mapping[str, Simulator], stop: int) -> str | None:
@@ -61,9 +55,7 @@ class CompiledLoop:
 
     engine = "compiled"
 
-    def __init__(
-        self, running: RunningSystem, recorder: Recorder, *, condition: Condition, allocate: Allocator
-    ) -> None:
+    def __init__(self, running: RunningSystem, recorder: Recorder, *, allocate: Allocator) -> None:
         self._running = running
         self._pace = 4  # instants of a slice
         self._shared: list[_MessagesInFlight] = []
@@ -74,7 +66,7 @@ class CompiledLoop:
         self._loop = loop = allocated_loop(allocate)
         self._tables = SharedTables(running, loop, allocate)
         self.backlog = Backlog(running, self._tables, recorder)
-        program, watched = condition(running.board)
+        program, watched = running.condition.program(running.board)
         self._watched = list(watched)
         if self._watched == [values for _, values in running.sources]:
             loop.in_rows = sum(len(signals) for signals, _ in running.sources)

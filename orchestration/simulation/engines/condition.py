@@ -5,6 +5,7 @@ The program calls Python where rounding matters.
 
 import operator
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias
 
@@ -20,52 +21,91 @@ Watch = Callable[[float], str | None]
 """Returns how the values of the row at t [s] have diverged; None if they have not"""
 
 
-def watch(
-    condition: str | None,
-    board: Board,
-    sources: Mapping[str, SourceValues],
-    signals_of: Mapping[str, Sequence[str]],
-    numbers: Mapping[str, float],
-) -> Watch:
-    """A divergence monitor for `condition`, over the board, `time`, the signals of sources and `numbers`, by name.
+Step: TypeAlias = tuple[int, int, float]
+"""The operation, the number of operands (of a signal, its place), and the value of a number"""
 
-    Raises `UsageError` if the condition has an unknown name.
-    """
-    if condition is None:
-        return lambda t: None
-    node = parse(condition)
-    named = set(names(node))
-    columns = [c for c in board.columns if c != "time" and is_named(c, named)]
-    used = [name for name, signals in signals_of.items() if any(is_named(signal, named) for signal in signals)]
-    constants = [name for name in numbers if name in named]
-    order = ["", "time", *columns, *(signal for name in used for signal in signals_of[name]), *constants]
-    places = {name: i for i, name in enumerate(order)}
-    try:
-        clauses = [_Clause(clause, places) for clause in _alternatives(node)]
-    except UsageError as error:
-        raise UsageError(f"criterion.diverged: {error}") from None
-    get = operator.itemgetter(
-        0, 0, *(board.place[column] for column in columns)
-    )  # two more than needed, so that it is a tuple
-    row = board.row.data
-    feeds, fixed = [sources[name].at for name in used], [float(numbers[name]) for name in constants]
-    conditions = [clause.holds for clause in clauses]
-
-    def check(t: float) -> str | None:
-        values: list[float] = [*get(row)]
-        values[1] = t
-        for at in feeds:
-            values += at(t)
-        values += fixed
-        for holds in conditions:
-            if holds(values):
-                return clauses[conditions.index(holds)].describe(values, t)
-        return None
-
-    return check
+HEADER = Path(__file__).with_name("condition.h")
+_OF_C = constants(HEADER.read_text(encoding="utf-8"))
+_BOUNDED = {word: made.bounded for word, made in OPERATORS.items() if made.bounded is not None}
+_CODES = {word: _OF_C[word.upper()] for word in ("number", "time", "signal", "source")}
+_CODES |= {word: code for code, word in enumerate(_BOUNDED, start=_OF_C["OPERATOR"])}
 
 
-def is_named(signal: str, named: set[str]) -> bool:
+@dataclass(frozen=True, kw_only=True)
+class Condition:
+    """The condition of divergence of a run, over the columns of the board, `time`, and what is given here by name."""
+
+    text: str | None = None
+    """Expression; None: no values diverge"""
+    sources: Mapping[str, SourceValues] = field(default_factory=dict)
+    signals_of: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    """Signals of each source"""
+    numbers: Mapping[str, float] = field(default_factory=dict)
+
+    def watch(self, board: Board) -> Watch:
+        """The monitor of a board; raises `UsageError` if the condition has an unknown name."""
+        if self.text is None:
+            return lambda t: None
+        node = parse(self.text)
+        named = set(names(node))
+        columns = [c for c in board.columns if c != "time" and _is_named(c, named)]
+        used = self._used(named)
+        constants = [name for name in self.numbers if name in named]
+        order = ["", "time", *columns, *(signal for name in used for signal in self.signals_of[name]), *constants]
+        places = {name: i for i, name in enumerate(order)}
+        try:
+            clauses = [_Clause(clause, places) for clause in _alternatives(node)]
+        except UsageError as error:
+            raise UsageError(f"criterion.diverged: {error}") from None
+        get = operator.itemgetter(
+            0, 0, *(board.place[column] for column in columns)
+        )  # two more than needed, so that it is a tuple
+        row = board.row.data
+        feeds, fixed = [self.sources[name].at for name in used], [float(self.numbers[name]) for name in constants]
+        conditions = [clause.holds for clause in clauses]
+
+        def check(t: float) -> str | None:
+            values: list[float] = [*get(row)]
+            values[1] = t
+            for at in feeds:
+                values += at(t)
+            values += fixed
+            for holds in conditions:
+                if holds(values):
+                    return clauses[conditions.index(holds)].describe(values, t)
+            return None
+
+        return check
+
+    def program(self, board: Board) -> tuple[Sequence[Step] | None, Sequence[SourceValues]]:
+        """The steps of the program, None if there is none, and the sources in it, whose signals it numbers in order."""
+        if self.text is None:
+            return [(_CODES["number"], 0, 0.0)], ()
+        node = parse(self.text)
+        named = set(names(node))
+        used = self._used(named)
+        signals = [signal for name in used for signal in self.signals_of[name]]
+        leaves = {column: ("signal", place, 0.0) for column, place in board.place.items()}
+        leaves["time"] = ("time", 0, 0.0)
+        leaves |= {signal: ("source", i, 0.0) for i, signal in enumerate(signals)}
+        leaves |= {name: ("number", 0, float(value)) for name, value in self.numbers.items()}
+        (scalar,) = scalars(node, {name: _axes(name, leaves) for name in named})
+        try:
+            steps = [(_CODES[word], operands, number) for word, operands, number in _words(scalar, leaves)]
+        except _Unknown:
+            return None, ()
+        return (steps if len(steps) < _OF_C["DEEPEST"] else None), [self.sources[name] for name in used]
+
+    def _used(self, named: set[str]) -> list[str]:
+        """The sources with a signal that is named."""
+        return [name for name, signals in self.signals_of.items() if any(_is_named(each, named) for each in signals)]
+
+
+NEVER = Condition()
+"""Condition of runs that do not diverge"""
+
+
+def _is_named(signal: str, named: set[str]) -> bool:
     """Whether a signal is one of the names of an expression, or a component of a vector of them."""
     return signal in named or signal.rpartition(".")[0] in named
 
@@ -97,16 +137,6 @@ class _Clause:
 _EXPECTED = {">": "at most", ">=": "less than", "<": "at least", "<=": "more than"}
 
 
-Step: TypeAlias = tuple[int, int, float]
-"""The operation, the number of operands (of a signal, its place), and the value of a number"""
-
-HEADER = Path(__file__).with_name("condition.h")
-_OF_C = constants(HEADER.read_text(encoding="utf-8"))
-_BOUNDED = {word: made.bounded for word, made in OPERATORS.items() if made.bounded is not None}
-_CODES = {word: _OF_C[word.upper()] for word in ("number", "time", "signal", "source")}
-_CODES |= {word: code for code, word in enumerate(_BOUNDED, start=_OF_C["OPERATOR"])}
-
-
 class _Unknown(Exception):
     """A function that has no program: Python evaluates it at every instant."""
 
@@ -118,34 +148,6 @@ def operators() -> str:
     return "\n".join(
         [head, "    switch (code) {", *cases, "    default: return (Known){0.0, INFINITY};", "    }", "}", ""]
     )
-
-
-def program(
-    condition: str | None,
-    board: Board,
-    sources: Mapping[str, SourceValues],
-    signals_of: Mapping[str, Sequence[str]],
-    numbers: Mapping[str, float],
-) -> tuple[Sequence[Step] | None, Sequence[SourceValues]]:
-    """The steps of the program, None if there is none, and the sources in it, whose signals are numbered in order.
-
-    The arguments are those of `watch`.
-    """
-    if condition is None:
-        return [(_CODES["number"], 0, 0.0)], ()
-    node = parse(condition)
-    named = set(names(node))
-    used = [name for name, signals in signals_of.items() if any(is_named(signal, named) for signal in signals)]
-    leaves = {column: ("signal", place, 0.0) for column, place in board.place.items()}
-    leaves["time"] = ("time", 0, 0.0)
-    leaves |= {s: ("source", i, 0.0) for i, s in enumerate(signal for name in used for signal in signals_of[name])}
-    leaves |= {name: ("number", 0, float(value)) for name, value in numbers.items()}
-    (scalar,) = scalars(node, {name: _axes(name, leaves) for name in named})
-    try:
-        steps = [(_CODES[word], operands, number) for word, operands, number in _words(scalar, leaves)]
-    except _Unknown:
-        return None, ()
-    return (steps if len(steps) < _OF_C["DEEPEST"] else None), [sources[name] for name in used]
 
 
 _Words: TypeAlias = list[tuple[str, int, float]]

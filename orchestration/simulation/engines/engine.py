@@ -8,7 +8,7 @@ from typing import Any, Literal, cast, get_args
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError, expected_name
 from orchestration.foundation.basics.simulator import Simulator
 from orchestration.foundation.basics.times import nanoseconds
-from orchestration.simulation.engines.compiled import CompiledLoop, Condition, reason_unavailable
+from orchestration.simulation.engines.compiled import CompiledLoop, reason_unavailable
 from orchestration.simulation.engines.master import Master
 from orchestration.simulation.engines.memory import Allocator
 from orchestration.systems.system.model import System
@@ -30,7 +30,6 @@ def create_master(
     system: System,
     simulators: Mapping[str, Simulator],
     *,
-    condition: Condition,
     allocate: Allocator,
     **others: Any,
 ) -> Master:
@@ -46,4 +45,4 @@ def create_master(
         return Master(system, simulators, **others)
     if reason:
         raise QuadcosimError(f"--engine compiled is not available: {reason}")
-    return Master(system, simulators, loop=partial(CompiledLoop, condition=condition, allocate=allocate), **others)
+    return Master(system, simulators, loop=partial(CompiledLoop, allocate=allocate), **others)

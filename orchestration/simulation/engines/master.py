@@ -12,11 +12,11 @@ from orchestration.foundation.recording.recording import Chunk, Recorder
 from orchestration.simulation.engines import initial
 from orchestration.simulation.engines.backlog import Backlog
 from orchestration.simulation.engines.channel import Channel
-from orchestration.simulation.engines.condition import Watch
+from orchestration.simulation.engines.condition import NEVER, Condition
 from orchestration.simulation.engines.feeds import Feed
 from orchestration.simulation.engines.instants import PythonLoop
 from orchestration.simulation.engines.running_system import Diverged, RunningSystem, Sources, Terminated
-from orchestration.simulation.engines.wires import Board, clock_of
+from orchestration.simulation.engines.wires import clock_of
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.model import System
@@ -58,7 +58,7 @@ class Master:
         sources: Sources = (),
         feeds: Sequence[Feed] = (),
         interrupted: Callable[[], bool] = lambda: False,
-        watch: Callable[[Board], Watch] | None = None,
+        condition: Condition = NEVER,
         first_exchange: Sequence[Sequence[int]] | None = None,
         waiting: Collection[str] = (),
         loop: Callable[[RunningSystem, Recorder], Loop] = PythonLoop,
@@ -69,7 +69,7 @@ class Master:
         """
         self._running = running = RunningSystem(
             system, simulators, timetable=timetable, streams=streams, recorded=recorded, sources=sources, feeds=feeds,
-            interrupted=interrupted, watch=watch,
+            interrupted=interrupted, condition=condition,
         )  # fmt: skip
         self.board, self.columns, self.recorder = running.board, running.columns, recorder
         self.divergence: str | None = None

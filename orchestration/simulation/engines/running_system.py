@@ -13,10 +13,10 @@ import numpy as np
 from orchestration.foundation.basics.errors import SimulatorError, StoppedStepError
 from orchestration.foundation.basics.simulator import Floats, Simulator, Transfer
 from orchestration.simulation.engines.channel import Channel
-from orchestration.simulation.engines.condition import Watch
+from orchestration.simulation.engines.condition import Condition
 from orchestration.simulation.engines.feeds import Feed
 from orchestration.simulation.engines.sources import SourceValues
-from orchestration.simulation.engines.wires import Board, Wires
+from orchestration.simulation.engines.wires import Wires
 from orchestration.systems.schedule.schedule import Cursor, Schedule
 from orchestration.systems.schedule.streams import NOISE, Streams
 from orchestration.systems.schedule.timetable import Timetable
@@ -92,7 +92,7 @@ class RunningSystem:
         sources: Sources,
         feeds: Sequence[Feed],
         interrupted: Callable[[], bool],
-        watch: Callable[[Board], Watch] | None,
+        condition: Condition,
     ) -> None:
         self.system, self.simulators, self.stop = system, simulators, timetable.stop
         self.wires = wires = Wires(system, recorded)
@@ -113,7 +113,7 @@ class RunningSystem:
         self.sampled = {index: self._sampled(names[index]) for index in wires.sampled}
         self.settles = any(x.held or x.behind or x.feeds for x in self.continuous.values())
         self.some_by_themselves = any(x.by_itself for x in self.sampled.values())
-        self._watch = watch(board) if watch is not None else lambda t: None
+        self.condition, self._watch = condition, condition.watch(board)
 
     def outputs(self, name: str) -> Floats:
         """The outputs of a component that are read, in the row."""

@@ -22,7 +22,7 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import seconds
 from orchestration.foundation.recording.recording import InMemory, Recorder
 from orchestration.simulation.engines import initial
-from orchestration.simulation.engines.condition import program, watch
+from orchestration.simulation.engines.condition import Condition
 from orchestration.simulation.engines.engine import Engine, create_master
 from orchestration.simulation.engines.feeds import Feed
 from orchestration.simulation.engines.master import Master
@@ -149,7 +149,6 @@ def prepared(
             recorder.describe({name: one.as_metadata() for name, one in resolved.described.items()})
             sources = resolved.sources(streams)
             signals = {name: system.sources[name].signals(name) for name in sources}
-            watched = (sources, signals, parameters)
             master = create_master(
                 engine,
                 system,
@@ -161,8 +160,9 @@ def prepared(
                 sources=[(signals[name], values) for name, values in sources.items()],
                 feeds=_feeds(system, sources, instances),
                 interrupted=lambda: interrupt.requested,
-                watch=lambda board: watch(system.criterion.diverged, board, *watched),
-                condition=lambda board: program(system.criterion.diverged, board, *watched),
+                condition=Condition(
+                    text=system.criterion.diverged, sources=sources, signals_of=signals, numbers=parameters
+                ),
                 allocate=allocate,
                 first_exchange=initial.groups(system.connections, lambda name, output: models[name].depends_on(output)),
                 waiting=[name for name in system.components if models[name].waits],

@@ -14,7 +14,7 @@ from orchestration.simulation.engines.batch.combining import combined
 from orchestration.simulation.engines.batch.kernels import preferred_lanes
 from orchestration.simulation.engines.batch.run_numbers import NO_COLUMNS, ParameterColumns, end_of
 from orchestration.simulation.engines.batch.shape import Shape, outline
-from orchestration.simulation.engines.condition import watch
+from orchestration.simulation.engines.condition import Condition
 from orchestration.simulation.engines.resolved import check_against_fmus, source_values
 from orchestration.simulation.engines.structures import structures
 from orchestration.simulation.results.objectives import Metrics, metrics_of
@@ -137,7 +137,8 @@ def _divergence_message(shape: Shape, batch: Batch, system: System, lane: int, t
     streams, parameters = Streams(system.seed, system.streams), batch.numbers.parameters(lane, system)
     sources = {name: source_values(system, name, parameters, streams) for name in system.sources}
     signals = {name: system.sources[name].signals(name) for name in sources}
-    monitor = watch(system.criterion.diverged, shape.board, sources, signals, parameters)
+    condition = Condition(text=system.criterion.diverged, sources=sources, signals_of=signals, numbers=parameters)
+    monitor = condition.watch(shape.board)
     shape.board.row[0] = t
     for column, place in shape.board.place.items():
         if column != "time":

@@ -14,7 +14,7 @@ from orchestration.foundation.recording.recording import Chunk, Event, InMemory
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.quadrotor.scenarios.wiring import COMMAND, MEASUREMENT, POSITION_REFERENCE
-from orchestration.simulation.engines.condition import watch
+from orchestration.simulation.engines.condition import Condition
 from orchestration.simulation.engines.master import Master
 from orchestration.simulation.engines.sources import ConstantValues, SourceValues
 from orchestration.systems.schedule.schedule import Cursor
@@ -234,7 +234,7 @@ class StubRun:
             streams=streams,
             recorded={"plant": (), "controller": ()},
             recorder=self.recorder,
-            watch=lambda board: watch(system.criterion.diverged, board, named, signals, {}),
+            condition=Condition(text=system.criterion.diverged, sources=named, signals_of=signals),
         )
         self.over: bool | None = None
         if start:
