@@ -59,8 +59,8 @@ if TYPE_CHECKING:
     from orchestration.quadrotor.scenarios.file import load_scenario
     from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice, Record
     from orchestration.quadrotor.scenarios.scenario import Scenario
-    from orchestration.quadrotor.scenarios.signals import DisturbanceChoice, ReferenceChoice
     from orchestration.quadrotor.scenarios.timing import Timing
+    from orchestration.quadrotor.scenarios.translation import DisturbanceChoice, ReferenceChoice
     from orchestration.quadrotor.scenarios.vehicle import load_vehicle
     from orchestration.simulation.runs.many_runs import Flights
     from orchestration.simulation.runs.many_runs import run_many as fly
@@ -105,8 +105,8 @@ _HOMES = {
     "Scenario": "orchestration.quadrotor.scenarios.scenario",
     "Timing": "orchestration.quadrotor.scenarios.timing",
     "FmuChoice": "orchestration.quadrotor.scenarios.fmu_choice",
-    "ReferenceChoice": "orchestration.quadrotor.scenarios.signals",
-    "DisturbanceChoice": "orchestration.quadrotor.scenarios.signals",
+    "ReferenceChoice": "orchestration.quadrotor.scenarios.translation",
+    "DisturbanceChoice": "orchestration.quadrotor.scenarios.translation",
     "Record": "orchestration.quadrotor.scenarios.fmu_choice",
     "Vehicle": "orchestration.systems.system.vehicle",
     "load_vehicle": "orchestration.quadrotor.scenarios.vehicle",

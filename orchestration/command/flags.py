@@ -155,8 +155,8 @@ class FlightFlags:
         """`scenario` with these flags; raises `UsageError` for invalid values."""
         from orchestration.components.building.fmus import native_twins
         from orchestration.quadrotor.scenarios.presets import preset_timing
-        from orchestration.quadrotor.scenarios.signals import DisturbanceChoice, ReferenceChoice, choice_of
         from orchestration.quadrotor.scenarios.timing import TIMING_KEYS
+        from orchestration.quadrotor.scenarios.translation import DisturbanceChoice, ReferenceChoice, choice_of
         from orchestration.quadrotor.scenarios.vehicle import load_vehicle
 
         timing: dict[str, Any] = {} if self.preset is None else preset_timing(self.preset)
@@ -190,8 +190,7 @@ class FlightFlags:
     def _timed(self, key: str) -> Any:
         """The value of a flag; of one that may be random a number, or the text of the table of its distribution."""
         from orchestration.quadrotor.scenarios.timing import Timing
-        from orchestration.systems.system.distribution import AS_TABLE
-        from orchestration.systems.system.distribution_table import is_table, may_vary
+        from orchestration.systems.system.distribution import AS_TABLE, is_table, may_vary
 
         text = getattr(self, key)
         if text is None or is_table(text) or not (key == "loss" or key in may_vary(Timing)):

@@ -5,6 +5,7 @@ import functools
 import hashlib
 import keyword
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -13,7 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
-from fmu_kit import loader, packaging
+from fmu_kit import packaging
 from fmu_kit.archive import read_source_hash
 from fmu_kit.bundle import SHARED_PACKAGES, PackagingError, Target, module_path
 from fmu_kit.compiler.pack import freshness
@@ -80,7 +81,7 @@ def _source_hash(packing: Packing, target: Target) -> str:
     """
     folders = [str(module_path(package).parent) for package in packages_of(target)]
     return _cached_source_hash(
-        packing, target, loader.compiler(), tuple(file for folder in folders for file in _files(folder))
+        packing, target, shutil.which("cc"), tuple(file for folder in folders for file in _files(folder))
     )
 
 

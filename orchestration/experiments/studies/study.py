@@ -15,7 +15,7 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.records import record
 from orchestration.simulation.requests.ranges import paths_in
 from orchestration.simulation.results.own_metrics import OwnMetric
-from orchestration.systems.system.distribution_table import is_table, trace_path
+from orchestration.systems.system.distribution import is_table, trace_path
 from orchestration.systems.system.files import Files, files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed, is_source_file, value_at

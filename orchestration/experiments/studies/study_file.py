@@ -12,7 +12,7 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.records import record
 from orchestration.foundation.basics.typed_tables import parsed, table_of
 from orchestration.simulation.requests.request import load_request, request_from_tables
-from orchestration.systems.system.distribution_table import as_text
+from orchestration.systems.system.distribution import as_text
 from orchestration.systems.system.paths import is_source_file
 from orchestration.systems.system.request import ControlLoop, Request
 

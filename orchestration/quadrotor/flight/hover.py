@@ -13,7 +13,7 @@ from orchestration.components.fmi.instance import Instance
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.quadrotor.scenarios import wiring
 from orchestration.quadrotor.scenarios.scenario import Scenario
-from orchestration.quadrotor.scenarios.signals import DisturbanceChoice, ReferenceChoice
+from orchestration.quadrotor.scenarios.translation import DisturbanceChoice, ReferenceChoice
 from orchestration.systems.system.check import AT_REST
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System

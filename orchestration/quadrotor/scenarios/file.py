@@ -10,12 +10,12 @@ from orchestration.foundation.basics.typed_tables import parsed, table_of
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
 from orchestration.quadrotor.scenarios.presets import preset_timing
 from orchestration.quadrotor.scenarios.scenario import Scenario
-from orchestration.quadrotor.scenarios.signals import DisturbanceChoice, ReferenceChoice
 from orchestration.quadrotor.scenarios.timing import Timing
+from orchestration.quadrotor.scenarios.translation import DisturbanceChoice, ReferenceChoice
 from orchestration.quadrotor.scenarios.vehicle import load_vehicle
 from orchestration.quadrotor.scenarios.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT
 from orchestration.systems.system.component import parameters_in
-from orchestration.systems.system.distribution_table import DistributionTable, with_distributions
+from orchestration.systems.system.distribution import DistributionTable, with_distributions
 
 TimingTable = table_of(Timing, within=[DistributionTable])
 ScenarioFile = table_of(

@@ -18,11 +18,12 @@ from orchestration.quadrotor.scenarios.initial_conditions import initial_conditi
 from orchestration.quadrotor.scenarios.nominal_model import axis_mismatch, model_mismatch
 from orchestration.quadrotor.scenarios.quantities import range_of
 from orchestration.quadrotor.scenarios.scenario_text import text_of
-from orchestration.quadrotor.scenarios.signals import DisturbanceChoice, ReferenceChoice
 from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.quadrotor.scenarios.translation import (
     BY_MEASUREMENT,
     TIMING,
+    DisturbanceChoice,
+    ReferenceChoice,
     disturbed,
     in_scenario_terms,
     paths_of,
@@ -38,8 +39,7 @@ from orchestration.quadrotor.scenarios.wiring import (
 from orchestration.simulation.results.quantities import setting
 from orchestration.systems.system.component import Parameter
 from orchestration.systems.system.description import describe_varying
-from orchestration.systems.system.distribution import Distribution
-from orchestration.systems.system.distribution_table import parsed_fields
+from orchestration.systems.system.distribution import Distribution, parsed_fields
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.systems.system.requirements import is_finite

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
-from orchestration.quadrotor.scenarios.signals import DisturbanceChoice, ReferenceChoice
+from orchestration.quadrotor.scenarios.translation import DisturbanceChoice, ReferenceChoice
 from orchestration.systems.system.file_tables import in_toml
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from orchestration.components.fmi.model import Model
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.units import METRE, NUMBER, ONE, SECOND, Unit
+from orchestration.foundation.basics.units import METRE, NUMBER, ONE, SECOND, Operand, Unit, agreed
 from orchestration.systems.expressions.operators import OPERATORS
 from orchestration.systems.expressions.over_span import STOP_TIME, TIME
 from orchestration.systems.expressions.syntax import (
@@ -26,7 +26,6 @@ from orchestration.systems.expressions.syntax import (
     parse_job_measures,
     text,
 )
-from orchestration.systems.expressions.unit_rules import Operand, agreed
 from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import System
 

@@ -13,8 +13,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from orchestration.systems.expressions import unit_rules
-from orchestration.systems.expressions.unit_rules import Rule
+from orchestration.foundation.basics import units
+from orchestration.foundation.basics.units import Rule
 
 Printer: TypeAlias = Callable[..., str]
 """Function from the texts of the operands to that of the result"""
@@ -86,7 +86,7 @@ def _norm(*parts: Any) -> Any:
 
 def _comparison(sign: str, tree: type[ast.AST], numpy: Callable[..., Any], lanes: str) -> Operator:
     return Operator(
-        tree=tree, unit=unit_rules.compared, gives_truth=True,
+        tree=tree, unit=units.compared, gives_truth=True,
         python=_infix(sign), numpy=numpy, lanes=_called(lanes),
         bounded=f"truth(a[0].value {sign} a[1].value, is_close(a[0], a[1]))",
     )  # fmt: skip
@@ -98,33 +98,33 @@ def _mathematical(name: str, unit: Rule, numpy: Callable[..., Any], count: int =
 
 # The root of the sum of the squares, in order: the same bits on all targets.
 _NORM = Operator(
-    arguments=(1, 99), joins=True, unit=unit_rules.agreed,
+    arguments=(1, 99), joins=True, unit=units.agreed,
     python=_root_of_squares("root"), numpy=_norm, lanes=_root_of_squares("q_sqrt"), bounded="norm(a, n)",
 )  # fmt: skip
 
 OPERATORS: Mapping[str, Operator] = {
     "+": Operator(
-        tree=ast.Add, unit=unit_rules.agreed, python=_infix("+"), numpy=np.add, lanes=_infix("+"),
+        tree=ast.Add, unit=units.agreed, python=_infix("+"), numpy=np.add, lanes=_infix("+"),
         bounded="known(a[0].value + a[1].value, a[0].error + a[1].error)",
     ),
     "-": Operator(
-        tree=ast.Sub, unit=unit_rules.agreed, python=_infix("-"), numpy=np.subtract, lanes=_infix("-"),
+        tree=ast.Sub, unit=units.agreed, python=_infix("-"), numpy=np.subtract, lanes=_infix("-"),
         bounded="known(a[0].value - a[1].value, a[0].error + a[1].error)",
     ),
     "*": Operator(
-        tree=ast.Mult, unit=unit_rules.product, python=_infix("*"), numpy=np.multiply, lanes=_infix("*"),
+        tree=ast.Mult, unit=units.product, python=_infix("*"), numpy=np.multiply, lanes=_infix("*"),
         bounded="product(a[0], a[1])",
     ),
     "/": Operator(
-        tree=ast.Div, unit=unit_rules.quotient, python=_called("quotient"), numpy=np.divide, lanes=_infix("/"),
+        tree=ast.Div, unit=units.quotient, python=_called("quotient"), numpy=np.divide, lanes=_infix("/"),
         bounded="quotient(a[0], a[1])",
     ),
     "**": Operator(
-        tree=ast.Pow, unit=unit_rules.power, python=_called("power"), numpy=np.power,
+        tree=ast.Pow, unit=units.power, python=_called("power"), numpy=np.power,
         lanes=lambda base, by: f"{base} * {base}" if by == "q_all(2.0)" else f"q_pow({base}, {by})",
     ),
     "neg": Operator(
-        tree=ast.USub, unit=unit_rules.first, python="-{}".format, numpy=np.negative, lanes="-{}".format,
+        tree=ast.USub, unit=units.first, python="-{}".format, numpy=np.negative, lanes="-{}".format,
         bounded="known(-a[0].value, a[0].error)",
     ),
     "<": _comparison("<", ast.Lt, np.less, "q_lt"),
@@ -134,40 +134,40 @@ OPERATORS: Mapping[str, Operator] = {
     "==": _comparison("==", ast.Eq, np.equal, "q_eq"),
     "!=": _comparison("!=", ast.NotEq, np.not_equal, "q_ne"),
     "and": Operator(
-        tree=ast.And, unit=unit_rules.none, gives_truth=True, takes_truths=True,
+        tree=ast.And, unit=units.none, gives_truth=True, takes_truths=True,
         python=_infix("and"), numpy=_of_all(np.logical_and), lanes=_infix("&"), bounded="joined(0, a, n)",
     ),
     "or": Operator(
-        tree=ast.Or, unit=unit_rules.none, gives_truth=True, takes_truths=True,
+        tree=ast.Or, unit=units.none, gives_truth=True, takes_truths=True,
         python=_infix("or"), numpy=_of_all(np.logical_or), lanes=_infix("|"), bounded="joined(1, a, n)",
     ),
     "not": Operator(
-        tree=ast.Not, unit=unit_rules.none, gives_truth=True, takes_truths=True,
+        tree=ast.Not, unit=units.none, gives_truth=True, takes_truths=True,
         python="not {}".format, numpy=np.logical_not, lanes=_called("q_not"),
         bounded="truth(a[0].value == 0.0, is_undecided(a[0]))",
     ),
     "abs": Operator(
-        unit=unit_rules.agreed, python=_called("abs"), numpy=np.abs, lanes=_called("q_fabs"),
+        unit=units.agreed, python=_called("abs"), numpy=np.abs, lanes=_called("q_fabs"),
         bounded="known(fabs(a[0].value), a[0].error)",
     ),
-    "sqrt": _mathematical("sqrt", unit_rules.root, np.sqrt),
-    "exp": _mathematical("exp", unit_rules.ratio, np.exp),
-    "log": _mathematical("log", unit_rules.ratio, np.log),
-    "sin": _mathematical("sin", unit_rules.ratio, np.sin),
-    "cos": _mathematical("cos", unit_rules.ratio, np.cos),
-    "tan": _mathematical("tan", unit_rules.ratio, np.tan),
-    "asin": _mathematical("asin", unit_rules.angle, np.arcsin),
-    "acos": _mathematical("acos", unit_rules.angle, np.arccos),
-    "atan2": _mathematical("atan2", unit_rules.direction, np.arctan2, count=2),
-    "tanh": _mathematical("tanh", unit_rules.ratio, np.tanh),
+    "sqrt": _mathematical("sqrt", units.root, np.sqrt),
+    "exp": _mathematical("exp", units.ratio, np.exp),
+    "log": _mathematical("log", units.ratio, np.log),
+    "sin": _mathematical("sin", units.ratio, np.sin),
+    "cos": _mathematical("cos", units.ratio, np.cos),
+    "tan": _mathematical("tan", units.ratio, np.tan),
+    "asin": _mathematical("asin", units.angle, np.arcsin),
+    "acos": _mathematical("acos", units.angle, np.arccos),
+    "atan2": _mathematical("atan2", units.direction, np.arctan2, count=2),
+    "tanh": _mathematical("tanh", units.ratio, np.tanh),
     "hypot": _NORM,
     "norm": _NORM,
     "min": Operator(
-        arguments=(2, 99), unit=unit_rules.agreed, python=_called("min"), numpy=_of_all(np.minimum),
+        arguments=(2, 99), unit=units.agreed, python=_called("min"), numpy=_of_all(np.minimum),
         lanes=_two_by_two("lowest"),
     ),
     "max": Operator(
-        arguments=(2, 99), unit=unit_rules.agreed, python=_called("max"), numpy=_of_all(np.maximum),
+        arguments=(2, 99), unit=units.agreed, python=_called("max"), numpy=_of_all(np.maximum),
         lanes=_two_by_two("highest"),
     ),
 }  # fmt: skip

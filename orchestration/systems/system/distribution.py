@@ -1,13 +1,18 @@
-"""Numbers that vary: their distribution, or the trace that they are taken from."""
+"""Numbers that vary: their distribution, or the trace that they are taken from; in a file, a table in place of one."""
 
+import dataclasses
+import functools
+import json
 import math
-from collections.abc import Hashable, Iterator, Mapping
-from dataclasses import fields, is_dataclass, replace
+from collections.abc import Hashable, Mapping
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeGuard
 
+from orchestration.foundation.basics.documents import toml_of
+from orchestration.foundation.basics.errors import at_place
 from orchestration.foundation.basics.records import record
+from orchestration.foundation.basics.typed_tables import parsed, table_of
 from orchestration.systems.system.choices import TraceOrder
 from orchestration.systems.system.requirements import is_finite, require, require_loss
 
@@ -208,42 +213,6 @@ def require_losses(of: object, burst_length: float | None, *names: str, place: s
             require(value in (0.0, 1.0), f"{place}{name}.values", value, "0 or 1")
 
 
-Of = TypeVar("Of")
-
-
-def distributions(of: Any) -> Iterator[tuple[str, Distribution]]:
-    """The distributions in a part of a system, each with its path from there."""
-    for field in fields(of):
-        value = getattr(of, field.name)
-        if isinstance(value, Distribution):
-            yield field.name, value
-        for name, part in _parts(field.name, value):
-            yield from ((f"{name}.{path}", each) for path, each in distributions(part))
-
-
-def with_traces_at(of: Of, paths: Mapping[str, Path]) -> Of:
-    """A part of a system with its trace files at other paths; `paths` are by the present ones."""
-    changes: dict[str, Any] = {}
-    for field in fields(of):  # type: ignore[arg-type]
-        value = getattr(of, field.name)
-        if isinstance(value, Distribution):
-            if value.file is not None:
-                changes[field.name] = replace(value, file=paths[str(value.file)])
-        elif is_dataclass(value):
-            changes[field.name] = with_traces_at(value, paths)
-        elif isinstance(value, Mapping) and any(map(is_dataclass, value.values())):
-            changes[field.name] = {name: with_traces_at(part, paths) for name, part in value.items()}
-    return replace(of, **changes) if changes else of  # type: ignore[type-var]
-
-
-def _parts(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """The records in a value that may contain distributions, each with its path."""
-    if isinstance(value, Mapping):
-        yield from ((f"{name}.{key}", part) for key, part in value.items() if is_dataclass(part))
-    elif is_dataclass(value) and not isinstance(value, Distribution):
-        yield name, value
-
-
 def _require_span(name: str, span: tuple[float, float]) -> None:
     first, last = span
     fits = is_finite(first) and is_finite(last) and 0.0 <= first <= last
@@ -268,3 +237,67 @@ def _column(path: Path, column: str, state: tuple[int, int] | None) -> "Floats":
     if (values < 0.0).any():
         raise rows.error(int((values < 0.0).argmax()), column, "zero or positive numbers")
     return values
+
+
+DistributionTable = table_of(Distribution, file=(str | None, None))
+"""The path of a trace is text, as written"""
+
+
+def with_distributions(place: str, table: Any, folder: Path) -> dict[str, Any]:
+    """The keys of a table of a file, with distributions in place of their tables; `place` ends with its dot."""
+    keys: dict[str, Any] = table.model_dump()
+    for key in keys:
+        value = getattr(table, key)
+        if isinstance(value, DistributionTable):
+            keys[key] = _distribution(f"{place}{key}", value, folder)
+    return keys
+
+
+def parsed_fields(of: Any, place: str, keys: Mapping[str, Any]) -> dict[str, Any]:
+    """New values of fields of a record, with distributions in place of their tables, or of the text of these.
+
+    Relative paths of traces start at the current folder. Raises `UsageError` for an invalid table.
+    """
+    kind: type = type(of)
+    varying = may_vary(kind)
+    return {key: _parsed_field(f"{place}{key}", value) if key in varying else value for key, value in keys.items()}
+
+
+@functools.cache
+def may_vary(kind: type) -> frozenset[str]:
+    """The fields of a record that are a number or a distribution."""
+    return frozenset(field.name for field in dataclasses.fields(kind) if field.type == Varying)
+
+
+def is_table(value: object) -> TypeGuard[str]:
+    """Whether a value is the text of a table."""
+    return isinstance(value, str) and value.lstrip().startswith("{")
+
+
+def as_text(table: Mapping[str, Any], folder: Path) -> str:
+    """The text of a table of a file, its trace by a path from the current folder."""
+    keys = {**table, "file": str(folder / str(table["file"]))} if "file" in table else table
+    return f"{{{', '.join(f'{key} = {json.dumps(value, default=str)}' for key, value in keys.items())}}}"
+
+
+def trace_path(value: str) -> str | None:
+    """The path of the trace in the text of a table; None without one."""
+    file = toml_of(f"value = {value}", value)["value"].get("file")
+    return None if file is None else str(Path(file))
+
+
+def _parsed_field(place: str, value: Any) -> Any:
+    if is_table(value):
+        value = toml_of(f"value = {value}", f"{place} = {value}")["value"]
+    return _distribution(place, _parsed(place, value), Path()) if isinstance(value, Mapping) else value
+
+
+def _parsed(place: str, table: Mapping[str, Any]) -> Any:
+    with at_place(place):
+        return parsed(table, DistributionTable)
+
+
+def _distribution(place: str, table: Any, folder: Path) -> Distribution:
+    keys = table.model_dump() | {"file": None if table.file is None else folder / table.file}
+    with at_place(place):
+        return Distribution(**keys)

@@ -11,7 +11,7 @@ from orchestration.systems.system.choices import Order
 from orchestration.systems.system.component import Component, Sampling, SamplingOnArrival, flattened, parameters_in
 from orchestration.systems.system.computers import Arrivals, Computer, Message, Network, Task
 from orchestration.systems.system.connection import Connection
-from orchestration.systems.system.distribution_table import DistributionTable, with_distributions
+from orchestration.systems.system.distribution import DistributionTable, with_distributions
 from orchestration.systems.system.model import Criterion, System
 from orchestration.systems.system.paths import changed, for_each
 from orchestration.systems.system.requirements import require

@@ -14,8 +14,7 @@ from orchestration.foundation.basics.records import replaced
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.computers import Computer, Network
 from orchestration.systems.system.connection import Connection
-from orchestration.systems.system.distribution import with_traces_at
-from orchestration.systems.system.input_files import input_files
+from orchestration.systems.system.input_files import input_files, with_traces_at
 from orchestration.systems.system.model import System
 from orchestration.systems.system.source import Source
 

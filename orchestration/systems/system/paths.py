@@ -267,7 +267,7 @@ def for_each(start: Iterable[str], value: Any) -> Any:
 
 def _replaced(place: str, of: Any, keys: Mapping[str, Any]) -> Any:
     if any(isinstance(value, (str, Mapping)) for value in keys.values()):
-        from orchestration.systems.system.distribution_table import parsed_fields  # which loads what reads files
+        from orchestration.systems.system.distribution import parsed_fields  # which loads what reads files
 
         keys = parsed_fields(of, f"{place}.", keys)
     try:

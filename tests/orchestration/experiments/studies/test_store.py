@@ -28,7 +28,7 @@ from orchestration.experiments.studies.run_key import run_key
 from orchestration.experiments.studies.store import DesignPoint, open_for_reading, open_for_writing
 from orchestration.experiments.studies.store_columns import TEXTS, metrics_with
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
-from orchestration.quadrotor.scenarios.signals import ReferenceChoice
+from orchestration.quadrotor.scenarios.translation import ReferenceChoice
 from orchestration.quadrotor.scenarios.wiring import DEFAULT_PLANT
 from orchestration.simulation.workers import provenance
 from orchestration.simulation.workers.provenance import Sources, imported, simulation_sources, sources_hash, versions

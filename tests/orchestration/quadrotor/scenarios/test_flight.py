@@ -21,7 +21,7 @@ from orchestration.components.building import fmus
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice, Record
 from orchestration.quadrotor.scenarios.measures import desired
-from orchestration.quadrotor.scenarios.signals import ReferenceChoice
+from orchestration.quadrotor.scenarios.translation import ReferenceChoice
 from orchestration.quadrotor.scenarios.wiring import COMMAND, MEASUREMENT, POSITION_REFERENCE, REFERENCE
 from orchestration.simulation.runs.prepared import prepared
 from quadcosim import Result, RunInterrupted, Scenario, SimulatorError, Timing, UsageError

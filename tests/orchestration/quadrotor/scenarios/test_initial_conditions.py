@@ -7,7 +7,7 @@ import pytest
 from fmu_kit.trajectory import Trajectory
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.quadrotor.scenarios.scenario import Scenario
-from orchestration.quadrotor.scenarios.signals import ReferenceChoice
+from orchestration.quadrotor.scenarios.translation import ReferenceChoice
 from orchestration.quadrotor.scenarios.wiring import REFERENCE
 from orchestration.systems.system.starts import Starts
 

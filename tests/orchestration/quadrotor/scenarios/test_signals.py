@@ -9,8 +9,7 @@ import pytest
 
 import quadcosim
 from orchestration.quadrotor.flight.hover import hover_of
-from orchestration.quadrotor.scenarios.signals import DRAG, choice_of
-from orchestration.quadrotor.scenarios.translation import paths_of
+from orchestration.quadrotor.scenarios.translation import DRAG, choice_of, paths_of
 from orchestration.simulation.runs.result import Result
 from orchestration.systems.signals.dryden import DRAWS, Dryden
 from orchestration.systems.signals.library import make_signal
