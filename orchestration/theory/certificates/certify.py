@@ -102,17 +102,16 @@ def _cells_of(family: LoopFamily, labels: int, refinement: int) -> Iterator[Cell
 
 def parts_of(family: LoopFamily) -> list[list[int]]:
     """The kept coordinates in sets that do not act on one another, the largest first."""
+    from scipy.sparse.csgraph import connected_components
+
     size = len(next(iter(family.matrices.values())))
     joined = np.eye(size, dtype=bool)
     for matrix in family.matrices.values():
         sizes = np.abs(matrix)
         joined |= sizes > COUPLED * sizes.max(axis=1, keepdims=True)
-    joined |= joined.T
-    for _ in range(math.ceil(math.log2(size)) + 1):
-        joined = (joined.astype(int) @ joined.astype(int)) > 0
-    within = joined[np.ix_(family.kept, family.kept)]
-    parts = {tuple(np.flatnonzero(row).tolist()) for row in within}
-    return [list(part) for part in sorted(parts, key=lambda part: (-len(part), part))]
+    which = connected_components(joined, directed=False)[1][list(family.kept)]
+    parts = [np.flatnonzero(which == one).tolist() for one in np.unique(which)]
+    return sorted(parts, key=lambda part: (-len(part), part))
 
 
 def _coordinates(family: LoopFamily, parts: Sequence[Sequence[int]]) -> Floats:

@@ -79,16 +79,16 @@ class RecordedEffects(ContinuousEffects):
                 places.add("sent", x.name, len(x.start))
 
     def start(self, in_transit: Sequence[int]) -> Course:
-        """As `Effects`."""
+        """As `LoopEffects`."""
         return Course(**vars(super().start(in_transit)), in_transit=tuple(in_transit))
 
     def advance(self, piece: Piece, duration: int) -> Piece:
-        """As `Effects`."""
+        """As `LoopEffects`."""
         assert isinstance(piece, Course)
         return replace(piece, steps=(*piece.steps, duration))
 
     def send(self, piece: Piece, link: int, at: int) -> Piece:
-        """As `Effects`."""
+        """As `LoopEffects`."""
         x = self.system.connections[link]
         if x.name == self._lossy and not self.loses:
             change = np.eye(len(piece.Z))
@@ -102,7 +102,7 @@ class RecordedEffects(ContinuousEffects):
         return super()._message_rows(x)
 
     def done(self, piece: Piece, event: BranchEvent, in_transit: Sequence[int]) -> Piece:
-        """As `Effects`: its map is recorded."""
+        """As `LoopEffects`: its map is recorded."""
         assert isinstance(piece, Course)
         subject = self.tasks[event.of] if event.kind == "sample" else self.system.connections[event.of].name
         lost = ", lost" if self.loses and subject == self._lossy else ""

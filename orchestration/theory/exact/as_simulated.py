@@ -80,7 +80,7 @@ class SimulatedEffects(LoopEffects):
     # -- events ---------------------------------------------------------------------------------------------------
 
     def advance(self, piece: Piece, duration: int) -> Piece:
-        """As `Effects`."""
+        """As `LoopEffects`."""
         if duration not in self._maps:
             self._maps[duration] = self._step(duration / ATTOSECONDS)
         change, costs = self._maps[duration]
@@ -89,7 +89,7 @@ class SimulatedEffects(LoopEffects):
         return piece.charged(costs).mapped(whole)
 
     def tick(self, piece: Piece, grid: int) -> Piece:
-        """As `Effects`: noise is drawn anew at its points."""
+        """As `LoopEffects`: noise is drawn anew at its points."""
         if grid >= len(self.noise):
             return piece
         source, place = self.system.sources[self.noise[grid]], self.places("noise", self.noise[grid])
@@ -106,7 +106,7 @@ class SimulatedEffects(LoopEffects):
             part = self.continuous[name]
             for wire in self._wires_into(name, ahead=True):
                 now = self._transfer(now, wire)
-            inputs = np.array([self.input_row(f"{name}.{end}") for end in part.inputs]).reshape(-1, self.size) @ now
+            inputs = self.input_rows(name) @ now
             by_state, by_input = self._derivatives(name, part, h)
             moved = by_state @ now[self.places("state", name)] + by_input @ inputs
             now = now.copy()

@@ -9,7 +9,6 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import Protocol
 
 import numpy as np
 
@@ -27,6 +26,7 @@ from orchestration.theory.exact.branch import (
     in_transit,
     place_in,
 )
+from orchestration.theory.exact.effects import LoopEffects
 from orchestration.theory.exact.links import RandomLink, SampledTask, attoseconds
 from orchestration.theory.exact.pieces import Piece
 from orchestration.theory.exact.random_times import Kinks
@@ -37,36 +37,6 @@ LONGEST_AGE = 100
 """messages that a first-order hold may lose in a row and still have a known age"""
 
 
-class Effects(Protocol):
-    """What events do to the state: the numbers of the loop, followed by those of the messages in transit, in order."""
-
-    size: int
-
-    def start(self, in_transit: Sequence[int]) -> Piece:
-        """No time, with messages of these links in transit."""
-
-    def advance(self, piece: Piece, duration: int) -> Piece:
-        """Time passes."""
-
-    def send(self, piece: Piece, link: int, at: int) -> Piece:
-        """A message is put among the numbers of those in transit, at number `at`."""
-
-    def receive(self, piece: Piece, link: int, since: int, gap: int | None) -> Piece:
-        """The first message in transit arrives, and leaves the state.
-
-        The one before arrived `since` ago. Where that is 0, it arrived `gap` after the one before it.
-        """
-
-    def sample(self, piece: Piece, task: int) -> Piece:
-        """A task samples."""
-
-    def tick(self, piece: Piece, grid: int) -> Piece:
-        """A point of a grid of known times is reached."""
-
-    def done(self, piece: Piece, event: BranchEvent, in_transit: Sequence[int]) -> Piece:
-        """All of an event has happened; messages of these links are in transit."""
-
-
 class Branching:
     """Follows branches from event to event, with the effects that these have."""
 
@@ -74,7 +44,7 @@ class Branching:
         self,
         tasks: Sequence[SampledTask],
         links: Sequence[RandomLink],
-        effects: Effects,
+        effects: LoopEffects,
         *,
         order: int,
         kinks: Kinks,

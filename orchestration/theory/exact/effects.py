@@ -50,7 +50,7 @@ class Places:
 
 
 class LoopEffects(ABC):
-    """The effects that a loop in continuous time and a simulated loop have in common."""
+    """What events do to the state: the numbers of the loop, followed by those of the messages in transit, in order."""
 
     def __init__(
         self, system: System, components: Components, tasks: Sequence[str], *, with_means: bool = False
@@ -154,6 +154,11 @@ class LoopEffects(ABC):
             return x.scale * self.output_row(x.sender, sender.outputs.index(variable_of(x.start[j])))
         return np.zeros(self.size)
 
+    def input_rows(self, name: str) -> Floats:
+        """The rows of all inputs of a component."""
+        ends = self.parts[name].inputs
+        return np.array([self.input_row(f"{name}.{end}") for end in ends]).reshape(len(ends), self.size)
+
     def output_row(self, name: str, j: int) -> Floats:
         """The row of an output of a component."""
         if name in self.sampled_parts:
@@ -170,11 +175,11 @@ class LoopEffects(ABC):
     # -- events ---------------------------------------------------------------------------------------------------
 
     def start(self, in_transit: Sequence[int]) -> Piece:
-        """As `Effects`."""
+        """No time, with messages of these links in transit."""
         return Piece.start(self.size + sum(len(self.system.connections[i].start) for i in in_transit), self.costs)
 
     def send(self, piece: Piece, link: int, at: int) -> Piece:
-        """As `Effects`."""
+        """A message is put among the numbers of those in transit, at number `at`."""
         x = self.system.connections[link]
         rows, size, first = self._message_rows(x), len(piece.Z), self.size + at
         message = np.hstack([rows, np.zeros((len(rows), size - self.size))])
@@ -189,16 +194,15 @@ class LoopEffects(ABC):
 
     def _message_row(self, start: str) -> Floats:
         """The row of an output as it is sent."""
-        outputs = self.parts[component_of(start)].outputs
-        variable = variable_of(start)
-        return (
-            self.output_row(component_of(start), outputs.index(variable))
-            if variable in outputs
-            else np.zeros(self.size)
-        )
+        owner, variable = component_of(start), variable_of(start)
+        outputs = self.parts[owner].outputs
+        return self.output_row(owner, outputs.index(variable)) if variable in outputs else np.zeros(self.size)
 
     def receive(self, piece: Piece, link: int, since: int, gap: int | None) -> Piece:
-        """As `Effects`."""
+        """The first message in transit arrives, and leaves the state.
+
+        The one before arrived `since` ago. Where that is 0, it arrived `gap` after the one before it.
+        """
         x = self.system.connections[link]
         size, leaves = len(piece.Z), slice(self.size, self.size + len(x.start))
         message = np.eye(size)[leaves]
@@ -215,12 +219,12 @@ class LoopEffects(ABC):
         return piece.mapped(np.delete(change, leaves, axis=0))
 
     def sample(self, piece: Piece, task: int) -> Piece:
-        """As `Effects`."""
+        """A task samples."""
         name = self.tasks[task]
         part = self.sampled_parts[name]
         size = len(piece.Z)
         state, output = self.places("state", name), self.places("output", name)
-        inputs = np.array([self.input_row(f"{name}.{end}") for end in part.inputs]).reshape(len(part.inputs), self.size)
+        inputs = self.input_rows(name)
         before = np.eye(self.size)[state]
         change = np.eye(size)
         change[output, : self.size] = part.C @ before + part.D @ inputs
@@ -229,14 +233,14 @@ class LoopEffects(ABC):
 
     @abstractmethod
     def advance(self, piece: Piece, duration: int) -> Piece:
-        """As `Effects`."""
+        """Time passes."""
 
     def tick(self, piece: Piece, grid: int) -> Piece:
-        """As `Effects`."""
+        """A point of a grid of known times is reached."""
         return piece
 
     def done(self, piece: Piece, event: BranchEvent, in_transit: Sequence[int]) -> Piece:
-        """As `Effects`."""
+        """All of an event has happened; messages of these links are in transit."""
         return piece
 
 
@@ -333,5 +337,5 @@ class ContinuousEffects(LoopEffects):
         self._flows = Flows(self.F, self.R, Q)
 
     def advance(self, piece: Piece, duration: int) -> Piece:
-        """As `Effects`."""
+        """As `LoopEffects`."""
         return piece.flowed(self._flows.over(duration / ATTOSECONDS))

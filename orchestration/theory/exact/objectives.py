@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -137,8 +137,7 @@ def _signals(used: Sequence[str], rest: Mapping[str, float], numbers: Mapping[st
     return list(dict.fromkeys(found))
 
 
-def _expect_quadratic(of: object, c: float, g: Floats, Q: Floats, written: str) -> None:
-    assert callable(of)
+def _expect_quadratic(of: Callable[[Floats], float], c: float, g: Floats, Q: Floats, written: str) -> None:
     draw = np.random.default_rng(0)
     for _ in range(TRIALS):
         y = draw.uniform(-3.0, 3.0, len(g))

@@ -15,7 +15,8 @@ from fractions import Fraction
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.theory.exact.branch import Branch, Mode
-from orchestration.theory.exact.branching import Branching, Effects
+from orchestration.theory.exact.branching import Branching
+from orchestration.theory.exact.effects import LoopEffects
 from orchestration.theory.exact.links import RandomLink, SampledTask, attoseconds
 from orchestration.theory.exact.moments import Passage, Stage
 from orchestration.theory.exact.pieces import Piece
@@ -32,7 +33,7 @@ class TimingChain:
         self,
         tasks: Sequence[SampledTask],
         links: Sequence[RandomLink],
-        effects: Effects,
+        effects: LoopEffects,
         *,
         order: int,
         grids: Sequence[Fraction] = (),

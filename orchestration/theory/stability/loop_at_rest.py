@@ -1,7 +1,7 @@
 """A system at rest at its operating point, and its components about it, each as a `Tangent`."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -228,10 +228,15 @@ class TracedInstance:
 
 def tracing_loader(instances: Instances) -> Loader:
     """A loader of instances as `TracedInstance`."""
+    return wrapping_loader(instances, TracedInstance)
+
+
+def wrapping_loader(instances: Instances, wrapper: Callable[[Instance], object]) -> Loader:
+    """A loader of instances, each in a wrapper that has its attributes."""
 
     @contextmanager
     def load(path: Path, instance_name: str) -> Iterator[Instance]:
         with instances.load(path, instance_name) as fmu:
-            yield cast(Instance, TracedInstance(fmu))
+            yield cast(Instance, wrapper(fmu))
 
     return load

@@ -8,12 +8,10 @@ every period of the loop; that law is fitted to the exchanged signals, by the si
 
 import math
 import zlib
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +24,7 @@ from orchestration.simulation.runs.prepared import prepared
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System
 from orchestration.theory.stability.linearised_component import PULSE
+from orchestration.theory.stability.loop_at_rest import wrapping_loader
 from orchestration.theory.stability.operating_point import (
     deterministic,
     exchanged_signals,
@@ -67,7 +66,7 @@ def growth_of(system: System, instances: Instances) -> Growth:
     nominal = replace(nominal, stop_time=float(horizon) / NANOSECONDS)
     interval = period * max(1, math.floor(horizon / period / MOST))
     unperturbed, perturbed = (
-        _exchanged_rows(nominal, load, interval) for load in (instances.load, _perturbing_loader(instances))
+        _exchanged_rows(nominal, load, interval) for load in (instances.load, wrapping_loader(instances, Pulsed))
     )
     expect_rest(nominal, unperturbed[1:6])
     count = min(len(unperturbed), len(perturbed))
@@ -131,15 +130,6 @@ def _exchanged_rows(system: System, load: Loader, interval: Fraction) -> Floats:
     columns = [result.columns.index(name) for name in exchanged_signals(system)]
     found: Floats = result.rows[rows][:, columns]
     return found
-
-
-def _perturbing_loader(instances: Instances) -> Loader:
-    @contextmanager
-    def load(path: Path, instance_name: str) -> Iterator[Instance]:
-        with instances.load(path, instance_name) as fmu:
-            yield cast(Instance, Pulsed(fmu))
-
-    return load
 
 
 class Pulsed:
