@@ -13,7 +13,7 @@ from orchestration.foundation.basics.bisection import first_failure
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.theory.certificates.family import LoopFamily
 
-LONGEST = 6
+LONGEST_SEQUENCE = 6
 """letters after which a sequence repeats"""
 SCAN = 24
 """values that are tried before the first unstable one is bisected"""
@@ -36,7 +36,7 @@ class BreakingSequence:
     """spectral radius of the sequence"""
 
 
-def unstable_sequence(family: LoopFamily, longest: int = LONGEST) -> tuple[tuple[Draw, ...], float] | None:
+def unstable_sequence(family: LoopFamily, longest: int = LONGEST_SEQUENCE) -> tuple[tuple[Draw, ...], float] | None:
     """The sequence that grows most by letter, each parameter at an end of its range; None if none is unstable."""
     draws = [(i, point) for i, x in enumerate(family.letters) for point in itertools.product(*x.ranges)]
     maps = {draw: family.at(family.letters[draw[0]], draw[1]) for draw in dict.fromkeys(draws)}
@@ -74,7 +74,7 @@ def _cycles(family: LoopFamily, maps: dict[Draw, Floats], longest: int) -> Itera
 
 
 def least_breaking(
-    family_up_to: Callable[[float], LoopFamily], limit: float, longest: int = LONGEST
+    family_up_to: Callable[[float], LoopFamily], limit: float, longest: int = LONGEST_SEQUENCE
 ) -> BreakingSequence | None:
     """The least value up to `limit` at which the scan finds an unstable sequence."""
     found = functools.cache(lambda value: unstable_sequence(family_up_to(value), longest))
@@ -83,7 +83,7 @@ def least_breaking(
     return None if bracket is None else breaking_at(family_up_to(bracket.bad), bracket.bad, longest)
 
 
-def breaking_at(family: LoopFamily, value: float, longest: int = LONGEST) -> BreakingSequence | None:
+def breaking_at(family: LoopFamily, value: float, longest: int = LONGEST_SEQUENCE) -> BreakingSequence | None:
     """An unstable sequence of a family; None if none was found."""
     found = unstable_sequence(family, longest)
     if found is None:

@@ -18,11 +18,11 @@ RADIUS = 1e-6
 """relative, of measured matrices"""
 LADDER = ((1, 0), (2, 1), (2, 2), (2, 3), (2, 4), (3, 3))
 """labels of each letter with a parameter, and the number of future labels that a form depends on: tried in turn"""
-LARGEST = 1000
+MAX_INEQUALITIES = 1000
 """inequalities of a search: steps of the ladder that need more are skipped"""
 SEARCHED = 12
 """cells for which forms are searched; of two parameters the square root of that along each"""
-FINER = {1: (2, 4, 8), 2: (2, 4)}
+REFINEMENTS = {1: (2, 4, 8), 2: (2, 4)}
 """factors on the number of cells for the proof, by the number of parameters: cells are refined first, forms searched
 again second"""
 ROUNDS = 3
@@ -49,7 +49,7 @@ def find_certificate(family: LoopFamily, of: Sequence[str], first: int = 0) -> C
             of=tuple(of), radius=RADIUS, family=family, cells=tuple(_cells_of(family, labels, 1)),
             coordinates=_coordinates(family, parts), memory=memory, forms={},
         )  # fmt: skip
-        if inequalities_of(certificate) > LARGEST:
+        if inequalities_of(certificate) > MAX_INEQUALITIES:
             continue
         found = _prove(certificate, parts, labels)
         if found is not None:
@@ -63,7 +63,7 @@ def _prove(certificate: Certificate, parts: Sequence[Sequence[int]], labels: int
         forms = forms_for(certificate, parts)
         if forms is None:
             return None
-        for refinement in FINER[max(1, *(len(letter.ranges) for letter in family.letters))]:
+        for refinement in REFINEMENTS[max(1, *(len(letter.ranges) for letter in family.letters))]:
             refined = replace(certificate, forms=forms, cells=tuple(_cells_of(family, labels, refinement)))
             try:
                 verified(refined)

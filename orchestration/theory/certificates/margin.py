@@ -23,7 +23,7 @@ from orchestration.systems.system.distribution import lowest
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.placement import messages_by_connection, tasks_of
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
-from orchestration.theory.certificates.breaking import LONGEST, BreakingSequence, breaking_at, least_breaking
+from orchestration.theory.certificates.breaking import LONGEST_SEQUENCE, BreakingSequence, breaking_at, least_breaking
 from orchestration.theory.certificates.causes import Cause, ScheduledLoop, cause_at
 from orchestration.theory.certificates.family import LoopFamily
 from orchestration.theory.certificates.parts import CertifiedLoop, certified_loop
@@ -150,9 +150,7 @@ def _of_times(timeline: LoopTimeline, varying: Varying, progress: Share) -> Cert
         return timeline.family([value])
 
     largest = floor_to_nanoseconds(timeline.largest())
-    searched = (
-        f"draws at either end of each range, sequences that repeat after at most {LONGEST}, values up to {largest:g} s"
-    )
+    searched = f"draws at either end of each range, sequences that repeat after at most {LONGEST_SEQUENCE}, values up to {largest:g} s"
     if breaking_at(up_to(0.0), 0.0) is not None:
         states = len(up_to(0.0).kept)
         return Certified(of=varying.path, breaking=0, largest=largest, searched=searched, states=states)
@@ -170,7 +168,9 @@ def _of_times(timeline: LoopTimeline, varying: Varying, progress: Share) -> Cert
 def _of_losses(timeline: LoopTimeline, varying: Varying, progress: Share) -> Certified:
     from orchestration.theory.certificates.certify import find_certificate
 
-    searched = f"sequences that repeat after at most the run and {LONGEST // 2} messages, runs up to {MOST_LOST}"
+    searched = (
+        f"sequences that repeat after at most the run and {LONGEST_SEQUENCE // 2} messages, runs up to {MOST_LOST}"
+    )
     if breaking_at(timeline.family(), 0.0) is not None:
         states = len(timeline.family().kept)
         return Certified(of=varying.path, breaking=0, largest=MOST_LOST, searched=searched, states=states)
@@ -179,7 +179,7 @@ def _of_losses(timeline: LoopTimeline, varying: Varying, progress: Share) -> Cer
     for run in range(MOST_LOST + 1):
         progress(run / (MOST_LOST + 1))
         family = timeline.family(run=run)
-        broken = breaking_at(family, run, run + LONGEST // 2)
+        broken = breaking_at(family, run, run + LONGEST_SEQUENCE // 2)
         if broken is not None:
             break
         found = find_certificate(family, [varying.path])

@@ -30,7 +30,7 @@ COLUMNS = 6
 """values of the first quantity, from 0 to the one that alone breaks the loop"""
 SHARES = (0.95, 0.98)
 """Shares of the breaking value: tried for a certificate, as of one quantity"""
-LONGEST = 4
+LONGEST_SEQUENCE = 4
 """draws after which the tried sequences repeat"""
 
 Pair = tuple[float, float]
@@ -120,7 +120,7 @@ def region(
     return Region(
         of=paths, certified=tuple(certified), breaking=tuple(breaking), certificates=tuple(texts),
         states=len(timeline.family([0.0, 0.0]).kept),
-        searched=f"draws at either end of both ranges, sequences that repeat after at most {LONGEST}",
+        searched=f"draws at either end of both ranges, sequences that repeat after at most {LONGEST_SEQUENCE}",
     )  # fmt: skip
 
 
@@ -134,4 +134,4 @@ def _least_breaking(timeline: LoopTimeline, other: float, *, first: bool = False
     def up_to(value: float) -> LoopFamily:
         return timeline.family([value, other] if first else [other, value])
 
-    return least_breaking(up_to, floor_to_nanoseconds(timeline.largest() - other), LONGEST)
+    return least_breaking(up_to, floor_to_nanoseconds(timeline.largest() - other), LONGEST_SEQUENCE)

@@ -23,13 +23,13 @@ from orchestration.systems.system.placement import PlacedTask, placed_tasks
 from orchestration.theory.certificates.breaking import FINE, SCAN
 from orchestration.theory.certificates.causes import EXECUTION, Cause
 from orchestration.theory.exact.loops import Loops
-from orchestration.theory.exact.mean_square import AGREE
+from orchestration.theory.exact.mean_square import RADIUS_TOLERANCE
 from orchestration.theory.stability.delay_bounds import patterns
 from orchestration.theory.stability.operating_point import deterministic
 
-LONGEST = 4
+MAX_TURNS = 4
 """turns after which a sequence repeats; a turn has as many jobs as there are in a period of the loop"""
-MOST_JOBS = 64
+MAX_SEQUENCE_JOBS = 64
 """Most jobs after which a sequence repeats"""
 
 Word = tuple[int, ...]
@@ -58,7 +58,7 @@ def least_repeated(system: System, cause: Cause, models: Mapping[str, Model], pe
         return RepeatedSearch(searched="no sequences")
     loops, always = Loops(models), _with_longest_jobs(system)
     jobs = math.ceil(period / NANOSECONDS / Fraction(repr(float(cause.period))))
-    longest = 1 if of.task.component is not None else max(1, min(LONGEST, MOST_JOBS // jobs))
+    longest = 1 if of.task.component is not None else max(1, min(MAX_TURNS, MAX_SEQUENCE_JOBS // jobs))
 
     words, unknown = (
         sorted(patterns(longest), key=lambda word: (len(word), [-share for share in word])),
@@ -68,7 +68,7 @@ def least_repeated(system: System, cause: Cause, models: Mapping[str, Model], pe
     def fails(value: float, word: Word) -> bool:
         system = _with_repeated(always, of, cause, [value * share for share in word for _ in range(jobs)])
         try:
-            return loops.radius(system, agree=AGREE) >= 1.0
+            return loops.radius(system, agree=RADIUS_TOLERANCE) >= 1.0
         except UsageError as error:  # an overloaded processor, or a timetable that does not repeat
             unknown[word] = error
             return False

@@ -15,9 +15,9 @@ from orchestration.theory.exact.loops import Loops
 from orchestration.theory.exact.objectives import inlined_objectives, means_of
 from orchestration.theory.stability.known_loops import LOOPS
 
-AGREE = 1e-3
+RADIUS_TOLERANCE = 1e-3
 """Difference of a radius allowed from order to order: enough to know whether it is above 1"""
-MOST = 50
+MAX_SYSTEMS = 50
 """systems that are examined"""
 
 
@@ -31,7 +31,7 @@ def infinite_means_warning(request: Request, systems: Sequence[System], files: F
         return None
     chosen: dict[str, System] = {}
     for system in systems:
-        if len(chosen) < MOST and system.depends_on_seed and _averages(system):
+        if len(chosen) < MAX_SYSTEMS and system.depends_on_seed and _averages(system):
             once = replace(system, seed=0)
             chosen.setdefault(once.to_toml(), once)
     if not chosen:
@@ -68,7 +68,7 @@ def radii_of(systems: Sequence[System], models: Mapping[str, Model]) -> list[flo
     loops, found = Loops(models), list[float | None]()
     for system in systems:
         try:
-            found.append(loops.radius(system, agree=AGREE))
+            found.append(loops.radius(system, agree=RADIUS_TOLERANCE))
         except QuadcosimError:
             found.append(None)
     return found

@@ -43,7 +43,7 @@ T = TypeVar("T")
 
 ORDERS = (1, 2, 4, 8, 16, 32)
 """Orders of Gauss's rule, tried in turn until the next one changes nothing"""
-AGREE = 1e-10
+ORDER_TOLERANCE = 1e-10
 """Difference of a result allowed from order to order"""
 
 
@@ -165,7 +165,7 @@ class Loops:
             return loop, np.array([loop.radius, *costs])
 
         effects = self._effects(system, linear, used)
-        converged = self._refined(self._tasks_and_links(system, linear, effects), effects, answer, AGREE)
+        converged = self._refined(self._tasks_and_links(system, linear, effects), effects, answer, ORDER_TOLERANCE)
         costs = converged.numbers[1:].tolist()
         means = _with_costs(linear, used, costs) if converged.result.radius < 1.0 else None
         return Solution(linear=linear, loop=converged, means=means)
@@ -184,7 +184,7 @@ class Loops:
             costs = costs_until(chain, start, constant, end) / (end / ATTOSECONDS) if used else np.zeros(0)
             return _with_costs(linear, used, costs.tolist()), costs
 
-        return self._refined(self._tasks_and_links(rests, linear, effects, horizon), effects, answer, AGREE)
+        return self._refined(self._tasks_and_links(rests, linear, effects, horizon), effects, answer, ORDER_TOLERANCE)
 
     def _refined(
         self,

@@ -14,9 +14,9 @@ from orchestration.systems.system.paths import changed
 from orchestration.theory.exact.loops import Loops
 from orchestration.theory.stability.known_loops import rested
 
-FINER = 0.01
+LIMIT_TOLERANCE = 0.01
 """Share of the tolerance of a measured limit"""
-AGREE = 1e-6
+RADIUS_TOLERANCE = 1e-6
 """Difference of a radius allowed from order to order"""
 
 
@@ -40,9 +40,9 @@ def mean_square_limit(varied: Varied, span: Range, models: Mapping[str, Model]) 
 
 def _crossing(system: System, paths: Sequence[str], span: Range, loops: Loops) -> MeanSquareLimit:
     def fails(value: float) -> bool:
-        return loops.radius(changed(system, dict.fromkeys(paths, value)), agree=AGREE) >= 1.0
+        return loops.radius(changed(system, dict.fromkeys(paths, value)), agree=RADIUS_TOLERANCE) >= 1.0
 
-    bracket = first_failure(fails, span.values(), FINER * span.tolerance)
+    bracket = first_failure(fails, span.values(), LIMIT_TOLERANCE * span.tolerance)
     if bracket is None:
         return MeanSquareLimit(reason="second moments are bounded throughout the range")
     if bracket.good is None:

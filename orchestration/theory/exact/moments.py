@@ -19,9 +19,9 @@ from orchestration.foundation.basics.simulator import Booleans, Floats
 from orchestration.theory.exact.krylov import SIZE, Map, solve_fixed_point, spectral_radius_of
 from orchestration.theory.exact.pieces import Piece
 
-LARGEST = 100_000
+MAX_MOMENTS = 100_000
 """numbers in the second moments of all modes together"""
-LARGEST_FOURTH = 1e8
+MAX_FOURTH_PRODUCTS = 1e8
 """products to propagate fourth moments over a period"""
 MOST_DOUBLINGS = 60
 """Most doublings of the number of periods in a sum"""
@@ -53,9 +53,9 @@ class JumpLinear:
         self._basis = _SymmetricBasis(self._sizes[0])
         self.numbers = self._basis.count
         """Numbers in the second moments where the period begins"""
-        if self.numbers > LARGEST:
+        if self.numbers > MAX_MOMENTS:
             raise UsageError(
-                f"{len(self._sizes[0])} modes with {self.numbers} second moments, more than {LARGEST}: "
+                f"{len(self._sizes[0])} modes with {self.numbers} second moments, more than {MAX_MOMENTS}: "
                 "expected fewer messages in transit, or states"
             )
 
@@ -155,7 +155,7 @@ class JumpLinear:
             return _spectral_radius(self._deterministic_map) ** 4
         halves = [[n * (n + 1) // 2 for n in sizes] for sizes in self._sizes]
         work = sum(halves[i][p.begin] ** 3 for i, stage in enumerate(self._stages) for p in stage)
-        if work > LARGEST_FOURTH:
+        if work > MAX_FOURTH_PRODUCTS:
             return None
         stages = [
             _BatchedStage(

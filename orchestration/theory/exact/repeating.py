@@ -43,7 +43,7 @@ from orchestration.theory.exact.periodic_schedule import NO_SCHEDULE, PeriodicSc
 from orchestration.theory.exact.scheduled import expect_certain
 from orchestration.theory.stability.operating_point import hyperperiod
 
-MOST_JOBS = 200_000
+MAX_SIMULATED_JOBS = 200_000
 """Most jobs of all tasks and messages that are simulated"""
 WINDOWS, MOST_WINDOWS = 12, 96
 """Windows that are compared at first, and at most"""
@@ -82,7 +82,7 @@ def periodic_schedule(
         found = windows.schedule()
         if found is not None:
             return found
-        if count >= MOST_WINDOWS or 4 * trace.jobs > MOST_JOBS:
+        if count >= MOST_WINDOWS or 4 * trace.jobs > MAX_SIMULATED_JOBS:
             raise UsageError(windows.failure_text())
         count *= 2
 
@@ -110,10 +110,10 @@ def _begin_and_hyperperiod(instants: Sequence[tuple[Fraction, Fraction]]) -> tup
     length = hyperperiod(periods).numerator  # a multiple, where it is no whole number
     begin = math.ceil(max((offset for offset, _ in instants), default=Fraction(0)) / length) * length
     jobs = sum((begin + WINDOWS * length) / period for period in periods)
-    if jobs > MOST_JOBS:
+    if jobs > MAX_SIMULATED_JOBS:
         raise UsageError(
             f"computers and networks: {int(jobs)} jobs and messages in {WINDOWS} hyperperiods of "
-            f"{length / NANOSECONDS:g} s: more than {MOST_JOBS}; expected periods that have more in common"
+            f"{length / NANOSECONDS:g} s: more than {MAX_SIMULATED_JOBS}; expected periods that have more in common"
         )
     return begin, length
 

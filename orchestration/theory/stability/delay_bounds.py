@@ -35,7 +35,7 @@ AROUND = 40
 """frequencies to each side of such a peak"""
 ALIASES = 40
 """Aliases to each side; those beyond are B/(jω), whose sum is known"""
-LONGEST = 4
+LONGEST_PATTERN = 4
 """samples after which the tried sequences of delays repeat"""
 SCAN = 16
 """values of the jitter at which each of them is tried, before the first unstable one is bisected"""
@@ -127,12 +127,12 @@ def _periods(bound: float) -> float:
 
 
 def breaking_jitter(loop: SampledLoop, limit: float) -> tuple[float, tuple[float, ...]] | None:
-    """The least J [s] found up to `limit` that makes the loop unstable, and the fractions of J of the delays in turn.
+    """The least J [s] found up to `limit` that makes the loop unstable, and the shares of J of the delays in turn.
 
-    Sequences of delays repeat after at most `LONGEST` samples, each delay d or d + J. None: none makes it unstable.
+    Sequences of delays repeat after at most `LONGEST_PATTERN` samples, each delay d or d + J. None: none makes it unstable.
     """
     best, found = limit, None
-    for pattern in patterns(LONGEST):
+    for pattern in patterns(LONGEST_PATTERN):
         rising = [best * i / SCAN for i in range(SCAN + 1)]
         fails = functools.partial(_fails, loop, pattern)
         bracket = first_failure(fails, rising, 1e-4 * loop.period)

@@ -19,7 +19,7 @@ from orchestration.theory.stability.linear_simulator import LinearSimulator
 
 PULSE = 1e-6
 """Size of a pulse of an input, both ways, by its value, or absolute where that is smaller than 1"""
-LARGEST = 1e4
+LARGEST_RESPONSE = 1e4
 """Largest response of an output to the pulse; later outputs are ignored"""
 NOISE = 100.0 * np.finfo(float).eps
 """Effect of rounding on an output, likewise"""
@@ -27,7 +27,7 @@ OBSERVABLE = 1e-11
 """Share of the largest singular value: smaller ones count as 0"""
 TURN = 1e-3
 """Difference of the response to a pulse on all inputs allowed from sample to sample"""
-FEWEST = 6
+FEWEST_POINTS = 6
 """points of the ladder at which states are produced at least"""
 LATER = 4
 """steps over which responses to pulses of several sizes are compared"""
@@ -75,7 +75,7 @@ class Tangent(LinearSimulator):
         self._outputs_now: Floats = np.zeros(len(rest.outputs))
         self._read = rest.fmu.reader(rest.outputs, self._outputs_now)
         self._pulse = pulse * np.maximum(1.0, np.abs(rest.held))
-        self._largest = LARGEST * pulse
+        self._largest = LARGEST_RESPONSE * pulse
         self._time = rest.time
         self._rest = _State(rest.fmu.save(), rest.time)
         self._read()
@@ -111,7 +111,7 @@ class Tangent(LinearSimulator):
     def _find_coordinates(self) -> None:
         """Produce states at points of the ladder until no further coordinates appear."""
         sets, before, rank = [self._pulse_responses()], 0, 0
-        fewest = max([FEWEST, *(self._dead_points(i) + 2 for i in range(len(self.inputs)))])
+        fewest = max([FEWEST_POINTS, *(self._dead_points(i) + 2 for i in range(len(self.inputs)))])
         for shown in range(1, len(self._ladder) + 1):
             self._shown = shown
             columns = [self._futures(pairs) for pairs in sets]
@@ -218,7 +218,7 @@ class Tangent(LinearSimulator):
 
     def _dead_points(self, i: int) -> int:
         """The number of points of the ladder before an output responds to an input; 0 if none does."""
-        for most in (FEWEST, len(self._ladder)):
+        for most in (FEWEST_POINTS, len(self._ladder)):
             up, down = (self._outputs_after(self._rest, self._pulses(i, s), self._ladder[:most]) for s in (1, -1))
             responds = (np.abs(up - down) / self._weight > NOISE).any(axis=1)
             if responds.any():

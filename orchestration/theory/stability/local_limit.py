@@ -16,7 +16,7 @@ from orchestration.theory.stability.period_map import growth_of_loop
 from orchestration.theory.stability.perturbed_runs import growth_of
 
 LOOP = "spectral radius of the sampled loop about the operating point, by differences through saved states"
-LOOP_FINER, TWINS_FINER = 0.01, 0.2
+LOOP_TOLERANCE, TWINS_TOLERANCE = 0.01, 0.2
 """Tolerances as shares of the tolerance of the measured limit"""
 TWINS = "growth of the difference of twin runs from the operating point, one of them perturbed by a pulse"
 OTHER_PULSE = 4.0
@@ -50,7 +50,7 @@ def about_rest(at: Callable[[float], System], span: Range) -> LocalLimit:
         why = str(error)
     try:
         with closing(Instances()) as instances:
-            found = _first_growth(lambda value: growth_of(at(value), instances).rate, span, TWINS_FINER, TWINS)
+            found = _first_growth(lambda value: growth_of(at(value), instances).rate, span, TWINS_TOLERANCE, TWINS)
     except (UsageError, SimulatorError) as error:
         return LocalLimit(reason=f"no local limit: {error}")
     return replace(found, method=f"{TWINS}, as saved states do not suffice: {why}")
@@ -64,7 +64,7 @@ def _through_saved_states(at: Callable[[float], System], span: Range, instances:
         growths[value] = found = growth_of_loop(at(value), instances)
         return found
 
-    found = _first_growth(growth, span, LOOP_FINER, LOOP)
+    found = _first_growth(growth, span, LOOP_TOLERANCE, LOOP)
     if found.limit is None or found.accuracy is None:
         return found
     below, above = (max(v for v in growths if v < found.limit), min(v for v in growths if v > found.limit))

@@ -36,7 +36,7 @@ from orchestration.theory.stability.operating_point import (
 
 LARGE, SMALL = 1e3, 1e-7
 """Factors on the initial difference: sizes between which it is followed, linear and above rounding"""
-FEWEST, MOST = 100, 400
+FEWEST_INSTANTS, MOST_INSTANTS = 100, 400
 """instants of a run at which the twins are compared"""
 DELAYS = 24
 """values of each signal over which the law is fitted, in addition to those in transit"""
@@ -62,9 +62,9 @@ def growth_of(system: System, instances: Instances) -> Growth:
     """The growth about the operating point of `system`; raises `UsageError` where the system does not rest there."""
     nominal = deterministic(system)
     period = hyperperiod_of(nominal) or longest_period(nominal)
-    horizon = max(exact_nanoseconds(nominal.stop_time), FEWEST * period)
+    horizon = max(exact_nanoseconds(nominal.stop_time), FEWEST_INSTANTS * period)
     nominal = replace(nominal, stop_time=float(horizon) / NANOSECONDS)
-    interval = period * max(1, math.floor(horizon / period / MOST))
+    interval = period * max(1, math.floor(horizon / period / MOST_INSTANTS))
     unperturbed, perturbed = (
         _exchanged_rows(nominal, load, interval) for load in (instances.load, wrapping_loader(instances, Pulsed))
     )

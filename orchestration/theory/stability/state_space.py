@@ -12,7 +12,7 @@ from orchestration.foundation.basics.simulator import Floats
 
 SAMPLES = (*range(32), 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024)
 """Samples of impulse responses, as long as they stay small"""
-LARGEST = 1e6
+LARGEST_RESPONSE = 1e6
 """Largest response, relative to the first"""
 MINIMAL = 1e-7
 """Share of the largest singular value between inputs and outputs, each by its own unit: smaller ones count as 0"""
@@ -79,7 +79,7 @@ def _powers(A: Floats, B: Floats) -> list[Floats]:
     for sample in SAMPLES[1:]:
         while k < sample:
             state, k = A @ state, k + 1
-        if np.abs(state).max() > LARGEST * np.abs(B).max():
+        if np.abs(state).max() > LARGEST_RESPONSE * np.abs(B).max():
             break
         found.append(state)
     return found

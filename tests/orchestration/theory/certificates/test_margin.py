@@ -124,7 +124,7 @@ def test_a_loop_that_is_unstable_by_itself_has_no_margin(system: System) -> None
 
 def test_two_at_once_leave_less_of_each(system: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(regions, "SHARES", (0.2,))
-    monkeypatch.setattr(regions, "LONGEST", 2)
+    monkeypatch.setattr(regions, "LONGEST_SEQUENCE", 2)
     both = region(system, SAMPLE, COMMAND, columns=2)
     (_, alone), (late, beside) = both.certified
     assert late > 0.0
