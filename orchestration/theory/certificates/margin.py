@@ -150,7 +150,10 @@ def _of_times(timeline: LoopTimeline, varying: Varying, progress: Share) -> Cert
         return timeline.family([value])
 
     largest = floor_to_nanoseconds(timeline.largest())
-    searched = f"draws at either end of each range, sequences that repeat after at most {LONGEST_SEQUENCE}, values up to {largest:g} s"
+    searched = (
+        f"draws at either end of each range, sequences that repeat after at most {LONGEST_SEQUENCE}, "
+        f"values up to {largest:g} s"
+    )
     if breaking_at(up_to(0.0), 0.0) is not None:
         states = len(up_to(0.0).kept)
         return Certified(of=varying.path, breaking=0, largest=largest, searched=searched, states=states)

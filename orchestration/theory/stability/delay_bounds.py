@@ -129,7 +129,7 @@ def _periods(bound: float) -> float:
 def breaking_jitter(loop: SampledLoop, limit: float) -> tuple[float, tuple[float, ...]] | None:
     """The least J [s] found up to `limit` that makes the loop unstable, and the shares of J of the delays in turn.
 
-    Sequences of delays repeat after at most `LONGEST_PATTERN` samples, each delay d or d + J. None: none makes it unstable.
+    Sequences of delays, each d or d + J, repeat after at most `LONGEST_PATTERN` samples. None: none makes it unstable.
     """
     best, found = limit, None
     for pattern in patterns(LONGEST_PATTERN):
