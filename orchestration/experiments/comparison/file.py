@@ -18,6 +18,7 @@ from orchestration.systems.expressions.at_instant import compiled
 from orchestration.systems.expressions.syntax import is_truth, names, parse
 from orchestration.systems.system.component import parameters_in
 from orchestration.systems.system.request import ControlLoop
+from orchestration.systems.system.requirements import is_number
 from orchestration.systems.system.starts import Starts
 
 
@@ -143,7 +144,7 @@ def _function_of_axis(text: Value, axis: str, place: str) -> Callable[[Value], f
         raise UsageError(f'{place} = {text}: expected an expression over {axis}, such as "0.9 / {axis}"')
 
     def parameter(value: Value) -> float:
-        if not _is_number(value):
+        if not is_number(value):
             raise UsageError(f"axis {axis}: expected numbers, for {place} depends on it")
         result = at([float(value)])
         if not math.isfinite(result):
@@ -185,16 +186,12 @@ def _vehicle(table: VehicleTable, base: ControlLoop, folder: Path) -> VehicleEnt
 def _condition(table: ConditionTable) -> Condition:
     place = f"conditions.{table.name}"
     sets, multiplies = (parameters_in(getattr(table, kind), f"{place}.{kind}") for kind in ("sets", "multiplies"))
-    factors = {target: value for target, value in multiplies.items() if _is_number(value)}
+    factors = {target: value for target, value in multiplies.items() if is_number(value)}
     for target in multiplies.keys() - factors.keys():
         raise UsageError(f"{place}.multiplies.{target} = {multiplies[target]}: expected a number")
     return Condition(
         name=table.name, sets=dict(sets), multiplies={target: float(value) for target, value in factors.items()}
     )
-
-
-def _is_number(value: Value) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _read(path: Path) -> dict[str, Value]:

@@ -40,6 +40,11 @@ class Evaluation:
     unmet: str | None = None
     """the part of the criterion that this seed did not meet, in words; None: it was met, or the run diverged"""
 
+    @property
+    def is_good(self) -> bool:
+        """Whether all of its runs were good."""
+        return self.flew == self.runs
+
 
 @dataclass(kw_only=True)
 class Evaluator:
@@ -64,8 +69,7 @@ class Evaluator:
 
     def fails(self, value: float) -> bool:
         """Whether some seed is not good; the remaining seeds are not run then."""
-        evaluation = self._run(value, stop=lambda metrics: not is_good(metrics))
-        return evaluation.flew < evaluation.runs
+        return not self._run(value, stop=lambda metrics: not is_good(metrics)).is_good
 
     def is_refuted(self, value: float) -> bool:
         """Whether so many of all seeds are not good that `RELIABILITY` is refuted at the confidence."""
@@ -103,7 +107,7 @@ def describe(evaluation: Evaluation) -> str:
     if evaluation.share is not None:
         low, high = evaluation.share
         return f"{evaluation.flew} of {evaluation.runs} seeds are good, a share of {low:.2f} to {high:.2f}"
-    if evaluation.flew == evaluation.runs:
+    if evaluation.is_good:
         return evaluation.outcome
     if evaluation.divergence_time is not None:
         return f"fails, {evaluation.outcome} at {evaluation.divergence_time:.3g} s"

@@ -48,7 +48,7 @@ def _draw_values(axes: Axes, result: Limit, across: Quantity) -> None:
     """One run per value: the judged objective, or good and not good where it has no value."""
     known = [one for one in result.tried if one.measured is not None]
     if not known:
-        _draw_marks(axes, result.tried, [float(is_good(one)) for one in result.tried], across)
+        _draw_marks(axes, result.tried, [float(one.is_good) for one in result.tried], across)
         axes.set(yticks=(0.0, 1.0), yticklabels=("not good", "good"), ylim=(-0.3, 1.3))
         return
     _draw_marks(axes, known, [one.measured or 0.0 for one in known], across)
@@ -95,14 +95,9 @@ def _draw_marks(
 ) -> None:
     """One mark per value: dots where all runs were good, crosses elsewhere."""
     for good, mark, color, label in ((True, "o", BLUE, "good"), (False, "X", RED, "not good")):
-        chosen = [i for i, one in enumerate(tried) if is_good(one) is good]
+        chosen = [i for i, one in enumerate(tried) if one.is_good is good]
         x, y = [tried[i].value * across.factor for i in chosen], [heights[i] for i in chosen]
         axes.plot(x, y, mark, color=color, markersize=6, label=label if chosen else None)
-
-
-def is_good(tried: Evaluation) -> bool:
-    """Whether all runs at a value were good."""
-    return tried.flew == tried.runs
 
 
 def _draw_limits(axes: Axes, result: Limit, across: Quantity) -> None:
@@ -126,7 +121,7 @@ def _title(result: Limit, across: Quantity) -> str:
     if result.large_signal_limit is not None:
         return f"Good up to {across.text_of(result.large_signal_limit, DIGITS)}: {what}{until}"
     first = result.tried[0]
-    return f"{what}: {'good throughout' if is_good(first) else 'never good'}{until}"
+    return f"{what}: {'good throughout' if first.is_good else 'never good'}{until}"
 
 
 def _quantity(result: Limit) -> Quantity:

@@ -15,6 +15,7 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.statistics import wilson
 from orchestration.simulation.results import display_names as labels
 from orchestration.simulation.results.quantities import Quantity
+from orchestration.systems.system.requirements import is_number
 
 MAX_ROWS = 50_000
 """Most rows of a table; a larger study is thinned evenly"""
@@ -146,7 +147,7 @@ def _by_part(rows: Sequence[Row], values: Floats, axis: ColumnAxis, *, by_chance
 
 
 def _ordered(values: list[Any]) -> list[Any]:
-    are_numbers = all(isinstance(value, float | int) and not isinstance(value, bool) for value in values)
+    are_numbers = all(map(is_number, values))
     return sorted(values) if are_numbers else values
 
 
@@ -160,4 +161,4 @@ def _displayed(value: Any, quantity: Quantity) -> Any:
 
 
 def _number(value: Any) -> float | None:
-    return float(value) if isinstance(value, float | int) and not isinstance(value, bool) else None
+    return float(value) if is_number(value) else None

@@ -20,6 +20,7 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.terminal import Share
 from orchestration.simulation.figures.style import SCREEN, Style, save
 from orchestration.simulation.results.criterion import bound_of, judged_objective
+from orchestration.systems.system.requirements import is_number
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -118,4 +119,4 @@ def _is_screened(study: Study) -> bool:
 
 
 def _is_numeric(axis: Axis) -> bool:
-    return axis.values is None or all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in axis.values)
+    return axis.values is None or all(map(is_number, axis.values))

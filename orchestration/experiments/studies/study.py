@@ -20,6 +20,7 @@ from orchestration.systems.system.files import Files, files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed, is_source_file, value_at
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
+from orchestration.systems.system.requirements import is_number
 
 
 @record()
@@ -189,6 +190,6 @@ def _product(value: Value, path: str, changes: Mapping[str, Any], origin: System
     base = changes[path] if path in changes else value_at(origin, path)
     if base is None:
         base = starts.get(path.removeprefix("components.").replace(".parameters.", ".", 1))
-    if isinstance(base, bool) or not isinstance(base, (int, float)):
+    if not is_number(base):
         raise UsageError(f"{path}: expected a number of the base or of an FMU to multiply")
     return float(value) * float(base)

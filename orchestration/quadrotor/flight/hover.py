@@ -68,11 +68,10 @@ def at_edge(scenario: Scenario) -> Scenario | None:
     system = scenario.as_system()
     known = files_of(system).start_values_of(system)
     own = {f"controller.{name}": value for name, value in scenario.controller.parameters.items()}
-    names = [f"controller.{name}" for name in (wiring.SURFACE_GAIN, wiring.SURFACE_EXPONENT, wiring.BOUNDARY_LAYER)]
-    if any(name not in known for name in names):
+    if any(name not in known for name in wiring.SURFACE):
         return None
-    gain, exponent, layer = (float(own.get(name, known[name])) for name in names)
-    return scenario.with_changes(parameters={names[0]: exponent * gain * layer ** (exponent - 1.0)})
+    gain, exponent, layer = (float(own.get(name, known[name])) for name in wiring.SURFACE)
+    return scenario.with_changes(parameters={wiring.SURFACE[0]: exponent * gain * layer ** (exponent - 1.0)})
 
 
 def displaced(name: str, size: float) -> dict[str, float]:

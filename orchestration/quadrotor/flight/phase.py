@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.quadrotor.scenarios.wiring import BOUNDARY_LAYER, SURFACE_EXPONENT, SURFACE_GAIN, components
+from orchestration.quadrotor.scenarios.wiring import SURFACE, components
 from orchestration.simulation.figures.drawn_run import DrawnRun
 from orchestration.simulation.figures.lines import name_runs, quantity
 from orchestration.simulation.figures.palette import GREY
@@ -69,10 +69,9 @@ def surface(error: Floats, parameters: Mapping[str, float]) -> Floats | None:
 
     Where `surface` of the law is 0, solved for the rate: this package does not import the sources of FMUs.
     """
-    names = [f"controller.{name}" for name in (SURFACE_GAIN, SURFACE_EXPONENT, BOUNDARY_LAYER)]
-    if not all(name in parameters for name in names):
+    if not all(name in parameters for name in SURFACE):
         return None
-    k_s, beta_t, epsilon = (parameters[name] for name in names)
+    k_s, beta_t, epsilon = (parameters[name] for name in SURFACE)
     size = np.abs(error)
     rate: Floats = np.where(size < epsilon, -k_s * error, -k_s * size**beta_t * np.sign(error))
     return rate

@@ -41,8 +41,8 @@ PAYLOAD = "payload.mass"
 """Mass of the plant beyond its own that its controller does not know."""
 
 BOUNDARY_LAYER = "boundary_layer"
-SURFACE_GAIN, SURFACE_EXPONENT = "gain.surface", "surface_exponent"
-"""Parameters of the controller: its gain is constant for position errors below ε, a power of them beyond."""
+SURFACE = tuple(f"controller.{name}" for name in ("gain.surface", "surface_exponent", BOUNDARY_LAYER))
+"""Parameters k_s, β_t and ε of the controller: its gain is constant for position errors below ε, a power beyond."""
 UNREDESIGNED: Mapping[str, tuple[object, ...]] = {"discretisation": ("explicit", 1), "prediction": (0.0,)}
 """Parameters of the controller, and their values without a redesign: the law is evaluated at the sample and held."""
 

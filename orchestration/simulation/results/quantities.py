@@ -8,6 +8,7 @@ import numpy as np
 
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.results import display_names as labels
+from orchestration.systems.system.requirements import is_number
 
 LONG = 1.0
 """Time below which times are shown in milliseconds, if all are shorter [s]"""
@@ -40,7 +41,7 @@ class Quantity:
 
 def quantity(name: str, unit: str | None, values: Iterable[Any]) -> Quantity:
     """A quantity with these values in `unit`; times that are all below a second are shown in milliseconds."""
-    sizes = [abs(value) for value in values if isinstance(value, int | float) and not isinstance(value, bool)]
+    sizes = [abs(value) for value in values if is_number(value)]
     if unit == "s" and sizes and max(sizes) < LONG:
         return Quantity(name=name, unit="ms", factor=1e3)
     return Quantity(name=name, unit=unit)

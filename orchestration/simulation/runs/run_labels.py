@@ -9,6 +9,7 @@ from orchestration.simulation.results import quantities
 from orchestration.simulation.results.quantities import Quantity
 from orchestration.simulation.runs.result import Result
 from orchestration.systems.system.component import flattened
+from orchestration.systems.system.requirements import is_number
 
 MAX_SETTINGS_IN_LABEL = 3
 """Most settings in a label"""
@@ -47,5 +48,4 @@ def _setting_text(path: str, named: Quantity, value: Any) -> str:
         return f"{named.name} as usual"
     if isinstance(value, str) and path.endswith((".fmu", ".file")):
         return PurePath(value).stem
-    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return f"{named.name} {named.text_of(value) if is_number else value}"
+    return f"{named.name} {named.text_of(value) if is_number(value) else value}"

@@ -13,6 +13,7 @@ from orchestration.simulation.engines.batch.kernels import preferred_lanes
 from orchestration.simulation.engines.batch.shape import outline
 from orchestration.simulation.workers.task import RunTask, TaskBatch
 from orchestration.systems.schedule.schedule_cache import schedule_key
+from orchestration.systems.system.requirements import is_number
 
 SAMPLE = 8
 """Runs that are repeated with FMUs"""
@@ -109,7 +110,7 @@ class LaneAgreement:
 def _difference(one: Any, other: Any) -> float:
     if one == other:
         return 0.0
-    numbers = [value for value in (one, other) if isinstance(value, (int, float)) and not isinstance(value, bool)]
+    numbers = [value for value in (one, other) if is_number(value)]
     if len(numbers) < 2:
         return math.inf
     return abs(one - other) / max(abs(one), abs(other))  # type: ignore[no-any-return]

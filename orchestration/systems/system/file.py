@@ -14,7 +14,7 @@ from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.distribution import DistributionTable, with_distributions
 from orchestration.systems.system.model import Criterion, System
 from orchestration.systems.system.paths import changed, for_each
-from orchestration.systems.system.requirements import require
+from orchestration.systems.system.requirements import is_number, require
 from orchestration.systems.system.source import Source
 
 Part = TypeVar("Part")
@@ -155,7 +155,7 @@ def _connection(index: int, table: Any, order: Order, folder: Path) -> Connectio
     for what in ("noise", "quantisation"):
         keys[what] = for_each(table.start, keys[what])
         for variable, value in keys[what].items():
-            if isinstance(value, bool) or not isinstance(value, (int, float)):
+            if not is_number(value):
                 raise UsageError(f"connections.{keys['name']}.{what}.{variable} = {value!r}: expected a number")
     return _part(f"connections.{keys['name']}", Connection, keys)
 
