@@ -98,14 +98,13 @@ def build(
         raise UsageError(f"--name {variant.name}: expected another name than that of a slave")
     names = [slave] if slave is not None else [DEFAULT_CONTROLLER] if variant.is_set else list(MODELS)
     slaves = variant.applied_to([each for name in names for each in builder.slaves_named(name)])
-    folder = None if slave in (None, *MODELS) else Path(str(slave))
-    if folder is not None:
-        folder = folder if folder.is_dir() else folder.parent
+    folder = fmus.default_folder()
+    if slave is not None and slave not in MODELS:
+        folder = builder.folder_of(slave)
         consent.agree(folder)
-    where = out or (folder or fmus.default_folder()) / packing.folder
     with progress_bar("building") as progress:
         how: Any = {"packing": packing, "systems": target, "progress": progress}
-        return result_of_files(builder.build_slaves(slaves, where, inform, **how))
+        return result_of_files(builder.build_slaves(slaves, out or folder / packing.folder, inform, **how))
 
 
 @option_group("limits", LimitFlags)

@@ -14,7 +14,7 @@ from fmpy.model_description import ValidationError
 from orchestration.command import cli
 from orchestration.components.building.models import MODELS
 from orchestration.components.checks.validation import confined_process, run_rules
-from orchestration.components.checks.validation.finding import Finding, check
+from orchestration.components.checks.validation.finding import Finding
 from orchestration.components.checks.validation.fmu import Fmu
 from orchestration.components.checks.validation.own_description import differences, elements
 from orchestration.components.checks.validation.probe import Probe
@@ -416,7 +416,7 @@ def lists(outputs: str, derivatives: str, initial: str) -> str:
     ],
 )
 def test_the_lists_of_the_structure_hold_what_fmi_asks_for(structure: str, texts: list[str]) -> None:
-    assert [f.text for f in check((outputs, initial_unknowns), fmu(STATE, structure))] == texts
+    assert [*outputs(view := fmu(STATE, structure)), *initial_unknowns(view)] == texts
 
 
 @pytest.mark.parametrize(

@@ -158,6 +158,12 @@ def slaves_named(text: str) -> list[Target]:
     return named
 
 
+def folder_of(text: str) -> Path:
+    """The folder of slaves that are named as by `slaves_named`, and are not of this project."""
+    path = Path(text)
+    return path if path.is_dir() else path.parent
+
+
 def with_fixed(slave: Target, name: str, values: Mapping[str, Scalar]) -> Target:
     """A variant of a slave with fixed parameters, by their FMI names, as the model `name`.
 

@@ -25,6 +25,8 @@ class OtherVersionError(UnreadableFmuError):
 
 VERSIONS = {"2.0": 2, "3.0": 3}
 """Supported versions of FMI, as model descriptions write them"""
+TOKENS = {2: "guid", 3: "instantiationToken"}
+"""Attribute by which a library identifies its description, by version of FMI"""
 
 
 @dataclass(frozen=True, slots=True)

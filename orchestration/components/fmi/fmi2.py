@@ -9,19 +9,16 @@ from fmpy import fmi2
 
 from orchestration.components.fmi.messages import WARNING
 from orchestration.components.fmi.native import NativeInstance
-from orchestration.foundation.basics.errors import SimulatorError, UsageError
+from orchestration.foundation.basics.errors import SimulatorError
 
 
 class Fmi2Instance(NativeInstance):
     """See `NativeInstance`."""
 
+    version, enumerations = 2, "Integer"
     stored: ClassVar = {"Real": np.float64, "Integer": np.int32, "Boolean": np.int32, "Enumeration": np.int32}
     counts_values = False
     state_calls = ("getFMUstate", "serializeFMUstate", "freeFMUstate", "deSerializeFMUstate", "setFMUstate")
-
-    def _expect_supported(self) -> None:
-        if self.model.version != 2:
-            raise UsageError(f"{self.path}: FMI {self.description.fmiVersion}; expected FMI 2.0 for co-simulation")
 
     def _load_step(self, library: Any) -> None:
         self._do_step = self.guarded(library.fmi2DoStep)
@@ -47,6 +44,3 @@ class Fmi2Instance(NativeInstance):
         dll.fmi2GetBooleanStatus(self._component, known[0], ctypes.byref(ends))
         dll.fmi2GetRealStatus(self._component, known[1], ctypes.byref(reached))
         return self._stopped_step("fmi2DoStep", end, reached=reached.value, ends=bool(ends))
-
-    def _access(self, action: str, type: str) -> str:
-        return f"fmi2{action}{'Integer' if type == 'Enumeration' else type}"

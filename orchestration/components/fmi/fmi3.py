@@ -15,6 +15,7 @@ from orchestration.foundation.basics.errors import SimulatorError, UsageError
 class Fmi3Instance(NativeInstance):
     """See `NativeInstance`."""
 
+    version, enumerations = 3, "Int64"
     stored: ClassVar = {
         **INTEGERS,
         "Float64": np.float64,
@@ -26,8 +27,7 @@ class Fmi3Instance(NativeInstance):
     state_calls = ("getFMUState", "serializeFMUState", "freeFMUState", "deserializeFMUState", "setFMUState")
 
     def _expect_supported(self) -> None:
-        if self.model.version != 3:
-            raise UsageError(f"{self.path}: FMI {self.description.fmiVersion}; expected FMI 3.0 for co-simulation")
+        super()._expect_supported()
         clocks = [v.name for v in self.variables.values() if v.kind == "Clock"]
         if clocks:
             raise UsageError(f"{self.path}: has clocks, which are not supported: {', '.join(clocks)}; expected none")
@@ -59,6 +59,3 @@ class Fmi3Instance(NativeInstance):
             return self._stopped_step("fmi3DoStep", end, reached=reached, ends=self._ends.value)
         what = "asks for event mode" if self._event else "returns early"
         return self.failure("fmi3DoStep", status, f"the FMU {what} at {reached:g} s, before {end:g} s")
-
-    def _access(self, action: str, type: str) -> str:
-        return f"fmi3{action}{'Int64' if type == 'Enumeration' else type}"

@@ -1,6 +1,7 @@
 """The interface of an instance of an FMU, in whichever process it is and of whichever version of FMI."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Protocol, TypeVar
@@ -9,7 +10,7 @@ from fmpy.model_description import ModelDescription
 
 from orchestration.components.fmi.model import Kind, Model, Variable
 from orchestration.components.fmi.values import Value
-from orchestration.foundation.basics.simulator import Simulator
+from orchestration.foundation.basics.simulator import Floats, Simulator
 
 T = TypeVar("T", bound="Instance")
 
@@ -41,6 +42,12 @@ class Instance(Simulator, Protocol):
 
     def close(self) -> None:
         """Free the instance and its resources."""
+
+    def initialise(self, inputs: Sequence[str], values: Floats, stop: float = math.inf) -> None:
+        """Initialise it at time 0 with these values of its inputs."""
+        self.enter_initialization(0.0, stop)
+        self.writer(inputs, values)()
+        self.exit_initialization()
 
     @property
     def description(self) -> ModelDescription:

@@ -19,6 +19,7 @@ from fmpy.model_description import ModelDescription, ModelVariable
 from fmu_kit.archive import read_source_hash
 from fmu_kit.units import BASE
 from orchestration.components.fmi.archive import (
+    TOKENS,
     OtherVersionError,
     UnreadableFmuError,
     expect_honest_size,
@@ -194,7 +195,7 @@ def read_description(path: Path) -> ModelDescription:
     if description.fmiMajorVersion not in (2, 3) or description.coSimulation is None:
         kind = "co-simulation" if description.coSimulation is not None else " and ".join(k for k in kinds if kinds[k])
         raise UsageError(f"{path}: FMI {description.fmiVersion}, {kind}; expected FMI 2.0 or 3.0 for co-simulation")
-    token = "guid" if description.fmiMajorVersion == 2 else "instantiationToken"
+    token = TOKENS[description.fmiMajorVersion]
     for name, value in ((token, description.guid), ("modelIdentifier", description.coSimulation.modelIdentifier)):
         if value is None:
             raise UsageError(f"{path}: its modelDescription.xml has no {name}")

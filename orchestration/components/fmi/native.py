@@ -6,6 +6,7 @@ The arrays of a step are allocated once, and the arguments of a transfer are con
 import ctypes
 import math
 import tempfile
+import zipfile
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -71,7 +72,8 @@ class NativeInstance(Instance):
         self._expect_supported()
         self.guard = None if self.model.is_of_this_kit else Surroundings()
         try:
-            folder_here(self.model.version, binary_folders(path))
+            with zipfile.ZipFile(path) as archive:
+                folder_here(self.model.version, binary_folders(archive.namelist()))
         except QuadcosimError as error:
             raise QuadcosimError(f"{path}: {error}") from None
         try:
@@ -88,6 +90,10 @@ class NativeInstance(Instance):
 
     # -- what differs between versions ---------------------------------------------------------------------------
 
+    version: ClassVar[int]
+    """of FMI"""
+    enumerations: ClassVar[str]
+    """the type by whose functions values of an Enumeration are transferred"""
     stored: ClassVar[Mapping[str, type[np.generic]]]
     """the type of the values in memory, by type of the variable"""
     counts_values: ClassVar[bool]
@@ -96,10 +102,6 @@ class NativeInstance(Instance):
     """Arguments into which an FMU of FMI 3.0 writes how a step has ended"""
     state_calls: tuple[str, str, str, str, str]
     """fmpy's names of the calls that get, serialise, free, deserialise and set a state"""
-
-    @abstractmethod
-    def _expect_supported(self) -> None:
-        """Raise `UsageError` for an FMU with features that are not supported."""
 
     @abstractmethod
     def _load_step(self, library: Any) -> None:
@@ -112,10 +114,6 @@ class NativeInstance(Instance):
     @abstractmethod
     def step_error(self, status: int, end: float) -> SimulatorError:
         """The error for the last step, to `end` [s], which did not succeed as a whole; `status` is that of the call."""
-
-    @abstractmethod
-    def _access(self, action: str, type: str) -> str:
-        """The name of the function that does an action, Get or Set, on variables of a type."""
 
     # -- a run ---------------------------------------------------------------------------------------------------
 
@@ -317,6 +315,16 @@ class NativeInstance(Instance):
         instantiate(fmu, self._messages)
         self._load_step(fmu.dll)
         return fmu
+
+    def _expect_supported(self) -> None:
+        """Raise `UsageError` for an FMU with features that are not supported."""
+        if self.model.version != self.version:
+            found = self.description.fmiVersion
+            raise UsageError(f"{self.path}: FMI {found}; expected FMI {self.version}.0 for co-simulation")
+
+    def _access(self, action: str, type: str) -> str:
+        """The name of the function that does an action, Get or Set, on variables of a type."""
+        return f"fmi{self.version}{action}{self.enumerations if type == 'Enumeration' else type}"
 
     def _transfer(self, function: str, references: Sequence[int], values: Numbers) -> Transfer:
         """A call of a function of `_access` that transfers `values`."""

@@ -8,13 +8,14 @@ import fmpy
 from fmu_kit import loader
 from orchestration.foundation.basics.errors import QuadcosimError
 
-_ENTRY = Path("resources", "slavemodule.txt")
+ENTRY = "resources/slavemodule.txt"
+"""The file of its FMU that has the name of the script to run."""
 _BANNER = "Fatal py exception"
 
 
 def is_made_by_it(folder: Path) -> bool:
     """Whether the FMU unpacked in `folder` was built by pythonfmu."""
-    return (folder / _ENTRY).is_file()
+    return (folder / ENTRY).is_file()
 
 
 def logged(message: bytes) -> bytes:

@@ -1,8 +1,7 @@
 """fmpy's instances of FMUs for co-simulation, loaded and instantiated alike for both versions of FMI."""
 
 import ctypes
-import zipfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -22,6 +21,9 @@ FOLDERS: Mapping[int, tuple[str, ...]] = {
 
 For other processors than x86, FMI 2.0 uses the names of FMI 3.0 (FMI 2.0.4, section 2.3), and tools use `linux64`.
 """
+
+INSTANTIATES: Mapping[int, str] = {2: "fmi2Instantiate", 3: "fmi3InstantiateCoSimulation"}
+"""The function that makes an instance, by the version of FMI."""
 
 
 class _CachedSignatures:
@@ -63,10 +65,9 @@ class FMU3Slave(_CachedSignatures, fmi3.FMU3Slave):  # type: ignore[misc]
         return list(values)
 
 
-def binary_folders(path: Path) -> list[str]:
-    """The folders of an FMU that have binaries."""
-    with zipfile.ZipFile(path) as archive:
-        parts = [name.split("/") for name in archive.namelist()]
+def binary_folders(files: Iterable[str]) -> list[str]:
+    """The folders that have binaries, of the files of an FMU."""
+    parts = [name.split("/") for name in files]
     return sorted({part[1] for part in parts if part[0] == "binaries" and len(part) > 2 and part[2]})
 
 

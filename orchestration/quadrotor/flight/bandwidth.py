@@ -60,9 +60,7 @@ def response(hover: System, frequency: float, fleet: Instances) -> float:
         controller = flight.instances["controller"]
         write, read = controller.writer(wiring.MEASUREMENT, measured), controller.reader(wiring.COMMAND, command)
         measured[_SCALAR] = 1.0
-        controller.enter_initialization(0.0, float(times[-1]) + 1.0)
-        write()
-        controller.exit_initialization()
+        controller.initialise(wiring.MEASUREMENT, measured, stop=float(times[-1]) + 1.0)
         for k, t in enumerate(times):
             half = 0.5 * AMPLITUDE * math.sin(frequency * t)
             measured[_ROLL], measured[_SCALAR] = math.sin(half), math.cos(half)

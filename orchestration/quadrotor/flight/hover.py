@@ -9,7 +9,6 @@ import math
 
 import numpy as np
 
-from orchestration.components.fmi.instance import Instance
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.quadrotor.scenarios import wiring
 from orchestration.quadrotor.scenarios.scenario import Scenario
@@ -86,10 +85,3 @@ def measurement_at(initial: dict[str, float]) -> Floats:
     """The measurement of a vehicle at hover but for these initial values, shape (13,)."""
     at_rest = {f"initial.{SCALAR_PART}": 1.0} | initial
     return np.array([at_rest.get(f"initial.{name}", 0.0) for name in wiring.MEASUREMENT])
-
-
-def initialise(fmu: Instance, inputs: tuple[str, ...], values: Floats) -> None:
-    """Initialise an FMU with these values of its inputs."""
-    fmu.enter_initialization(0.0, math.inf)
-    fmu.writer(inputs, values)()
-    fmu.exit_initialization()

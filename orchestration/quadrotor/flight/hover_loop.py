@@ -15,7 +15,7 @@ from orchestration.components.fmi.instance import Instance
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.quadrotor.flight.hover import COORDINATES, STEP, displaced, hover_of, initialise, measurement_at
+from orchestration.quadrotor.flight.hover import COORDINATES, STEP, displaced, hover_of, measurement_at
 from orchestration.quadrotor.flight.plant_step import INSTANT, PlantStep
 from orchestration.quadrotor.scenarios import wiring
 from orchestration.quadrotor.scenarios.scenario import Scenario
@@ -84,7 +84,7 @@ def controller_at_hover(hover: Scenario, fleet: Instances) -> tuple[Floats, Floa
     with prepared(hover, load=fleet.load) as flight:
         controller = flight.instances["controller"]
         at_rest = measurement_at({})
-        initialise(controller, wiring.MEASUREMENT, at_rest)
+        controller.initialise(wiring.MEASUREMENT, at_rest)
         step = min(STEP, 1e-3 * _value(controller, wiring.BOUNDARY_LAYER, absent=1.0))
 
         instants = itertools.count()

@@ -12,7 +12,7 @@ from orchestration.components.fmi.instance import Instance
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.quadrotor.flight.hover import COORDINATES, STEP, displaced, initialise
+from orchestration.quadrotor.flight.hover import COORDINATES, STEP, displaced
 from orchestration.quadrotor.scenarios import wiring
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.simulation.engines.resolved import resolve
@@ -105,7 +105,7 @@ class PlantStep:
         component = dataclasses.replace(self._plant, parameters={**self._plant.parameters, **parameters})
         with self._load() as plant:
             set_parameters(plant, component)
-            initialise(plant, wiring.COMMAND, command)
+            plant.initialise(wiring.COMMAND, command)
             return plant.save()
 
     def _load(self) -> AbstractContextManager[Instance]:

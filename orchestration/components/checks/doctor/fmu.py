@@ -20,7 +20,15 @@ from orchestration.components.checks.doctor.binaries import (
     origin_in,
     read,
 )
-from orchestration.components.fmi.archive import DESCRIPTION, UnreadableFmuError, read_archive, read_root, version_of
+from orchestration.components.fmi.archive import (
+    DESCRIPTION,
+    TOKENS,
+    UnreadableFmuError,
+    read_archive,
+    read_root,
+    version_of,
+)
+from orchestration.components.fmi.slaves import binary_folders
 
 CO_SIMULATION = "CoSimulation"
 KINDS = {CO_SIMULATION: "co-simulation", "ModelExchange": "model exchange", "ScheduledExecution": "scheduled execution"}
@@ -117,7 +125,7 @@ def inspected(path: Path, size_limit: float = math.inf) -> InspectedFmu:
         version=version,
         kinds=kinds,
         model_identifier=chosen.get("modelIdentifier", ""),
-        guid=description.get("guid" if version == 2 else "instantiationToken", ""),
+        guid=description.get(TOKENS[version], ""),
         start_time=_start_time(description),
         needs_tool=tool if chosen.get("needsExecutionTool") in ("true", "1") else None,
         platforms=_platforms(archive.files, version, chosen.get("modelIdentifier", "")),
@@ -135,9 +143,8 @@ def _start_time(description: Element) -> float:
 
 
 def _platforms(files: Mapping[str, bytes], version: int, identifier: str) -> tuple[PlatformBinary, ...]:
-    parts = [name.split("/") for name in files]
-    folders = sorted({part[1] for part in parts if part[0] == "binaries" and len(part) > 2 and part[2]})
-    return tuple(_platform(files, version, folder, identifier) for folder in folders if not _is_static(version, folder))
+    folders = [folder for folder in binary_folders(files) if not _is_static(version, folder)]
+    return tuple(_platform(files, version, folder, identifier) for folder in folders)
 
 
 def _is_static(version: int, folder: str) -> bool:

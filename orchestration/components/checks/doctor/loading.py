@@ -110,7 +110,7 @@ def _load(fmu: InspectedFmu, folder: Path) -> None:
 
     from orchestration.components.fmi.messages import Message, failure_text
     from orchestration.components.fmi.pythonfmu import expect_readable_place
-    from orchestration.components.fmi.slaves import folder_here, instantiate, load_slave
+    from orchestration.components.fmi.slaves import INSTANTIATES, folder_here, instantiate, load_slave
 
     folder_here(fmu.version, [part.platform for part in fmu.platforms])
     fmpy.extract(str(fmu.path), str(folder))
@@ -119,7 +119,7 @@ def _load(fmu: InspectedFmu, folder: Path) -> None:
     call = "loading"
     try:
         slave = load_slave(fmu.version, folder, token=fmu.guid, identifier=fmu.model_identifier, name="doctor")
-        call = "fmi2Instantiate" if fmu.version == 2 else "fmi3InstantiateCoSimulation"
+        call = INSTANTIATES[fmu.version]
         instantiate(slave, messages)
         for call, make in _initialisation(slave, fmu):  # noqa: B007 - the last one is named where it fails
             make()

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from fmu_kit.syntax_trees import parse_module
+from orchestration.components.fmi.pythonfmu import ENTRY
 
-ENTRY = "resources/slavemodule.txt"
 _MODULES = (".py", ".so", ".pyd")
 _IMPORT_ERRORS = {"ImportError", "ModuleNotFoundError"}
 

@@ -6,12 +6,8 @@ from collections.abc import Iterator
 
 from fmu_kit.archive import NATIVE_TABLES
 from orchestration.components.checks.validation.fmu import LIBRARIES, Fmu
-from orchestration.components.fmi.archive import Archive
-
-TOKENS = {2: "guid", 3: "instantiationToken"}
-"""Attribute by which a library identifies its description, by version of FMI."""
-SLAVE_MODULE = "resources/slavemodule.txt"
-"""contains the name of the script that pythonfmu runs"""
+from orchestration.components.fmi.archive import TOKENS, Archive
+from orchestration.components.fmi.pythonfmu import ENTRY
 
 
 def standard(archive: Archive) -> list[str]:
@@ -95,13 +91,13 @@ def _comes_as_sources(fmu: Fmu) -> bool:
 def slave_module(fmu: Fmu) -> Iterator[str]:
     """The script that pythonfmu runs exists, unless the FMU has no Python inside."""
     files = fmu.archive.files
-    if SLAVE_MODULE not in files:
+    if ENTRY not in files:
         if fmu.is_ours and NATIVE_TABLES not in files:
-            yield f"{SLAVE_MODULE}: expected this file, with the name of the script in resources/"
+            yield f"{ENTRY}: expected this file, with the name of the script in resources/"
         return
-    name = files[SLAVE_MODULE].decode("utf-8", "replace").strip()
+    name = files[ENTRY].decode("utf-8", "replace").strip()
     if f"resources/{name}.py" not in files:
-        yield f"{SLAVE_MODULE}: it names {name}, expected a script in resources/; there is no resources/{name}.py"
+        yield f"{ENTRY}: it names {name}, expected a script in resources/; there is no resources/{name}.py"
 
 
 RULES = (guid, model_identifier, capabilities, default_experiment, binaries, source_files, slave_module)

@@ -33,8 +33,3 @@ class Finding:
 def name_of(rule: Callable[..., object]) -> str:
     """The name under which a rule reports."""
     return str(getattr(rule, "__name__", rule)).replace("_", "-")
-
-
-def check(rules: Iterable[Rule[Subject]], subject: Subject) -> list[Finding]:
-    """All findings of the rules."""
-    return [Finding(name_of(rule), str(text), note=isinstance(text, Note)) for rule in rules for text in rule(subject)]

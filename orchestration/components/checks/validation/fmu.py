@@ -11,6 +11,7 @@ from fmpy.model_description import ModelDescription, ModelVariable
 from fmu_kit.archive import SOURCE_HASH_FILE
 from orchestration.components.fmi.archive import Archive, UnreadableFmuError
 from orchestration.components.fmi.model import attribute, kind_of, read_description, starts_of
+from orchestration.components.fmi.slaves import binary_folders
 from orchestration.foundation.basics.errors import UsageError
 
 NUMBERS = ("Real", "Integer", "Enumeration")
@@ -70,9 +71,9 @@ class Fmu:
     @property
     def platforms(self) -> list[str]:
         """Folders with a library, and `c-code` for sources to compile."""
-        parts = [name.split("/") for name in self.archive.files if name.endswith((*LIBRARIES, ".c"))]
-        found = {part[1] for part in parts if part[0] == "binaries" and len(part) > 2 and part[-1][-2:] != ".c"}
-        return [*(["c-code"] if any(part[0] == "sources" for part in parts) else []), *sorted(found)]
+        files = self.archive.files
+        is_source = any(name.startswith("sources/") and name.endswith(".c") for name in files)
+        return [*(["c-code"] if is_source else []), *binary_folders(name for name in files if name.endswith(LIBRARIES))]
 
     @cached_property
     def variables(self) -> tuple[ModelVariable, ...]:

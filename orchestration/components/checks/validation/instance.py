@@ -12,6 +12,7 @@ from orchestration.components.fmi.fmi3 import Fmi3Instance
 from orchestration.components.fmi.messages import Message, failure_text
 from orchestration.components.fmi.model import Model, Variable
 from orchestration.components.fmi.native import NativeInstance
+from orchestration.components.fmi.slaves import INSTANTIATES
 from orchestration.foundation.basics.errors import SimulatorError, StoppedStepError
 from orchestration.foundation.basics.simulator import Floats, Transfer
 
@@ -34,9 +35,6 @@ class CheckedInstance(NativeInstance):
 
     Errors of its calls name the function without the instance.
     """
-
-    instantiates: str
-    """the function that instantiates an FMU"""
 
     def __init__(self, model: Model, folder: Path, name: str, beat: Callable[[], None]) -> None:
         self._beat = beat
@@ -135,7 +133,7 @@ class CheckedInstance(NativeInstance):
 
     def no_instance(self, why: str) -> SimulatorError:
         """As `NativeInstance`."""
-        return SimulatorError(self.reported(self.instantiates, why))
+        return SimulatorError(self.reported(INSTANTIATES[self.model.version], why))
 
     def failure(self, function: str, status: int, otherwise: str | None = None) -> SimulatorError:
         """As `NativeInstance`: an error of whatever kind is a refusal."""
@@ -177,13 +175,9 @@ class CheckedInstance(NativeInstance):
 class CheckedInstance2(CheckedInstance, Fmi2Instance):
     """An instance of FMI 2.0."""
 
-    instantiates = "fmi2Instantiate"
-
 
 class CheckedInstance3(CheckedInstance, Fmi3Instance):
     """An instance of FMI 3.0, without event mode and early return, which an importer need not support."""
-
-    instantiates = "fmi3InstantiateCoSimulation"
 
     def step(self, t: float, h: float) -> None:
         """As `Fmi3Instance`; the FMU must not request what was not offered."""

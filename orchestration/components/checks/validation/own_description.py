@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from orchestration.components.checks.validation.description import SLAVE_MODULE
 from orchestration.components.checks.validation.probe import Probe
+from orchestration.components.fmi.pythonfmu import ENTRY
 
 _DIFFERS = {"guid", "generationDateAndTime", "generationTool", "version"}
 """attributes that depend on packaging and date"""
@@ -36,9 +36,9 @@ sys.stdout.buffer.write(text.encode("utf-8"))
 def own_description(probe: Probe) -> Iterator[str]:
     """The description is the one that the bundled slave generates."""
     fmu = probe.fmu
-    if SLAVE_MODULE not in fmu.archive.files:
+    if ENTRY not in fmu.archive.files:
         return  # checked by another rule
-    name = fmu.archive.files[SLAVE_MODULE].decode("utf-8", "replace").strip()
+    name = fmu.archive.files[ENTRY].decode("utf-8", "replace").strip()
     command = [sys.executable, "-I", "-c", _PROGRAM, str(probe.folder / "resources"), name]
     done = subprocess.run(command, capture_output=True, stdin=subprocess.DEVNULL, check=False)
     if done.returncode != 0:

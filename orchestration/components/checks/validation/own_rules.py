@@ -8,10 +8,10 @@ from fmpy.model_description import ModelVariable
 from fmu_kit.archive import ICONS, NATIVE_TABLES, content_guid
 from fmu_kit.loader import GUID_FILE
 from orchestration.components.building.models import MODELS
-from orchestration.components.checks.validation.description import TOKENS
 from orchestration.components.checks.validation.fmu import Fmu
 from orchestration.components.checks.validation.roles import ROLES
 from orchestration.components.checks.validation.units import dimensions
+from orchestration.components.fmi.archive import TOKENS
 from orchestration.components.fmi.model import attribute, kind_of, starts_of
 
 PAGE = "documentation/index.html"
