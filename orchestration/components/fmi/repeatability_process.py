@@ -16,7 +16,7 @@ import numpy as np
 from orchestration.components.fmi.instances import open_here
 from orchestration.components.fmi.model import Variable
 from orchestration.components.fmi.native import NativeInstance
-from orchestration.components.fmi.values import Value, number_of, within
+from orchestration.components.fmi.values import Value, start_number, within
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.processes.channel import Parent
 from orchestration.foundation.processes.limits import Limits, restrict
@@ -82,7 +82,7 @@ class _Runs:
 
     def _input(self, k: int, phase: float) -> list[float]:
         moves = self._moves or phase > 0.0
-        return [_moving(v, k, phase + i) if moves else _start(v) for i, v in enumerate(self._inputs)]
+        return [_moving(v, k, phase + i) if moves else start_number(v) for i, v in enumerate(self._inputs)]
 
 
 def main(path: str, manner: str) -> None:
@@ -150,8 +150,7 @@ def _further_is_same(runs: _Runs, expected: bytes) -> bool:
     """Whether it repeats in an instance beside one that takes the same steps, and in one after both."""
     try:
         with runs.open() as beside, runs.open() as instance:
-            beside.enter_initialization(0.0, math.inf)
-            beside.exit_initialization()
+            beside.initialise((), np.zeros(0))
             if runs.reference_run(instance, beside.step) != expected:
                 return False
         with runs.open() as instance:
@@ -170,20 +169,16 @@ def _default_step(instance: NativeInstance) -> float:
     return step if 0.0 < step < math.inf else 0.01
 
 
-def _start(variable: Variable) -> float:
-    return 0.0 if variable.start is None else number_of(variable, variable.start)
-
-
 def _moving(variable: Variable, k: int, phase: float) -> float:
     if variable.kind == "Boolean":
         return float(int(k + phase) % 2)
     if variable.kind != "Real":
-        return _start(variable)
-    return within(variable, _start(variable) + 0.1 * math.sin(0.7 * k + phase))
+        return start_number(variable)
+    return within(variable, start_number(variable) + 0.1 * math.sin(0.7 * k + phase))
 
 
 def _moved(variable: Variable) -> Value:
-    start = _start(variable)
+    start = start_number(variable)
     if variable.kind == "Boolean":
         return start == 0.0
     if variable.kind == "Real":

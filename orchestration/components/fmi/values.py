@@ -72,15 +72,18 @@ def start_value(variable: Variable) -> Value | bytes:
 
     Raises `UsageError` for a start value that is none of its type.
     """
-    start = variable.start or ""
     if variable.kind == "String":
-        return start
+        return variable.start or ""
     if variable.kind == "Binary":
-        return bytes.fromhex(start)
-    number = number_of(variable, start) if start else 0.0
-    if variable.kind == "Real":
-        return float(np.float32(number)) if variable.type == "Float32" else number
-    return bool(number) if variable.kind == "Boolean" else int(number)
+        return bytes.fromhex(variable.start or "")
+    number = start_number(variable)
+    return number if variable.kind == "Real" else bool(number) if variable.kind == "Boolean" else int(number)
+
+
+def start_number(variable: Variable) -> float:
+    """As `start_value`, of a number or a Boolean, as the number that is recorded."""
+    number = number_of(variable, variable.start) if variable.start else 0.0
+    return float(np.float32(number)) if variable.type == "Float32" else number
 
 
 def within(variable: Variable, value: float) -> float:

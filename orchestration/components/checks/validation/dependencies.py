@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from fmpy.model_description import Unknown
 
-from orchestration.components.checks.validation.excitation import ExcitationPlan
+from orchestration.components.checks.validation.excitation import ExcitationPlan, around
 from orchestration.components.checks.validation.instance import CheckedInstance, Row, Value, Values
 from orchestration.components.checks.validation.probe import Probe
 from orchestration.components.checks.validation.run_comparison import same
@@ -125,7 +125,7 @@ def _move(
 
 def _moving(probe: Probe, instance: CheckedInstance, v: Variable, before: Row) -> set[str]:
     """The outputs that move with a variable, which is then reset."""
-    value, *near = probe.around(v)
+    value, *near = around(v, probe.inputs_at(0))
     outputs = set()
     for other in near:
         instance.put({v.name: other})

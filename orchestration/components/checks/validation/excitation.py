@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from orchestration.components.checks.validation.instance import Value, Values
 from orchestration.components.fmi.model import Variable
-from orchestration.components.fmi.values import start_value, within
+from orchestration.components.fmi.values import start_number, start_value, within
 
 STEPS = 100
 """communication steps of a run"""
@@ -38,7 +38,7 @@ def inputs_at(inputs: Iterable[Variable], k: int) -> dict[str, Value]:
     for i, v in enumerate(inputs):
         if v.kind == "Real":
             away = 0.05 * (i % 7 + 1) + 0.1 * math.sin(0.7 * k + i)
-            values[v.name] = within(v, _start(v) + _scale(v) * away)
+            values[v.name] = within(v, start_number(v) + _scale(v) * away)
     return values
 
 
@@ -61,15 +61,11 @@ def around(v: Variable, values: Values) -> list[Value]:
 
 def moved(v: Variable) -> float:
     """A value a little away from the start of a variable."""
-    start = _start(v)
+    start = start_number(v)
     step = 0.05 * (start or _scale(v))
     up = within(v, start + step)
     return up if up != start else within(v, start - step)
 
 
-def _start(v: Variable) -> float:
-    return float(start_value(v))
-
-
 def _scale(v: Variable) -> float:
-    return abs(v.nominal) if v.nominal is not None else max(1.0, abs(_start(v)))
+    return abs(v.nominal) if v.nominal is not None else max(1.0, abs(start_number(v)))

@@ -12,7 +12,6 @@ from orchestration.components.checks.validation.excitation import (
     STEPS,
     UNEVEN,
     ExcitationPlan,
-    around,
     inputs_at,
     moved,
 )
@@ -130,10 +129,6 @@ class Probe:
     def inputs_at(self, k: int) -> dict[str, Value]:
         """As `excitation.inputs_at`."""
         return inputs_at(self.inputs, k)
-
-    def around(self, v: Variable) -> list[Value]:
-        """As `excitation.around`, for an input about its value at step 0."""
-        return around(v, self.inputs_at(0))
 
     @functools.cached_property
     def watched(self) -> tuple[Variable, ...]:

@@ -1,4 +1,7 @@
-"""All rules, by their subject and the FMUs that they apply to."""
+"""All rules, by their subject and the FMUs that they apply to.
+
+The tables of the documentation are made of their docstrings by `docs/website/rules.py`.
+"""
 
 from orchestration.components.checks.validation import (
     archive_rules,
