@@ -25,8 +25,8 @@ from orchestration.systems.system.placement import messages_by_connection, tasks
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
 from orchestration.theory.certificates.breaking import LONGEST_SEQUENCE, BreakingSequence, breaking_at, least_breaking
 from orchestration.theory.certificates.causes import Cause, ScheduledLoop, cause_at
+from orchestration.theory.certificates.certified_loop import CertifiedLoop, certified_loop
 from orchestration.theory.certificates.family import LoopFamily
-from orchestration.theory.certificates.parts import CertifiedLoop, certified_loop
 from orchestration.theory.certificates.repeated import least_repeated
 from orchestration.theory.certificates.timeline import LoopTimeline
 from orchestration.theory.certificates.varying import DELAY, JITTER, LOSS, Varying

@@ -9,8 +9,8 @@ from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.model import System
 from orchestration.theory.certificates.certificate import Cells, Certificate
+from orchestration.theory.certificates.certified_loop import CertifiedLoop
 from orchestration.theory.certificates.family import Factor, Letter, LoopFamily
-from orchestration.theory.certificates.parts import CertifiedLoop
 from orchestration.theory.stability.matrices import Components, Continuous, SampledSystem
 
 HOVER_A = np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 19.62, 0.0], [0.0, 0.0, 0.0, 0.5], [0.0, 0.0, 0.0, 0.0]])

@@ -15,11 +15,11 @@ from orchestration.systems.system.paths import changed
 from orchestration.theory.certificates import margin as certificates
 from orchestration.theory.certificates import region as regions
 from orchestration.theory.certificates.breaking import breaking_at
+from orchestration.theory.certificates.certified_loop import CertifiedLoop
 from orchestration.theory.certificates.certify import find_certificate, parts_of
 from orchestration.theory.certificates.check import check
 from orchestration.theory.certificates.checker import verified
 from orchestration.theory.certificates.margin import Certified, linear_loop_of, margin, small_gain, varying_of
-from orchestration.theory.certificates.parts import CertifiedLoop
 from orchestration.theory.certificates.region import region
 from orchestration.theory.certificates.timeline import LoopTimeline
 from orchestration.theory.stability import delay_bounds
