@@ -173,23 +173,23 @@ class FunctionWriter(ExpressionWriter):
     def _assign(self, each: Statement, rest: Block) -> None:
         target, value = each.symbols
         if id(target) in self.used:
-            self._set(target, self._as(target.kind, value))
+            self._set(target, self._as_kind(target.kind, value))
 
     def _set(self, symbol: Symbol, value: str) -> None:
         """Assign a value to a symbol."""
         self._line(f"{self._pin(symbol)} = {value};")
 
     def _store(self, each: Statement, rest: Block) -> None:
-        self._line(f"{self._place(each.data)} = {self._lanes(each.symbols[0])};")
+        self._line(f"{self._place(each.data)} = {self._as_argument(each.symbols[0])};")
 
     def _return(self, each: Statement, rest: Block) -> None:
         for k, symbol in enumerate(each.symbols):
-            self._line(f"out[{k}] = {self._lanes(symbol)};")
+            self._line(f"out[{k}] = {self._as_argument(symbol)};")
         self._line("return 0;")
 
     def _call(self, each: Statement, rest: Block) -> None:
         call: Call = each.data
-        given = [self._as(p.kind, symbol) for symbol, p in zip(each.symbols, call.function.parameters)]
+        given = [self._as_kind(p.kind, symbol) for symbol, p in zip(each.symbols, call.function.parameters)]
         results = [self._name("r")] if call.function.results else []
         self.declared += [f"q_real {name}[{call.function.results}] = {{{self.zero}}};" for name in results]
         status = self._name("status")
@@ -232,7 +232,7 @@ class FunctionWriter(ExpressionWriter):
         states = []
         for start in starts:
             states.append(self._name("s"))
-            self._line(f"{c_type(start)} {states[-1]} = {self._as(start.kind, start)};")
+            self._line(f"{c_type(start)} {states[-1]} = {self._as_kind(start.kind, start)};")
         last, index = self.value(count), self._name("i")
         self._line(f"for (q_real {index} = {self.zero}; {self._goes_on(index, last)}; {index} = {index} + 1.0) {{")
         self.scopes.append({})
@@ -259,7 +259,7 @@ class FunctionWriter(ExpressionWriter):
     def _round(self, body: Block, states: list[str], nexts: tuple[Symbol, ...]) -> None:
         """One round of a loop."""
         self._block(body)
-        for state, name in zip(states, [self._as(symbol.kind, symbol) for symbol in nexts]):
+        for state, name in zip(states, [self._as_kind(symbol.kind, symbol) for symbol in nexts]):
             self._line(f"{state} = {name};")
 
     def _warn(self, each: Statement, rest: Block) -> None:

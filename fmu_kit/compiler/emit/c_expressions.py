@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Callable
 from typing import ClassVar
 
 from fmu_kit.compiler.emit.c_names import c_type
@@ -21,6 +22,10 @@ _CALLED = {
     "floordiv": "q_floor_divide",
 }  # fmt: skip
 _OF_BITS = ("bit_and", "bit_or", "bit_xor")
+_ASSIGNED = ("load", "result", "failed", "phi", "outcome")
+"""Values that statements assign"""
+_OF_LOOP = ("variable", "index", "parameter")
+"""Values that exist in a loop alone"""
 _SIGNED_ZEROS = ("neg", "mul", "mod", "floordiv", "floor", "ceil")
 """Operations on real numbers that may give a signed zero."""
 _WIDE_COMPARED = {
@@ -82,9 +87,9 @@ class ExpressionWriter:
             return self.pinned[id(symbol)]
         if symbol.op == "constant":
             return _constant(symbol)
-        if symbol.op in ("load", "result", "failed", "phi", "outcome", "variable", "index", "parameter"):
-            if symbol.op in ("load", "result", "failed", "phi", "outcome"):
-                return self._pin(symbol)
+        if symbol.op in _ASSIGNED:
+            return self._pin(symbol)
+        if symbol.op in _OF_LOOP:
             raise TraceError(f"{self.name}: {symbol.op} {symbol.data} is used outside of its loop")
         for waiting in _unknown_below(symbol, self._is_known):
             text = self._expression(waiting)
@@ -98,27 +103,27 @@ class ExpressionWriter:
     def _is_known(self, symbol: Symbol) -> bool:
         return not symbol.args or symbol.op == "phi" or any(id(symbol) in scope for scope in self.scopes)
 
-    def _real(self, symbol: Symbol) -> str:
+    def _as_real(self, symbol: Symbol) -> str:
         if symbol.kind == "bool" and symbol.op == "constant":
-            return self._everywhere(f"{value_of(symbol)!r}")
+            return self._broadcast(f"{value_of(symbol)!r}")
         name = self.value(symbol)
-        return f"q_select({name}, {self._everywhere('1.0')}, {self.zero})" if symbol.kind == "bool" else name
+        return f"q_select({name}, {self._broadcast('1.0')}, {self.zero})" if symbol.kind == "bool" else name
 
-    def _lanes(self, symbol: Symbol) -> str:
+    def _as_argument(self, symbol: Symbol) -> str:
         """A value as an argument of a function; constants are broadcast to all lanes."""
-        text = self._real(symbol)
+        text = self._as_real(symbol)
         is_number = symbol.op == "constant" and symbol.kind != "bool" and text.strip("(-")[0].isdigit()
-        return self._everywhere(text) if is_number else text
+        return self._broadcast(text) if is_number else text
 
     zero: ClassVar[str] = "0.0"
 
-    def _everywhere(self, number: str) -> str:
+    def _broadcast(self, number: str) -> str:
         """A constant in the type of a variable."""
         return number
 
-    def _as(self, kind: Kind, symbol: Symbol) -> str:
+    def _as_kind(self, kind: Kind, symbol: Symbol) -> str:
         """A value converted to a kind."""
-        return self.value(symbol) if kind == "bool" else self._lanes(symbol)
+        return self.value(symbol) if kind == "bool" else self._as_argument(symbol)
 
     def _expression(self, symbol: Symbol) -> str:
         op, args = symbol.op, symbol.args
@@ -145,17 +150,17 @@ class ExpressionWriter:
         if symbol.op == "constant":
             high, low = divmod(integer_of(symbol) % 2**128, 2**64)
             return f"q_wide_known({high:#x}u, {low:#x}u)"
-        return self.value(symbol) if symbol.kind == "wide" else f"q_wide_of({self._lanes(symbol)})"
+        return self.value(symbol) if symbol.kind == "wide" else f"q_wide_of({self._as_argument(symbol)})"
 
     def _of_reals(self, symbol: Symbol) -> str:
         op, args = symbol.op, symbol.args
         if op in _BINARY:
-            first = self._lanes(args[0]) if args[1].op == "constant" else self._real(args[0])
-            return f"{first} {_BINARY[op]} {self._real(args[1])}"
+            first = self._as_argument(args[0]) if args[1].op == "constant" else self._as_real(args[0])
+            return f"{first} {_BINARY[op]} {self._as_real(args[1])}"
         if op in ("lt", "le", "gt", "ge", "eq", "ne"):
-            return f"q_{op}({self._real(args[0])}, {self._real(args[1])})"
+            return f"q_{op}({self._as_real(args[0])}, {self._as_real(args[1])})"
         if op == "neg":
-            return f"-{self._real(args[0])}"
+            return f"-{self._as_real(args[0])}"
         if op in ("and", "or"):
             return f"{self.value(args[0])} {'&' if op == 'and' else '|'} {self.value(args[1])}"
         if op == "not":
@@ -164,11 +169,11 @@ class ExpressionWriter:
             if symbol.kind == "bool":
                 c, a, b = map(self.value, args)
                 return f"({c} & {a}) | (q_not({c}) & {b})"
-            return f"q_select({self.value(args[0])}, {self._lanes(args[1])}, {self._lanes(args[2])})"
+            return f"q_select({self.value(args[0])}, {self._as_argument(args[1])}, {self._as_argument(args[2])})"
         if op in ("sin", "cos") and id(self._other_of_the_pair(symbol)) in self.used:
             return f"{self._pair(args[0])}.{op}"
         if op in _CALLED:
-            return f"{_CALLED[op]}({', '.join(map(self._lanes, args))})"
+            return f"{_CALLED[op]}({', '.join(map(self._as_argument, args))})"
         raise TraceError(f"{op} of computed values cannot be written in C")
 
     @staticmethod
@@ -183,7 +188,7 @@ class ExpressionWriter:
             if id(both) in scope:
                 return scope[id(both)]
         name = self.scopes[-1][id(both)] = self._name("p")
-        self._line(f"const q_sines {name} = {self._sines(self._lanes(angle))};")
+        self._line(f"const q_sines {name} = {self._sines(self._as_argument(angle))};")
         return name
 
     def _sines(self, angle: str) -> str:
@@ -202,7 +207,7 @@ def _constant(symbol: Symbol) -> str:
     return f"({value!r})" if value < 0 or repr(value).startswith("-") else repr(value)
 
 
-def _unknown_below(symbol: Symbol, is_known: object) -> list[Symbol]:
+def _unknown_below(symbol: Symbol, is_known: Callable[[Symbol], bool]) -> list[Symbol]:
     """The unknown symbols that must be computed for a symbol, in order."""
     found: dict[int, Symbol] = {}
     stack: list[tuple[Symbol, bool]] = [(symbol, False)]
@@ -210,7 +215,7 @@ def _unknown_below(symbol: Symbol, is_known: object) -> list[Symbol]:
         one, visited = stack.pop()
         if visited:
             found[id(one)] = one
-        elif id(one) not in found and not is_known(one):  # type: ignore[operator]
+        elif id(one) not in found and not is_known(one):
             stack.append((one, True))
             stack += [(arg, False) for arg in reversed(one.args)]
     return list(found.values())

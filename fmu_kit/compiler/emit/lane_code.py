@@ -55,7 +55,7 @@ class LaneWriter(FunctionWriter):
 
     zero: ClassVar[str] = "q_all(0.0)"
 
-    def _everywhere(self, number: str) -> str:
+    def _broadcast(self, number: str) -> str:
         return f"q_all({number.strip('()')})"
 
     # -- lanes -----------------------------------------------------------------------------------------------
@@ -131,11 +131,11 @@ class LaneWriter(FunctionWriter):
 
     def _store(self, each: Statement, rest: Block) -> None:
         place = self._place(each.data)
-        self._line(f"{place} = q_select({self.masks[-1]}, {self._lanes(each.symbols[0])}, {place});")
+        self._line(f"{place} = q_select({self.masks[-1]}, {self._as_argument(each.symbols[0])}, {place});")
 
     def _return(self, each: Statement, rest: Block) -> None:
         for k, symbol in enumerate(each.symbols):
-            value = self._lanes(symbol)
+            value = self._as_argument(symbol)
             kept = f"q_select({self.masks[-1]}, {value}, out[{k}])" if self.returns_early else value
             self._line(f"out[{k}] = {kept};")
         if len(self.masks) == 1:
@@ -169,7 +169,7 @@ class LaneWriter(FunctionWriter):
         if takes_out:
             self._line(f"const q_mask {before} = {goes_on};")
         self._block(body)
-        for state, symbol, value in zip(states, nexts, [self._as(symbol.kind, symbol) for symbol in nexts]):
+        for state, symbol, value in zip(states, nexts, [self._as_kind(symbol.kind, symbol) for symbol in nexts]):
             self._line(f"{state} = {self._choice(symbol, value, state)};")
         self.masks.pop()
         if takes_out:
@@ -209,7 +209,7 @@ class LineWriter(LaneWriter):
         needed = [each for each in stores if each.data not in self.unread]
         guards = [self.value(each.symbols[0]) for each in block if each.op == "if"]
         for each in needed:
-            self._lanes(each.symbols[0])
+            self._as_argument(each.symbols[0])
         self._line(f"Q_IF_EVER(q_any(live & ({' | '.join(['rare', *guards])}))) return q_known(0);")
         self.is_guarded = False
         for each in needed:
@@ -220,7 +220,7 @@ class LineWriter(LaneWriter):
 
     def _wanted(self, stores: list[Statement]) -> None:
         """Write the stores of one vector, done if any of them is wanted."""
-        self._line(f"if ({' || '.join(f'Q_WANTED({self.places[each.data]})' for each in stores)}) {{")
+        self._line(f"if ({' || '.join(['!wanted', *(f'wanted[{self.places[each.data]}]' for each in stores)])}) {{")
         self.scopes.append({})
         for each in stores:
             self._store(each, ())
@@ -231,7 +231,7 @@ class LineWriter(LaneWriter):
         if self.is_guarded and symbol.op in ("sin", "cos"):
             return f"{self._pair(symbol.args[0])}.{symbol.op}"
         if self.is_guarded and symbol.op == "pow":
-            return f"q_usual_pow({', '.join(map(self._lanes, symbol.args))}, &rare)"
+            return f"q_usual_pow({', '.join(map(self._as_argument, symbol.args))}, &rare)"
         return super()._of_reals(symbol)
 
     def _sines(self, angle: str) -> str:

@@ -63,6 +63,11 @@ class Lanes:
         """status of a lane that has diverged"""
 
     @property
+    def step(self) -> int:
+        """The address of the function that advances the lanes, called as `do_step`."""
+        return ctypes.cast(self._library.quadcosim_do_step, ctypes.c_void_p).value or 0
+
+    @property
     def line(self) -> tuple[int, int]:
         """The numbers of steps tried as a straight line (`passes/straightening.py`), and of those that left it."""
         tried, left = ctypes.c_int64(), ctypes.c_int64()

@@ -35,7 +35,6 @@ typedef q_real q_place __attribute__((aligned(QUADCOSIM_LANES < 8 ? 8 * QUADCOSI
 typedef q_real q_place;
 #endif
 
-#define Q_WANTED(place) (!wanted || wanted[place])
 
 #include "lane_functions.h"
 

@@ -72,7 +72,7 @@ class BatchArrays:
 
         writer, sizes = shape.expressions.folds.writer, [len(x.start) for x in shape.system.connections]
         return cls(
-            memories=[rows(kernel.lanes.places) for kernel in shape.kernels.values()],
+            memories=[rows(kernel.places) for kernel in shape.kernels.values()],
             wanted=[shape.read(name) for name in shape.names],
             ratios=[rows(1) for _ in shape.names],
             channels=[

@@ -34,7 +34,7 @@ class Initialisation:
         """Set start values, parameters, and all that differs between lanes."""
         shape, arrays = self._shape, self._arrays
         for memory, kernel in zip(arrays.memories, shape.kernels.values()):
-            kernel.lanes.begin(address(memory))
+            kernel.begin(address(memory))
         for lane, system in enumerate(systems):
             for index, name in enumerate(shape.names):
                 self._put_parameters(index, name, lane, system)
@@ -118,7 +118,7 @@ class Initialisation:
         lanes = self._shape.lanes
         active, status = np.full(lanes, 2**64 - 1, dtype=np.uint64), np.zeros(lanes, dtype=np.int32)
         kernel = self._shape.kernels[self._shape.names[index]]
-        kernel.lanes.initialise(
+        kernel.initialise(
             address(self._arrays.memories[index]), address(active), address(self._begins[index]), address(status)
         )
         failed: Booleans = status != 0

@@ -4,7 +4,6 @@ import ctypes
 import functools
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -32,33 +31,15 @@ def preferred_lanes() -> int:
         raise QuadcosimError(str(error)) from error
 
 
-@dataclass(frozen=True)
-class Kernel:
-    """A component in lanes: functions that take addresses."""
-
-    lanes: Lanes
-    path: Path
-
-    @property
-    def step(self) -> int:
-        """The address of the function that advances it."""
-        return ctypes.cast(ctypes.CDLL(str(self.path)).quadcosim_do_step, ctypes.c_void_p).value or 0
-
-
-def component(name: str, model: Model, lanes: int) -> Kernel:
-    """The kernel of a component; raises `UsageError` naming it if its FMU has no sources for lanes."""
-    return _compiled(tuple(sorted(sources_of(name, model).items())), lanes)
-
-
-def sources_of(name: str, model: Model) -> Mapping[str, bytes]:
-    """The sources of a component for lanes, by name; raises `UsageError` naming it if its FMU has none."""
+def component(name: str, model: Model, lanes: int) -> Lanes:
+    """A component in lanes; raises `UsageError` naming it if its FMU has no sources for them."""
     sources = _sources_in(model.path, model.path.stat().st_mtime_ns)
     if MAIN not in sources or model.version != 2:
         raise UsageError(
             f"components.{name}: {model.path.name}: expected a native FMU of this project's kit, as quadcosim build "
             "--native makes them, to be one of many at once"
         )
-    return sources
+    return _compiled(tuple(sorted(sources.items())), lanes)
 
 
 @functools.lru_cache(maxsize=64)
@@ -69,10 +50,9 @@ def _sources_in(path: Path, changed: int) -> Mapping[str, bytes]:
 
 
 @functools.lru_cache(maxsize=64)
-def _compiled(sources: tuple[tuple[str, bytes], ...], lanes: int) -> Kernel:
+def _compiled(sources: tuple[tuple[str, bytes], ...], lanes: int) -> Lanes:
     key = (OPTIONS, FOR_THIS_PROCESSOR, lanes)
-    path = cached_library("lanes", dict(sources), key, lambda: compiled_lanes(dict(sources), lanes))
-    return Kernel(Lanes(path), path)
+    return Lanes(cached_library("lanes", dict(sources), key, lambda: compiled_lanes(dict(sources), lanes)))
 
 
 @functools.lru_cache(maxsize=256)

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from fmu_kit.compiler.pack.lanes import Lanes
 from orchestration.components.fmi.model import Model, Variable
 from orchestration.foundation.basics.identity import IdentityCache
 from orchestration.foundation.basics.simulator import Booleans
 from orchestration.simulation.engines import initial
 from orchestration.simulation.engines.batch.code import ExpressionCode, expression_code
-from orchestration.simulation.engines.batch.kernels import Kernel, batch, component, preferred_lanes
+from orchestration.simulation.engines.batch.kernels import batch, component, preferred_lanes
 from orchestration.simulation.engines.batch.writing import Kind, Leaf
 from orchestration.simulation.engines.structures import ONE_LANE
 from orchestration.simulation.engines.wires import Board, Wires
@@ -86,7 +87,7 @@ class Shape:
     # -- components and connections --------------------------------------------------------------------------------
 
     @cached_property
-    def kernels(self) -> Mapping[str, Kernel]:
+    def kernels(self) -> Mapping[str, Lanes]:
         """The kernel of each component; raises `UsageError` naming one that has none."""
         return {name: component(name, model, self.lanes) for name, model in self.models.items()}
 
@@ -144,7 +145,7 @@ class Shape:
 
     def read(self, name: str) -> Booleans:
         """Whether a connection or an expression reads each variable of a component."""
-        index, is_read = self.names.index(name), np.zeros(self.kernels[name].lanes.variables, dtype=np.bool_)
+        index, is_read = self.names.index(name), np.zeros(self.kernels[name].variables, dtype=np.bool_)
         is_read[self.connected[name]] = True
         is_read[[int(place) for owner, place in _SIGNAL.findall(self.expressions.text) if int(owner) == index]] = True
         return is_read
@@ -246,7 +247,7 @@ class Shape:
         """The functions that run its systems in SIMD lanes."""
         bits = ", ".join(f"1ull << {lane}" for lane in range(self.lanes))
         sizes = {  # rounded up, so that similar systems share a library
-            "COMPONENTS": -8 * (-len(self.names) // 8), "CHANNELS": -8 * (-len(self.system.connections) // 8) or 8,
+            "CHANNELS": -8 * (-len(self.system.connections) // 8) or 8,
             "HAS_CONDITION": int(self.condition is not None), "KEPT": len(self.expressions.folds.kept),
             "LANE_BITS": f"{{{bits}}}",
         }  # fmt: skip
