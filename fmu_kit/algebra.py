@@ -9,6 +9,7 @@ Instances are values and are never modified.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 from fmu_kit.scalar import FLOAT, Scalar, ScalarOps
 
@@ -134,6 +135,11 @@ class Quaternion:
 
     def __neg__(self) -> Quaternion:
         return Quaternion(-self.vector, -self.scalar)
+
+    @staticmethod
+    def where(condition: Any, a: Quaternion, b: Quaternion, ops: ScalarOps = FLOAT) -> Quaternion:
+        """`a` where the condition holds, else `b`, componentwise."""
+        return Quaternion.from_xyzw(*(ops.where(condition, *pair) for pair in zip(a, b)))
 
     def inverse(self) -> Quaternion:
         """Q⁻¹ = [-q, q0], for a unit quaternion."""

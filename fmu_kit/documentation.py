@@ -62,23 +62,21 @@ def to_html(slave: Any, notes: BuildNotes, fragment: str = "") -> str:
         "python": escape(PYTHON_REQUIRED),
         "source": escape(notes.source),
         "fmi": str(notes.version),
+        "description": escape(slave.description),
+        "start": _number(experiment.start_time),
+        "stop": _number(experiment.stop_time),
+        "step": _number(experiment.step_size),
+        "status": notes.status,
+        "afterwards": escape(notes.afterwards),
+        "contents": "".join(f"{link} · " for link in _contents(fragment)),
+        "fragment": _relocated(fragment, posixpath.dirname(notes.source)).strip(),
+        "variables": "\n".join(variable_tables(slave.variables)),
+        "categories": _table(
+            ("Category", "Messages"), [(_code(k), escape(v)) for k, v in slave.log_categories.items()]
+        ),
     }
-    return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
-        model=values["model"],
-        fmi=values["fmi"],
-        description=escape(slave.description),
-        whose=values["whose"],
-        start=_number(experiment.start_time),
-        stop=_number(experiment.stop_time),
-        step=_number(experiment.step_size),
-        status=notes.status,
-        afterwards=escape(notes.afterwards),
-        needs=Template(notes.needs.read_text(encoding="utf-8")).substitute(values),
-        contents="".join(f"{link} · " for link in _contents(fragment)),
-        fragment=_relocated(fragment, posixpath.dirname(notes.source)).strip(),
-        variables="\n".join(variable_tables(slave.variables)),
-        categories=_table(("Category", "Messages"), [(_code(k), escape(v)) for k, v in slave.log_categories.items()]),
-    )
+    needs = Template(notes.needs.read_text(encoding="utf-8")).substitute(values)
+    return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(values, needs=needs)
 
 
 def _attribution(slave: Any) -> str:

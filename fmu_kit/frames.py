@@ -49,8 +49,8 @@ def body_matrix(turned: Scalar, J: Inertia) -> Inertia:
 def attitude(turned: Scalar, Q: Quaternion) -> Quaternion:
     """An attitude, inertial to body: with half turns about north-east before it and about forward after it."""
     x, y, z, w = Q
-    others = (_HALF * (x + y), _HALF * (x - y), _HALF * (w - z), _HALF * (w + z))
-    return Quaternion.from_xyzw(*(FLOAT.where(turned, other, own) for other, own in zip(others, Q)))
+    other = Quaternion.from_xyzw(_HALF * (x + y), _HALF * (x - y), _HALF * (w - z), _HALF * (w + z))
+    return Quaternion.where(turned, other, Q)
 
 
 def rotation(turned: Scalar, Q: Quaternion) -> Quaternion:

@@ -67,12 +67,4 @@ def tilted_to(attitude: Quaternion, desired: Quaternion) -> Quaternion:
     axis, cosine = current.cross(target), current @ target
     opposite = (cosine < 0.0) & (axis @ axis < SMALLEST_SINE * SMALLEST_SINE)
     turn = Quaternion(axis, FLOAT.where(opposite, 1.0, 1.0 + cosine)).normalised()
-    tilted = turn * attitude
-    return Quaternion(
-        Vec3(
-            FLOAT.where(opposite, desired.vector.x, tilted.vector.x),
-            FLOAT.where(opposite, desired.vector.y, tilted.vector.y),
-            FLOAT.where(opposite, desired.vector.z, tilted.vector.z),
-        ),
-        FLOAT.where(opposite, desired.scalar, tilted.scalar),
-    )
+    return Quaternion.where(opposite, desired, turn * attitude)
