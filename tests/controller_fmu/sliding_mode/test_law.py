@@ -431,7 +431,11 @@ def test_virtual_control_without_a_desired_attitude_is_named(F: Vec3) -> None:
 
 @pytest.mark.parametrize("F", [Vec3(0.0, 0.0, 9.80), Vec3(1e-3, 0.0, 12.5), Vec3(0.0, 0.0, -1e6)])
 def test_virtual_control_next_to_the_singularity_is_realised(F: Vec3) -> None:
-    assert math.isfinite(evaluate(*at_rest(F), Gains(), Model()).torque.norm())
+    """(T/m) R(Q_d)ᵀ z = g z - F, to the digits that 1 + (g - F_z)/n has left."""
+    found, u = evaluate(*at_rest(F), Gains(), Model()), 9.81 * Z - F
+    n = u.norm()
+    assert found.thrust == pytest.approx(Model().mass * n)
+    assert (n * found.desired_quaternion.z_axis() - u).norm() <= 1e-13 * n * n / (n + u.z)
 
 
 def test_one_point_of_a_batch_without_a_desired_attitude_is_enough() -> None:

@@ -49,6 +49,23 @@ def calls(path: Path, nm: str = "nm") -> set[str]:
     return {line.split()[-1] for line in _succeeds([compiler(nm), "-u", str(path)]).splitlines()}
 
 
+def defined(path: Path) -> set[str]:
+    """The functions that an object has for others."""
+    symbols = _succeeds([compiler("nm"), "-g", "--defined-only", str(path)]).splitlines()
+    return {name for _, kind, name in map(str.split, symbols) if kind == "T"}
+
+
+def declared(header: Path) -> set[str]:
+    """The functions of a header."""
+    return set(re.findall(r"^\w.*\b(\w+)\(.*\);$", header.read_text("utf-8"), re.M))
+
+
+def assert_its_header_is_kept(source: Path, *flags: str) -> None:
+    """A source compiles without a warning to the functions that its header declares, and to no other for others."""
+    names = {f"{source.stem}_{name}" for name in ("init", "start", "step", "changed", "error")}
+    assert defined(made(source, "cc", *flags)) == declared(source.with_suffix(".h")) == names
+
+
 def on_this_machine(main: str, sources: list[Path], folder: Path, *flags: str, by: str = "cc") -> list[str]:
     """The lines that a program of this folder prints."""
     _succeeds([*_with(main, by, sources, folder), *flags, "-o", str(folder / "here"), "-lm"])

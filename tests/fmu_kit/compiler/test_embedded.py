@@ -18,7 +18,10 @@ from tests.fmu_kit.compiler.embedded import (
     ARM,
     M4F,
     M7,
+    assert_its_header_is_kept,
     calls,
+    declared,
+    defined,
     elsewhere,
     made,
     on_cortex_m,
@@ -200,7 +203,7 @@ def test_numbers_too_large_or_too_small_for_single_precision_are_its_largest_and
 def test_the_command_writes_one_slave_of_a_folder_and_says_in_one_line_what_is_none(main: Main, tmp_path: Path) -> None:
     done = main("export-c", "examples/dc_servo/PidController", "--out", tmp_path / "out", "--single")
     assert done.stdout.splitlines() == [str(tmp_path / "out" / f"PidController.{end}") for end in "hc"]
-    assert made(tmp_path / "out" / "PidController.c", "cc").is_file()
+    assert_its_header_is_kept(tmp_path / "out" / "PidController.c")
     for asked, words in (
         ("Controller", f"Controller: expected {' or '.join(MODELS)}, a folder"),
         ("examples/dc_servo/Pid", "examples/dc_servo/Pid: expected one of PidController, Servo in examples/dc_servo"),
@@ -215,14 +218,17 @@ def test_the_program_of_the_page_is_good_c(exported: dict[str, Path], tmp_path: 
     (program,) = re.findall(r"```c\n(.*?)```", page, re.DOTALL)
     source = exported["UnifiedController"].with_name("main.c")
     source.write_text(program)
-    assert made(source, "cc").is_file()
+    program_object = made(source, "cc")
+    assert defined(program_object) == {"main"}
+    used = {f"UnifiedController_{name}" for name in ("init", "start", "step", "error")}
+    assert calls(program_object) & declared(exported["UnifiedController"].with_suffix(".h")) == used
 
 
 @pytest.mark.parametrize("name", ["Branches", "Words"])
 def test_a_slave_with_much_to_say_is_written_without_a_warning_of_the_compiler(name: str, tmp_path: Path) -> None:
     target = Target.parse(f"tests.fmu_kit.compiler.probes:{name}", Path().resolve())
     for single, flags in ((False, ()), (True, ("-O1",))):
-        assert made(write(target, tmp_path, single=single), "cc", *flags).is_file()
+        assert_its_header_is_kept(write(target, tmp_path, single=single), *flags)
 
 
 def test_of_values_that_are_fixed_and_what_they_turn_off_there_is_nothing_left(main: Main, tmp_path: Path) -> None:

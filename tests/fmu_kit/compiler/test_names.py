@@ -22,7 +22,7 @@ from fmu_kit.declared_names import PYTHONFMU_NAMES
 from fmu_kit.packaging import slave_class
 from fmu_kit.slave import Slave
 from tests.fmu_kit.compiler.compiled import compiler
-from tests.fmu_kit.compiler.embedded import _succeeds, made
+from tests.fmu_kit.compiler.embedded import _succeeds, assert_its_header_is_kept
 from tests.fmu_kit.compiler.probes import Kept
 from tests.fmu_kit.compiler.twins import GUID, InC, InPython, answers, compiled
 
@@ -126,7 +126,7 @@ def test_a_slave_may_call_its_own_what_it_likes(target: Target, tmp_path: Path) 
 def test_embedded_c_has_names_that_are_keywords_of_c(target: Target, tmp_path: Path) -> None:
     for single in (False, True):
         source = write(target, tmp_path, single=single)
-        assert made(source, "cc", "-O0").is_file()
+        assert_its_header_is_kept(source, "-O0")
     seen = tmp_path / "seen.cpp"
     seen.write_text(f'#include <cmath>\n#include <cstdio>\n#include "{source.stem}.h"\n')
     _succeeds([compiler("g++"), "-fsyntax-only", str(seen)])

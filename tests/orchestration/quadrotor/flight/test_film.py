@@ -1,13 +1,16 @@
 """A flight as a film."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from matplotlib.animation import FFMpegWriter
 from PIL import Image
 
 import quadcosim
+from orchestration.foundation.basics.simulator import Floats
 from orchestration.quadrotor.flight import film as filming
 from orchestration.simulation.figures.style import SCREEN
 from orchestration.simulation.runs.draw import runs_of
@@ -22,19 +25,45 @@ def flight() -> Result:
     return quadcosim.run(native(stop_time=0.4))
 
 
-def test_a_film_has_twenty_pictures_a_second_in_which_the_vehicle_moves(flight: Result, tmp_path: Path) -> None:
+def test_a_film_has_twenty_pictures_a_second_in_which_the_vehicle_follows_its_path(
+    flight: Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     heard: list[float] = []
+    places: list[Floats] = []
+    move = filming._Vehicle.move
+
+    def moved(vehicle: Any, now: float) -> None:
+        move(vehicle, now)
+        places.append(pixel_of(vehicle.outlines[0].axes, vehicle._at(filming.PLACE, now)))
+
+    monkeypatch.setattr(filming._Vehicle, "move", moved)
     runs = runs_of([flight], ["one"], filming.COLUMNS | {"time"}, (0.0, 0.3))
     path = filming.film(runs, tmp_path / "new" / "flight.gif", SCREEN, heard.append)
     with Image.open(path) as film:
         assert film.n_frames == len(heard) == 6
         assert film.info["duration"] == 50
         pictures = []
-        for place in (0, 5):
-            film.seek(place)
-            pictures.append(np.asarray(film.convert("RGB")))
-    assert (pictures[0] != pictures[1]).any()
+        for number in range(6):
+            film.seek(number)
+            pictures.append(np.asarray(film.convert("L")))
+    for picture, place in zip(pictures, places, strict=True):
+        assert np.linalg.norm(dark_centre(picture, place) - place) < 1.5
+    assert np.linalg.norm(places[-1] - places[0]) > 5.0
     assert heard[-1] == 1.0
+
+
+def pixel_of(axes: Any, point: Floats) -> Floats:
+    """Column and row of a point in space in a picture of the figure."""
+    x, y, _, w = axes.get_proj() @ [*point, 1.0]
+    column, row = axes.transData.transform((x / w, y / w))
+    return np.array([column, axes.figure.bbox.height - row])
+
+
+def dark_centre(picture: npt.NDArray[np.uint8], about: Floats, reach: int = 12) -> Floats:
+    """Mean column and row of the dark pixels about a place: the arms of a vehicle cross in its centre."""
+    left, top = (int(value) - reach for value in about)
+    rows, columns = np.nonzero(picture[top : top + 2 * reach + 1, left : left + 2 * reach + 1] < 70)
+    return np.array([left + columns.mean() + 0.5, top + rows.mean() + 0.5])
 
 
 def test_a_rotation_turns_the_axes_of_the_body_by_its_quaternion() -> None:

@@ -91,7 +91,7 @@ def test_any_text_is_an_expression_or_wrong_usage(source):
         tree = parse(source)
     except UsageError:
         return
-    assert list(names(tree)) is not None
+    assert _flat(parse(text(tree))) == _flat(tree)
 
 
 _trees = st.recursive(
