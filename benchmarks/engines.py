@@ -12,7 +12,7 @@ from typing import get_args
 from orchestration.components.building.fmus import native_twin
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.quadrotor.scenarios.timing import Timing
-from orchestration.simulation.engines.engine import Engine
+from orchestration.simulation.engines.master import Engine
 from orchestration.simulation.runs.prepared import prepared
 
 REPETITIONS = 9

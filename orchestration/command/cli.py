@@ -28,7 +28,6 @@ from orchestration.command import (
 )
 from orchestration.command.registry import OutputOptions, ask, option_group
 from orchestration.components.building import consent
-from orchestration.components.fmi.banners import banners_to_stderr
 from orchestration.foundation.basics.errors import (
     QuadcosimError,
     SimulatorError,
@@ -38,7 +37,7 @@ from orchestration.foundation.basics.errors import (
     worded_by,
 )
 from orchestration.foundation.basics.extras import lack_of
-from orchestration.foundation.basics.terminal import inform, report_error
+from orchestration.foundation.basics.terminal import banners_to_stderr, inform, report_error
 from orchestration.foundation.processes.subprocesses import misleading_variables
 
 

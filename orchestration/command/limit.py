@@ -81,7 +81,7 @@ def limit(
 ) -> CommandResult:
     """Find the largest good value of a period, delay, jitter, loss or any path by runs, and the local limit."""
     from orchestration.experiments.limits import limit as limits
-    from orchestration.simulation.engines.engine import engine_named
+    from orchestration.simulation.engines.master import engine_named
 
     how = "auto" if engine == "auto" else engine_named(engine, "auto")
     request = request_from(scenario, flags, timing)

@@ -69,7 +69,7 @@ def run(
     process: ProcessFlags,
 ) -> CommandResult:
     """Run a scenario or a system and print its metrics. FMUs that are missing or out of date are built first."""
-    from orchestration.simulation.engines.engine import engine_named  # modules for runs are loaded only if needed
+    from orchestration.simulation.engines.master import engine_named  # modules for runs are loaded only if needed
 
     if resume is not None and (scenario is not None or pause_at is not None or flags != FlightFlags()):
         raise UsageError("--resume: expected no scenario and no flags of the run; the paused run has its own")
@@ -134,7 +134,7 @@ def _resumed(paused_in: Path, out: Path | None, figures: bool, how: Any) -> "Res
 
 
 def _metrics(result: "Result") -> CommandResult:
-    from orchestration.simulation.results.criterion import unmet
+    from orchestration.simulation.results.objectives import unmet
 
     found = {**result.metrics, "wall_time": result.provenance["wall_time"], "engine": result.provenance["engine"]}
     width, units = max(map(len, found)), {**result.units, "wall_time": "s"}

@@ -23,8 +23,8 @@ from orchestration.components.checks.validation.structure import initial_unknown
 from orchestration.components.checks.validation.units import dimensions, unit_meaning
 from orchestration.components.checks.validation.validator import validate
 from orchestration.components.checks.validation.variables import aliases, names
+from orchestration.components.fmi.instance import start_value
 from orchestration.components.fmi.model import attribute, scalars_of
-from orchestration.components.fmi.values import start_value
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.processes.child import Child, Ending
 from orchestration.foundation.processes.limits import Limits

@@ -13,8 +13,8 @@ from orchestration.components.checks.validation.structure import RULES, indices,
 from orchestration.components.checks.validation.validator import validate
 from orchestration.components.checks.validation.variables import arrays, bounds, names
 from orchestration.components.fmi.archive import UnreadableFmuError
+from orchestration.components.fmi.instance import start_value
 from orchestration.components.fmi.model import scalars_of
-from orchestration.components.fmi.values import start_value
 from tests.fmus.archive import files_of, view_of
 from tests.fmus.damage import DESCRIPTION, write_fmu
 from tests.fmus.making import PAIR

@@ -6,9 +6,9 @@ from typing import Any, ClassVar
 import numpy as np
 from fmpy import fmi3
 
-from orchestration.components.fmi.messages import WARNING
+from orchestration.components.fmi.instance import INTEGERS
 from orchestration.components.fmi.native import NativeInstance
-from orchestration.components.fmi.values import INTEGERS
+from orchestration.components.fmi.slaves import WARNING
 from orchestration.foundation.basics.errors import SimulatorError, UsageError
 
 

@@ -1,16 +1,133 @@
-"""The interface of an instance of an FMU, in whichever process it is and of whichever version of FMI."""
+"""The interface of an instance of an FMU, in whichever process and of whichever version of FMI, and its values."""
 
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeAlias, TypeVar
 
+import numpy as np
 from fmpy.model_description import ModelDescription
 
 from orchestration.components.fmi.model import Kind, Model, Variable
-from orchestration.components.fmi.values import Value
+from orchestration.foundation.basics.errors import UsageError, expected_name, shown
 from orchestration.foundation.basics.simulator import Floats, Simulator
+
+Value: TypeAlias = float | bool | str
+
+_ROUNDING = {"Float32": 1e-6}
+"""Relative differences that count as none, by type; 1e-12 for others: an FMU may store a value in other units"""
+
+INTEGERS: Mapping[str, type[np.signedinteger[Any] | np.unsignedinteger[Any]]] = {
+    "Integer": np.int32, "Enumeration": np.int32, "Int8": np.int8, "UInt8": np.uint8, "Int16": np.int16,
+    "UInt16": np.uint16, "Int32": np.int32, "UInt32": np.uint32, "Int64": np.int64, "UInt64": np.uint64,
+}  # fmt: skip
+"""The numpy type of each integer type"""
+
+
+def convert_value(variable: Variable, value: object, place: str) -> Value:
+    """Convert `value` to the type of the variable, an item of an enumeration to its number.
+
+    Raises `UsageError` that names the place for an invalid value; a constant accepts its own value only.
+    """
+    converted = _of_its_type(variable, value, place)
+    if variable.is_constant and number_of(variable, converted) != number_of(variable, variable.start):
+        raise UsageError(f"{place} = {shown(value)}: expected {variable.start}, which is fixed in this FMU")
+    return converted
+
+
+def _of_its_type(variable: Variable, value: object, place: str) -> Value:
+    if variable.kind == "Boolean":
+        return _of_kind(value, bool, place, "true or false")
+    if variable.kind == "String":
+        return _of_kind(value, str, place, "a text")
+    if variable.kind in ("Integer", "Enumeration") and isinstance(value, float) and value.is_integer():
+        value = int(value)  # as in ranges and on the command line
+    if variable.choices:
+        return _chosen(variable.choices, value, place)
+    if variable.kind in ("Integer", "Enumeration"):
+        bounds = np.iinfo(INTEGERS[variable.type])
+        fits = isinstance(value, int) and not isinstance(value, bool) and bounds.min <= value <= bounds.max
+        whole = _if(fits, value, place, f"a whole number of {bounds.bits} bits")
+        return _if(int(float(whole)) == whole, whole, place, "a whole number that a float holds: all are up to 2**53")
+    if variable.kind != "Real":
+        raise UsageError(f"{place}: is a {variable.kind}, which cannot be set")
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool) and _is_float(value)
+    return float(_if(is_number, value, place, "a number"))
+
+
+def number_of(variable: Variable, value: object) -> float:
+    """A value of the variable, or its start value as the description has it, as the number that is recorded.
+
+    Raises `UsageError` for a start value that is none.
+    """
+    if isinstance(value, str):
+        value = {"true": 1, "false": 0, **variable.choices}.get(value, value)
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except ValueError:
+        raise UsageError(
+            f"{variable.name} = {shown(value)}: expected a start value that is a {variable.type}"
+        ) from None
+
+
+def start_value(variable: Variable) -> Value | bytes:
+    """The start value of a variable in its type; zero, false or an empty text if it has none.
+
+    Raises `UsageError` for a start value that is none of its type.
+    """
+    if variable.kind == "String":
+        return variable.start or ""
+    if variable.kind == "Binary":
+        return bytes.fromhex(variable.start or "")
+    number = start_number(variable)
+    return number if variable.kind == "Real" else bool(number) if variable.kind == "Boolean" else int(number)
+
+
+def start_number(variable: Variable) -> float:
+    """As `start_value`, of a number or a Boolean, as the number that is recorded."""
+    number = number_of(variable, variable.start) if variable.start else 0.0
+    return float(np.float32(number)) if variable.type == "Float32" else number
+
+
+def within(variable: Variable, value: float) -> float:
+    """The value that the variable may take, by its bounds and its type, nearest to `value`."""
+    low = -math.inf if variable.minimum is None else variable.minimum
+    high = math.inf if variable.maximum is None else variable.maximum
+    if variable.type in INTEGERS:
+        of = np.iinfo(INTEGERS[variable.type])
+        low, high = max(low, of.min), min(high, of.max)
+    return min(max(value, low), high)
+
+
+def same(variable: Variable, value: Value, read: Value) -> bool:
+    """Whether the value that is read is the one that was set, up to the precision of the type."""
+    if isinstance(value, str) or isinstance(read, str):
+        return value == read
+    return math.isclose(value, read, rel_tol=_ROUNDING.get(variable.type, 1e-12))
+
+
+def _chosen(choices: Mapping[str, int], value: object, place: str) -> int:
+    if isinstance(value, int) and not isinstance(value, bool) and value in choices.values():
+        return value
+    if not isinstance(value, str) or value not in choices:
+        raise UsageError(f"{place} = {shown(value)}: {expected_name(str(value), list(choices))}")
+    return choices[value]
+
+
+def _is_float(value: float) -> bool:
+    return isinstance(value, float) or abs(value) < 2**63
+
+
+def _of_kind(value: object, kind: type, place: str, expected: str) -> Value:
+    return _if(isinstance(value, kind), value, place, expected)
+
+
+def _if(condition: bool, value: object, place: str, expected: str) -> Value:
+    if not condition:
+        raise UsageError(f"{place} = {shown(value)}: expected {expected}")
+    return value  # type: ignore[return-value]
+
 
 T = TypeVar("T", bound="Instance")
 

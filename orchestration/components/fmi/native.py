@@ -18,13 +18,20 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 
 from orchestration.components.fmi import pythonfmu
-from orchestration.components.fmi.instance import Instance
-from orchestration.components.fmi.messages import WARNING, Messages, failure_text, status_name
+from orchestration.components.fmi.instance import Instance, Value, convert_value, same
 from orchestration.components.fmi.model import Variable, read_model
-from orchestration.components.fmi.slaves import binary_folders, folder_here, instantiate, load_slave
+from orchestration.components.fmi.slaves import (
+    WARNING,
+    Messages,
+    binary_folders,
+    failure_text,
+    folder_here,
+    instantiate,
+    load_slave,
+    status_name,
+)
 from orchestration.components.fmi.surroundings import FOLDER, ROUNDING, Surroundings, sentence
 from orchestration.components.fmi.transfers import Numbers, TransferCall, TransferLayout, TransferPart
-from orchestration.components.fmi.values import Value, convert_value, same
 from orchestration.foundation.basics import scratch
 from orchestration.foundation.basics.errors import (
     QuadcosimError,

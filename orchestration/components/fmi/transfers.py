@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from orchestration.components.fmi.instance import number_of
 from orchestration.components.fmi.model import Model, Variable
-from orchestration.components.fmi.values import number_of
 from orchestration.foundation.basics.errors import SimulatorError
 from orchestration.foundation.basics.simulator import Floats
 

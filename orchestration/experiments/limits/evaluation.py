@@ -8,7 +8,7 @@ from typing import Any
 from orchestration.foundation.basics.bisection import Range
 from orchestration.foundation.basics.statistics import refutes, wilson
 from orchestration.simulation.requests.ranges import Varied
-from orchestration.simulation.results.criterion import judged_objective, unmet
+from orchestration.simulation.results.objectives import judged_objective, unmet
 from orchestration.simulation.workers.executors import RunEvaluator
 
 RELIABILITY = 0.9

@@ -12,11 +12,11 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.progress import ShareProgress, share_reporter
 from orchestration.foundation.basics.terminal import inform
-from orchestration.simulation.engines.engine import Engine
+from orchestration.simulation.engines.master import Engine
 from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.simulation.requests.ranges import Varied, default_quantity, search_range
 from orchestration.simulation.requests.request import RequestLike, request_of
-from orchestration.simulation.results.criterion import bound_of, judged_objective
+from orchestration.simulation.results.objectives import bound_of, judged_objective
 from orchestration.simulation.workers.choice import single_run_execution
 from orchestration.simulation.workers.executors import RunEvaluator
 from orchestration.systems.system.files import Files, files_of

@@ -25,8 +25,7 @@ from orchestration.experiments.studies.sweep import AGREEMENT, expect_current
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.results import display_names as labels
-from orchestration.simulation.results.criterion import judged_objective
-from orchestration.simulation.results.objectives import FIXED
+from orchestration.simulation.results.objectives import FIXED, judged_objective
 from orchestration.simulation.results.quantities import quantity
 from orchestration.simulation.results.units import column_infos
 from orchestration.simulation.workers.batching import LaneAgreement

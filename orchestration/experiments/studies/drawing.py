@@ -19,7 +19,7 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.terminal import Share
 from orchestration.simulation.figures.style import SCREEN, Style, save
-from orchestration.simulation.results.criterion import bound_of, judged_objective
+from orchestration.simulation.results.objectives import bound_of, judged_objective
 from orchestration.systems.system.requirements import is_number
 
 if TYPE_CHECKING:

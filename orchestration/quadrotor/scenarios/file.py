@@ -15,7 +15,7 @@ from orchestration.quadrotor.scenarios.translation import DisturbanceChoice, Ref
 from orchestration.quadrotor.scenarios.vehicle import load_vehicle
 from orchestration.quadrotor.scenarios.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT
 from orchestration.systems.system.component import parameters_in
-from orchestration.systems.system.distribution import DistributionTable, with_distributions
+from orchestration.systems.system.file import DistributionTable, with_distributions
 
 TimingTable = table_of(Timing, within=[DistributionTable])
 ScenarioFile = table_of(

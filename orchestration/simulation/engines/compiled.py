@@ -5,12 +5,18 @@ C processes some instants at a time, so that interruptions are noticed in betwee
 """
 
 import ctypes
+import functools
 import time as clock
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fmu_kit.bundle import PackagingError
+from fmu_kit.compiler.pack.c_compiler import OPTIONS, compiled_here
+from fmu_kit.compiler.runtime import FOLDER
+from fmu_kit.libraries import cached_library
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.components.fmi.fmi3 import Fmi3Instance
 from orchestration.components.fmi.native import NativeInstance
@@ -19,13 +25,38 @@ from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.basics.simulator import Floats, Integers, Simulator
 from orchestration.foundation.basics.times import seconds
 from orchestration.foundation.recording.recording import Recorder
+from orchestration.simulation.engines import condition
 from orchestration.simulation.engines.backlog import Backlog
-from orchestration.simulation.engines.loop import Operation, library
 from orchestration.simulation.engines.memory import Allocator, SharedTables, allocated_loop
 from orchestration.simulation.engines.run_structures import RunStructures
 from orchestration.simulation.engines.running_system import RunningSystem, Terminated
-from orchestration.simulation.engines.structures import ONE_LANE, address
+from orchestration.simulation.engines.structures import HEADER, ONE_LANE, address, declared, expect_same_sizes, shared
 from orchestration.systems.schedule.schedule import Schedule
+
+INSTANTS = Path(__file__).with_name("instants.h")
+"""C of what happens at an instant, for runs of FMUs and of kernels in SIMD lanes"""
+FILES = (Path(__file__).with_name("loop.c"), condition.HEADER, INSTANTS, HEADER, FOLDER / "lanes.h")
+"""Its sources, beside the generated operators.h"""
+Operation: Any = declared(condition.HEADER.read_text(encoding="utf-8"))["Operation"]
+"""One step of a condition"""
+
+
+@functools.cache
+def library() -> Any:
+    """The function `run` of loop.c; raises `QuadcosimError` with the reason if it is not available."""
+    sources = {path.name: path.read_bytes() for path in FILES}
+    sources["operators.h"] = condition.operators().encode()
+    try:
+        path = cached_library("loop", sources, OPTIONS, lambda: compiled_here(sources, "loop.c", mathematics="libm"))
+        loaded = ctypes.CDLL(str(path))
+    except (PackagingError, OSError) as error:
+        raise QuadcosimError(str(error)) from error
+    expect_same_sizes(loaded, {**shared(1), "Operation": Operation})
+    run = loaded.run
+    run.restype = ctypes.c_int
+    run.argtypes = (ctypes.c_void_p,)
+    return run
+
 
 SLICE = 0.05
 """Time after which C returns, about [s]"""

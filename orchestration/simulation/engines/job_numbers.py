@@ -7,8 +7,7 @@ import numpy as np
 from orchestration.foundation.basics.errors import UsageError, expected_name
 from orchestration.foundation.basics.times import seconds
 from orchestration.systems.computers.results import Frames, Jobs, Timeline
-from orchestration.systems.expressions.over_run import evaluate, job_terms
-from orchestration.systems.expressions.over_span import Recorded
+from orchestration.systems.expressions.over_run import Recorded, evaluate, job_terms
 from orchestration.systems.expressions.syntax import (
     Call,
     JobMeasure,

@@ -1,20 +1,33 @@
-"""The master of one run: initialises it, has a loop process its instants, pauses it, and states how it ended."""
+"""The master of one run: initialises it, has a loop process its instants, pauses it, and states how it ended.
 
+The loop is the compiled one where it is available, else that in Python; both give the same bytes.
+"""
+
+import logging
 from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import Any, Protocol
+from functools import partial
+from typing import Any, Literal, Protocol, cast, get_args
 
 import numpy as np
 
-from orchestration.foundation.basics.errors import SimulatorError, StoppedStepError
+from orchestration.foundation.basics.errors import (
+    QuadcosimError,
+    SimulatorError,
+    StoppedStepError,
+    UsageError,
+    expected_name,
+)
 from orchestration.foundation.basics.simulator import Booleans, Floats, Simulator
 from orchestration.foundation.basics.times import nanoseconds, seconds
 from orchestration.foundation.recording.recording import Chunk, Recorder
 from orchestration.simulation.engines import initial
 from orchestration.simulation.engines.backlog import Backlog
 from orchestration.simulation.engines.channel import Channel
+from orchestration.simulation.engines.compiled import CompiledLoop, reason_unavailable
 from orchestration.simulation.engines.condition import NEVER, Condition
 from orchestration.simulation.engines.feeds import Feed
 from orchestration.simulation.engines.instants import PythonLoop
+from orchestration.simulation.engines.memory import Allocator
 from orchestration.simulation.engines.running_system import Diverged, RunningSystem, Sources, Terminated
 from orchestration.simulation.engines.wires import clock_of
 from orchestration.systems.schedule.streams import Streams
@@ -233,3 +246,38 @@ class Master:
             raise SimulatorError(
                 f"initialisation: no values found around the loop {ends} after {initial.ITERATIONS} exchanges"
             )
+
+
+_NOTES = logging.getLogger("quadcosim")
+
+Engine = Literal["python", "compiled"]
+
+
+def engine_named(name: str | None, *others: str) -> Engine | None:
+    """The engine of that name; raises `UsageError` for an unknown name, listing `others` too."""
+    if name is not None and name not in get_args(Engine):
+        raise UsageError(f"--engine {name}: {expected_name(name, [*get_args(Engine), *others])}")
+    return cast(Engine | None, name)
+
+
+def create_master(
+    engine: Engine | None,
+    system: System,
+    simulators: Mapping[str, Simulator],
+    *,
+    allocate: Allocator,
+    **others: Any,
+) -> Master:
+    """The master of a run, with an engine; default: the compiled loop where available.
+
+    The compiled loop keeps what it has not handed over in memory of `allocate`; `others` are arguments of `Master`.
+    Raises `QuadcosimError` with the reason if the compiled loop was requested and is not available.
+    """
+    reason = None if engine == "python" else reason_unavailable(simulators, nanoseconds(system.stop_time))
+    if reason:
+        _NOTES.debug("no compiled loop: %s", reason)
+    if engine == "python" or (engine is None and reason):
+        return Master(system, simulators, **others)
+    if reason:
+        raise QuadcosimError(f"--engine compiled is not available: {reason}")
+    return Master(system, simulators, loop=partial(CompiledLoop, allocate=allocate), **others)

@@ -10,7 +10,7 @@ from orchestration.components.fmi.model import Model
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.units import METRE, NUMBER, ONE, SECOND, Operand, Unit, agreed
 from orchestration.systems.expressions.operators import OPERATORS
-from orchestration.systems.expressions.over_span import STOP_TIME, TIME
+from orchestration.systems.expressions.over_run import STOP_TIME, TIME
 from orchestration.systems.expressions.syntax import (
     Call,
     JobMeasure,

@@ -14,7 +14,7 @@ from orchestration.foundation.processes.child import Child, Died
 from orchestration.foundation.processes.limits import UNLIMITED
 from orchestration.foundation.recording.recording import Chunk, Recorder
 from orchestration.simulation.engines.backlog import RunEvents
-from orchestration.simulation.engines.engine import Engine
+from orchestration.simulation.engines.master import Engine
 from orchestration.simulation.engines.memory import Unrecorded, read_unrecorded
 from orchestration.simulation.engines.resolved import ResolvedRequest
 from orchestration.simulation.runs.outcome import Course, Progress, RunLost, RunOutcome, result_of

@@ -12,7 +12,7 @@ from orchestration.simulation.engines.resolved import ResolvedRequest, uneven_st
 from orchestration.simulation.results import objectives
 from orchestration.simulation.results.units import column_infos
 from orchestration.simulation.runs.result import Provenance, Result
-from orchestration.systems.expressions.over_span import Recorded
+from orchestration.systems.expressions.over_run import Recorded
 
 _NOTES = logging.getLogger("quadcosim")
 

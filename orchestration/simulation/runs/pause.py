@@ -13,7 +13,7 @@ from orchestration.foundation.basics.times import nanoseconds
 from orchestration.foundation.processes.limits import Limits
 from orchestration.foundation.recording.recording import InMemory, Recorder
 from orchestration.foundation.recording.tables import InFolder, ToFolder
-from orchestration.simulation.engines.engine import Engine
+from orchestration.simulation.engines.master import Engine
 from orchestration.simulation.engines.resolved import Announce
 from orchestration.simulation.requests.request import RequestLike, load_request, request_of
 from orchestration.simulation.runs.outcome import Progress

@@ -23,9 +23,8 @@ from orchestration.foundation.basics.times import seconds
 from orchestration.foundation.recording.recording import InMemory, Recorder
 from orchestration.simulation.engines import initial
 from orchestration.simulation.engines.condition import Condition
-from orchestration.simulation.engines.engine import Engine, create_master
 from orchestration.simulation.engines.feeds import Feed
-from orchestration.simulation.engines.master import Master
+from orchestration.simulation.engines.master import Engine, Master, create_master
 from orchestration.simulation.engines.memory import Allocator, process_memory
 from orchestration.simulation.engines.resolved import Announce, ResolvedRequest, fixed_steps, resolve
 from orchestration.simulation.engines.sources import SourceValues

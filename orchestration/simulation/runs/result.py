@@ -16,8 +16,7 @@ from orchestration.foundation.recording import frames
 from orchestration.foundation.recording.recording import About, Event, Recording, events_of, rows_of
 from orchestration.simulation.results import display_names as labels
 from orchestration.simulation.results import exports, html
-from orchestration.simulation.results.criterion import unmet
-from orchestration.simulation.results.objectives import Metrics
+from orchestration.simulation.results.objectives import Metrics, unmet
 from orchestration.simulation.results.units import ColumnInfo
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request

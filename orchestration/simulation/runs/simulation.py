@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, overload
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.processes.limits import Limits
 from orchestration.foundation.recording.recording import InMemory, Recorder
-from orchestration.simulation.engines.engine import Engine
+from orchestration.simulation.engines.master import Engine
 from orchestration.simulation.engines.resolved import Announce, resolve
 from orchestration.simulation.runs.outcome import Course, Progress
 from orchestration.simulation.runs.prepared import PreparedRun, prepared

@@ -4,8 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from orchestration.components.fmi.instance import Instance
-from orchestration.components.fmi.values import Value
+from orchestration.components.fmi.instance import Instance, Value
 from orchestration.foundation.basics.simulator import Floats, Transfer
 
 

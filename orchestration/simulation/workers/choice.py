@@ -7,7 +7,7 @@ from typing import Literal, cast, get_args
 from orchestration.components.building.fmus import native_twins
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError, expected_name
 from orchestration.simulation.engines.batch.shape import expect_lanes
-from orchestration.simulation.engines.engine import Engine
+from orchestration.simulation.engines.master import Engine
 from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.systems.system.files import Files, files_of
 from orchestration.systems.system.model import System

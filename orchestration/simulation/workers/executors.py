@@ -13,7 +13,7 @@ from itertools import islice
 from typing import Any
 
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
-from orchestration.simulation.engines.engine import Engine
+from orchestration.simulation.engines.master import Engine
 from orchestration.simulation.workers.batching import chunks
 from orchestration.simulation.workers.pool import Inputs, InterruptedWorker, Pool
 from orchestration.simulation.workers.task import RunTask, TaskBatch, TaskOutcome

@@ -80,7 +80,9 @@ def versions() -> dict[str, str]:
 
 def simulation_sources() -> dict[str, Path]:
     """The modules of this project that the simulation code imports, directly or not, by name."""
-    from orchestration.simulation.engines import loop  # deferred: a worker that receives its sources does not need them
+    from orchestration.simulation.engines import (
+        compiled,  # deferred: a worker that receives its sources does not need them
+    )
     from orchestration.simulation.engines.batch import kernels
     from orchestration.simulation.requests.kinds import KINDS
 
@@ -95,7 +97,7 @@ def simulation_sources() -> dict[str, Path]:
             modules[name] = path
             waiting += imported(path.read_text(encoding="utf-8"))
     based_on = (file for kind in KINDS.all() for file in kind.files)
-    return modules | {path.name: path for path in (*based_on, *loop.FILES, *kernels.FILES)}
+    return modules | {path.name: path for path in (*based_on, *compiled.FILES, *kernels.FILES)}
 
 
 _IMPORT = re.compile(r"^[ \t]*(?:from[ \t]+([\w.]+)[ \t]+)?import[ \t]+(\([^)]*\)|[^#\n]*)", re.MULTILINE)

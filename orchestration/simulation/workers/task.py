@@ -12,7 +12,7 @@ from orchestration.components.fmi.instance import Instance
 from orchestration.components.fmi.model import read_model
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError
-from orchestration.simulation.engines.engine import Engine
+from orchestration.simulation.engines.master import Engine
 from orchestration.simulation.results.own_metrics import OwnMetric
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.simulation.runs.result import Result

@@ -9,9 +9,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from fmu_kit.bundle import PackagingError
 from fmu_kit.compiler.pack.c_compiler import OPTIONS, compiled_here
+from fmu_kit.libraries import cached_library
 from orchestration.foundation.basics.errors import QuadcosimError
-from orchestration.foundation.basics.libraries import cached_library
 from orchestration.foundation.basics.simulator import Integers
 from orchestration.foundation.basics.times import Constant
 from orchestration.systems.computers import parts as constants
@@ -218,12 +219,12 @@ def _tables(
 def _library() -> Any:
     """scheduler.c as a library; raises `QuadcosimError`, naming the reason, if there is none."""
     sources = {"scheduler.c": SOURCE.read_bytes(), "constants.h": _constants().encode()}
-    path = cached_library(
-        "scheduler", sources, (*OPTIONS, *_FASTER), lambda: compiled_here(sources, "scheduler.c", options=_FASTER)
-    )
     try:
+        path = cached_library(
+            "scheduler", sources, (*OPTIONS, *_FASTER), lambda: compiled_here(sources, "scheduler.c", options=_FASTER)
+        )
         library = ctypes.CDLL(str(path))
-    except OSError as error:
+    except (PackagingError, OSError) as error:
         raise QuadcosimError(str(error)) from error
     for name in ("size_of_arguments", "scheduler_next_instant", "scheduler_run"):
         getattr(library, name).restype = ctypes.c_int64

@@ -1,6 +1,6 @@
 """The operators of the language and its functions of values at one instant, defined for all targets.
 
-The targets are numpy over a span of a run (`over_span.py`), Python at an instant (`at_instant.py`), C in SIMD lanes,
+The targets are numpy over a span of a run (`over_run.py`), Python at an instant (`at_instant.py`), C in SIMD lanes,
 and C with a bound on its error in the condition of the compiled loop (`engines`). A truth value is 0 or 1.
 """
 

@@ -5,8 +5,7 @@ from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from orchestration.systems.schedule.common_timetable import CommonTimetable
-from orchestration.systems.schedule.spans import Span
+from orchestration.systems.schedule.common_timetable import CommonTimetable, Span
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system import placement

@@ -13,7 +13,7 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Booleans, Integers
-from orchestration.systems.schedule.common_timetable import CommonTimetable
+from orchestration.systems.schedule.common_timetable import CommonTimetable, InstantCollector, Span
 from orchestration.systems.schedule.fixed_step import FixedStep, Misalignment
 from orchestration.systems.schedule.lookahead import Lookahead
 from orchestration.systems.schedule.random_timing import (
@@ -23,7 +23,6 @@ from orchestration.systems.schedule.random_timing import (
     TimedComponent,
 )
 from orchestration.systems.schedule.schedule import Schedule
-from orchestration.systems.schedule.spans import InstantCollector, Span
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.system.model import System
 

@@ -10,9 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeGuard
 
 from orchestration.foundation.basics.documents import toml_of
-from orchestration.foundation.basics.errors import at_place
 from orchestration.foundation.basics.records import record
-from orchestration.foundation.basics.typed_tables import parsed, table_of
 from orchestration.systems.system.choices import TraceOrder
 from orchestration.systems.system.requirements import is_finite, require, require_loss
 
@@ -239,20 +237,6 @@ def _column(path: Path, column: str, state: tuple[int, int] | None) -> "Floats":
     return values
 
 
-DistributionTable = table_of(Distribution, file=(str | None, None))
-"""The path of a trace is text, as written"""
-
-
-def with_distributions(place: str, table: Any, folder: Path) -> dict[str, Any]:
-    """The keys of a table of a file, with distributions in place of their tables; `place` ends with its dot."""
-    keys: dict[str, Any] = table.model_dump()
-    for key in keys:
-        value = getattr(table, key)
-        if isinstance(value, DistributionTable):
-            keys[key] = _distribution(f"{place}{key}", value, folder)
-    return keys
-
-
 def parsed_fields(of: Any, place: str, keys: Mapping[str, Any]) -> dict[str, Any]:
     """New values of fields of a record, with distributions in place of their tables, or of the text of these.
 
@@ -289,15 +273,8 @@ def trace_path(value: str) -> str | None:
 def _parsed_field(place: str, value: Any) -> Any:
     if is_table(value):
         value = toml_of(f"value = {value}", f"{place} = {value}")["value"]
-    return _distribution(place, _parsed(place, value), Path()) if isinstance(value, Mapping) else value
+    if not isinstance(value, Mapping):
+        return value
+    from orchestration.systems.system.file import parsed_distribution  # not before: it loads what reads files
 
-
-def _parsed(place: str, table: Mapping[str, Any]) -> Any:
-    with at_place(place):
-        return parsed(table, DistributionTable)
-
-
-def _distribution(place: str, table: Any, folder: Path) -> Distribution:
-    keys = table.model_dump() | {"file": None if table.file is None else folder / table.file}
-    with at_place(place):
-        return Distribution(**keys)
+    return parsed_distribution(place, value)

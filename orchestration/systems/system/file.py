@@ -11,13 +11,17 @@ from orchestration.systems.system.choices import Order
 from orchestration.systems.system.component import Component, Sampling, SamplingOnArrival, flattened, parameters_in
 from orchestration.systems.system.computers import Arrivals, Computer, Message, Network, Task
 from orchestration.systems.system.connection import Connection
-from orchestration.systems.system.distribution import DistributionTable, with_distributions
+from orchestration.systems.system.distribution import Distribution
 from orchestration.systems.system.model import Criterion, System
 from orchestration.systems.system.paths import changed, for_each
 from orchestration.systems.system.requirements import is_number, require
 from orchestration.systems.system.source import Source
 
 Part = TypeVar("Part")
+
+
+DistributionTable = table_of(Distribution, file=(str | None, None))
+"""The path of a trace is text, as written"""
 
 
 class SamplingTable(table_of(Sampling, within=[DistributionTable], period=(float | None, None))):  # type: ignore[misc]
@@ -168,3 +172,26 @@ def _source(name: str, table: Any, folder: Path) -> Source:
 def _part(place: str, kind: type[Part], keys: Mapping[str, Any]) -> Part:
     with at_place(place):
         return kind(**keys)
+
+
+def with_distributions(place: str, table: Any, folder: Path) -> dict[str, Any]:
+    """The keys of a table of a file, with distributions in place of their tables; `place` ends with its dot."""
+    keys: dict[str, Any] = table.model_dump()
+    for key in keys:
+        value = getattr(table, key)
+        if isinstance(value, DistributionTable):
+            keys[key] = _distribution(f"{place}{key}", value, folder)
+    return keys
+
+
+def parsed_distribution(place: str, table: Mapping[str, Any]) -> Distribution:
+    """The distribution of a table, with the path of its trace from the current folder; raises `UsageError`."""
+    with at_place(place):
+        found = parsed(table, DistributionTable)
+    return _distribution(place, found, Path())
+
+
+def _distribution(place: str, table: Any, folder: Path) -> Distribution:
+    keys = table.model_dump() | {"file": None if table.file is None else folder / table.file}
+    with at_place(place):
+        return Distribution(**keys)

@@ -10,6 +10,7 @@ from orchestration.foundation.basics.records import replaced
 from orchestration.systems.system.component import Component, Sampling, SamplingOnArrival, TaskSampling
 from orchestration.systems.system.computers import Arrivals, Computer, Network
 from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.distribution import parsed_fields
 from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import SHARED
 from orchestration.systems.system.source import Source
@@ -267,8 +268,6 @@ def for_each(start: Iterable[str], value: Any) -> Any:
 
 def _replaced(place: str, of: Any, keys: Mapping[str, Any]) -> Any:
     if any(isinstance(value, (str, Mapping)) for value in keys.values()):
-        from orchestration.systems.system.distribution import parsed_fields  # which loads what reads files
-
         keys = parsed_fields(of, f"{place}.", keys)
     try:
         return dataclasses.replace(of, **dict(keys))

@@ -12,8 +12,7 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.systems.expressions.at_instant import compiled
 from orchestration.systems.expressions.operators import OPERATORS, applied
-from orchestration.systems.expressions.over_run import inlined, reductions
-from orchestration.systems.expressions.over_span import STOP_TIME, TIME
+from orchestration.systems.expressions.over_run import STOP_TIME, TIME, inlined, reductions
 from orchestration.systems.expressions.syntax import (
     Call,
     Name,

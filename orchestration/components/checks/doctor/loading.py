@@ -108,9 +108,15 @@ def _load(fmu: InspectedFmu, folder: Path) -> None:
     """Load with the required parts of the description only: others may be invalid."""
     import fmpy
 
-    from orchestration.components.fmi.messages import Message, failure_text
     from orchestration.components.fmi.pythonfmu import expect_readable_place
-    from orchestration.components.fmi.slaves import INSTANTIATES, folder_here, instantiate, load_slave
+    from orchestration.components.fmi.slaves import (
+        INSTANTIATES,
+        Message,
+        failure_text,
+        folder_here,
+        instantiate,
+        load_slave,
+    )
 
     folder_here(fmu.version, [part.platform for part in fmu.platforms])
     fmpy.extract(str(fmu.path), str(folder))

@@ -12,8 +12,8 @@ from orchestration.components.checks.validation.excitation import ExcitationPlan
 from orchestration.components.checks.validation.instance import CheckedInstance, Row, Value, Values
 from orchestration.components.checks.validation.probe import Probe
 from orchestration.components.checks.validation.run_comparison import same
+from orchestration.components.fmi.instance import start_value
 from orchestration.components.fmi.model import Variable
-from orchestration.components.fmi.values import start_value
 from orchestration.foundation.basics.errors import SimulatorError
 
 MAX_SWITCHES = 16

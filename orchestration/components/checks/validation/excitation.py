@@ -5,8 +5,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from orchestration.components.checks.validation.instance import Value, Values
+from orchestration.components.fmi.instance import start_number, start_value, within
 from orchestration.components.fmi.model import Variable
-from orchestration.components.fmi.values import start_number, start_value, within
 
 STEPS = 100
 """communication steps of a run"""

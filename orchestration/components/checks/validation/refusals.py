@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 from orchestration.components.checks.validation.excitation import PLAIN
 from orchestration.components.checks.validation.instance import Value
 from orchestration.components.checks.validation.probe import Probe
+from orchestration.components.fmi.instance import start_value
 from orchestration.components.fmi.model import Variable
-from orchestration.components.fmi.values import start_value
 from orchestration.foundation.basics.errors import SimulatorError
 
 

@@ -11,9 +11,9 @@ from orchestration.components.checks.validation.fmu import is_clocked
 from orchestration.components.checks.validation.instance import Row, Value
 from orchestration.components.checks.validation.probe import MIN_STEPS, Probe
 from orchestration.components.checks.validation.run_comparison import same
-from orchestration.components.fmi.messages import WARNING
+from orchestration.components.fmi.instance import start_value
 from orchestration.components.fmi.model import Variable
-from orchestration.components.fmi.values import start_value
+from orchestration.components.fmi.slaves import WARNING
 from orchestration.foundation.basics.errors import SimulatorError
 
 _DIGITS = 5e-15

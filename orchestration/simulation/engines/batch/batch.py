@@ -20,10 +20,10 @@ from orchestration.simulation.engines.batch.shape import Shape
 from orchestration.simulation.engines.resolved import source_values
 from orchestration.simulation.engines.sources import SourceValues
 from orchestration.simulation.engines.structures import address, structures
-from orchestration.systems.expressions.over_span import STOP_TIME
+from orchestration.systems.expressions.over_run import STOP_TIME
 from orchestration.systems.expressions.syntax import Call
+from orchestration.systems.schedule.common_timetable import Instants, Span
 from orchestration.systems.schedule.schedule_cache import RunSchedule, ScheduleCache, ScheduleKey
-from orchestration.systems.schedule.spans import Instants, Span
 from orchestration.systems.schedule.streams import NOISE, Streams
 from orchestration.systems.system.model import System
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from orchestration.simulation.engines.batch.folds import Folds
 from orchestration.simulation.engines.batch.writing import ExpressionWriter, Leaf, Section
-from orchestration.systems.expressions.over_span import TIME
+from orchestration.systems.expressions.over_run import TIME
 from orchestration.systems.expressions.syntax import Call, Name, Node
 
 

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from orchestration.foundation.basics.simulator import Booleans, Floats
-from orchestration.systems.expressions.over_run import reductions
-from orchestration.systems.expressions.over_span import Recorded, SpanValues
+from orchestration.systems.expressions.over_run import Recorded, SpanValues, reductions
 from orchestration.systems.expressions.syntax import Call, Node
 
 

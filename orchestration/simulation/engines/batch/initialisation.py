@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from orchestration.components.fmi.instance import convert_value, number_of
 from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
-from orchestration.components.fmi.values import convert_value, number_of
 from orchestration.foundation.basics.simulator import Booleans, Floats
 from orchestration.simulation.engines import initial
 from orchestration.simulation.engines.batch.arrays import BatchArrays

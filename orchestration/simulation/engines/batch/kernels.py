@@ -3,10 +3,11 @@
 import ctypes
 import functools
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from fmu_kit import libraries
 from fmu_kit.bundle import PackagingError
 from fmu_kit.compiler.pack.c_compiler import FOR_THIS_PROCESSOR, OPTIONS, compiled_here
 from fmu_kit.compiler.pack.lanes import MAIN, Lanes, compiled_lanes
@@ -14,8 +15,7 @@ from fmu_kit.compiler.pack.lanes import preferred_lanes as lanes_of_fmus
 from fmu_kit.compiler.runtime import FOLDER
 from orchestration.components.fmi.model import Model
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
-from orchestration.foundation.basics.libraries import cached_library
-from orchestration.simulation.engines.loop import INSTANTS
+from orchestration.simulation.engines.compiled import INSTANTS
 from orchestration.simulation.engines.structures import HEADER, expect_same_sizes, shared
 
 FILES = (Path(__file__).with_name("batch.c"), INSTANTS, HEADER, FOLDER / "lanes.h", FOLDER / "mathematics.h")
@@ -52,7 +52,7 @@ def _sources_in(path: Path, changed: int) -> Mapping[str, bytes]:
 @functools.lru_cache(maxsize=64)
 def _compiled(sources: tuple[tuple[str, bytes], ...], lanes: int) -> Lanes:
     key = (OPTIONS, FOR_THIS_PROCESSOR, lanes)
-    return Lanes(cached_library("lanes", dict(sources), key, lambda: compiled_lanes(dict(sources), lanes)))
+    return Lanes(_cached_library("lanes", dict(sources), key, lambda: compiled_lanes(dict(sources), lanes)))
 
 
 @functools.lru_cache(maxsize=256)
@@ -62,9 +62,17 @@ def batch(sizes: str, expressions: str, lanes: int) -> Any:
     sources |= {"sizes.h": sizes.encode(), "expressions.h": expressions.encode()}
     options = (*FOR_THIS_PROCESSOR, f"-DQUADCOSIM_LANES={lanes}", "-Wno-psabi")
     compile_ = lambda: compiled_here(sources, "batch.c", options=options)  # noqa: E731
-    library = ctypes.CDLL(str(cached_library("batch", sources, (OPTIONS, options), compile_)))
+    library = ctypes.CDLL(str(_cached_library("batch", sources, (OPTIONS, options), compile_)))
     expect_same_sizes(library, shared(lanes))
     for name in ("run", "clear", "free_all"):
         getattr(library, name).argtypes = (ctypes.c_void_p,)
     library.grown.argtypes = (ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)
     return library
+
+
+def _cached_library(folder: str, sources: Mapping[str, bytes], how: Any, compiled: Callable[[], bytes]) -> Path:
+    """As `fmu_kit.libraries.cached_library`; raises `QuadcosimError` if it cannot be compiled or stored."""
+    try:
+        return libraries.cached_library(folder, sources, how, compiled)
+    except (PackagingError, OSError) as error:
+        raise QuadcosimError(str(error)) from error

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from orchestration.components.fmi.values import number_of
+from orchestration.components.fmi.instance import number_of
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import nanoseconds, seconds
 from orchestration.simulation.engines.batch.shape import Shape
 from orchestration.simulation.engines.job_numbers import job_numbers
-from orchestration.systems.expressions.over_span import STOP_TIME
+from orchestration.systems.expressions.over_run import STOP_TIME
 from orchestration.systems.expressions.syntax import names_job_measure
 from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import System

@@ -21,8 +21,7 @@ from orchestration.simulation.engines.structures import ONE_LANE
 from orchestration.simulation.engines.wires import Board, Wires
 from orchestration.simulation.results.objectives import GOOD
 from orchestration.systems.expressions.at_instant import scalars
-from orchestration.systems.expressions.over_run import inlined, reductions
-from orchestration.systems.expressions.over_span import STOP_TIME, TIME, vectors
+from orchestration.systems.expressions.over_run import STOP_TIME, TIME, inlined, reductions, vectors
 from orchestration.systems.expressions.syntax import Call, Node, names, names_job_measure, parse
 from orchestration.systems.schedule.plan import is_plain
 from orchestration.systems.system.check import recorded_variables

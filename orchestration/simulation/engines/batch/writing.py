@@ -1,11 +1,11 @@
-"""Expressions as C over SIMD lanes: at a row, just before the next, and half-way, as in `expressions/over_span.py`."""
+"""Expressions as C over SIMD lanes: at a row, just before the next, and half-way, as in `expressions/over_run.py`."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from orchestration.systems.expressions.operators import OPERATORS
-from orchestration.systems.expressions.over_span import alone, unknown
+from orchestration.systems.expressions.over_run import alone, unknown
 from orchestration.systems.expressions.syntax import Call, Name, Node, Number, Operation, Sampled
 
 Moment: TypeAlias = Literal["row", "end", "middle"]

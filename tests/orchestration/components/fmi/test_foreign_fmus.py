@@ -435,7 +435,7 @@ def test_what_an_fmu_prints_is_not_among_what_the_command_prints(load: str, tmp_
     path = small(tmp_path, "PRINTS")
     script = textwrap.dedent(f"""
         import sys
-        from orchestration.components.fmi.banners import banners_to_stderr
+        from orchestration.foundation.basics.terminal import banners_to_stderr
         from orchestration.components.fmi.instances import open_here
         from orchestration.components.fmi.isolated import IsolatedInstance
         from orchestration.systems.system.component import Component

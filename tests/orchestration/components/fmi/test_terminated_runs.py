@@ -13,7 +13,7 @@ from orchestration.components.fmi.isolated import IsolatedInstance
 from orchestration.components.fmi.repeatability import Repeatability
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import SimulatorError, UsageError
-from orchestration.simulation.engines.engine import Engine
+from orchestration.simulation.engines.master import Engine
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.simulation.runs.result import Result
 from orchestration.simulation.runs.run_directory import load_run, save_run

@@ -9,7 +9,7 @@ import pytest
 import quadcosim
 from orchestration.foundation.recording.recording import InMemory, thinned
 from orchestration.quadrotor.flight.names import FIGURES as FLIGHT
-from orchestration.simulation.engines.engine import Engine
+from orchestration.simulation.engines.master import Engine
 from orchestration.simulation.runs import draw as drawn
 from orchestration.simulation.runs.draw import draw
 from orchestration.simulation.runs.pause import resume, run_until

@@ -28,7 +28,7 @@ from orchestration.components.fmi.transfers import range_of
 from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError
 from orchestration.foundation.basics.times import Grid, exact_nanoseconds
 from orchestration.foundation.recording.recording import InMemory
-from orchestration.simulation.engines import loop
+from orchestration.simulation.engines import compiled
 from orchestration.simulation.engines.memory import SharedTables
 from orchestration.simulation.runs import simulation
 from orchestration.simulation.runs.outcome import RunInterrupted
@@ -398,14 +398,14 @@ def test_what_stands_in_the_way_is_said_in_a_line(fmu: Path, tmp_path: Path, mon
         assert run.master.engine == "python"
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setattr(shutil, "which", lambda name: None)
-    loop.library.cache_clear()
+    compiled.library.cache_clear()
     try:
         with pytest.raises(QuadcosimError, match=r"^engine compiled is not available: no C compiler that is called cc"):
             ran(of(LOOP, fmu), "compiled")
         with prepared(of(LOOP, fmu)) as run:
             assert run.master.engine == "python"
     finally:
-        loop.library.cache_clear()
+        compiled.library.cache_clear()
 
 
 def test_an_instance_that_does_more_than_call_its_fmu_is_stepped_in_python(fmu: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.recording.recording import ARRIVED, LOST, SAMPLED, SENT
-from orchestration.simulation.engines import loop
+from orchestration.simulation.engines import compiled
 from orchestration.simulation.engines.batch import kernels
 from orchestration.simulation.engines.structures import constants, declared, shared, structures
 from tests.orchestration.components.fmi.small import needs_compiler
@@ -55,12 +55,12 @@ def longer(lanes: int) -> Mapping[str, Any]:
 @needs_compiler
 def test_a_loop_whose_structures_have_another_size_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     size = ctypes.sizeof(structures(1).Channel)
-    monkeypatch.setattr(loop, "shared", longer)
-    loop.library.cache_clear()
+    monkeypatch.setattr(compiled, "shared", longer)
+    compiled.library.cache_clear()
     with pytest.raises(
         QuadcosimError, match=f"^structures.h: Channel has {size} bytes in C: expected {size + 8}, as in"
     ):
-        loop.library()
+        compiled.library()
 
 
 @needs_compiler
@@ -77,10 +77,10 @@ def test_lanes_whose_structures_have_another_size_are_refused(tmp_path: Path, mo
 
 @needs_compiler
 def test_a_structure_that_a_library_does_not_have_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(loop, "shared", lambda lanes: {**shared(lanes), "Another": structures(1).List})
-    loop.library.cache_clear()
+    monkeypatch.setattr(compiled, "shared", lambda lanes: {**shared(lanes), "Another": structures(1).List})
+    compiled.library.cache_clear()
     with pytest.raises(QuadcosimError, match="Another has no bytes in C: expected 16"):
-        loop.library()
+        compiled.library()
 
 
 def test_numbers_that_a_header_gives_are_counted_on_from() -> None:

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from orchestration.quadrotor.scenarios.translation import quadrotor
-from orchestration.simulation.results.criterion import bound_of, unmet
+from orchestration.simulation.results.objectives import bound_of, unmet
 from orchestration.systems.system.model import System
 
 

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from orchestration.simulation.engines.batch.writing import ExpressionWriter, Leaf, Section
 from orchestration.systems.expressions.at_instant import compiled, scalars
-from orchestration.systems.expressions.over_run import evaluate
-from orchestration.systems.expressions.over_span import Recorded
+from orchestration.systems.expressions.over_run import Recorded, evaluate
 from orchestration.systems.expressions.syntax import Call, Node, parse
 
 PLACES = {"p.x": 0, "p.y": 1, "p.z": 2, "v": 3}

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from orchestration.systems.expressions.at_instant import compiled
 from orchestration.systems.expressions.operators import OPERATORS
-from orchestration.systems.expressions.over_span import Recorded, SpanValues
+from orchestration.systems.expressions.over_run import Recorded, SpanValues
 from orchestration.systems.expressions.syntax import MAX_NESTING, Call, Name, Node, Number, Operation, parse
 
 PLACES = {"a": 0, "b": 1}

@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.systems.expressions.over_run import evaluate
-from orchestration.systems.expressions.over_span import Recorded
+from orchestration.systems.expressions.over_run import Recorded, evaluate
 from orchestration.systems.expressions.syntax import parse
 
 TIME = np.array([0.0, 0.5, 1.0, 3.0])
