@@ -98,8 +98,8 @@ def _lines(found: "Scheduled") -> Iterator[str]:
                 yield f"{name}: {task.skipped} releases skipped, {task.aborted} jobs aborted"
 
 
-def _table(kind: str, each: "Mapping[str, Responses]") -> Iterator[str]:
-    rows = [(kind, *HEAD[1:]), *((name, *_row(one)) for name, one in each.items())]
+def _table(kind: str, responses: "Mapping[str, Responses]") -> Iterator[str]:
+    rows = [(kind, *HEAD[1:]), *((name, *_row(one)) for name, one in responses.items())]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
         first, *rest = (

@@ -75,9 +75,9 @@ class FunctionWriter(ExpressionWriter):
 
     # -- used symbols ----------------------------------------------------------------------------------------
 
-    def _named(self, each: Statement) -> tuple[Symbol, ...]:
+    def _named(self, statement: Statement) -> tuple[Symbol, ...]:
         """The symbols that a statement uses directly, as far as it is written."""
-        return each.symbols
+        return statement.symbols
 
     def _named_in(self, block: Block) -> list[Symbol]:
         found: list[Symbol] = []
@@ -115,8 +115,8 @@ class FunctionWriter(ExpressionWriter):
         for i, each in enumerate(block):
             getattr(self, f"_{each.op}")(each, block[i + 1 :])
 
-    def _if(self, each: Statement, rest: Block) -> None:
-        (condition,), (then, otherwise) = each.symbols, each.blocks
+    def _if(self, statement: Statement, rest: Block) -> None:
+        (condition,), (then, otherwise) = statement.symbols, statement.blocks
         name = self.value(condition)
         if not ends(then):
             self._hoist(then, otherwise, rest)
@@ -170,8 +170,8 @@ class FunctionWriter(ExpressionWriter):
         self._block(block)
         self.scopes.pop()
 
-    def _assign(self, each: Statement, rest: Block) -> None:
-        target, value = each.symbols
+    def _assign(self, statement: Statement, rest: Block) -> None:
+        target, value = statement.symbols
         if id(target) in self.used:
             self._set(target, self._as_kind(target.kind, value))
 
@@ -179,22 +179,22 @@ class FunctionWriter(ExpressionWriter):
         """Assign a value to a symbol."""
         self._line(f"{self._pin(symbol)} = {value};")
 
-    def _store(self, each: Statement, rest: Block) -> None:
-        self._line(f"{self._place(each.data)} = {self._as_argument(each.symbols[0])};")
+    def _store(self, statement: Statement, rest: Block) -> None:
+        self._line(f"{self._place(statement.data)} = {self._as_argument(statement.symbols[0])};")
 
-    def _return(self, each: Statement, rest: Block) -> None:
-        for k, symbol in enumerate(each.symbols):
+    def _return(self, statement: Statement, rest: Block) -> None:
+        for k, symbol in enumerate(statement.symbols):
             self._line(f"out[{k}] = {self._as_argument(symbol)};")
         self._line("return 0;")
 
-    def _call(self, each: Statement, rest: Block) -> None:
-        call: Call = each.data
-        given = [self._as_kind(p.kind, symbol) for symbol, p in zip(each.symbols, call.function.parameters)]
+    def _call(self, statement: Statement, rest: Block) -> None:
+        call: Call = statement.data
+        given = [self._as_kind(p.kind, symbol) for symbol, p in zip(statement.symbols, call.function.parameters)]
         results = [self._name("r")] if call.function.results else []
         self.declared += [f"q_real {name}[{call.function.results}] = {{{self.zero}}};" for name in results]
         status = self._name("status")
-        self._called(each, [*given, *results], status)
-        for symbol in self._values_after(each):
+        self._called(statement, [*given, *results], status)
+        for symbol in self._values_after(statement):
             if symbol.op == "failed":
                 self._set(symbol, self._has_failed(status, 1 + ERRORS.index(symbol.data[0])))
             elif symbol.op == "result":
@@ -203,12 +203,12 @@ class FunctionWriter(ExpressionWriter):
             else:
                 self._set(symbol, self._load(symbol))
 
-    def _called(self, each: Statement, given: list[str], status: str) -> None:
+    def _called(self, statement: Statement, given: list[str], status: str) -> None:
         """Call a function; return its error unless the caller handles it."""
-        callee = each.data.function
+        callee = statement.data.function
         text = f"{c_name(callee.name)}({', '.join(['m', *given])})"
         self._line(f"const int {status} = {text};" if callee.raises else f"{text};")
-        if callee.raises and not self._is_caught(each):
+        if callee.raises and not self._is_caught(statement):
             self._line(f"if ({status}) return {status};")
 
     def _has_failed(self, status: str, number: int) -> str:
@@ -223,10 +223,10 @@ class FunctionWriter(ExpressionWriter):
     def _is_caught(self, call: Statement) -> bool:
         return any(symbol.op == "failed" for symbol in self._values_after(call))
 
-    def _loop(self, each: Statement, rest: Block) -> None:
-        depth, (body,) = each.data, each.blocks
-        size = (len(each.symbols) - 1) // 2
-        count, starts, nexts = each.symbols[0], each.symbols[1 : 1 + size], each.symbols[1 + size :]
+    def _loop(self, statement: Statement, rest: Block) -> None:
+        depth, (body,) = statement.data, statement.blocks
+        size = (len(statement.symbols) - 1) // 2
+        count, starts, nexts = statement.symbols[0], statement.symbols[1 : 1 + size], statement.symbols[1 + size :]
         needed = closure([*self._named_in(body), *nexts])
         self._compute_unless_defined_in(needed, body, needed)
         states = []
@@ -245,7 +245,7 @@ class FunctionWriter(ExpressionWriter):
         self.scopes.pop()
         self._line("}")
         for symbol in self.used.values():
-            if symbol.op != "outcome" or symbol.data[1] is not each:
+            if symbol.op != "outcome" or symbol.data[1] is not statement:
                 continue
             if len(self.scopes) > 1:  # it may be in several branches, and used after them
                 self._set(symbol, states[symbol.data[0]])
@@ -262,27 +262,27 @@ class FunctionWriter(ExpressionWriter):
         for state, name in zip(states, [self._as_kind(symbol.kind, symbol) for symbol in nexts]):
             self._line(f"{state} = {name};")
 
-    def _warn(self, each: Statement, rest: Block) -> None:
-        key, words = each.data
+    def _warn(self, statement: Statement, rest: Block) -> None:
+        key, words = statement.data
         bit = self.program.warnings.index(key)
         self._line(f"if (!(m->state.warned & {1 << bit}u)) {{")
         self.scopes.append({})
         self._line(f"m->state.warned |= {1 << bit}u;")
-        self._text(each, words)
+        self._text(statement, words)
         self._line("warn(m);")
         self.scopes.pop()
         self._line("}")
 
-    def _raise(self, each: Statement, rest: Block) -> None:
-        kind, words = each.data
+    def _raise(self, statement: Statement, rest: Block) -> None:
+        kind, words = statement.data
         if words == (("failure",),):
             self._line(f"return {1 + ERRORS.index(kind)};")
             return
-        self._text(each, words)
+        self._text(statement, words)
         self._line(f"return fail(m, {1 + ERRORS.index(kind)}); /* {kind} */")
 
-    def _text(self, each: Statement, words: tuple[str | tuple[str], ...]) -> None:
-        values = iter(each.symbols)
+    def _text(self, statement: Statement, words: tuple[str | tuple[str], ...]) -> None:
+        values = iter(statement.symbols)
         self._line("text_begin(m);")
         for word in words:
             if isinstance(word, str):

@@ -96,13 +96,13 @@ class _StructWriter(FunctionWriter):
     def _place(self, name: str) -> str:
         return f"m->{self.places[name]}"
 
-    def _warn(self, each: Statement, rest: Block) -> None:
-        key, words = each.data
+    def _warn(self, statement: Statement, rest: Block) -> None:
+        key, words = statement.data
         self.messages.warnings[key] = _plain(words)
         self._line(f"m->warnings |= {1 << self.program.warnings.index(key)}u; /* {comment(key)} */")
 
-    def _raise(self, each: Statement, rest: Block) -> None:
-        kind, words = each.data
+    def _raise(self, statement: Statement, rest: Block) -> None:
+        kind, words = statement.data
         number = 1 + ERRORS.index(kind)
         if ("failure",) in words:  # its status is already set
             self._line(f"return {number};")

@@ -50,8 +50,8 @@ class LaneWriter(FunctionWriter):
     def _memory(self) -> list[str]:
         return []
 
-    def _named(self, each: Statement) -> tuple[Symbol, ...]:
-        return () if each.op == "raise" or _is_silent((each,)) else each.symbols
+    def _named(self, statement: Statement) -> tuple[Symbol, ...]:
+        return () if statement.op == "raise" or _is_silent((statement,)) else statement.symbols
 
     zero: ClassVar[str] = "q_all(0.0)"
 
@@ -108,8 +108,8 @@ class LaneWriter(FunctionWriter):
             self._line(f"    {mask} = {mask} & q_not({condition});")
         self._line("}")
 
-    def _if(self, each: Statement, rest: Block) -> None:
-        (condition,), (then, otherwise) = each.symbols, each.blocks
+    def _if(self, statement: Statement, rest: Block) -> None:
+        (condition,), (then, otherwise) = statement.symbols, statement.blocks
         if _is_silent(then) and _is_silent(otherwise):
             return
         holds, mask = self.value(condition), self.masks[-1]
@@ -129,12 +129,12 @@ class LaneWriter(FunctionWriter):
                 self._line(f"    {mask} = {mask} & {others if ends(block) else f'({others} | {own})'};")
             self._line("}")
 
-    def _store(self, each: Statement, rest: Block) -> None:
-        place = self._place(each.data)
-        self._line(f"{place} = q_select({self.masks[-1]}, {self._as_argument(each.symbols[0])}, {place});")
+    def _store(self, statement: Statement, rest: Block) -> None:
+        place = self._place(statement.data)
+        self._line(f"{place} = q_select({self.masks[-1]}, {self._as_argument(statement.symbols[0])}, {place});")
 
-    def _return(self, each: Statement, rest: Block) -> None:
-        for k, symbol in enumerate(each.symbols):
+    def _return(self, statement: Statement, rest: Block) -> None:
+        for k, symbol in enumerate(statement.symbols):
             value = self._as_argument(symbol)
             kept = f"q_select({self.masks[-1]}, {value}, out[{k}])" if self.returns_early else value
             self._line(f"out[{k}] = {kept};")
@@ -143,12 +143,12 @@ class LaneWriter(FunctionWriter):
         else:
             self._line(f"done = done | {self.masks[-1]};")
 
-    def _called(self, each: Statement, given: list[str], status: str) -> None:
-        callee, mask = each.data.function, self.masks[-1]
+    def _called(self, statement: Statement, given: list[str], status: str) -> None:
+        callee, mask = statement.data.function, self.masks[-1]
         text = f"{c_name(callee.name)}({', '.join(['v', mask, 'failed', *given])})"
         if not callee.raises:
             self._line(f"{text};")
-        elif self._is_caught(each):
+        elif self._is_caught(statement):
             self._line(f"const q_mask {status} = {mask} & q_not({text});")
         else:
             self._line(f"{mask} = {text};")
@@ -175,11 +175,11 @@ class LaneWriter(FunctionWriter):
         if takes_out:
             self._line(f"{self.masks[-1]} = {self.masks[-1]} & (q_not({before}) | {goes_on});")
 
-    def _warn(self, each: Statement, rest: Block) -> None:
+    def _warn(self, statement: Statement, rest: Block) -> None:
         pass
 
-    def _raise(self, each: Statement, rest: Block) -> None:
-        kind, _ = each.data
+    def _raise(self, statement: Statement, rest: Block) -> None:
+        kind, _ = statement.data
         mask = self.masks[-1]
         self._line(f"*failed = q_select({mask}, q_all({1 + ERRORS.index(kind)}.0), *failed); /* {kind} */")
         if len(self.masks) == 1:
@@ -247,9 +247,14 @@ def _returns(block: Block) -> bool:
     return any(each.op == "return" or any(map(_returns, each.blocks)) for each in block)
 
 
-def _is_check(each: Statement) -> bool:
+def _is_check(statement: Statement) -> bool:
     """Whether a statement only fails if a condition holds."""
-    return each.op == "if" and not each.blocks[1] and len(each.blocks[0]) == 1 and each.blocks[0][0].op == "raise"
+    return (
+        statement.op == "if"
+        and not statement.blocks[1]
+        and len(statement.blocks[0]) == 1
+        and statement.blocks[0][0].op == "raise"
+    )
 
 
 def _is_silent(block: Block) -> bool:

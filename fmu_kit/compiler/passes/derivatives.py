@@ -118,7 +118,7 @@ class _Body:
         self.loops[each] = made = statement("loop", symbols, each.data, (body,))
         return (made,)
 
-    def _warn(self, each: Statement) -> Iterable[Statement]:
+    def _warn(self, statement: Statement) -> Iterable[Statement]:
         return ()
 
     def _raise(self, each: Statement) -> Iterable[Statement]:

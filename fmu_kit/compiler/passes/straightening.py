@@ -158,11 +158,11 @@ class _Frame:
                 return returned
         return None
 
-    def _if(self, each: Statement, under: Symbol | None) -> _Returned | None:
-        then, otherwise = each.blocks
+    def _if(self, statement: Statement, under: Symbol | None) -> _Returned | None:
+        then, otherwise = statement.blocks
         if not (_does(then) or _does(otherwise)):
             return None
-        condition = self.value(each.symbols[0])
+        condition = self.value(statement.symbols[0])
         if condition.op == "constant":
             return self.block(then if condition is constant(True) else otherwise, under)
         ways = self.line.ways(condition, under)
@@ -197,24 +197,24 @@ class _Frame:
             a, b = (line.read(place, value, memory) for memory in (memory_a, memory_b))
             line.memory[place] = lifted(select(condition, a, b))
 
-    def _assign(self, each: Statement, under: Symbol | None) -> None:
-        target, value = each.symbols
+    def _assign(self, statement: Statement, under: Symbol | None) -> None:
+        target, value = statement.symbols
         self.chosen[target] = _as(target, self.value(value))
         self.known = {}
 
-    def _store(self, each: Statement, under: Symbol | None) -> None:
-        self.line.memory[each.data] = self.value(each.symbols[0])
+    def _store(self, statement: Statement, under: Symbol | None) -> None:
+        self.line.memory[statement.data] = self.value(statement.symbols[0])
 
-    def _call(self, each: Statement, under: Symbol | None) -> None:
-        call: Call = each.data
-        after = self.line.program.versions[call.memory, each]
-        self.results[after] = self.line.call(call.function, [self.value(symbol) for symbol in each.symbols], under)
+    def _call(self, statement: Statement, under: Symbol | None) -> None:
+        call: Call = statement.data
+        after = self.line.program.versions[call.memory, statement]
+        self.results[after] = self.line.call(call.function, [self.value(symbol) for symbol in statement.symbols], under)
         self.memories[after] = dict(self.line.memory)
         self.known = {}
 
-    def _loop(self, each: Statement, under: Symbol | None) -> None:
-        size = (len(each.symbols) - 1) // 2
-        count, starts, nexts = each.symbols[0], each.symbols[1 : 1 + size], each.symbols[1 + size :]
+    def _loop(self, statement: Statement, under: Symbol | None) -> None:
+        size = (len(statement.symbols) - 1) // 2
+        count, starts, nexts = statement.symbols[0], statement.symbols[1 : 1 + size], statement.symbols[1 + size :]
         states = [self.value(symbol) for symbol in starts]
         times = self.value(count)
         least = min((value for value in self.line.values.of(times) if value >= 1.0), default=0.0)
@@ -225,20 +225,20 @@ class _Frame:
             if under is None:
                 self.line.decided[times] = least
         for k in range(int(least)):
-            self.rounds[each.data], self.known = (k, states), {}
-            if self.block(each.blocks[0], under) is not None:
+            self.rounds[statement.data], self.known = (k, states), {}
+            if self.block(statement.blocks[0], under) is not None:
                 raise _NoLineError
             states = [_as(symbol, self.value(symbol)) for symbol in nexts]
-        self.outcomes[each], self.known = states, {}
+        self.outcomes[statement], self.known = states, {}
 
-    def _warn(self, each: Statement, under: Symbol | None) -> None:
+    def _warn(self, statement: Statement, under: Symbol | None) -> None:
         pass
 
-    def _raise(self, each: Statement, under: Symbol | None) -> None:
+    def _raise(self, statement: Statement, under: Symbol | None) -> None:
         self.line.expect_not(True, under)
 
-    def _return(self, each: Statement, under: Symbol | None) -> _Returned:
-        return _Returned([self.value(symbol) for symbol in each.symbols])
+    def _return(self, statement: Statement, under: Symbol | None) -> _Returned:
+        return _Returned([self.value(symbol) for symbol in statement.symbols])
 
     # -- values ------------------------------------------------------------------------------------------------
 

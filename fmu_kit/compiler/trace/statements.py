@@ -163,12 +163,12 @@ def symbols_of(block: Block) -> list[Symbol]:
     return found
 
 
-def has_effect(each: Statement) -> bool:
+def has_effect(statement: Statement) -> bool:
     """Whether a statement may fail, warn, or change the memory; a store only writes what was changed before."""
-    if each.op == "call":
-        function: Function = each.data.function
+    if statement.op == "call":
+        function: Function = statement.data.function
         return bool(function.stores or function.raises) or any(map(has_effect, function.body))
-    return each.op in ("raise", "warn") or any(has_effect(inner) for block in each.blocks for inner in block)
+    return statement.op in ("raise", "warn") or any(has_effect(inner) for block in statement.blocks for inner in block)
 
 
 def stores_of(block: Block) -> set[str]:

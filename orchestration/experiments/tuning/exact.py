@@ -93,6 +93,6 @@ def _expected(systems: Sequence[System], loops: Loops) -> list[Expected]:
     return results
 
 
-def _cost(one: Expected) -> float:
-    cost = one.objectives[COST]
-    return UNSTABLE * one.mean_square_radius if cost is None else cost
+def _cost(expected: Expected) -> float:
+    cost = expected.objectives[COST]
+    return UNSTABLE * expected.mean_square_radius if cost is None else cost

@@ -234,7 +234,7 @@ class CompiledLoop:
             component.now = int(self._reached[index])
 
     def _share_sources(self, t: Floats) -> None:
-        self._fed = [np.ascontiguousarray(feed.each(t), dtype=np.float64) for feed in self._running.feeds]
+        self._fed = [np.ascontiguousarray(feed.at_each(t), dtype=np.float64) for feed in self._running.feeds]
         for place, values in enumerate(self._fed):
             self._structures.feeds[place].values = address(values)
         if self._watched:

@@ -35,7 +35,7 @@ class Feed:
         self.into[:] = values if self._places is None else [values[i] for i in self._places]
         self.transfer()
 
-    def each(self, t: Floats) -> Floats:
+    def at_each(self, t: Floats) -> Floats:
         """The values that `write` sets at times `t` [s], shape (n,), to the bit; shape (n, number of inputs)."""
-        values = self._values.each(t)
+        values = self._values.at_each(t)
         return values if self._places is None else values[:, self._places]

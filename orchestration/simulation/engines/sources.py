@@ -26,7 +26,7 @@ class SourceValues(Protocol):
     def over(self, t: Floats) -> Floats:
         """The values at times `t` [s], shape (n,), as an array of shape (n, number of signals)."""
 
-    def each(self, t: Floats) -> Floats:
+    def at_each(self, t: Floats) -> Floats:
         """As `over`, with the bits of `at`."""
 
 
@@ -44,7 +44,7 @@ class ConstantValues:
         """The values, a row for each time."""
         return np.tile(np.array(self._values), (len(t), 1))
 
-    each = over
+    at_each = over
 
 
 class TableValues:
@@ -65,7 +65,7 @@ class TableValues:
         """The values at times `t`."""
         return np.column_stack([np.interp(t, self.time, column) for column in self.columns.T])
 
-    def each(self, t: Floats) -> Floats:
+    def at_each(self, t: Floats) -> Floats:
         """As `over`, by the operations of `at`."""
         i = np.clip(np.searchsorted(self.time, t, side="right") - 1, 0, len(self.time) - 2)
         share = np.clip((t - self.time[i]) / (self.time[i + 1] - self.time[i]), 0.0, 1.0)
@@ -86,7 +86,7 @@ class HeldValues(TableValues):
         values: Floats = self.columns[np.maximum(np.searchsorted(self.time, t, side="right") - 1, 0)]
         return values
 
-    each = over
+    at_each = over
 
 
 NUMPY = ScalarOps(
@@ -118,7 +118,7 @@ class BuiltIn:
         """x, y, z at times `t`."""
         return np.column_stack(list(self._trajectory.position(t, NUMPY)))
 
-    def each(self, t: Floats) -> Floats:
+    def at_each(self, t: Floats) -> Floats:
         """As `over`, one by one: the mathematical functions of numpy differ from those of Python."""
         return np.array([self.at(time) for time in t.tolist()]).reshape(len(t), 3)
 
@@ -148,7 +148,7 @@ class Moving:
         """The values at times `t`."""
         return self._motion(t)[:, self._quantities]
 
-    each = over
+    at_each = over
 
 
 def motion_values(motion: Motion) -> Callable[[Floats], Floats]:
@@ -188,9 +188,9 @@ class Scaled:
         """The values at times `t`."""
         return self._factor * self._values.over(t)
 
-    def each(self, t: Floats) -> Floats:
+    def at_each(self, t: Floats) -> Floats:
         """As `over`, with the bits of `at`."""
-        return self._factor * self._values.each(t)
+        return self._factor * self._values.at_each(t)
 
 
 class WhiteNoise:
@@ -215,7 +215,7 @@ class WhiteNoise:
         result: Floats = self._upto(int(indices.max()))[indices]
         return result
 
-    each = over
+    at_each = over
 
     def _index(self, t: float) -> int:
         time = round(t * NANOSECONDS)

@@ -83,14 +83,14 @@ def after(path: Derivatives, time: Derivatives) -> Derivatives:
     )
 
 
-def shifted(by: float, one: Derivatives) -> Derivatives:
+def shifted(by: float, motion: Derivatives) -> Derivatives:
     """`one` plus a constant."""
-    return Derivatives(by + one.value, *one[1:])
+    return Derivatives(by + motion.value, *motion[1:])
 
 
-def scaled(factor: float, one: Derivatives) -> Derivatives:
+def scaled(factor: float, motion: Derivatives) -> Derivatives:
     """`one` times a factor."""
-    return Derivatives(*(factor * each for each in one))
+    return Derivatives(*(factor * each for each in motion))
 
 
 def reference(x: Derivatives, y: Derivatives, z: Derivatives) -> Reference:

@@ -201,8 +201,14 @@ def _circle(motion: _Periodic, time: Derivatives, ops: ScalarOps) -> tuple[Deriv
     return shifted(motion.x, after(sine, time)), shifted(motion.y + radius, scaled(-1.0, after(cosine, time)))
 
 
-def _coordinates(one: Reference) -> list[Derivatives]:
-    orders: tuple[Vec3, ...] = (one.position, one.velocity, one.acceleration, one.jerk, one.snap)
+def _coordinates(reference: Reference) -> list[Derivatives]:
+    orders: tuple[Vec3, ...] = (
+        reference.position,
+        reference.velocity,
+        reference.acceleration,
+        reference.jerk,
+        reference.snap,
+    )
     return [Derivatives(*each) for each in zip(*orders)]
 
 

@@ -257,7 +257,7 @@ class Batch:
             t = seconds(instants.times)
             self._source_values[key] = (
                 np.ascontiguousarray(np.column_stack([values.over(t) for values in run.seen] or [t[:, None]])),
-                np.ascontiguousarray(np.column_stack([values.each(t) for values in run.given] or [t[:, None]])),
+                np.ascontiguousarray(np.column_stack([values.at_each(t) for values in run.given] or [t[:, None]])),
             )
             while len(self._source_values) > _CACHED_SOURCE_VALUES:
                 self._source_values.popitem(last=False)

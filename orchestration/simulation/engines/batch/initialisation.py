@@ -69,7 +69,7 @@ class Initialisation:
         shape, memories = self._shape, self._arrays.memories
         wrong = np.zeros(shape.lanes, dtype=np.bool_)
         for lane, sources in enumerate(given):
-            values = [value for source in sources for value in source.each(np.zeros(1))[0].tolist()]
+            values = [value for source in sources for value in source.at_each(np.zeros(1))[0].tolist()]
             for memory, name in zip(memories, shape.names):
                 for number, place in shape.fed[name]:
                     memory[place, lane] = values[number]

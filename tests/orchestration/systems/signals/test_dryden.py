@@ -86,4 +86,4 @@ def test_a_seed_gives_the_same_gusts_again_and_a_longer_run_begins_with_them() -
     assert (long.columns[:count] == short.columns).all()
     assert not (other.columns == short.columns).any()
     times = np.linspace(0.0, 3.0, 301)
-    assert (short.each(times) == np.array([short.at(t) for t in times.tolist()])).all()
+    assert (short.at_each(times) == np.array([short.at(t) for t in times.tolist()])).all()
