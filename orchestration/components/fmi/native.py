@@ -98,7 +98,7 @@ class NativeInstance(Instance):
     # -- what differs between versions ---------------------------------------------------------------------------
 
     version: ClassVar[int]
-    """of FMI"""
+    """Version of FMI"""
     enumerations: ClassVar[str]
     """the type by whose functions values of an Enumeration are transferred"""
     stored: ClassVar[Mapping[str, type[np.generic]]]
