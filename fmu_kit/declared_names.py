@@ -16,6 +16,12 @@ def expect_free_names(slave: type, base: type, declared: Iterable[Declaration]) 
             raise TypeError(f"{slave.__name__}.{each.attribute}: every slave has this name; expected another one")
 
 
+def expect_variables(slave: Any, where: str, names: Iterable[str]) -> None:
+    """Raise `TypeError` for a name that is not of a variable of the slave."""
+    for name in sorted(set(names).difference(each.name for each in slave.variables)):
+        raise TypeError(f"{slave.__name__}: {where}: there is no {name}; expected inputs and parameters")
+
+
 def expect_declared(slave: Any, again: Callable[[], None]) -> None:
     """Raise `AttributeError` for an attribute that was set without being declared, probably by a typing error.
 

@@ -20,7 +20,7 @@ from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
 from fmu_kit import model_description
-from fmu_kit.declared_names import expect_declared, expect_free_names
+from fmu_kit.declared_names import expect_declared, expect_free_names, expect_variables
 from fmu_kit.errors import DivergenceError, FmuError, require
 from fmu_kit.failure import Failure, printf_safe, report
 from fmu_kit.interface import Declaration, declarations_in, initial_values, variables_of
@@ -107,8 +107,15 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             )
         declared = declarations_in(cls)
         expect_free_names(cls, Slave, declared)
-        if declared == getattr(cls, "_declared", None) and "fixed" not in cls.__dict__:
-            return  # those of its base: pythonfmu 0.7.0 leaks the class of each instance, so it should be small
+        if declared != getattr(cls, "_declared", None) or "fixed" in cls.__dict__:
+            cls._declare(declared)  # else those of its base: pythonfmu 0.7.0 leaks the class of each instance
+        elif "initial_dependencies" not in cls.__dict__:
+            return
+        for output in (v.name for v in cls.variables if v.causality == "output"):
+            expect_variables(cls, f"initial_dependencies of {output}", cls.initial_dependencies(output))
+
+    @classmethod
+    def _declare(cls, declared: list[Declaration]) -> None:
         cls.variables = with_fixed_values(cls.__name__, cls.fixed, variables_of(declared))
         cls._initial = initial_values(declared)
         cls._index = {v.name: i for i, v in enumerate(cls.variables)}

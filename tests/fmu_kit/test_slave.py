@@ -85,3 +85,18 @@ def test_variables_as_a_list_are_refused_where_they_are_declared() -> None:
     u = Variable(name="u", description="", causality="input", variability="continuous")
     with pytest.raises(TypeError, match=r"Listed\.variables: expected variables as attributes"):
         type("Listed", (Slave,), {"variables": (u,)})
+
+
+def test_an_output_whose_dependencies_are_no_variables_is_refused_where_it_is_declared() -> None:
+    class Moving(Slave):
+        start = FixedParameter("its start", "m", 0.0, name="initial.position")
+        position = Output("its position", "m")
+
+        @classmethod
+        def initial_dependencies(cls, output: str) -> frozenset[str]:
+            return frozenset({f"initial.{output}"})
+
+        def step(self, t: float, h: float) -> None: ...
+
+    with pytest.raises(TypeError, match=r"initial_dependencies of speed: there is no initial\.speed"):
+        type("Faster", (Moving,), {"speed": Output("its speed", "m/s")})

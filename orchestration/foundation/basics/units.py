@@ -177,6 +177,23 @@ def none(word: str, operands: Sequence[Operand]) -> Unit | None:
     return ONE
 
 
+def second(word: str, operands: Sequence[Operand]) -> Unit | None:
+    """The unit of a time."""
+    return SECOND
+
+
+def settled(word: str, operands: Sequence[Operand]) -> Unit | None:
+    """The unit of a time, with operands of one unit."""
+    agreed(word, operands)
+    return SECOND
+
+
+def over_time(word: str, operands: Sequence[Operand]) -> Unit | None:
+    """The unit of an integral over time."""
+    unit = operands[0].unit
+    return None if unit is None else unit.times(SECOND)
+
+
 def compared(word: str, operands: Sequence[Operand]) -> Unit | None:
     """The unit of a truth value, with operands of one unit."""
     agreed(word, operands)

@@ -8,9 +8,10 @@ from typing import TypeAlias
 
 from orchestration.components.fmi.model import Model
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.units import METRE, NUMBER, ONE, SECOND, Operand, Unit, agreed
+from orchestration.foundation.basics.units import METRE, NUMBER, SECOND, Operand, Unit, agreed
 from orchestration.systems.expressions.operators import OPERATORS
 from orchestration.systems.expressions.over_run import STOP_TIME, TIME
+from orchestration.systems.expressions.reductions import REDUCTIONS
 from orchestration.systems.expressions.syntax import (
     Call,
     JobMeasure,
@@ -107,7 +108,7 @@ def unit_of(node: Node, units: Units) -> Unit | None:
         case Sampled(_, argument):
             return unit_of(argument, units)
         case Call(function, arguments) if is_over_run(node):
-            return _over_run(function, [_operand(argument, units) for argument in arguments])
+            return REDUCTIONS[function].unit(function, [_operand(argument, units) for argument in arguments])
         case Operation(word, operands) | Call(word, operands):
             return OPERATORS[word].unit(word, [_operand(operand, units) for operand in operands])
 
@@ -139,17 +140,6 @@ def _constant(node: Node) -> Fraction | None:
             one, other = _constant(above), _constant(below)
             return one / other if one is not None and other else None
     return None
-
-
-def _over_run(function: str, arguments: Sequence[Operand]) -> Unit | None:
-    of = arguments[0].unit
-    if function == "settling_time":
-        agreed(function, arguments)
-    if function in ("settling_time", "peak_time"):
-        return SECOND
-    if function in ("share", "growth_share"):
-        return ONE
-    return of.times(SECOND) if function == "integral" and of is not None else of
 
 
 @dataclass(frozen=True, kw_only=True)

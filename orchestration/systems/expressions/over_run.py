@@ -14,7 +14,7 @@ from orchestration.foundation.basics.errors import UsageError, did_you_mean
 from orchestration.foundation.basics.simulator import Booleans, Floats
 from orchestration.systems.expressions.at_instant import IS_VECTOR
 from orchestration.systems.expressions.operators import applied
-from orchestration.systems.expressions.reductions import FOLDS, Course, Fold
+from orchestration.systems.expressions.reductions import REDUCTIONS, Course, Fold
 from orchestration.systems.expressions.syntax import (
     Call,
     Name,
@@ -88,10 +88,10 @@ class SpanValues:
         self._recorded, self._known = recorded, known
         self._found: dict[tuple[Node, str], Any] = {}
 
-    def add_to(self, fold: Fold) -> None:
+    def add_to(self, fold: Fold, call: Call) -> None:
         """Add this span to a number of the whole run."""
-        argument, *rest = fold.call.arguments
-        fold.add(self._course(argument, fold.call.function), *(self.number(other) for other in rest))
+        argument, *rest = call.arguments
+        fold.add(self._course(argument, call.function), *(self.number(other) for other in rest))
 
     def number(self, node: Node) -> float | None:
         """The value of an expression that is one number."""
@@ -198,12 +198,14 @@ def evaluate(nodes: Mapping[str, Node], spans: Spans) -> dict[str, float | None]
     context: Recorded | None = None
     with np.errstate(all="ignore"):
         for level in range(1, max(depths.values(), default=0) + 1):
-            folds = {call: FOLDS[call.function](call) for call, depth in depths.items() if depth == level}
+            folds = {
+                call: REDUCTIONS[call.function].fold(call.function) for call, depth in depths.items() if depth == level
+            }
             for span in spans():
                 context, values = span, SpanValues(span, known)
                 for call, fold in folds.items():
                     with _naming(nodes, whole, call):
-                        values.add_to(fold)
+                        values.add_to(fold, call)
             known |= {call: _finite(fold.value()) for call, fold in folds.items()}
         context = context or next(spans())
         found = {}

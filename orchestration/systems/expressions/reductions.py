@@ -6,12 +6,14 @@ Integrals are exact for signals that are held.
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from orchestration.foundation.basics import units
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.systems.expressions.syntax import Call
+from orchestration.foundation.basics.units import Rule
 
 
 class Course:
@@ -68,8 +70,8 @@ class Course:
 class Fold(ABC):
     """A number of a whole run, computed span by span."""
 
-    def __init__(self, call: Call) -> None:
-        self.call = call
+    def __init__(self, function: str) -> None:
+        self.function = function
 
     @abstractmethod
     def add(self, x: Course, *numbers: float | None) -> None:
@@ -83,9 +85,9 @@ class Fold(ABC):
 class _Extreme(Fold):
     """max and min: the largest or smallest value, also just before a held signal changes."""
 
-    def __init__(self, call: Call) -> None:
-        super().__init__(call)
-        self._sign = 1.0 if call.function == "max" else -1.0
+    def __init__(self, function: str) -> None:
+        super().__init__(function)
+        self._sign = 1.0 if function == "max" else -1.0
         self._best = -math.inf
 
     def add(self, x: Course, *numbers: float | None) -> None:
@@ -100,15 +102,15 @@ class _Extreme(Fold):
 class _Integral(Fold):
     """integral, and mean, rms and share by it; of a sampled signal the mean of its values."""
 
-    def __init__(self, call: Call) -> None:
-        super().__init__(call)
+    def __init__(self, function: str) -> None:
+        super().__init__(function)
         self._sum, self._span, self._first, self._count = 0.0, 0.0, math.nan, 0
         self._sampled = False
 
     def add(self, x: Course, *numbers: float | None) -> None:
-        if self.call.function == "rms":
+        if self.function == "rms":
             x = x.map(np.square)
-        elif self.call.function == "share":  # a condition holds from its row to the next
+        elif self.function == "share":  # a condition holds from its row to the next
             x = x.held((x.values != 0.0).astype(float))
         if not self._count and len(x.values):
             self._first = float(x.values[0])
@@ -120,17 +122,17 @@ class _Integral(Fold):
     def value(self) -> float | None:
         if not self._count:
             return None
-        if self.call.function == "integral":
+        if self.function == "integral":
             return self._sum
         mean = self._sum / self._count if self._sampled else self._sum / self._span if self._span else self._first
-        return math.sqrt(mean) if self.call.function == "rms" else mean
+        return math.sqrt(mean) if self.function == "rms" else mean
 
 
 class _Edge(Fold):
     """first and last."""
 
-    def __init__(self, call: Call) -> None:
-        super().__init__(call)
+    def __init__(self, function: str) -> None:
+        super().__init__(function)
         self._values: list[float] = []
 
     def add(self, x: Course, *numbers: float | None) -> None:
@@ -139,14 +141,14 @@ class _Edge(Fold):
             self._values = [*self._values[:1], float(new[0]), float(new[-1])]
 
     def value(self) -> float | None:
-        return None if not self._values else self._values[0 if self.call.function == "first" else -1]
+        return None if not self._values else self._values[0 if self.function == "first" else -1]
 
 
 class _PeakTime(Fold):
     """peak_time: when the largest value occurs first."""
 
-    def __init__(self, call: Call) -> None:
-        super().__init__(call)
+    def __init__(self, function: str) -> None:
+        super().__init__(function)
         self._best, self._time = -math.inf, None
 
     def add(self, x: Course, *numbers: float | None) -> None:
@@ -163,8 +165,8 @@ class _PeakTime(Fold):
 class _SettlingTime(Fold):
     """settling_time: the time from which |x| stays within the band."""
 
-    def __init__(self, call: Call) -> None:
-        super().__init__(call)
+    def __init__(self, function: str) -> None:
+        super().__init__(function)
         self._inside_from: float | None = None
 
     def add(self, x: Course, *numbers: float | None) -> None:
@@ -183,8 +185,8 @@ class _SettlingTime(Fold):
 class _TotalVariation(Fold):
     """total_variation: the sum of all changes of x, including jumps."""
 
-    def __init__(self, call: Call) -> None:
-        super().__init__(call)
+    def __init__(self, function: str) -> None:
+        super().__init__(function)
         self._sum = 0.0
 
     def add(self, x: Course, *numbers: float | None) -> None:
@@ -197,8 +199,8 @@ class _TotalVariation(Fold):
 class _GrowthShare(Fold):
     """growth_share: of the steps from one value to the next, the share that grows and ends above the floor."""
 
-    def __init__(self, call: Call) -> None:
-        super().__init__(call)
+    def __init__(self, function: str) -> None:
+        super().__init__(function)
         self._last: float | None = None
         self._grown = self._steps = 0
 
@@ -215,8 +217,28 @@ class _GrowthShare(Fold):
         return self._grown / self._steps if self._steps else None
 
 
-FOLDS: dict[str, type[Fold]] = {
-    "min": _Extreme, "max": _Extreme, "mean": _Integral, "rms": _Integral, "share": _Integral, "integral": _Integral,
-    "first": _Edge, "last": _Edge, "peak_time": _PeakTime, "settling_time": _SettlingTime,
-    "total_variation": _TotalVariation, "growth_share": _GrowthShare,
-}  # fmt: skip
+@dataclass(frozen=True, kw_only=True)
+class Reduction:
+    """One function over a run. In SIMD lanes those alone that `engines/batch/folds.py` writes in C."""
+
+    arguments: tuple[int, int] = (1, 1)
+    """the fewest and most"""
+    fold: type[Fold]
+    unit: Rule = units.first
+
+
+REDUCTIONS: dict[str, Reduction] = {
+    "min": Reduction(arguments=(1, 99), fold=_Extreme),
+    "max": Reduction(arguments=(1, 99), fold=_Extreme),
+    "mean": Reduction(fold=_Integral),
+    "rms": Reduction(fold=_Integral),
+    "last": Reduction(fold=_Edge),
+    "first": Reduction(fold=_Edge),
+    "integral": Reduction(fold=_Integral, unit=units.over_time),
+    "peak_time": Reduction(fold=_PeakTime, unit=units.second),
+    "settling_time": Reduction(arguments=(2, 2), fold=_SettlingTime, unit=units.settled),
+    "total_variation": Reduction(fold=_TotalVariation),
+    "share": Reduction(fold=_Integral, unit=units.none),
+    "growth_share": Reduction(arguments=(2, 2), fold=_GrowthShare, unit=units.none),
+}
+"""Functions over a run, by name; `min` and `max` of several arguments are of values at one instant."""

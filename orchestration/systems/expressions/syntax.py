@@ -11,17 +11,10 @@ from typing import Any, TypeAlias
 from fmu_kit.syntax_trees import parse_expression
 from orchestration.foundation.basics.errors import UsageError, did_you_mean
 from orchestration.systems.expressions.operators import OPERATORS
+from orchestration.systems.expressions.reductions import REDUCTIONS
 
 MAX_EXPRESSION_LENGTH, MAX_NESTING = 10_000, 60
 """The most characters, and the deepest nesting, of an expression"""
-
-OVER_RUN = {
-    "min": (1, 99), "max": (1, 99), "mean": (1, 1), "rms": (1, 1), "last": (1, 1), "first": (1, 1),
-    "integral": (1, 1), "peak_time": (1, 1), "settling_time": (2, 2), "total_variation": (1, 1), "share": (1, 1),
-    "growth_share": (2, 2),
-}  # fmt: skip
-"""Functions over a run; `min` and `max` of several arguments are of values at one instant."""
-
 
 SAMPLED = "sampled"
 """`sampled(CONNECTION, x)`: the values of x at the rows at which a message of that connection arrived"""
@@ -127,7 +120,7 @@ def parse_job_measures(text: str) -> Node:
 def names_job_measure(name: str) -> bool:
     """Whether a name is the text of a function over a measure of jobs."""
     function, bracket, _ = name.partition("(")
-    return bool(bracket) and function in OVER_RUN
+    return bool(bracket) and function in REDUCTIONS
 
 
 def has_job_measure(node: Node) -> bool:
@@ -182,7 +175,7 @@ def _bracketed(node: Node) -> str:
 
 def is_over_run(node: Call) -> bool:
     """Whether a call is a function over a whole run."""
-    return node.function in OVER_RUN and not (node.function in ("min", "max") and len(node.arguments) > 1)
+    return node.function in REDUCTIONS and not (node.function in ("min", "max") and len(node.arguments) > 1)
 
 
 def is_number(node: Node) -> bool:
@@ -282,7 +275,8 @@ def _dotted(tree: ast.expr, text: str) -> str:
 
 def _checked_name(function: str, count: int, text: str) -> str:
     at_instant = {word: operator.arguments for word, operator in OPERATORS.items() if operator.tree is None}
-    functions = {**at_instant, **OVER_RUN, SAMPLED: (2, 2), **dict.fromkeys(JOB_MEASURES, (1, 1))}
+    over_run = {word: reduction.arguments for word, reduction in REDUCTIONS.items()}
+    functions = {**at_instant, **over_run, SAMPLED: (2, 2), **dict.fromkeys(JOB_MEASURES, (1, 1))}
     if function not in functions:
         expected = f"expected one of {', '.join(functions)}{did_you_mean(function, functions)}"
         raise UsageError(f"{_short(text)}: no function {function}; {expected}")

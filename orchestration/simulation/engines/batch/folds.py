@@ -4,7 +4,7 @@ The value of each is computed from its final states. A signal in continuous time
 row as at that row; a held signal has there the value of the row before.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -48,7 +48,9 @@ class Folds:
         """the states that count them"""
 
     def add(self, call: Call) -> None:
-        """Write a reduction; raises `UsageError` for an invalid argument."""
+        """Write a reduction; raises `UsageError` for an invalid argument, and for one that lanes cannot compute."""
+        if call.function not in LANES:
+            raise UsageError(f"{call.function}(…) is not computed in SIMD lanes; expected {', '.join(LANES)}")
         argument = call.arguments[0]
         connection = argument.connection if isinstance(argument, Sampled) else None
         node = argument.argument if isinstance(argument, Sampled) else argument
@@ -60,11 +62,7 @@ class Folds:
         if connection is None and self.writer.kinds(node) <= {"number"}:
             raise UsageError(f"{call.function} of a number; expected a signal")
         x = self.writer.value(node, "row", rows.section)
-        write = _Fold(self, rows, call, node, x, connection is not None)
-        self.values[call] = getattr(write, f"{_ALIKE.get(call.function, call.function)}")()
-
-
-_ALIKE = {"mean": "integral", "rms": "integral", "share": "integral"}
+        self.values[call] = LANES[call.function](_Fold(self, rows, call, node, x, connection is not None))
 
 
 @dataclass
@@ -223,6 +221,15 @@ class _Fold:
             f"if (!keep(&b->kept[{number}], {last})) return 0;",
         ]  # fmt: skip
         return lambda states, end: np.full(len(end), np.nan)  # its floor is known at the end of the run
+
+
+LANES: Mapping[str, Callable[[_Fold], Value]] = {
+    "min": _Fold.min, "max": _Fold.max, "mean": _Fold.integral, "rms": _Fold.integral, "last": _Fold.last,
+    "first": _Fold.first, "integral": _Fold.integral, "peak_time": _Fold.peak_time,
+    "settling_time": _Fold.settling_time, "total_variation": _Fold.total_variation, "share": _Fold.integral,
+    "growth_share": _Fold.growth_share,
+}  # fmt: skip
+"""The writers of reductions in C, by function: with one that is not here, runs are executed one at a time"""
 
 
 def _has_time(node: Node) -> bool:

@@ -1,5 +1,6 @@
 """By default the fastest available engine is chosen, and the reason is reported if it is not the fastest."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ from orchestration.simulation.workers.choice import (
     engine_choice,
     single_run_execution,
 )
+from orchestration.systems.expressions.reductions import REDUCTIONS
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.files import Files, files_of
 from orchestration.systems.system.model import System
@@ -51,6 +53,17 @@ def test_without_lanes_native_twins_are_chosen_with_the_reason(monkeypatch: pyte
     assert str(execution) == "engine compiled: native FMUs, one run at a time (no compiler)"
     with pytest.raises(QuadcosimError, match="no compiler"):
         choose_execution("batch", False, first)
+
+
+def test_with_a_reduction_that_has_no_form_in_lanes_runs_are_alone_with_the_reason(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(REDUCTIONS, "highest", REDUCTIONS["max"])
+    system, files = first(True)
+    objectives = {**system.objectives, "peak": "highest(plant.thrust)"}
+    execution = choose_execution("auto", False, lambda _: (replace(system, objectives=objectives), files))
+    assert (execution.native, execution.in_lanes) == (True, False)
+    assert str(execution.reason).startswith("highest(…) is not computed in SIMD lanes")
 
 
 def test_without_native_twins_the_fmus_are_run_as_they_are_with_the_reason() -> None:
