@@ -47,4 +47,4 @@ SECTIONS: dict[str, Callable[[], str]] = {
         },
     ),
 }
-"""What follows the text of pages, by address."""
+"""Continuation of the text of pages, by address."""
