@@ -1,15 +1,110 @@
-"""Opens instances of FMUs: in this process, or in a separate one if a process cannot have two of them."""
+"""Opens instances of FMUs: in this process, or in a separate one if a process cannot have two of them.
 
+A reset of many FMUs is incomplete, and some share state between instances. Only what has been shown to repeat to the
+bit is relied upon. It is tested once for the content of an FMU on a machine, in a confined process, and the result is
+kept in the user's cache directory.
+"""
+
+import contextlib
+import functools
+import hashlib
+import json
+import platform
+import sys
+import tempfile
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from orchestration.components.fmi import repeatability
+from fmu_kit.libraries import write_atomically
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.components.fmi.fmi3 import Fmi3Instance
 from orchestration.components.fmi.instance import Instance
 from orchestration.components.fmi.isolated import IsolatedInstance
 from orchestration.components.fmi.model import read_model
 from orchestration.components.fmi.native import NativeInstance
-from orchestration.components.fmi.repeatability import content_hash
+from orchestration.foundation.processes import subprocesses
+from orchestration.foundation.processes.child import Child
+from orchestration.foundation.processes.limits import Limits
+
+_RULES = "2"
+"""The version of the test; another one repeats all tests"""
+MANNERS = ("moving", "held", "fine")
+"""Kinds of the compared run, tried until one works: inputs that vary; inputs that keep their start values; a short
+step"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Repeatability:
+    """The properties of an FMU that have been shown."""
+
+    reset: bool = False
+    """A run after a reset equals that of a fresh process"""
+    second_instance: bool = False
+    """A run of a further instance in a process, beside another one or after it, equals that of a fresh process"""
+
+
+def repeatability_of(path: Path) -> Repeatability:
+    """The repeatability of the FMU at `path`, tested now if it has not been; raises `UsageError` if it is no FMU."""
+    return _of(content_hash(path), path)
+
+
+def content_hash(path: Path) -> str:
+    """SHA-256 of a file, read again only if it has changed."""
+    status = path.stat()
+    return _hash(path.absolute(), status.st_mtime_ns, status.st_size)
+
+
+@functools.lru_cache(maxsize=256)
+def _hash(path: Path, changed: int, size: int) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+_known: dict[str, Repeatability] = {}
+
+
+def _of(content: str, path: Path) -> Repeatability:
+    if content not in _known:
+        _known[content] = _stored(content) or _tested(content, path)
+    return _known[content]
+
+
+def _place(content: str) -> Path:
+    import platformdirs
+
+    where = "\n".join((_RULES, content, platform.node(), platform.platform(), sys.version))
+    key = hashlib.sha256(where.encode()).hexdigest()
+    return Path(platformdirs.user_cache_dir("quadcosim")) / "repeatability" / f"{key}.json"
+
+
+def _stored(content: str) -> Repeatability | None:
+    try:
+        stored = json.loads(_place(content).read_text(encoding="utf-8"))
+        return Repeatability(reset=stored["reset"] is True, second_instance=stored["second_instance"] is True)
+    except (OSError, ValueError, LookupError, TypeError):
+        return None
+
+
+def _tested(content: str, path: Path) -> Repeatability:
+    """Test the FMU in a process; the result is kept unless the process was stopped, which may have other reasons."""
+    read_model(path)
+    result = Repeatability()
+    for manner in MANNERS:
+        shown: dict[str, bool] = {}
+        with tempfile.TemporaryDirectory(prefix="quadcosim-", ignore_cleanup_errors=True) as folder:
+            module = subprocesses.Module.of(
+                "orchestration.components.fmi.repeatability_process", path.absolute(), manner
+            )
+            with Child(module, environment=subprocesses.environment(TMPDIR=folder), limits=Limits()) as child:
+                ending = child.receive_all(shown.update)
+        if ending.reached is not None:
+            return Repeatability()
+        if shown.pop("fresh", False):
+            result = Repeatability(**shown)
+            break
+    with contextlib.suppress(OSError):  # where nothing can be written, each process repeats the test
+        write_atomically(_place(content), json.dumps(asdict(result)).encode())
+    return result
+
 
 _opened: set[str] = set()
 """Hashes of the FMUs that have had an instance in this process"""
@@ -22,7 +117,7 @@ def open_instance(path: Path, instance_name: str) -> Instance:
     shown to behave as the first.
     """
     content = content_hash(path)
-    if content in _opened and not repeatability.of(path).second_instance:
+    if content in _opened and not repeatability_of(path).second_instance:
         return IsolatedInstance(path, instance_name)
     _opened.add(content)
     return open_here(path, instance_name)

@@ -17,13 +17,13 @@ import fmpy
 import numpy as np
 from fmpy.fmi1 import FMICallException
 
-from orchestration.components.fmi import pythonfmu
 from orchestration.components.fmi.instance import Instance, Value, convert_value, same
 from orchestration.components.fmi.model import Variable, read_model
 from orchestration.components.fmi.slaves import (
     WARNING,
     Messages,
     binary_folders,
+    expect_readable_place,
     failure_text,
     folder_here,
     instantiate,
@@ -307,7 +307,7 @@ class NativeInstance(Instance):
         """A folder with what the FMU needs to run, until it is closed."""
         self._folder = scratch.temporary()
         fmpy.extract(str(self.path), str(self._folder.path), include=_is_used if self.model.is_of_this_kit else None)
-        pythonfmu.expect_readable_place(self._folder.path)
+        expect_readable_place(self._folder.path)
         return self._folder.path
 
     def no_instance(self, why: str) -> QuadcosimError:

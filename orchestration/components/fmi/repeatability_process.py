@@ -1,7 +1,7 @@
 """The confined process that tests whether runs of an FMU repeat.
 
 `python -m orchestration.components.fmi.repeatability_process FMU MANNER` runs a fresh instance first, in `MANNER` (see
-`repeatability.MANNERS`), and then the same run after other ones, with other parameters, other inputs and longer. After
+`instances.MANNERS`), and then the same run after other ones, with other parameters, other inputs and longer. After
 each comparison it reports what it has shown.
 """
 

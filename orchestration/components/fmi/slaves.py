@@ -1,7 +1,8 @@
-"""fmpy's instances of FMUs for co-simulation, loaded alike for both versions of FMI, and the messages that they log.
+"""fmpy's instances of FMUs for co-simulation, loaded alike for both versions of FMI, and what they log.
 
 In FMI 2.0 an FMU logs like printf, with a format and variable arguments, which a Python callback cannot read. fmpy's
-compiled logger formats the text and passes it to one function for the whole process, which finds the instance.
+compiled logger formats the text and passes it to one function for the whole process, which finds the instance. Of pythonfmu 0.7.0, with which FMUs in Python are
+built, some peculiarities matter when one is loaded.
 """
 
 import ctypes
@@ -15,9 +16,62 @@ import fmpy
 from fmpy import fmi2, fmi3
 from fmpy.fmi1 import printLogMessage
 
-from orchestration.components.fmi import pythonfmu
-from orchestration.components.fmi.pythonfmu import release_interpreter_state
+from fmu_kit import loader
 from orchestration.foundation.basics.errors import QuadcosimError
+
+ENTRY = "resources/slavemodule.txt"
+"""The file of its FMU that has the name of the script to run."""
+_BANNER = "Fatal py exception"
+
+
+def is_made_by_pythonfmu(folder: Path) -> bool:
+    """Whether the FMU unpacked in `folder` was built by pythonfmu."""
+    return (folder / ENTRY).is_file()
+
+
+def logged(message: bytes) -> bytes:
+    """The message of the slave: pythonfmu doubles its percent signs."""
+    return message.replace(b"%%", b"%")
+
+
+def without_banner(text: str) -> str:
+    """The slave's own text of an error, without the line that pythonfmu prepends."""
+    return text.partition("\n")[2] if text.startswith(_BANNER) else text
+
+
+def uri_is_read(folder: Path) -> bool:
+    """Whether pythonfmu finds an FMU that is unpacked in `folder`; it crashes if it does not.
+
+    It receives the folder as a URI, of whose escapes it decodes only that of the space.
+    """
+    return "%" not in folder.as_uri().replace("%20", "")
+
+
+def expect_readable_place(folder: Path) -> None:
+    """Raise `QuadcosimError` if pythonfmu would crash on the folder in which its FMU was unpacked.
+
+    With the loader of this project it does not, because that decodes the URI.
+    """
+    decoded = fmpy.platform == "linux64" and (folder / loader.BESIDE).is_file()
+    if is_made_by_pythonfmu(folder) and not decoded and not uri_is_read(folder):
+        raise QuadcosimError(
+            f"unpacked in {folder}; pythonfmu reads no path with other characters than ASCII letters, digits, "
+            "spaces and - . _ ~: set TMPDIR (on Windows TEMP) to such a folder"
+        )
+
+
+def release_interpreter_state(library: ctypes.CDLL) -> None:
+    """Have pythonfmu release what it would otherwise free twice when its library is unloaded.
+
+    Unloading releases a static pointer after its destructor has run, which sometimes corrupts the heap when the
+    process ends. If it is released before, both do nothing. It holds a thread that initialises Python in a host
+    without Python, so that a host in Python does not need it. FMUs of this project release it themselves; those that
+    pythonfmu's own builder packed do not.
+    """
+    release = getattr(library, "finalizePythonInterpreter", None)
+    if release is not None:
+        release()
+
 
 Message: TypeAlias = tuple[int, bytes | None, bytes]
 """Status, category and text of a message"""
@@ -57,7 +111,7 @@ def collecting_callbacks(messages: list[Message], name: str, folder: Path) -> fm
     callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
     callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
     add_formatting = getattr(fmi2, "addLoggerProxy", None)  # fmpy has none for some platforms
-    if add_formatting is None or pythonfmu.is_made_by_it(folder):
+    if add_formatting is None or is_made_by_pythonfmu(folder):
         callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(_logger_of_fmi2(messages))
         return callbacks
     environment = next(_environments)
@@ -79,13 +133,13 @@ def failure_text(messages: Sequence[Message], otherwise: str) -> tuple[str, str]
     """The first line of the first message of a failure, and the rest of it; `otherwise` if there is none."""
     bad = [message for message in messages if message[0] > WARNING]
     text = bad[0][2].decode("utf-8", "replace") if bad else otherwise
-    summary, _, details = pythonfmu.without_banner(text).partition("\n")
+    summary, _, details = without_banner(text).partition("\n")
     return summary, details
 
 
 def _logger_of_fmi2(messages: list[Message]) -> Any:
     def log(environment: Any, instance: bytes, status: int, category: bytes | None, message: bytes | None) -> None:
-        messages.append((status, category, pythonfmu.logged(message or b"")))
+        messages.append((status, category, logged(message or b"")))
 
     return log
 

@@ -108,10 +108,10 @@ def _load(fmu: InspectedFmu, folder: Path) -> None:
     """Load with the required parts of the description only: others may be invalid."""
     import fmpy
 
-    from orchestration.components.fmi.pythonfmu import expect_readable_place
     from orchestration.components.fmi.slaves import (
         INSTANTIATES,
         Message,
+        expect_readable_place,
         failure_text,
         folder_here,
         instantiate,

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from fmu_kit.syntax_trees import parse_module
-from orchestration.components.fmi.pythonfmu import ENTRY
+from orchestration.components.fmi.slaves import ENTRY
 
 _MODULES = (".py", ".so", ".pyd")
 _IMPORT_ERRORS = {"ImportError", "ModuleNotFoundError"}

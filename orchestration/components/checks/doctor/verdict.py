@@ -10,7 +10,7 @@ from orchestration.components.checks.doctor.dependencies import PYTHON_DLL, miss
 from orchestration.components.checks.doctor.fmu import InspectedFmu, PlatformBinary
 from orchestration.components.checks.doctor.machine import Machine
 from orchestration.components.checks.doctor.pythons import BY_LOADER, ON_PATH, PRELOADED, PythonLibrary
-from orchestration.components.fmi.pythonfmu import uri_is_read
+from orchestration.components.fmi.slaves import uri_is_read
 
 LIBPYTHON_VARIABLE = "QUADCOSIM_LIBPYTHON"
 """environment variable with the path of a libpython for the loader in an FMU"""

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from fmu_kit.archive import NATIVE_TABLES
 from orchestration.components.checks.validation.fmu import LIBRARIES, Fmu
 from orchestration.components.fmi.archive import TOKENS, Archive
-from orchestration.components.fmi.pythonfmu import ENTRY
+from orchestration.components.fmi.slaves import ENTRY
 
 
 def standard(archive: Archive) -> list[str]:

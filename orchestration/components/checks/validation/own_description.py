@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from orchestration.components.checks.validation.probe import Probe
-from orchestration.components.fmi.pythonfmu import ENTRY
+from orchestration.components.fmi.slaves import ENTRY
 
 _DIFFERS = {"guid", "generationDateAndTime", "generationTool", "version"}
 """attributes that depend on packaging and date"""

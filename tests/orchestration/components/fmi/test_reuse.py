@@ -4,10 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.components.fmi import repeatability
+from orchestration.components.fmi.instances import Repeatability, repeatability_of
 from orchestration.components.fmi.isolated import IsolatedInstance
 from orchestration.components.fmi.native import NativeInstance
-from orchestration.components.fmi.repeatability import Repeatability
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.processes.child import Child, Ending
 from orchestration.simulation.runs.prepared import prepared
@@ -45,12 +44,12 @@ REUSED = ("none", "STICKY_PARAMETER", "STATICS", "BROKEN_RESET STATICS")
 
 @pytest.mark.parametrize("habits", [habits for habits in HABITS if habits not in REUSED])
 def test_what_is_shown_of_an_fmu_is_what_it_does(habits: str, tmp_path: Path) -> None:
-    assert repeatability.of(build(habits, tmp_path)) == HABITS[habits]
+    assert repeatability_of(build(habits, tmp_path)) == HABITS[habits]
 
 
 def test_fmi_3_is_shown_likewise(tmp_path: Path) -> None:
-    assert repeatability.of(build("none", tmp_path / "a", fmi=3)) == HABITS["none"]
-    assert repeatability.of(build("BROKEN_RESET", tmp_path / "b", fmi=3)) == HABITS["BROKEN_RESET"]
+    assert repeatability_of(build("none", tmp_path / "a", fmi=3)) == HABITS["none"]
+    assert repeatability_of(build("BROKEN_RESET", tmp_path / "b", fmi=3)) == HABITS["BROKEN_RESET"]
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +73,7 @@ def test_runs_one_after_another_are_those_of_fresh_processes(habits: str, fresh:
             rows.append(simulation.result().rows.tobytes())
     instances.close()
     assert rows == fresh
-    assert repeatability.of(path) == HABITS[habits], "what it does is what is shown of it"
+    assert repeatability_of(path) == HABITS[habits], "what it does is what is shown of it"
     needs_a_process = not HABITS[habits].reset and not HABITS[habits].second_instance
     assert kinds == [False] + [needs_a_process] * (len(SETTINGS) - 1)
 
@@ -94,15 +93,15 @@ def test_the_repeatability_of_an_fmu_is_shown_once_on_a_machine(
     tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = build("BROKEN_RESET", tmp_path)
-    first = repeatability.of(path)
-    monkeypatch.setattr(repeatability, "_known", {})
+    first = repeatability_of(path)
+    monkeypatch.setattr("orchestration.components.fmi.instances._known", {})
     monkeypatch.setattr(Child, "receive_all", lambda *_: pytest.fail("shown again"))
-    assert repeatability.of(path) == first
+    assert repeatability_of(path) == first
     (stored,) = cache.rglob("*.json")
     stored.write_text("damaged")
-    monkeypatch.setattr(repeatability, "_known", {})
+    monkeypatch.setattr("orchestration.components.fmi.instances._known", {})
     with pytest.raises(pytest.fail.Exception, match="shown again"):
-        repeatability.of(path)
+        repeatability_of(path)
 
 
 def test_what_could_not_be_tried_to_the_end_is_not_relied_on_nor_kept(
@@ -110,10 +109,10 @@ def test_what_could_not_be_tried_to_the_end_is_not_relied_on_nor_kept(
 ) -> None:
     stopped = Ending(code=None, reached="it takes longer than the limit of 60 s", out_of_time=True)
     monkeypatch.setattr(Child, "receive_all", lambda *_: stopped)
-    assert repeatability.of(build("none", tmp_path)) == Repeatability(reset=False, second_instance=False)
+    assert repeatability_of(build("none", tmp_path)) == Repeatability(reset=False, second_instance=False)
     assert not list(cache.rglob("*.json"))
 
 
 def test_the_fmus_of_this_project_are_reused(built: dict[str, Path]) -> None:
     for path in built.values():
-        assert repeatability.of(path) == Repeatability(reset=True, second_instance=True)
+        assert repeatability_of(path) == Repeatability(reset=True, second_instance=True)

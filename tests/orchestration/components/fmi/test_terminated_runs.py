@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from orchestration.components.fmi import instances
+from orchestration.components.fmi.instances import Repeatability
 from orchestration.components.fmi.isolated import IsolatedInstance
-from orchestration.components.fmi.repeatability import Repeatability
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import SimulatorError, UsageError
 from orchestration.simulation.engines.master import Engine
@@ -119,7 +119,9 @@ def test_isolated_or_not_a_run_ends_the_same(tmp_path: Path) -> None:
 def test_an_instance_that_has_ended_a_run_is_for_no_other(
     load: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("orchestration.components.fmi.repeatability.of", lambda path: Repeatability(reset=True))
+    monkeypatch.setattr(
+        "orchestration.components.fmi.instances.repeatability_of", lambda path: Repeatability(reset=True)
+    )
     monkeypatch.setattr("orchestration.components.fmi.reuse.open_instance", load)
     kept = Instances()
     used = []
