@@ -19,11 +19,9 @@ from fmu_kit.libraries import write_atomically
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.components.fmi.fmi3 import Fmi3Instance
 from orchestration.components.fmi.instance import Instance
-from orchestration.components.fmi.isolated import IsolatedInstance
 from orchestration.components.fmi.model import read_model
 from orchestration.components.fmi.native import NativeInstance
 from orchestration.foundation.processes import subprocesses
-from orchestration.foundation.processes.child import Child
 from orchestration.foundation.processes.limits import Limits
 
 _RULES = "2"
@@ -86,6 +84,8 @@ def _stored(content: str) -> Repeatability | None:
 
 def _tested(content: str, path: Path) -> Repeatability:
     """Test the FMU in a process; the result is kept unless the process was stopped, which may have other reasons."""
+    from orchestration.foundation.processes.child import Child
+
     read_model(path)
     result = Repeatability()
     for manner in MANNERS:
@@ -118,6 +118,8 @@ def open_instance(path: Path, instance_name: str) -> Instance:
     """
     content = content_hash(path)
     if content in _opened and not repeatability_of(path).second_instance:
+        from orchestration.components.fmi.isolated import IsolatedInstance  # not before: loads what starts processes
+
         return IsolatedInstance(path, instance_name)
     _opened.add(content)
     return open_here(path, instance_name)

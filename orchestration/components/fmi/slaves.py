@@ -1,8 +1,9 @@
 """fmpy's instances of FMUs for co-simulation, loaded alike for both versions of FMI, and what they log.
 
 In FMI 2.0 an FMU logs like printf, with a format and variable arguments, which a Python callback cannot read. fmpy's
-compiled logger formats the text and passes it to one function for the whole process, which finds the instance. Of pythonfmu 0.7.0, with which FMUs in Python are
-built, some peculiarities matter when one is loaded.
+compiled logger formats the text and passes it to one function for the whole process, which finds the instance.
+
+pythonfmu 0.7.0, with which FMUs in Python are built, has peculiarities that matter when one is loaded.
 """
 
 import ctypes

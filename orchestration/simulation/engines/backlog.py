@@ -11,9 +11,6 @@ from orchestration.foundation.basics.simulator import Floats, Integers
 from orchestration.foundation.basics.times import nanoseconds, seconds
 from orchestration.foundation.recording.recording import BYTES, EVENTS, ROWS, Chunk, Events, Recorder
 from orchestration.simulation.engines.running_system import RunningSystem
-from orchestration.systems.computers.compiled import scheduler
-from orchestration.systems.computers.scheduler_events import NEEDED
-from orchestration.systems.schedule.resources import Resources
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.system.model import System
 
@@ -25,6 +22,10 @@ class _OnComputers:
     """The events of the tasks and frames of a system, computed as far as requested."""
 
     def __init__(self, system: System) -> None:
+        from orchestration.systems.computers.compiled import scheduler  # not before: few systems have any
+        from orchestration.systems.computers.scheduler_events import NEEDED
+        from orchestration.systems.schedule.resources import Resources
+
         resources = Resources(system, nanoseconds(system.stop_time))
         parts = resources.of_run(Streams(system.seed, system.streams))
         self._scheduler, self._events = scheduler(parts, NEEDED), resources.event_builder()

@@ -13,7 +13,6 @@ from orchestration.components.fmi.model import NUMERIC, Model, read_model
 from orchestration.foundation.basics.errors import UsageError, at_place
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import Grid, exact_nanoseconds
-from orchestration.simulation.engines.job_numbers import job_numbers
 from orchestration.simulation.engines.sources import (
     BuiltIn,
     ConstantValues,
@@ -33,8 +32,6 @@ from orchestration.systems.expressions.over_run import job_terms
 from orchestration.systems.schedule.fixed_step import FixedStep
 from orchestration.systems.schedule.streams import VALUE, Streams
 from orchestration.systems.signals.library import make_signal
-from orchestration.systems.signals.table_file import read_table
-from orchestration.systems.signals.waypoints import read_waypoints
 from orchestration.systems.system.check import check, connect_references, describe_references, recorded_variables
 from orchestration.systems.system.component import Component, has_scheduled_instants
 from orchestration.systems.system.connection import variable_of
@@ -119,8 +116,11 @@ def check_against_fmus(system: System, models: Mapping[str, Model]) -> CheckedSy
     for name, component in system.components.items():
         _expect_clock(name, component, models[name])
     parameters = _parameters(system, models)
-    terms = job_terms(text for _, text in expressions(system))
-    of_jobs = job_numbers(system) if terms else {}
+    of_jobs: dict[str, float] = {}
+    if job_terms(text for _, text in expressions(system)):
+        from orchestration.simulation.engines.job_numbers import job_numbers  # not before: loads the scheduler
+
+        of_jobs = job_numbers(system)
     system = objectives.with_available_objectives(system, signals_of(system, models), {*parameters, *of_jobs})
     return CheckedSystem(
         system=system, parameters=parameters, units=units(system, models), follows=words, of_jobs=of_jobs
@@ -202,6 +202,9 @@ def _of_file_or_signal(system: System, name: str, streams: Streams) -> SourceVal
         if source.is_motion:
             return Moving(motion_values(signal), quantities)
         return gusts(signal, system.stop_time, streams.of(f"sources.{name}", VALUE))
+    from orchestration.systems.signals.table_file import read_table
+    from orchestration.systems.signals.waypoints import read_waypoints
+
     assert source.file is not None
     if source.is_motion:
         return Moving(spline_values(read_waypoints(source.file, source.parameters)), quantities)

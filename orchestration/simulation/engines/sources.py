@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -13,8 +13,10 @@ from fmu_kit.trajectory import Trajectory
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS, Grid, exact_nanoseconds
 from orchestration.systems.signals.dryden import DRAWS, Dryden
-from orchestration.systems.signals.motions import Motion
-from orchestration.systems.signals.spline import Spline
+
+if TYPE_CHECKING:
+    from orchestration.systems.signals.motions import Motion
+    from orchestration.systems.signals.spline import Spline
 
 
 class SourceValues(Protocol):
@@ -151,7 +153,7 @@ class Moving:
     at_each = over
 
 
-def motion_values(motion: Motion) -> Callable[[Floats], Floats]:
+def motion_values(motion: "Motion") -> Callable[[Floats], Floats]:
     """A motion of the library, at times (n,) [s] as an array (n, 15)."""
 
     def over(t: Floats) -> Floats:
@@ -162,7 +164,7 @@ def motion_values(motion: Motion) -> Callable[[Floats], Floats]:
     return over
 
 
-def spline_values(curve: Spline) -> Callable[[Floats], Floats]:
+def spline_values(curve: "Spline") -> Callable[[Floats], Floats]:
     """The curve through waypoints, at times (n,) [s] as an array (n, 15)."""
     return lambda t: curve.at(t).reshape(len(t), -1)
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,12 +14,14 @@ from orchestration.foundation.basics.simulator import Booleans, Integers
 from orchestration.foundation.basics.times import Grid, exact_nanoseconds, nanoseconds
 from orchestration.systems.schedule.fixed_step import FixedStep, in_seconds
 from orchestration.systems.schedule.plan import Plan, expect_no_longer
-from orchestration.systems.schedule.resources import Resources
 from orchestration.systems.schedule.schedule import Schedule
 from orchestration.systems.system.component import has_scheduled_instants
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import messages_by_connection, placed_tasks, tasks_of
+
+if TYPE_CHECKING:
+    from orchestration.systems.schedule.resources import Resources
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -199,12 +201,14 @@ class CommonTimetable:
         self._kept: OrderedDict[tuple[int, int], Instants] = OrderedDict()
 
     @cached_property
-    def resources(self) -> Resources:
+    def resources(self) -> "Resources":
         """The computers and networks for the scheduler, up to the time until which it has to run.
 
         That is after the end for measurements ahead of a sample after the end, and up to the deadlines of jobs that
         read at their release.
         """
+        from orchestration.systems.schedule.resources import Resources  # not before: few systems have any
+
         measured = (self.system.connections[i] for i in self.plan.measured)
         ahead = (nanoseconds(highest(x.delay)) + nanoseconds(highest(x.delay_jitter)) for x in measured)
         tasks = (each.task for each in placed_tasks(self.system.computers))

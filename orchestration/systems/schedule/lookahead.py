@@ -7,12 +7,11 @@ import numpy as np
 from orchestration.foundation.basics.simulator import Integers
 from orchestration.systems.computers.compiled import scheduler
 from orchestration.systems.computers.parts import ARRIVES, KINDS, LATER, SAMPLED, SENT
+from orchestration.systems.schedule.random_timing import NEVER
 from orchestration.systems.schedule.resources import Resources
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.system.model import System
 
-NEVER = 2**60
-"""Time of what does not occur before the end [ns]"""
 _UNKNOWN = -2
 _SENT, _LOST, _NOTHING = range(3)
 """The outcome of a message of a connection, as in a note SENT"""

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from functools import lru_cache, partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,11 +11,16 @@ from orchestration.foundation.basics.simulator import Integers
 from orchestration.foundation.basics.times import Constant, Grid, exact_nanoseconds, nanoseconds
 from orchestration.systems.schedule.fixed_step import FixedStep, Misalignment, in_seconds
 from orchestration.systems.schedule.lateness_and_loss import lateness, losses, times
-from orchestration.systems.schedule.lookahead import NEVER, Lookahead
 from orchestration.systems.schedule.plan import Plan
 from orchestration.systems.schedule.streams import DELAY, DELAY_JITTER, JITTER, LOSS, Streams
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.distribution import highest
+
+if TYPE_CHECKING:
+    from orchestration.systems.schedule.lookahead import Lookahead
+
+NEVER = 2**60
+"""Time [ns] of what does not occur before the end"""
 
 
 class Link:
@@ -218,7 +224,7 @@ class ScheduledComponent(TimedComponent):
         name: str,
         plan: Plan,
         links: Sequence[Link],
-        lookahead: Lookahead,
+        lookahead: "Lookahead",
         fixed: Mapping[str, FixedStep],
         misaligned: list[Misalignment],
     ) -> None:

@@ -7,7 +7,7 @@ instants.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Booleans, Integers
 from orchestration.systems.schedule.common_timetable import CommonTimetable, InstantCollector, Span
 from orchestration.systems.schedule.fixed_step import FixedStep, Misalignment
-from orchestration.systems.schedule.lookahead import Lookahead
 from orchestration.systems.schedule.random_timing import (
     ClockedComponent,
     Link,
@@ -25,6 +24,9 @@ from orchestration.systems.schedule.random_timing import (
 from orchestration.systems.schedule.schedule import Schedule
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.system.model import System
+
+if TYPE_CHECKING:
+    from orchestration.systems.schedule.lookahead import Lookahead
 
 
 class Timetable:
@@ -50,7 +52,7 @@ class Timetable:
         for i, x in enumerate(self._connections):
             stepped = self._fixed.get(x.sender if i in self._plan.measured else x.receiver)
             self._links.append(Link(i, x, streams, stepped, self._misaligned))
-        self._lookahead = Lookahead(common.system, common.resources, streams) if common.system.uses_scheduler else None
+        self._lookahead = _lookahead(common, streams) if common.system.uses_scheduler else None
         self._tasks = [self._timed(name, streams) for name in self._plan.sampled]
         self.first_samples = {
             name: task.first for name, task in zip(self._plan.sampled, self._tasks) if task.first < self.stop
@@ -257,6 +259,12 @@ class _Sent(NamedTuple):
             for i, column in enumerate((self.k, self.sent, self.arrival, self.time)):
                 rows[:, i + 1] = column if which is None else column[which]
         return rows
+
+
+def _lookahead(common: CommonTimetable, streams: Streams) -> "Lookahead":
+    from orchestration.systems.schedule.lookahead import Lookahead  # not before: few systems use the scheduler
+
+    return Lookahead(common.system, common.resources, streams)
 
 
 def _concatenated(tables: Sequence[Integers]) -> Integers:
