@@ -35,7 +35,7 @@ def _districts() -> str:
     lines = ["", "| district | what it is for |", "|---|---|"]
     lines += [f"| [`{name}/`](#{name}) | {_docstring(f'orchestration/{name}')[0]} |" for name in names]
     for name in names:
-        lines += ["", f"### `{name}/`", "", *_docstring(f"orchestration/{name}")]
+        lines += ["", f"### `{name}/`", *_docstring(f"orchestration/{name}")[1:]]
         if rooms := floors.get(f"orchestration.{name}"):
             lines += ["", "| floor | room | what is in it |", "|---|---|---|"]
         for number, floor in zip(range(len(rooms or ()), 0, -1), rooms or ()):
