@@ -119,7 +119,7 @@ def build(target: Target, folder: Path) -> Path:
         needs=documentation.IN_PYTHON,
         source=f"../resources/{name}/{path_in_bundle(target.module, target.root)}",
         status="fmi2Fatal",
-        afterwards="After a failure, do not call the instance again: make a new one.",
+        afterwards="Switch logging on to see the log. After a failure, do not call the instance again: make a new one.",
     )
     add_description(files, target, notes, to_xml(slave_class(target)))
     files[loader.GUID_FILE] = insert_guid(files).encode()

@@ -170,7 +170,8 @@ static Instance *create(size_t size, Text name, int logs)
     if (!m)
         return NULL;
     m->name = strcpy((char *)m + size, name);
-    set_logging(m, logs, 0, NULL);
+    m->logs[LOG_ERROR] = m->logs[LOG_DIVERGENCE] = 1; /* until the host says otherwise: most say nothing */
+    m->logs[LOG_WARNING] = logs;
     begin(m);
     return m;
 }
