@@ -82,13 +82,13 @@ class Model:
     """An FMU file and its description; it is read once and compared by identity."""
 
     path: Path
-    """Path of the FMU"""
+    """Path of the FMU."""
     description: ModelDescription
     """Its model description, as fmpy reads it."""
     variables: Mapping[str, Variable]
     """Its variables by name, arrays by their elements: causality, unit, start value, description."""
     initial_dependencies: Mapping[str, frozenset[str] | None]
-    """Inputs that an output depends on at initialisation, by output; None: all of them"""
+    """Inputs that an output depends on at initialisation, by output; None: all of them."""
 
     def __repr__(self) -> str:
         counts = Counter(v.causality for v in self.variables.values())
