@@ -2,6 +2,7 @@
 
 import copy
 import os
+import shlex
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -63,11 +64,21 @@ def load_request(path: str | Path, timing: str | Path | None = None) -> Request:
             return _from_ssp(path, overlay, path.parent if timing is None else Path(timing).parent)
     if timing is not None:
         raise UsageError(f"{timing}: expected no second file; only an SSP has its timing in one")
-    tables = read_toml(path, "system or scenario file")
+    tables = tables_of_request(path)
     with _errors_naming(path):
         if isinstance(tables.get(SSP), str):
             return _from_ssp(path.parent / tables.pop(SSP), tables, path.parent)
         return request_from_tables(tables, path.parent)
+
+
+def tables_of_request(path: Path) -> dict[str, Any]:
+    """The tables of a system or scenario file; raises `UsageError`."""
+    if path.suffix.lower() == ".fmu":
+        raise UsageError(
+            f"{path}: expected a system file, which says which FMUs are connected and when each of them steps; "
+            f"`quadcosim connect {shlex.quote(str(path))} --out system.toml` proposes one"
+        )
+    return read_toml(path, "system or scenario file")
 
 
 def request_from_tables(tables: dict[str, Any], folder: Path) -> Request:

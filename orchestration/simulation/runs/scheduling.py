@@ -6,10 +6,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import seconds
-from orchestration.simulation.requests.request import SSP, SSP_ENDINGS, RequestLike, request_from_tables, request_of
+from orchestration.simulation.requests.request import (
+    SSP,
+    SSP_ENDINGS,
+    RequestLike,
+    request_from_tables,
+    request_of,
+    tables_of_request,
+)
 from orchestration.systems.computers.results import Timeline
 from orchestration.systems.schedule.resources import timeline_of
 from orchestration.systems.schedule.responses import Responses, responses_of
@@ -72,7 +78,7 @@ def request_until(request: RequestLike, until: float | None) -> Request:
         return request_of(request)
     if isinstance(request, (str, os.PathLike)) and Path(request).suffix.lower() not in SSP_ENDINGS:
         path = Path(request)
-        tables = read_toml(path, "system or scenario file")
+        tables = tables_of_request(path)
         if SSP not in tables:
             return request_from_tables({**tables, "stop_time": until}, path.parent)
     if isinstance(request, Mapping):

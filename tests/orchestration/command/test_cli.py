@@ -373,6 +373,7 @@ def test_a_run_paused_and_resumed_is_the_same_run(main: Main, here: Path) -> Non
         (["--set", "controller.sample_period=0.1"], "controller.sample_period: expected --period and --clock instead"),
         (["--preset", "arducopter"], "preset arducopter: expected one of px4"),
         (["none.toml"], "none.toml: expected a readable system or scenario file"),
+        (["its plant.fmu"], "`quadcosim connect 'its plant.fmu' --out system.toml` proposes one"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
