@@ -116,7 +116,7 @@ def limits_of(reaches: Sequence[Reach], axis: Quantity, in_seconds: bool, style:
     panels[1].set(xlabel=f"settle up to {axis.title}")
     panels[0].invert_yaxis()
     if in_seconds:
-        panels[2].set(xlabel=f"settle: {axis.name} ·\nbandwidth of the attitude loop [rad]")
+        panels[2].set(xlabel=f"settle: {axis.name} ·\nbandwidth of the\nattitude loop [rad]")
     figure.legend(loc="outside upper center", ncols=2)
     return figure
 

@@ -41,7 +41,7 @@ def lines(
 ) -> Figure:
     """A metric against the first axis, one line for each value of the second; runs that are not good are crosses.
 
-    Diverged runs have no metric and are marked along the lower edge, in a row for each line. `units` are those of
+    Diverged runs have no metric and are marked along the upper edge, in a row for each line. `units` are those of
     metrics and axes.
     """
     figure = style.figure(35.0)
@@ -60,10 +60,10 @@ def lines(
         panel.plot(at[not_good], y[not_good], "x", color=color, markersize=5)
         diverged[color if len(groups) == 1 else tuple(color)] = at[(ordered["outcome"] == DIVERGED).to_numpy()]
     outcomes = {*table["outcome"].dropna()}
-    for word, mark in ((words[0], ".-"), (words[1], "x"), (TERMINATED, "x"), (DIVERGED, "v")):
+    for word, mark in ((words[0], ".-"), (words[1], "x"), (TERMINATED, "x"), (DIVERGED, "^")):
         if word in outcomes:
             color = BLUE if len(groups) == 1 and word == words[0] else GREY
-            panel.plot([], [], mark, color=color, markersize=4 if mark == "v" else None, label=word)
+            panel.plot([], [], mark, color=color, markersize=4 if mark == "^" else None, label=word)
     panel.set(
         xlabel=across.title, ylabel=labels.metric_with_unit(metric, units.get(metric)), yscale=_scale(table[metric])
     )
@@ -80,18 +80,18 @@ def lines(
 
 
 def _mark_diverged(panel: Axes, places: Mapping[str | tuple[float, ...], Floats]) -> None:
-    """Triangles along the lower edge, in a row for each colour, below all other marks."""
+    """Triangles along the upper edge, in a row for each colour, above all other marks."""
     if not places:
         return
     step = min(0.022, 0.25 / len(places))
     share = step * (len(places) + 1)
     scale = panel.yaxis.get_transform()
     low, high = (scale.transform(end) for end in panel.get_ylim())
-    bottom = scale.inverted().transform(low - (high - low) * share / (1.0 - share))
-    panel.set_ylim(bottom=float(np.asarray(bottom)))
+    top = scale.inverted().transform(high + (high - low) * share / (1.0 - share))
+    panel.set_ylim(top=float(np.asarray(top)))
     for row, (color, at) in enumerate(places.items(), start=1):
         across = panel.get_xaxis_transform()
-        panel.plot(at, np.full(len(at), row * step), "v", color=color, markersize=4, transform=across)
+        panel.plot(at, np.full(len(at), 1.0 - row * step), "^", color=color, markersize=4, transform=across)
 
 
 def scatter(
@@ -103,7 +103,7 @@ def scatter(
     units: Mapping[str, str],
     style: Style = SCREEN,
 ) -> Figure:
-    """A metric against each of many axes; crosses for runs that are not good, marks at the lower edge for diverged."""
+    """A metric against each of many axes; crosses for runs that are not good, marks at the upper edge for diverged."""
     figure = style.figure(17.0 * math.ceil(len(axes) / 2))
     panels = figure.subplots(math.ceil(len(axes) / 2), 2, squeeze=False, sharey=True).ravel()
     not_good = ~good_runs(table)
@@ -112,14 +112,14 @@ def scatter(
         for chosen, marker, color in ((table[~not_good], ".", BLUE), (table[not_good], "x", RED)):
             panel.plot(across.of(chosen[axis.name]), chosen[metric], marker, color=color, markersize=4, alpha=0.7)
         down = across.of(table.loc[table["outcome"] == "diverged", axis.name])
-        panel.plot(down, np.full(len(down), 0.02), "v", color=RED, markersize=3, transform=panel.get_xaxis_transform())
+        panel.plot(down, np.full(len(down), 0.98), "^", color=RED, markersize=3, transform=panel.get_xaxis_transform())
         panel.set(xlabel=across.title, yscale=_scale(table[metric]))
         panel.set_xscale(SCALES[axis.scale])
         plain(panel.yaxis)
     for panel in panels[len(axes) :]:
         panel.set_visible(False)
     figure.supylabel(labels.metric_with_unit(metric, units.get(metric)))
-    kinds = zip((*words, TERMINATED, DIVERGED), ("dots", "crosses", "crosses", "below"), strict=True)
+    kinds = zip((*words, TERMINATED, DIVERGED), ("dots", "crosses", "crosses", "above"), strict=True)
     counted = [(int((table["outcome"] == kind).sum()), kind, mark) for kind, mark in kinds]
     counts = [f"{count} {kind} ({mark})" for count, kind, mark in counted if count]
     low, high = wilson(int((~not_good).sum()), len(table))

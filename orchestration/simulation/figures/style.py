@@ -173,7 +173,9 @@ def write(figure: Figure, file: Path | BinaryIO, ending: str) -> None:
     canvas: Any = figure.canvas
     if not hasattr(canvas, f"print_{ending}"):
         canvas = get_registered_canvas_class(ending)(figure)
+    dpi = figure.dpi
     getattr(canvas, f"print_{ending}")(file, metadata=_UNDATED[ending])
+    figure.dpi = dpi  # SVG and PDF leave that of their points
 
 
 @contextmanager

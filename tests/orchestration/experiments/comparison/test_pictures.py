@@ -5,7 +5,9 @@ from collections.abc import Sequence
 from matplotlib.figure import Figure
 
 from orchestration.experiments.comparison.cells import CellSummary, Share
-from orchestration.experiments.comparison.figures import colors_of, shares
+from orchestration.experiments.comparison.figures import Reach, colors_of, limits_of, shares
+from orchestration.experiments.comparison.limits import GridLimit
+from orchestration.simulation.figures.style import SCREEN
 from orchestration.simulation.results.quantities import Quantity
 
 SURVIVORS = {"soon": (20, 3, 0), "later": (20, 14, 0), "never": (20, 20, 20)}
@@ -41,3 +43,18 @@ def test_several_panels_have_their_controllers_in_one_legend() -> None:
     figure = drawn("one", "other")
     assert [text.get_text() for text in figure.legends[0].get_texts()] == [*SURVIVORS, "survive", "settle"]
     assert not any(panel.texts for panel in figure.axes)
+
+
+def test_no_label_of_the_limits_is_cut_off() -> None:
+    fates = [
+        GridLimit(vehicle="v", condition="c", controller="a", fate=fate, share="half", value=0.1, low=0.1, high=None,
+                  bandwidth=20.0)
+        for fate in ("survive", "settle")
+    ]  # fmt: skip
+    reaches = [Reach(name="cascade, no rate derivative", limits=fates, last=0.8)]
+    with SCREEN.applied():
+        figure = limits_of(reaches, Quantity(name="period", unit="ms", factor=1e3), True)
+        figure.draw_without_rendering()
+    for panel in figure.axes:
+        label = panel.xaxis.label.get_window_extent()
+        assert (label.x0, label.x1) == (max(label.x0, 0.0), min(label.x1, figure.bbox.width)), panel.get_xlabel()

@@ -183,20 +183,20 @@ def test_a_metric_has_its_unit_wherever_it_is_drawn() -> None:
     assert scattered.get_supylabel() == "largest position error, last third [m]"
 
 
-def test_diverged_runs_are_marked_in_a_row_for_each_line_below_all_values() -> None:
+def test_diverged_runs_are_marked_in_a_row_for_each_line_above_all_values() -> None:
     runs = pd.concat([table().assign(**{"timing.delay": delay}) for delay in (0.0, 0.01)])
     runs.loc[runs["timing.period"] > 0.03, ["outcome", "ultimate_bound"]] = ["diverged", np.nan]
     axes = (axis("timing.period", 0.01), axis("timing.delay", 0.01))
     figure = figures.lines(judged(runs), axes, "ultimate_bound", WORDS, units={})
     panel = figure.axes[0]
-    rows = [line for line in lines_of(figure) if line.get_marker() == "v" and len(line.get_xdata())]
+    rows = [line for line in lines_of(figure) if line.get_marker() == "^" and len(line.get_xdata())]
     heights = [
         set(panel.transAxes.inverted().transform(line.get_path().transformed(line.get_transform()).vertices)[:, 1])
         for line in rows
     ]
-    lowest = panel.transAxes.inverted().transform(panel.transData.transform((10.0, 0.01)))[1]
+    highest = panel.transAxes.inverted().transform(panel.transData.transform((30.0, 0.03)))[1]
     assert [len(one) for one in heights] == [1, 1]
-    assert 0.0 < min(heights[0]) < min(heights[1]) < lowest
+    assert highest < min(heights[1]) < min(heights[0]) < 1.0
 
 
 def test_without_a_metric_the_first_objective_that_varies_is_drawn(tmp_path: Path) -> None:
@@ -266,7 +266,7 @@ def test_a_line_marks_diverged_runs_without_a_value() -> None:
     runs["outcome"] = ["diverged", *runs["outcome"][1:]]
     runs.loc[runs["outcome"] == "diverged", "ultimate_bound"] = np.nan
     *_, down = lines_of(figures.lines(judged(runs), (axis("timing.period", 0.01),), "ultimate_bound", WORDS, units={}))
-    assert (down.get_marker(), down.get_xdata().tolist()) == ("v", pytest.approx([50.0]))
+    assert (down.get_marker(), down.get_xdata().tolist()) == ("^", pytest.approx([50.0]))
 
 
 def test_a_map_of_good_runs_has_no_boundary() -> None:

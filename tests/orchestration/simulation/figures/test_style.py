@@ -106,3 +106,9 @@ def test_what_cannot_be_drawn_is_reported(flags: dict[str, Any], expected: str) 
 def test_a_format_that_is_not_known_is_no_style() -> None:
     with pytest.raises(UsageError, match="format gif: expected one of png, svg, pdf"):
         Style(formats=("gif",))
+
+
+def test_a_picture_is_as_sharp_after_any_other_format(tmp_path: Path) -> None:
+    paths = save({"a": drawn(STYLES["screen"])}, tmp_path, replace(STYLES["screen"], formats=("svg", "pdf", "png")))
+    with Image.open(paths[-1]) as image:
+        assert image.info["dpi"] == pytest.approx((200.0, 200.0), abs=0.1)
