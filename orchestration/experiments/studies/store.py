@@ -11,24 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from orchestration.experiments.studies.store_columns import (
-    DESIGN_WIDTH,
-    OBJECTIVES,
-    RUN,
-    SETTINGS,
-    TEXTS,
-    metrics_with,
-    tables_for,
-)
-from orchestration.experiments.studies.store_integrity import (
-    checksum,
-    error_text,
-    expect_sound,
-    expect_written,
-    objectives_of,
-    schema_of,
-    store_errors,
-)
+from orchestration.experiments.studies import store_columns as columns
+from orchestration.experiments.studies import store_integrity as integrity
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.simulation.workers.row import Row
 
@@ -57,19 +41,19 @@ class Store:
         self.path = path
         self._connection = connection
         self._is_whole = False
-        self.metrics = metrics_with(objectives)
+        self.metrics = columns.metrics_with(objectives)
         """Metrics of a row"""
-        self.columns = ("design_index", *RUN, *self.metrics)
+        self.columns = ("design_index", *columns.RUN, *self.metrics)
         """Columns of the table of runs, besides the axes"""
 
     def about(self) -> dict[str, str]:
         """The entries that describe the study, by name."""
-        with store_errors(self.path):
+        with integrity.store_errors(self.path):
             return dict(self._connection.execute("SELECT name, value FROM about"))
 
     def describe(self, about: Mapping[str, str], design: Iterable[DesignPoint] | None = None) -> None:
         """Write entries that describe the study, and the points of its design; rows of runs remain."""
-        with store_errors(self.path), self._connection:
+        with integrity.store_errors(self.path), self._connection:
             self._insert("about", about.items())
             if design is not None:
                 self._connection.execute("DELETE FROM design")
@@ -96,13 +80,13 @@ class Store:
     def _pairs(self, query: str, *values: bool) -> dict[Any, Any]:
         """The two columns of a query over a store that is whole, the second by the first."""
         self.expect_whole()
-        with store_errors(self.path):
+        with integrity.store_errors(self.path):
             return dict(self._connection.execute(query, values))
 
     def add(self, rows: Iterable[Row]) -> None:
         """Write rows in one transaction, replacing rows of the same runs."""
         rows = list(rows)
-        with store_errors(self.path), self._connection:
+        with integrity.store_errors(self.path), self._connection:
             self._insert("design", ((row.index, row.key, json.dumps(row.settings)) for row in rows))
             self._insert("runs", (_values(row, self.metrics) for row in rows))
 
@@ -111,7 +95,7 @@ class Store:
         for block in self.blocks():
             for values in zip(*block.values(), strict=True):
                 row = dict(zip(block, values, strict=True))
-                yield {**row, SETTINGS: json.loads(row[SETTINGS])}
+                yield {**row, columns.SETTINGS: json.loads(row[columns.SETTINGS])}
 
     def blocks(self, most: int = 20_000) -> Iterator[dict[str, tuple[Any, ...]]]:
         """All rows sorted by design index, at most `most` at a time, as values by column.
@@ -120,17 +104,17 @@ class Store:
         at the end, if anything is not as it was written.
         """
         runs, points = set[str](), 0
-        with store_errors(self.path):
+        with integrity.store_errors(self.path):
             cursor = self._connection.execute(
                 "SELECT design.*, runs.* FROM design JOIN runs USING (key) ORDER BY design_index"
             )
             while rows := cursor.fetchmany(most):
-                expect_written(self.path, "design", (row[:DESIGN_WIDTH] for row in rows))
-                expect_written(self.path, "runs", (row[DESIGN_WIDTH:] for row in rows))
+                integrity.expect_written(self.path, "design", (row[: columns.DESIGN_WIDTH] for row in rows))
+                integrity.expect_written(self.path, "runs", (row[columns.DESIGN_WIDTH :] for row in rows))
                 index, _, settings, _, *values, _ = zip(*rows, strict=True)
                 points += len(index)
                 runs.update(values[0])
-                yield dict(zip((*self.columns, SETTINGS), (index, *values, settings), strict=True))
+                yield dict(zip((*self.columns, columns.SETTINGS), (index, *values, settings), strict=True))
         if (points, len(runs)) != (self._number("design"), self._number("runs")):
             self.expect_whole()  # rows without counterpart were not read, as happens with a damaged key
 
@@ -138,13 +122,13 @@ class Store:
         """Raise `QuadcosimError` unless every row has its checksum; checks once."""
         if self._is_whole:
             return
-        with store_errors(self.path):
+        with integrity.store_errors(self.path):
             for table in ("design", "runs"):
-                expect_written(self.path, table, self._connection.execute(f"SELECT * FROM {table}"))
+                integrity.expect_written(self.path, table, self._connection.execute(f"SELECT * FROM {table}"))
         self._is_whole = True
 
     def _number(self, table: str) -> int:
-        with store_errors(self.path):
+        with integrity.store_errors(self.path):
             (number,) = self._connection.execute(f"SELECT count(*) FROM {table}").fetchone()
         return int(number)
 
@@ -154,28 +138,28 @@ class Store:
 
 def _create_tables(connection: sqlite3.Connection, objectives: list[str]) -> None:
     """Create all tables in one transaction, unless they exist; unused tables for other objectives are replaced."""
-    schema, existing = schema_of(connection), objectives_of(connection)
+    schema, existing = integrity.schema_of(connection), integrity.objectives_of(connection)
     if existing == objectives or (schema and not _is_unused(connection, schema, existing)):
         return
     with connection:
         connection.execute("BEGIN IMMEDIATE")  # else each of these statements is a separate transaction
         for table in schema:
             connection.execute(f"DROP TABLE {table}")
-        for statement in tables_for(objectives).values():
+        for statement in columns.tables_for(objectives).values():
             connection.execute(statement)
-        _insert(connection, "about", [(OBJECTIVES, json.dumps(objectives))])
+        _insert(connection, "about", [(columns.OBJECTIVES, json.dumps(objectives))])
 
 
 def _is_unused(connection: sqlite3.Connection, schema: Mapping[str, str], objectives: list[str] | None) -> bool:
     """Whether a database is a store without a description of a study and without rows."""
-    if objectives is None or schema != tables_for(objectives):
+    if objectives is None or schema != columns.tables_for(objectives):
         return False
     query = "SELECT EXISTS (SELECT 1 FROM about WHERE name != ?) OR EXISTS (SELECT 1 FROM runs)"
-    return not connection.execute(query, (OBJECTIVES,)).fetchone()[0]
+    return not connection.execute(query, (columns.OBJECTIVES,)).fetchone()[0]
 
 
 def _insert(connection: sqlite3.Connection, table: str, rows: Iterable[tuple[Any, ...]]) -> None:
-    complete = ((*row, checksum(row)) for row in rows)
+    complete = ((*row, integrity.checksum(row)) for row in rows)
     first = next(complete, None)
     if first is not None:
         marks = ", ".join("?" * len(first))
@@ -192,7 +176,7 @@ def open_for_writing(path: Path, objectives: Iterable[str]) -> Iterator[Store]:
     """
     import filelock
 
-    with store_errors(path):
+    with integrity.store_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         lock = filelock.FileLock(f"{path}.lock", timeout=0)
         try:
@@ -200,17 +184,17 @@ def open_for_writing(path: Path, objectives: Iterable[str]) -> Iterator[Store]:
         except filelock.Timeout:
             raise QuadcosimError(f"{path}: another sweep is writing into it; expected to be the only one") from None
     try:
-        with store_errors(path):
+        with integrity.store_errors(path):
             connection = sqlite3.connect(path, timeout=10.0)
         with closing(connection):
-            with store_errors(path):
+            with integrity.store_errors(path):
                 connection.execute("PRAGMA journal_mode=WAL")
                 connection.execute("PRAGMA synchronous=NORMAL")
                 _create_tables(connection, list(objectives))
-                opened = Store(path, connection, expect_sound(path, connection))
+                opened = Store(path, connection, integrity.expect_sound(path, connection))
             opened.expect_whole()
             yield opened
-            with store_errors(path):
+            with integrity.store_errors(path):
                 connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     finally:
         lock.release()
@@ -229,23 +213,23 @@ def open_for_reading(path: Path) -> Iterator[Store]:
             connection = _read_only(path)
         except sqlite3.OperationalError:  # WAL writes beside the file, so open a copy
             copy = Path(folder) / path.name
-            with store_errors(path):
+            with integrity.store_errors(path):
                 for suffix in ("", "-wal"):
                     if Path(f"{path}{suffix}").is_file():
                         shutil.copyfile(f"{path}{suffix}", f"{copy}{suffix}")
                 connection = _read_only(copy)
         except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
-            raise QuadcosimError(f"{path}: expected the store of a study: {error_text(error)}") from error
+            raise QuadcosimError(f"{path}: expected the store of a study: {integrity.error_text(error)}") from error
         with closing(connection):
-            with store_errors(path):
-                opened = Store(path, connection, expect_sound(path, connection))
+            with integrity.store_errors(path):
+                opened = Store(path, connection, integrity.expect_sound(path, connection))
             yield opened
 
 
 def _read_only(path: Path) -> sqlite3.Connection:
     connection = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True, timeout=10.0)
     try:
-        schema_of(connection)
+        integrity.schema_of(connection)
     except BaseException:
         connection.close()
         raise
@@ -256,7 +240,7 @@ def _values(row: Row, metrics: Iterable[str]) -> tuple[Any, ...]:
     measured = {name: (row.metrics or {}).get(name) for name in metrics}
     return (
         row.key, row.status, row.message, row.seed, _real(row.duration), row.machine,
-        *(_text(value) if name in TEXTS else _real(value) for name, value in measured.items()),
+        *(_text(value) if name in columns.TEXTS else _real(value) for name, value in measured.items()),
     )  # fmt: skip
 
 

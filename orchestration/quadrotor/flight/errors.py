@@ -10,18 +10,8 @@ from matplotlib.figure import Figure
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.quadrotor.scenarios.measures import desired
 from orchestration.quadrotor.scenarios.wiring import POSITION, components
+from orchestration.simulation.figures import lines
 from orchestration.simulation.figures.drawn_run import DrawnRun
-from orchestration.simulation.figures.lines import (
-    TIME,
-    clip_peaks,
-    legend_of_runs,
-    logarithmic,
-    name_runs,
-    positive,
-    quantity,
-    set_time_axis,
-    wrapped,
-)
 from orchestration.simulation.figures.palette import BLUE, GREEN, RED
 from orchestration.simulation.figures.style import Style
 
@@ -45,12 +35,12 @@ def errors(runs: Sequence[DrawnRun], style: Style) -> Figure:
         for run in runs:
             values = error.of(run)
             if values is not None:
-                norm = positive(np.linalg.norm(values, axis=1))
+                norm = lines.positive(np.linalg.norm(values, axis=1))
                 panel.plot(run.time, norm, color=run.color, linestyle=run.dashes, label=run.name)
-        logarithmic(panel)
-        panel.set_ylabel(wrapped(quantity(f"{error.name}, norm", error.unit)))
+        lines.logarithmic(panel)
+        panel.set_ylabel(lines.wrapped(lines.quantity(f"{error.name}, norm", error.unit)))
         panel.minorticks_off()
-        set_time_axis(panel, runs)
+        lines.set_time_axis(panel, runs)
     return figure
 
 
@@ -72,10 +62,10 @@ def draw_components(panel: Axes, run: DrawnRun, error: Error, style: Style, *, c
     assert values is not None
     for k, (axis, color, dashes) in enumerate(AXES):
         panel.plot(run.time, values[:, k], color=color, linestyle=dashes, label=axis)
-    panel.set_ylabel(wrapped(quantity(error.name, error.unit)))
-    set_time_axis(panel, [run])
+    panel.set_ylabel(lines.wrapped(lines.quantity(error.name, error.unit)))
+    lines.set_time_axis(panel, [run])
     if clips:
-        clip_peaks(panel, [(run.time, values[:, k]) for k in range(3)], error.unit, style)
+        lines.clip_peaks(panel, [(run.time, values[:, k]) for k in range(3)], error.unit, style)
 
 
 def _overlaid(runs: Sequence[DrawnRun], style: Style) -> Figure:
@@ -88,11 +78,11 @@ def _overlaid(runs: Sequence[DrawnRun], style: Style) -> Figure:
             drawn = [(run, values[:, k]) for run in runs if (values := error.of(run)) is not None]
             for run, values in drawn:
                 panel.plot(run.time, values, color=run.color, linestyle=run.dashes, label=run.name)
-            set_time_axis(panel, runs)
-            panel.set_ylabel(wrapped(quantity(f"{error.name} {'xyz'[k]}", error.unit), 18))
+            lines.set_time_axis(panel, runs)
+            panel.set_ylabel(lines.wrapped(lines.quantity(f"{error.name} {'xyz'[k]}", error.unit), 18))
             if i == len(available) - 1:
-                panel.set_xlabel(TIME)
-    legend_of_runs(figure, runs, style)
+                panel.set_xlabel(lines.TIME)
+    lines.legend_of_runs(figure, runs, style)
     return figure
 
 
@@ -106,8 +96,8 @@ def _panels(runs: Sequence[DrawnRun], style: Style) -> tuple[Figure, list[tuple[
     for panel in panels[len(available) :]:
         panel.set_visible(False)
     for panel in panels[max(0, len(available) - columns) : len(available)]:
-        panel.set_xlabel(TIME)
-    name_runs(figure, runs, style)
+        panel.set_xlabel(lines.TIME)
+    lines.name_runs(figure, runs, style)
     return figure, list(zip(panels, available))
 
 

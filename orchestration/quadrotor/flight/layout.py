@@ -5,17 +5,8 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from fmu_kit.frames import Frame
 from orchestration.experiments.report.model import Line, Panel, Scene
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.quadrotor.scenarios import wiring
 from orchestration.quadrotor.scenarios.measures import position_error
-from orchestration.quadrotor.scenarios.wiring import (
-    ANGULAR_VELOCITY,
-    COMMAND,
-    ENERGY,
-    POSITION,
-    POSITION_REFERENCE,
-    QUATERNION,
-    VELOCITY,
-    components,
-)
 from orchestration.systems.system.model import System
 
 POSITION_ERROR = "position error"
@@ -31,16 +22,16 @@ def _of_plant(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(f"plant.{name}" for name in names)
 
 
-PLACE, ATTITUDE = _of_plant(POSITION), _of_plant(QUATERNION)
-DESIRED = tuple(f"controller.{name}" for name in components("desired_quaternion", "xyzw"))
+PLACE, ATTITUDE = _of_plant(wiring.POSITION), _of_plant(wiring.QUATERNION)
+DESIRED = tuple(f"controller.{name}" for name in wiring.components("desired_quaternion", "xyzw"))
 """Q_d as of the last sample, of controllers with this output"""
-THRUST = f"plant.{COMMAND[0]}"
+THRUST, TORQUE = f"plant.{wiring.COMMAND[0]}", _of_plant(wiring.components("torque"))
 
 
 class FlightLayout:
     """The layout of runs with the columns of a quadrotor."""
 
-    compact = (*_of_plant((*POSITION, *QUATERNION, *ANGULAR_VELOCITY, *COMMAND)), *DESIRED)
+    compact = (*_of_plant((*wiring.POSITION, *wiring.QUATERNION, *wiring.ANGULAR_VELOCITY, *wiring.COMMAND)), *DESIRED)
     logarithmic = (POSITION_ERROR,)
 
     def fits(self, columns: Collection[str]) -> bool:
@@ -66,7 +57,7 @@ class FlightLayout:
                 unit="m",
                 lines=(
                     *_vector(PLACE, "xyz"),
-                    *(_vector(POSITION_REFERENCE, OF_REFERENCE, reference=True) if has_reference else ()),
+                    *(_vector(wiring.POSITION_REFERENCE, OF_REFERENCE, reference=True) if has_reference else ()),
                 ),
             ),
             Panel(
@@ -82,11 +73,11 @@ class FlightLayout:
                 ),
             ),
             Panel(title="thrust", unit="N", lines=(Line(column=THRUST, label="thrust", held=True),)),
-            Panel(title="torque", unit="N·m", lines=(*_vector(_of_plant(components("torque")), "xyz", held=True),)),
-            Panel(title="angular velocity", unit="rad/s", lines=(*_vector(_of_plant(ANGULAR_VELOCITY), "xyz"),)),
-            Panel(title="velocity", unit="m/s", lines=(*_vector(_of_plant(VELOCITY), "xyz"),), shown=False),
+            Panel(title="torque", unit="N·m", lines=(*_vector(TORQUE, "xyz", held=True),)),
+            Panel(title="angular velocity", unit="rad/s", lines=(*_vector(_of_plant(wiring.ANGULAR_VELOCITY), "xyz"),)),
+            Panel(title="velocity", unit="m/s", lines=(*_vector(_of_plant(wiring.VELOCITY), "xyz"),), shown=False),
             Panel(
-                title="energy", unit="J", lines=(Line(column=f"controller.{ENERGY}", label="L", held=True),),
+                title="energy", unit="J", lines=(Line(column=f"controller.{wiring.ENERGY}", label="L", held=True),),
                 logarithmic=True, shown=False,
             ),
         ]  # fmt: skip
@@ -99,7 +90,7 @@ class FlightLayout:
         return Scene(
             position=(PLACE[0], PLACE[1], PLACE[2]),
             quaternion=(ATTITUDE[0], ATTITUDE[1], ATTITUDE[2], ATTITUDE[3]),
-            reference=(POSITION_REFERENCE[0], POSITION_REFERENCE[1], POSITION_REFERENCE[2])
+            reference=(wiring.POSITION_REFERENCE[0], wiring.POSITION_REFERENCE[1], wiring.POSITION_REFERENCE[2])
             if _has_reference(columns)
             else None,
             desired=(DESIRED[0], DESIRED[1], DESIRED[2], DESIRED[3]) if {*DESIRED} <= {*columns} else None,
@@ -109,7 +100,7 @@ class FlightLayout:
 
 
 def _has_reference(columns: Collection[str]) -> bool:
-    return all(name in columns for name in POSITION_REFERENCE)
+    return all(name in columns for name in wiring.POSITION_REFERENCE)
 
 
 def _vector(

@@ -13,29 +13,14 @@ from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD, USE_R
 from orchestration.foundation.basics.bisection import Range
 from orchestration.foundation.basics.errors import UsageError, no_such_key, shown
 from orchestration.foundation.basics.records import record
+from orchestration.quadrotor.scenarios import translation, wiring
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice, Record
 from orchestration.quadrotor.scenarios.initial_conditions import initial_conditions
 from orchestration.quadrotor.scenarios.nominal_model import axis_mismatch, model_mismatch
 from orchestration.quadrotor.scenarios.quantities import range_of
 from orchestration.quadrotor.scenarios.scenario_text import text_of
 from orchestration.quadrotor.scenarios.timing import Timing
-from orchestration.quadrotor.scenarios.translation import (
-    BY_MEASUREMENT,
-    TIMING,
-    DisturbanceChoice,
-    ReferenceChoice,
-    disturbed,
-    in_scenario_terms,
-    paths_of,
-    quadrotor,
-    reference_source,
-)
 from orchestration.quadrotor.scenarios.vehicle import load_vehicle
-from orchestration.quadrotor.scenarios.wiring import (
-    DEFAULT_CONTROLLER,
-    DEFAULT_PLANT,
-    RIGID_BODY,
-)
 from orchestration.simulation.results.quantities import setting
 from orchestration.systems.system.component import Parameter
 from orchestration.systems.system.description import describe_varying
@@ -69,18 +54,18 @@ class Scenario:
     vehicle: Annotated[Vehicle | None, BeforeValidator(_loaded_vehicle)] = None
     """The vehicle, of `load_vehicle`, by name or by the path of its file; its parameters hold unless `controller` or
     `plant` sets them."""
-    controller: FmuChoice = field(default_factory=lambda: FmuChoice(fmu=DEFAULT_CONTROLLER))
+    controller: FmuChoice = field(default_factory=lambda: FmuChoice(fmu=wiring.DEFAULT_CONTROLLER))
     """The FMU of the controller and its parameters: in a file `fmu`, its name or path, and parameters by their names in
     the FMU."""
-    plant: FmuChoice = field(default_factory=lambda: FmuChoice(fmu=DEFAULT_PLANT))
+    plant: FmuChoice = field(default_factory=lambda: FmuChoice(fmu=wiring.DEFAULT_PLANT))
     """Likewise of the plant."""
     timing: Timing = field(default_factory=Timing)
     """The digital clock between them; in a file `loss` sets both losses, `preset` the rate and latency of a real
     flight stack."""
-    reference: ReferenceChoice = field(default_factory=ReferenceChoice)
+    reference: translation.ReferenceChoice = field(default_factory=translation.ReferenceChoice)
     """The reference: in a file `name` of a motion or `file` of way-points, and its parameters; default: the trajectory
     built into the controller."""
-    disturbance: DisturbanceChoice = field(default_factory=DisturbanceChoice)
+    disturbance: translation.DisturbanceChoice = field(default_factory=translation.DisturbanceChoice)
     """Forces beside the built-in wind: in a file `name` of gusts or `file`, `drag`, `interpolation`, and parameters of
     the gusts."""
     record: Record = field(default_factory=Record)
@@ -170,27 +155,27 @@ class Scenario:
         this = self.resolved()
         sides = {"plant": this.plant, "controller": this.controller}
         changes: dict[str, Any] = {"stop_time": this.stop_time, "seed": this.seed}
-        for key, paths in TIMING.items():
+        for key, paths in translation.TIMING.items():
             changes |= {path: getattr(this.timing, key) for path in paths}
-        for kind in BY_MEASUREMENT:
+        for kind in translation.BY_MEASUREMENT:
             changes |= {f"connections.measurement.{kind}.{name}": v for name, v in getattr(this.timing, kind).items()}
         for side, choice in sides.items():
             changes[f"components.{side}.fmu"] = choice.fmu
             changes |= {f"components.{side}.parameters.{name}": value for name, value in choice.parameters.items()}
             changes[f"components.{side}.record"] = getattr(this.record, side)
-        reference = reference_source(this.reference)
+        reference = translation.reference_source(this.reference)
         changes |= {f"sources.reference.{key}": value for key, value in reference.items()}
         if not reference and this.controller.parameters.get(USE_REFERENCE_INPUTS) is True:
             raise UsageError(f"controller.{USE_REFERENCE_INPUTS}: expected [reference] name or file = … to feed them")
-        return disturbed(changed(quadrotor(), changes), this.disturbance)
+        return translation.disturbed(changed(translation.quadrotor(), changes), this.disturbance)
 
     def in_own_terms(self, text: str) -> str:
         """`text` with the paths of the system replaced by the names of a scenario."""
-        return in_scenario_terms(text)
+        return translation.in_scenario_terms(text)
 
     def paths_of(self, target: str) -> tuple[str, ...]:
         """The paths of `timing.KEY`, `controller.NAME`, `plant.NAME` and so on; raises `UsageError` for others."""
-        return paths_of(target)
+        return translation.paths_of(target)
 
     def range_of(self, quantity: str) -> Range | None:
         """The search range of `period`, `delay`, `jitter` or `loss`; None for another name."""
@@ -207,7 +192,7 @@ class Scenario:
         texts = [] if of_axes is None else [of_axes]
         if not self.model_mismatch:
             sides = [
-                {name: parameters[f"{side}.{name}"] for name in RIGID_BODY if f"{side}.{name}" in parameters}
+                {name: parameters[f"{side}.{name}"] for name in wiring.RIGID_BODY if f"{side}.{name}" in parameters}
                 for side in ("plant", "controller")
             ]
             of_model = model_mismatch(*sides)

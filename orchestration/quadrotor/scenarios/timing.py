@@ -6,16 +6,8 @@ from typing import ClassVar
 from orchestration.foundation.basics.errors import shown
 from orchestration.foundation.basics.records import record
 from orchestration.foundation.basics.times import is_at_least
+from orchestration.systems.system import distribution
 from orchestration.systems.system.choices import Clock, Hold, Order, Spread
-from orchestration.systems.system.distribution import (
-    Varying,
-    highest,
-    lowest,
-    reads_file,
-    require_losses,
-    require_spread,
-    require_varying,
-)
 from orchestration.systems.system.requirements import (
     is_finite,
     require,
@@ -50,20 +42,20 @@ class Timing:
     clock: Clock = "master"
     """The clock by which the controller samples: that of the master, or of the FMU, by its parameters sample_period and
     sample_offset."""
-    delay: Varying = 0.0
+    delay: distribution.Varying = 0.0
     """The time d from a sample to the application of its command [s], or its distribution; it may exceed the period."""
-    delay_jitter: Varying = 0.0
+    delay_jitter: distribution.Varying = 0.0
     """The largest random addition J_d to the delay of each command [s], or the distribution of the addition
     itself."""
-    jitter: Varying = 0.0
+    jitter: distribution.Varying = 0.0
     """The largest lateness J of a sample [s], drawn for each, or the distribution of the lateness itself; it is less
     than the period."""
     jitter_distribution: Spread = "uniform"
     """The distribution over [0, J], and over [0, J_d], of what is given by its largest value; normal is centred at J/2
     with standard deviation J/6, cut to the range."""
-    measurement_loss: Varying = 0.0
+    measurement_loss: distribution.Varying = 0.0
     """The probability that a measurement is lost, or values of 0 and 1, as of a trace: 1 for a lost one."""
-    command_loss: Varying = 0.0
+    command_loss: distribution.Varying = 0.0
     """The probability that a command is lost, or likewise."""
     burst_length: float | None = None
     """The mean number of losses in a row (Gilbert-Elliott); default: losses are independent."""
@@ -80,15 +72,15 @@ class Timing:
             value = getattr(self, name)
             require(is_at_least(value, ratio), _PLACE + name, value, "at least a nanosecond")
         require_not_negative(self, "offset", place=_PLACE)
-        require_varying(self, "delay", "delay_jitter", "jitter", place=_PLACE)
-        require_spread(self.jitter_distribution, self.jitter, self.delay_jitter, place=_PLACE)
-        require_losses(self, self.burst_length, "measurement_loss", "command_loss", place=_PLACE)
+        distribution.require_varying(self, "delay", "delay_jitter", "jitter", place=_PLACE)
+        distribution.require_spread(self.jitter_distribution, self.jitter, self.delay_jitter, place=_PLACE)
+        distribution.require_losses(self, self.burst_length, "measurement_loss", "command_loss", place=_PLACE)
         for what in ("noise", "quantisation"):
             for variable, value in getattr(self, what).items():
                 require(is_finite(value) and value >= 0.0, f"{_PLACE}{what} of {variable}", value, "zero or positive")
         longest = self.period / self.clock_ratio
-        if not reads_file(self.jitter):
-            most = highest(self.jitter)
+        if not distribution.reads_file(self.jitter):
+            most = distribution.highest(self.jitter)
             require(most < longest, f"{_PLACE}jitter", most, f"less than the period of {longest:g} s")
         if self.clock == "fmu":
             require_own_clock(self, _PLACE)
@@ -100,7 +92,7 @@ class Timing:
             return (f"timing.offset = {shown(self.offset)}: {end}, so the controller never samples",)
         if (self.offset + self.period) / self.clock_ratio >= stop_time:
             return (f"timing.period = {shown(self.period)}: {end}, so the controller samples only once",)
-        if (least := lowest(self.delay)) >= stop_time:
+        if (least := distribution.lowest(self.delay)) >= stop_time:
             return (f"timing.delay = {shown(least)}: {end}, so no command arrives",)
         return ()
 

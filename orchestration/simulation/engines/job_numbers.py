@@ -7,18 +7,8 @@ import numpy as np
 from orchestration.foundation.basics.errors import UsageError, expected_name
 from orchestration.foundation.basics.times import seconds
 from orchestration.systems.computers.results import Frames, Jobs, Timeline
+from orchestration.systems.expressions import syntax
 from orchestration.systems.expressions.over_run import Recorded, evaluate, job_terms
-from orchestration.systems.expressions.syntax import (
-    Call,
-    JobMeasure,
-    Name,
-    Node,
-    Operation,
-    Sampled,
-    children,
-    parse_job_measures,
-    text,
-)
 from orchestration.systems.schedule.resources import timeline_of
 from orchestration.systems.system.model import System, expressions
 
@@ -36,35 +26,35 @@ def job_numbers(system: System) -> dict[str, float]:
     timeline = timeline_of(system)
     values = {}
     for name in terms:
-        call = parse_job_measures(name)
-        assert isinstance(call, Call)
+        call = syntax.parse_job_measures(name)
+        assert isinstance(call, syntax.Call)
         value = evaluate({name: _at_jobs(call)}, lambda call=call: iter([_recorded(timeline, call)]))[name]  # type: ignore[misc]
         values[name] = np.nan if value is None else value
     return values
 
 
-def _at_jobs(call: Call) -> Call:
+def _at_jobs(call: syntax.Call) -> syntax.Call:
     """The same term of a signal that has a value for each job."""
     argument, *rest = call.arguments
-    return Call(call.function, (Sampled(_JOBS, _named(argument)), *rest))
+    return syntax.Call(call.function, (syntax.Sampled(_JOBS, _named(argument)), *rest))
 
 
-def _named(node: Node) -> Node:
+def _named(node: syntax.Node) -> syntax.Node:
     match node:
-        case JobMeasure():
-            return Name(text(node))
-        case Operation(sign, operands):
-            return Operation(sign, tuple(map(_named, operands)))
-        case Call(function, arguments):
-            return Call(function, tuple(map(_named, arguments)))
+        case syntax.JobMeasure():
+            return syntax.Name(syntax.text(node))
+        case syntax.Operation(sign, operands):
+            return syntax.Operation(sign, tuple(map(_named, operands)))
+        case syntax.Call(function, arguments):
+            return syntax.Call(function, tuple(map(_named, arguments)))
     return node
 
 
-def _recorded(timeline: Timeline, call: Call) -> Recorded:
+def _recorded(timeline: Timeline, call: syntax.Call) -> Recorded:
     quantities = [*dict.fromkeys(_of_jobs(call))]
     if len(quantities) > 1:
-        both = " and ".join(map(text, quantities))
-        raise UsageError(f"{text(call)}: expected jobs of one task in one way, not {both}")
+        both = " and ".join(map(syntax.text, quantities))
+        raise UsageError(f"{syntax.text(call)}: expected jobs of one task in one way, not {both}")
     (of,) = quantities
     jobs = _jobs(timeline, of)
     if of.what == "response":
@@ -73,24 +63,24 @@ def _recorded(timeline: Timeline, call: Call) -> Recorded:
         times, values = jobs.deadline[jobs.due], jobs.missed[jobs.due].astype(np.float64)
     return Recorded(
         time=seconds(times),
-        signals={text(of): values},
+        signals={syntax.text(of): values},
         arrivals={_JOBS: np.ones(len(times), dtype=np.bool_)},
         stop_time=seconds(timeline.stop),
     )
 
 
-def _of_jobs(node: Node) -> Iterable[JobMeasure]:
-    if isinstance(node, JobMeasure):
+def _of_jobs(node: syntax.Node) -> Iterable[syntax.JobMeasure]:
+    if isinstance(node, syntax.JobMeasure):
         yield node
-    for child in children(node):
+    for child in syntax.children(node):
         yield from _of_jobs(child)
 
 
-def _jobs(timeline: Timeline, of: JobMeasure) -> Jobs | Frames:
+def _jobs(timeline: Timeline, of: syntax.JobMeasure) -> Jobs | Frames:
     """The jobs of a task, or the frames of a message, by its name alone where that is unique."""
     every: dict[str, Jobs | Frames] = {**timeline.jobs, **timeline.frames}
     matching = [name for name in every if of.task in (name, name.partition(".")[2])]
     if of.task in every or len(matching) == 1:
         return every[of.task if of.task in every else matching[0]]
     expected = f"one of {', '.join(matching)}" if matching else expected_name(of.task, list(every))
-    raise UsageError(f"{text(of)}: {expected}")
+    raise UsageError(f"{syntax.text(of)}: {expected}")

@@ -10,13 +10,7 @@ from typing import Any, Literal, Protocol, cast, get_args
 
 import numpy as np
 
-from orchestration.foundation.basics.errors import (
-    QuadcosimError,
-    SimulatorError,
-    StoppedStepError,
-    UsageError,
-    expected_name,
-)
+from orchestration.foundation.basics import errors
 from orchestration.foundation.basics.simulator import Booleans, Floats, Simulator
 from orchestration.foundation.basics.times import nanoseconds, seconds
 from orchestration.foundation.recording.recording import Chunk, Recorder
@@ -87,7 +81,7 @@ class Master:
         self.board, self.columns, self.recorder = running.board, running.columns, recorder
         self.divergence: str | None = None
         self.divergence_time: int | None = None
-        self.failure: SimulatorError | None = None
+        self.failure: errors.SimulatorError | None = None
         """the error of an FMU that has ended the run after its first row; it has been raised"""
         self._first_exchange = (
             [(i,) for i in range(len(running.channels))] if first_exchange is None else first_exchange
@@ -131,7 +125,7 @@ class Master:
         """Initialise with the first exchange, in the order of dependencies: never lost, late or noisy."""
         try:
             self._exchange_first()
-        except (Diverged, SimulatorError) as error:
+        except (Diverged, errors.SimulatorError) as error:
             self._ended(error)
 
     def run(self, *, pause_at: int | None = None, progress: Callable[[float], None] | None = None) -> bool:
@@ -149,8 +143,8 @@ class Master:
         try:
             if not self._loop.run(pause_at, progress):
                 return False
-        except (Diverged, Terminated, SimulatorError) as error:
-            if isinstance(error, SimulatorError) and not isinstance(error, StoppedStepError):
+        except (Diverged, Terminated, errors.SimulatorError) as error:
+            if isinstance(error, errors.SimulatorError) and not isinstance(error, errors.StoppedStepError):
                 error.timed(seconds(self.now))
             self._ended(error)
         if self.interrupted_at is not None:
@@ -196,7 +190,7 @@ class Master:
         """End the run by divergence or by an FMU that ends it; any other failure of an FMU is raised."""
         if isinstance(error, Terminated):
             self._running.termination = str(error)
-        elif isinstance(error, SimulatorError) and not error.divergence:
+        elif isinstance(error, errors.SimulatorError) and not error.divergence:
             if self.backlog.has_row():
                 self.failure = error
                 self._running.now = self._running.interrupted_at = nanoseconds(self.board.row[0])
@@ -243,7 +237,7 @@ class Master:
 
         if initial.exchange(group, pass_on).any():
             ends = "; ".join(f"{', '.join(connections[i].start)} -> {', '.join(connections[i].end)}" for i in group)
-            raise SimulatorError(
+            raise errors.SimulatorError(
                 f"initialisation: no values found around the loop {ends} after {initial.ITERATIONS} exchanges"
             )
 
@@ -256,7 +250,7 @@ Engine = Literal["python", "compiled"]
 def engine_named(name: str | None, *others: str) -> Engine | None:
     """The engine of that name; raises `UsageError` for an unknown name, listing `others` too."""
     if name is not None and name not in get_args(Engine):
-        raise UsageError(f"--engine {name}: {expected_name(name, [*get_args(Engine), *others])}")
+        raise errors.UsageError(f"--engine {name}: {errors.expected_name(name, [*get_args(Engine), *others])}")
     return cast(Engine | None, name)
 
 
@@ -279,5 +273,5 @@ def create_master(
     if engine == "python" or (engine is None and reason):
         return Master(system, simulators, **others)
     if reason:
-        raise QuadcosimError(f"--engine compiled is not available: {reason}")
+        raise errors.QuadcosimError(f"--engine compiled is not available: {reason}")
     return Master(system, simulators, loop=partial(CompiledLoop, allocate=allocate), **others)

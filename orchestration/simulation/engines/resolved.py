@@ -13,19 +13,7 @@ from orchestration.components.fmi.model import NUMERIC, Model, read_model
 from orchestration.foundation.basics.errors import UsageError, at_place
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import Grid, exact_nanoseconds
-from orchestration.simulation.engines.sources import (
-    BuiltIn,
-    ConstantValues,
-    HeldValues,
-    Moving,
-    Scaled,
-    SourceValues,
-    TableValues,
-    WhiteNoise,
-    gusts,
-    motion_values,
-    spline_values,
-)
+from orchestration.simulation.engines import sources
 from orchestration.simulation.results import objectives
 from orchestration.simulation.results.units import ColumnInfo, column_infos, units
 from orchestration.systems.expressions.over_run import job_terms
@@ -84,7 +72,7 @@ class ResolvedRequest(CheckedSystem):
         """The unit and the description of each column."""
         return column_infos(self.system, self.models, ("time", *signals_of(self.system, self.models)))
 
-    def sources(self, streams: Streams) -> dict[str, SourceValues]:
+    def sources(self, streams: Streams) -> dict[str, sources.SourceValues]:
         """The values of the sources in a run, by name."""
         return {name: source_values(self.system, name, self.parameters, streams) for name in self.system.sources}
 
@@ -131,8 +119,8 @@ def columns_of(system: System) -> tuple[str, ...]:
     """The columns that every run of `system` has, whatever else is recorded."""
     exchanged = [start for x in system.connections for start in x.start]
     applied = [end for x in system.connections for end in x.end if system.components[x.receiver].sampling is None]
-    sources = [signal for name, source in system.sources.items() for signal in source.signals(name)]
-    return ("time", *dict.fromkeys((*applied, *exchanged, *sources)))
+    of_sources = [signal for name, source in system.sources.items() for signal in source.signals(name)]
+    return ("time", *dict.fromkeys((*applied, *exchanged, *of_sources)))
 
 
 def _expect_clock(name: str, component: Component, model: Model) -> None:
@@ -169,19 +157,19 @@ def signals_of(system: System, models: Mapping[str, Model]) -> set[str]:
     return signals.union(columns_of(system)) - {"time"}
 
 
-def source_values(system: System, name: str, parameters: Mapping[str, float], streams: Streams) -> SourceValues:
+def source_values(system: System, name: str, parameters: Mapping[str, float], streams: Streams) -> sources.SourceValues:
     """The values of a source in a run; `parameters` are those of the component of a trajectory, as COMPONENT.NAME."""
     source = system.sources[name]
     if source.constant is not None:
-        return ConstantValues([source.constant] * len(source.to))
+        return sources.ConstantValues([source.constant] * len(source.to))
     if source.noise is not None and source.period is not None:
-        return WhiteNoise(source.noise, source.period, len(source.to), streams.of(f"sources.{name}", VALUE))
+        return sources.WhiteNoise(source.noise, source.period, len(source.to), streams.of(f"sources.{name}", VALUE))
     if not source.is_built_in:
         values = _of_file_or_signal(system, name, streams)
-        return values if source.scale == 1.0 else Scaled(values, source.scale)
+        return values if source.scale == 1.0 else sources.Scaled(values, source.scale)
     fields = {f"{source.trajectory}.{name}": field for name, field in TRAJECTORY.items()}
     values_of_fields = {field: parameters[name] for name, field in fields.items() if name in parameters}
-    return BuiltIn(Trajectory(**values_of_fields))
+    return sources.BuiltIn(Trajectory(**values_of_fields))
 
 
 def source_signals(system: System, parameters: Mapping[str, float], t: Floats) -> dict[str, Floats]:
@@ -194,22 +182,22 @@ def source_signals(system: System, parameters: Mapping[str, float], t: Floats) -
     return signals
 
 
-def _of_file_or_signal(system: System, name: str, streams: Streams) -> SourceValues:
+def _of_file_or_signal(system: System, name: str, streams: Streams) -> sources.SourceValues:
     source = system.sources[name]
     quantities = [MOTION.index(".".join(signal.split(".")[-2:])) for signal in source.signals(name) if source.is_motion]
     if source.signal is not None:
         signal = make_signal(source.signal, source.parameters)
         if source.is_motion:
-            return Moving(motion_values(signal), quantities)
-        return gusts(signal, system.stop_time, streams.of(f"sources.{name}", VALUE))
+            return sources.Moving(sources.motion_values(signal), quantities)
+        return sources.gusts(signal, system.stop_time, streams.of(f"sources.{name}", VALUE))
     from orchestration.systems.signals.table_file import read_table
     from orchestration.systems.signals.waypoints import read_waypoints
 
     assert source.file is not None
     if source.is_motion:
-        return Moving(spline_values(read_waypoints(source.file, source.parameters)), quantities)
+        return sources.Moving(sources.spline_values(read_waypoints(source.file, source.parameters)), quantities)
     table = read_table(source.file, table_columns(source), system.stop_time)
-    return HeldValues(*table) if source.interpolation == "previous" else TableValues(*table)
+    return sources.HeldValues(*table) if source.interpolation == "previous" else sources.TableValues(*table)
 
 
 def table_columns(source: Source) -> Sequence[str]:

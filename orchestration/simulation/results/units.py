@@ -9,24 +9,10 @@ from typing import TypeAlias
 from orchestration.components.fmi.model import Model
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.units import METRE, NUMBER, SECOND, Operand, Unit, agreed
+from orchestration.systems.expressions import syntax
 from orchestration.systems.expressions.operators import OPERATORS
 from orchestration.systems.expressions.over_run import STOP_TIME, TIME
 from orchestration.systems.expressions.reductions import REDUCTIONS
-from orchestration.systems.expressions.syntax import (
-    Call,
-    JobMeasure,
-    Name,
-    Node,
-    Number,
-    Operation,
-    Sampled,
-    is_over_run,
-    names,
-    names_job_measure,
-    parse,
-    parse_job_measures,
-    text,
-)
 from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import System
 
@@ -68,14 +54,14 @@ def _units(
 
 def _unit(place: str, expression: str, known: Mapping[str, Unit | None]) -> Unit | None:
     try:
-        return unit_of(parse(expression), known)
+        return unit_of(syntax.parse(expression), known)
     except UsageError as error:
         raise UsageError(f"{place}: {error}") from error
 
 
 def _of_signals(expressions: Sequence[str], sources: Sources, models: Mapping[str, Model]) -> dict[str, Unit | None]:
     """The units of all names in expressions, by COMPONENT.VARIABLE and SOURCE.VARIABLE."""
-    named = {name for expression in expressions for name in names(parse(expression))}
+    named = {name for expression in expressions for name in syntax.names(syntax.parse(expression))}
     units: dict[str, Unit | None] = {}
     for name, model in models.items():
         for variable in model.variables:
@@ -92,34 +78,34 @@ Units: TypeAlias = Mapping[str, Unit | None]
 """Units by name; None: it has none, or an unknown one"""
 
 
-def unit_of(node: Node, units: Units) -> Unit | None:
+def unit_of(node: syntax.Node, units: Units) -> Unit | None:
     """The unit of an expression of names in `units`; None where one of these has none.
 
     Raises `UsageError` for values in different units that are added or compared, and for functions of a ratio with
     other arguments. A number has no unit and fits any other: also `x + 2 * v`.
     """
     match node:
-        case Number():
+        case syntax.Number():
             return NUMBER
-        case JobMeasure(what):
+        case syntax.JobMeasure(what):
             return SECOND if what == "response" else NUMBER
-        case Name(name):
+        case syntax.Name(name):
             return _named(name, units)
-        case Sampled(_, argument):
+        case syntax.Sampled(_, argument):
             return unit_of(argument, units)
-        case Call(function, arguments) if is_over_run(node):
+        case syntax.Call(function, arguments) if syntax.is_over_run(node):
             return REDUCTIONS[function].unit(function, [_operand(argument, units) for argument in arguments])
-        case Operation(word, operands) | Call(word, operands):
+        case syntax.Operation(word, operands) | syntax.Call(word, operands):
             return OPERATORS[word].unit(word, [_operand(operand, units) for operand in operands])
 
 
-def _operand(node: Node, units: Units) -> Operand:
-    return Operand(text=text(node), unit=unit_of(node, units), number=_constant(node))
+def _operand(node: syntax.Node, units: Units) -> Operand:
+    return Operand(text=syntax.text(node), unit=unit_of(node, units), number=_constant(node))
 
 
 def _named(name: str, units: Units) -> Unit | None:
-    if names_job_measure(name):
-        return unit_of(parse_job_measures(name), units)
+    if syntax.names_job_measure(name):
+        return unit_of(syntax.parse_job_measures(name), units)
     if name in (TIME, STOP_TIME):
         return SECOND
     if name in units:
@@ -128,15 +114,15 @@ def _named(name: str, units: Units) -> Unit | None:
     return agreed(name, [Operand(text=part, unit=units[part]) for part in parts]) if parts else None
 
 
-def _constant(node: Node) -> Fraction | None:
+def _constant(node: syntax.Node) -> Fraction | None:
     """The value of an expression that consists of numbers only, as 1 / 2."""
     match node:
-        case Number(value):
+        case syntax.Number(value):
             return Fraction(value).limit_denominator(1000)
-        case Operation("neg", (operand,)):
+        case syntax.Operation("neg", (operand,)):
             inner = _constant(operand)
             return None if inner is None else -inner
-        case Operation("/", (above, below)):
+        case syntax.Operation("/", (above, below)):
             one, other = _constant(above), _constant(below)
             return one / other if one is not None and other else None
     return None

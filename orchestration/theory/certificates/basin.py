@@ -7,8 +7,6 @@ the set zᵀPz ≤ 1, as long as |H z| ≤ limit there: states in it stay in it,
 programming and proved by the checker of certificates, in ball arithmetic.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Searches periodic sequences of letters that make a loop unstable, and so bound certificates from above."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 from collections.abc import Callable, Iterator

@@ -4,8 +4,6 @@ Whatever the execution times are, a component samples within a window after its 
 within another. A loop that no sequence of draws from these windows makes unstable is stable on that computer.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """A certificate: matrices, cells and quadratic forms, as a file that a checker verifies independently."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import math

@@ -1,7 +1,5 @@
 """A loop about its operating point, of which timing is certified: the matrices of its components."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from fractions import Fraction
 

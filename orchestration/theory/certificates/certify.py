@@ -1,7 +1,5 @@
 """Finds a certificate for a family: chooses cells, labels and coordinates, searches forms, and calls the checker."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """The check of a certificate's file: what it proves, and whether it is about a system."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -10,8 +10,6 @@ r half of the cell's width; and MᵀPM is convex in M, so the corners suffice. T
 X of the state: the tested matrices are congruent to the above. Nothing here depends on how the forms were found.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -89,7 +87,7 @@ def edges_of(certificate: Certificate) -> Iterator[tuple[Node, Node, int]]:
             yield (mode, longer[:-1]), (after, longer[1:]), longer[0]
 
 
-def _expect_fall(edge: tuple[Node, Node, int], forms: dict[Node, arb_mat], enclosures: _Enclosures) -> None:
+def _expect_fall(edge: tuple[Node, Node, int], forms: dict[Node, arb_mat], enclosures: "_Enclosures") -> None:
     start, end, label = edge
     for box, corners in enclosures.of(label):
         for M in corners:

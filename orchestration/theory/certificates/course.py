@@ -3,8 +3,6 @@
 The state of the family has places for the numbers of the loop, and for the messages of each link in transit, by age.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -43,7 +41,7 @@ class Jump:
         found[np.ix_(self.after, self.before)] = self.change
         return found
 
-    def is_same(self, other: Jump) -> bool:
+    def is_same(self, other: "Jump") -> bool:
         """Whether another event has the same map."""
         places = (self.before, self.after) == (other.before, other.after)
         return places and np.array_equal(self.change, other.change)

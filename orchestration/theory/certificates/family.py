@@ -5,8 +5,6 @@ matrices, and of exponentials exp(G t) with t affine in the letter's parameters 
 interval. Modes determine which letters may follow one another: a letter moves from a mode to another.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -68,7 +66,7 @@ class LoopFamily:
         found: Floats = total[list(self.kept)]
         return found
 
-    def without_idle(self) -> LoopFamily:
+    def without_idle(self) -> "LoopFamily":
         """The family without coordinates on whose values at the beginning of a period nothing depends."""
         samples = [abs(self.at(x, [low + share * (high - low) for low, high in x.ranges]))
                    for x in self.letters for share in (0.0, 0.37, 1.0)]  # fmt: skip
@@ -78,7 +76,7 @@ class LoopFamily:
             alive = used
         return replace(self, kept=tuple(self.kept[i] for i in alive))._without_unused()
 
-    def _without_unused(self) -> LoopFamily:
+    def _without_unused(self) -> "LoopFamily":
         """The family without coordinates that no kept one depends on, not even within a period."""
         acts, used = np.sum([abs(M) for M in self.matrices.values()], axis=0) > 0.0, np.zeros(0, dtype=int)
         then = np.array(self.kept)

@@ -1,7 +1,5 @@
 """How far a quantity of a loop may vary from draw to draw: certified, breaking, and by the small-gain bound."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Two quantities that vary at once: pairs of values that are certified, and pairs that break the loop."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,14 +13,9 @@ from orchestration.foundation.basics.times import floor_to_nanoseconds
 from orchestration.simulation.figures.palette import BLUE, RED
 from orchestration.simulation.figures.style import SCREEN, Style, save
 from orchestration.simulation.requests.request import RequestLike, request_of
+from orchestration.theory.certificates import margin
 from orchestration.theory.certificates.breaking import BreakingSequence, least_breaking, unstable_sequence
 from orchestration.theory.certificates.family import LoopFamily
-from orchestration.theory.certificates.margin import (
-    expect_without_scheduler,
-    largest_certified,
-    linear_loop_of,
-    varying_of,
-)
 from orchestration.theory.certificates.timeline import LoopTimeline
 from orchestration.theory.certificates.varying import LOSS
 
@@ -94,11 +87,11 @@ def region(
     unstable without either.
     """
     request = request_of(request)
-    pair = [varying_of(request, each) for each in (of, and_of)]
+    pair = [margin.varying_of(request, each) for each in (of, and_of)]
     if any(each.kind == LOSS for each in pair) or pair[0] == pair[1]:
         raise UsageError(f"--of {of} --and {and_of}: expected two different jitters or delay jitters")
-    expect_without_scheduler(request)
-    timeline = LoopTimeline(linear_loop_of(request), pair)
+    margin.expect_without_scheduler(request)
+    timeline = LoopTimeline(margin.linear_loop_of(request), pair)
     if unstable_sequence(timeline.family([0.0, 0.0])) is not None:
         raise UsageError("the loop is unstable where nothing varies, so nothing can be certified")
     paths = (pair[0].path, pair[1].path)
@@ -113,7 +106,7 @@ def region(
             top = floor_to_nanoseconds(timeline.largest() - a) if broken is None else broken.value
             if broken is not None:
                 breaking.append((a, broken.value))
-            b, text = largest_certified(_second_varies(timeline, a), paths, top, lambda share: None, SHARES)
+            b, text = margin.largest_certified(_second_varies(timeline, a), paths, top, lambda share: None, SHARES)
             if b is not None and text is not None:
                 certified.append((a, b))
                 texts.append(text)

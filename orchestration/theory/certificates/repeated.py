@@ -3,8 +3,6 @@
 A task whose execution times repeat after n jobs is equivalent to n tasks, each with n times the period.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Searches the quadratic forms of a certificate, by semidefinite programming; they are proved elsewhere."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 import math

@@ -5,8 +5,6 @@ of a piece follow one another in an order; where the order depends on the draw t
 for a single value at which events of one instant have an effect that no other value has.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 

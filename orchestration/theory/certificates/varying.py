@@ -1,7 +1,5 @@
 """The quantities that vary from draw to draw, and their draws: times in attoseconds."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass

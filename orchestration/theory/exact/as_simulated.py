@@ -1,7 +1,5 @@
 """The effects of events in a simulated loop: held noise, steps of components, means over the rows of the run."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from fractions import Fraction
 

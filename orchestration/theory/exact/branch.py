@@ -1,7 +1,5 @@
 """A branch: one course of events of a loop up to a time, and the events that it plans. Times are whole attoseconds."""
 
-from __future__ import annotations
-
 import bisect
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -29,7 +27,7 @@ class BranchEvent(NamedTuple):
     """Index among the offsets of a period, of a sample or a posted message; of a measurement: the time until its sample
     """
 
-    def later(self, by: int) -> BranchEvent:
+    def later(self, by: int) -> "BranchEvent":
         """The event, later by a time."""
         return self if self.time == NEVER else self._replace(time=self.time + by)
 

@@ -3,8 +3,6 @@
 An event with a random outcome splits a branch in two or more. Times are whole attoseconds.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

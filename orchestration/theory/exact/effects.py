@@ -5,8 +5,6 @@ last, and of a first-order hold its slope and the last arrival; of tasks their s
 noise and outputs as of the last step follow.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """The exact average costs of a linear loop, without runs and seeds."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ Van Loan's block exponential contains e^(-At), which overflows for stiff plants;
 doubled, in which decaying terms only decay.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from dataclasses import dataclass
@@ -40,7 +38,7 @@ class Flow:
         found: Floats = np.eye(len(self.change)) + self.change
         return found
 
-    def doubled(self) -> Flow:
+    def doubled(self) -> "Flow":
         """The flow over twice the time."""
         change, matrix = self.change, self.matrix
         return Flow(

@@ -1,7 +1,5 @@
 """The expected costs of a linear loop from its initial state to a given time: moments from cut to cut of its chain."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A warning for runs of loops in which means of squares have no finite expectation: their averages mean nothing."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

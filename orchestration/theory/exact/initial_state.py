@@ -1,7 +1,5 @@
 """The initial state of a system, as deviations from rest."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """The largest eigenvalue of a linear map, and the solution of x = L x + b, from images of vectors."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

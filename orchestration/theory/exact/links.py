@@ -1,7 +1,5 @@
 """Tasks and links: which components sample when, and the messages between them. Times are whole attoseconds."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from fractions import Fraction
 

@@ -1,7 +1,5 @@
 """Linear loops from their FMUs, each linearised once, solved under any timing."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import math

@@ -1,7 +1,5 @@
 """The value of a random quantity at and above which mean squares are infinite."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

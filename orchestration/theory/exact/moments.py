@@ -5,8 +5,6 @@ state may differ from mode to mode. A passage leads from a mode to one of the ne
 `Piece`.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Sequence
@@ -89,7 +87,7 @@ class JumpLinear:
         return [np.zeros((n, n)) for n in self._sizes[i % len(self._sizes)]]
 
     @functools.cached_property
-    def _batched_stages(self) -> list[_BatchedStage]:
+    def _batched_stages(self) -> list["_BatchedStage"]:
         return [
             _BatchedStage(
                 [(p.begin, p.end, p.probability, p.piece.Z) for p in stage], self._sizes[(i + 1) % len(self._sizes)]
@@ -190,7 +188,7 @@ def _geometric_sum(turn: Floats, added: Floats) -> Floats:
     return found
 
 
-def _radius(propagate: Map, basis: _SymmetricBasis) -> float:
+def _radius(propagate: Map, basis: "_SymmetricBasis") -> float:
     if basis.count > SIZE:
         try:
             return spectral_radius_of(propagate, basis.numbers([np.eye(n) for n in basis.sizes]))

@@ -1,7 +1,5 @@
 """The objectives of a system as means of quadratic polynomials of signals, as far as they are such."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from orchestration.components.fmi.model import Model

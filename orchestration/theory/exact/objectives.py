@@ -1,7 +1,5 @@
 """Objectives as what can be expected exactly: numbers made of means of quadratic polynomials of signals."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,21 +8,10 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.systems.expressions import syntax
 from orchestration.systems.expressions.at_instant import compiled
 from orchestration.systems.expressions.operators import OPERATORS, applied
 from orchestration.systems.expressions.over_run import STOP_TIME, TIME, inlined, reductions
-from orchestration.systems.expressions.syntax import (
-    Call,
-    Name,
-    Node,
-    Number,
-    Operation,
-    Sampled,
-    is_over_run,
-    names,
-    parse,
-    text,
-)
 
 STEP = 1.0
 """Step of a signal: second differences of a quadratic polynomial are exact for any step"""
@@ -43,18 +30,18 @@ class Mean:
     Q: Floats
 
 
-def means_of(node: Node) -> list[Call]:
+def means_of(node: syntax.Node) -> list[syntax.Call]:
     """The means in an objective, `rms` included; raises `UsageError` naming any other reduction."""
     found = list(dict.fromkeys(reductions(node)))
     for call in found:
         if call.function not in ("mean", "rms"):
             raise UsageError(_not_a_mean(f"{call.function}(…)"))
-        if isinstance(call.arguments[0], Sampled):
+        if isinstance(call.arguments[0], syntax.Sampled):
             raise UsageError("over arrivals: expected a mean over time")
         if reductions(call.arguments[0]):
             raise UsageError("of other numbers of the run: expected a mean of signals")
     if not found:
-        raise UsageError(_not_a_mean(text(node)))
+        raise UsageError(_not_a_mean(syntax.text(node)))
     return found
 
 
@@ -62,41 +49,41 @@ def _not_a_mean(written: str) -> str:
     return f"{written}: expected mean(…) or rms(…), of which there are expectations"
 
 
-def inlined_objectives(objectives: Mapping[str, str]) -> dict[str, Node]:
+def inlined_objectives(objectives: Mapping[str, str]) -> dict[str, syntax.Node]:
     """Objectives by name, with the objectives that they name inlined."""
-    found: dict[str, Node] = {}
+    found: dict[str, syntax.Node] = {}
     for name, written in objectives.items():
-        found[name] = inlined(parse(written), found)
+        found[name] = inlined(syntax.parse(written), found)
     return found
 
 
-def integrand(call: Call) -> Node:
+def integrand(call: syntax.Call) -> syntax.Node:
     """The expression that a mean averages."""
     inner = call.arguments[0]
-    return inner if call.function == "mean" else Operation("*", (inner, inner))
+    return inner if call.function == "mean" else syntax.Operation("*", (inner, inner))
 
 
-def evaluated(node: Node, means: Mapping[Call, float], numbers: Mapping[str, float]) -> float:
+def evaluated(node: syntax.Node, means: Mapping[syntax.Call, float], numbers: Mapping[str, float]) -> float:
     """An objective by the values of its means."""
     match node:
-        case Number(number):
+        case syntax.Number(number):
             return number
-        case Call() if is_over_run(node):
+        case syntax.Call() if syntax.is_over_run(node):
             mean = means[node]
             return math.sqrt(max(mean, 0.0)) if node.function == "rms" else mean
-        case Name(name) if name in numbers:
+        case syntax.Name(name) if name in numbers:
             return numbers[name]
-        case Operation(word, operands) | Call(word, operands) if word in OPERATORS:
+        case syntax.Operation(word, operands) | syntax.Call(word, operands) if word in OPERATORS:
             return float(applied(word, *(evaluated(operand, means, numbers) for operand in operands)))
-    raise UsageError(f"{text(node)} has a value at each instant; expected one number of the run")
+    raise UsageError(f"{syntax.text(node)} has a value at each instant; expected one number of the run")
 
 
-def quadratic(node: Node, rest: Mapping[str, float], numbers: Mapping[str, float]) -> Mean:
+def quadratic(node: syntax.Node, rest: Mapping[str, float], numbers: Mapping[str, float]) -> Mean:
     """An expression about `rest` as a quadratic polynomial, by second differences, which are exact for one.
 
     Raises `UsageError` for an expression that is none, or depends on time.
     """
-    used = list(dict.fromkeys(names(node)))
+    used = list(dict.fromkeys(syntax.names(node)))
     for name in (TIME, STOP_TIME):
         if name in used:
             raise UsageError(f"depends on {name}: expected signals alone, whose mean is stationary")
@@ -119,7 +106,7 @@ def quadratic(node: Node, rest: Mapping[str, float], numbers: Mapping[str, float
         for j in range(i):
             both = of(unit[i] + unit[j])
             Q[i, j] = Q[j, i] = (both - c - g[i] - g[j] - Q[i, i] - Q[j, j]) / 2.0
-    _expect_quadratic(of, c, g, Q, text(node))
+    _expect_quadratic(of, c, g, Q, syntax.text(node))
     return Mean(signals=tuple(signals), c=c, g=g, Q=Q)
 
 

@@ -1,7 +1,5 @@
 """When components sample and messages are sent and arrive, as decided by the scheduler."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction

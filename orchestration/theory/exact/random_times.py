@@ -1,7 +1,5 @@
 """Random times as values with probabilities: as listed, or by Gauss's rule for a density."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 from collections.abc import Callable, Sequence
@@ -32,7 +30,7 @@ class RandomTime:
     """Probabilities of the values; empty for a density"""
     normal: tuple[float, float] | None = None
     """mean and standard deviation of a normal density, truncated to its ends; None: uniform"""
-    added: RandomTime | None = None
+    added: "RandomTime | None" = None
     """another, independent amount that is added"""
 
     @property

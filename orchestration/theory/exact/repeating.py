@@ -5,8 +5,6 @@ network. Equal windows repeat for ever if no backlog grows from one to the next,
 other yields.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Sequence
@@ -18,23 +16,7 @@ import numpy as np
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Integers
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds, nanoseconds
-from orchestration.systems.computers.parts import (
-    ABORTED,
-    ARRIVES,
-    FINISHED,
-    FIXED_PRIORITY,
-    FRAME_TRANSMITTED,
-    NONE,
-    QUEUED,
-    RELEASED,
-    RESUMED,
-    SAMPLED,
-    SENT,
-    SKIPPED,
-    STARTED,
-    SWITCHING,
-    WRITTEN,
-)
+from orchestration.systems.computers import parts
 from orchestration.systems.system.component import Sampling, has_scheduled_instants
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System
@@ -47,9 +29,9 @@ MAX_SIMULATED_JOBS = 200_000
 """Most jobs of all tasks and messages that are simulated"""
 WINDOWS, MOST_WINDOWS = 12, 96
 """Windows that are compared at first, and at most"""
-_WITH_TIMES = (RELEASED, SKIPPED, QUEUED, SAMPLED, ARRIVES)
+_WITH_TIMES = (parts.RELEASED, parts.SKIPPED, parts.QUEUED, parts.SAMPLED, parts.ARRIVES)
 """Kinds of notes whose last number is a time"""
-_WORK = (SWITCHING, STARTED, RESUMED)
+_WORK = (parts.SWITCHING, parts.STARTED, parts.RESUMED)
 
 
 def periodic_schedule(
@@ -128,7 +110,7 @@ class _Windows:
         content, are_times = notes[:, [0, 1, 2, 4]], np.isin(notes[:, 1], _WITH_TIMES)
         content[:, 0] -= window * length
         content[are_times, 3] -= (window * length)[are_times]
-        content[notes[:, 1] == WRITTEN, 3] = 0
+        content[notes[:, 1] == parts.WRITTEN, 3] = 0
         ends = np.searchsorted(window, np.arange(count + 1))
         self._parts = [notes[begin:end] for begin, end in itertools.pairwise(ends.tolist())]
         self._contents = [content[begin:end].tobytes() for begin, end in itertools.pairwise(ends.tolist())]
@@ -151,7 +133,7 @@ class _Windows:
     @property
     def _longest(self) -> int:
         """The longest time without a note [ns] of a job, a frame, or a message that will release a task."""
-        arrivals = self._trace.notes[self._trace.notes[:, 1] == ARRIVES]
+        arrivals = self._trace.notes[self._trace.notes[:, 1] == parts.ARRIVES]
         placed = placed_tasks(self._trace.system.computers)
         jobs = [nanoseconds(highest(each.task.execution) + each.computer.switch) for each in placed]
         frames = [leg.length + of.pause for of in self._trace.resources.parts.messages for leg in of.legs]
@@ -163,36 +145,36 @@ class _Windows:
         As many jobs end as are released, so that every queue is as it was before. The jobs of a task may pile up if its
         priority is fixed and its own alone.
         """
-        parts, count = self._trace.resources.parts, _counter(notes)
-        for i, task in enumerate(parts.tasks):
-            over, works = count(FINISHED, i) + count(ABORTED, i), any(count(kind, i) for kind in _WORK)
-            more, processor = count(RELEASED, i) - over, parts.processors[task.processor]
-            others = [one for j, one in enumerate(parts.tasks) if one.processor == task.processor and j != i]
-            first = processor.policy == FIXED_PRIORITY and all(one.priority != task.priority for one in others)
+        of_all, count = self._trace.resources.parts, _counter(notes)
+        for i, task in enumerate(of_all.tasks):
+            over, works = count(parts.FINISHED, i) + count(parts.ABORTED, i), any(count(kind, i) for kind in _WORK)
+            more, processor = count(parts.RELEASED, i) - over, of_all.processors[task.processor]
+            others = [one for j, one in enumerate(of_all.tasks) if one.processor == task.processor and j != i]
+            first = processor.policy == parts.FIXED_PRIORITY and all(one.priority != task.priority for one in others)
             if more < 0 or (more > 0 and not first) or (works and not over):
                 return False
-        for c, carrier in enumerate(parts.carriers):
-            if carrier.sender != NONE and count(SAMPLED, carrier.sender) != count(SENT, c):
+        for c, carrier in enumerate(of_all.carriers):
+            if carrier.sender != parts.NONE and count(parts.SAMPLED, carrier.sender) != count(parts.SENT, c):
                 return False
-        return all(count(QUEUED, m) == self._received(notes, m) for m in range(len(parts.messages)))
+        return all(count(parts.QUEUED, m) == self._received(notes, m) for m in range(len(of_all.messages)))
 
     def _received(self, notes: Integers, message: int) -> int:
         """How many frames of a message were received."""
         last = len(self._trace.resources.parts.messages[message].legs) - 1
-        return int(((notes[:, 1] == FRAME_TRANSMITTED) & (notes[:, 2] == message) & (notes[:, 4] == last)).sum())
+        return int(((notes[:, 1] == parts.FRAME_TRANSMITTED) & (notes[:, 2] == message) & (notes[:, 4] == last)).sum())
 
     def failure_text(self) -> str:
         """Why no schedule repeats, in one line."""
         half = np.concatenate(self._parts[-(self._count // 2) :])
         count, seconds = _counter(half), self._count // 2 * self._length / NANOSECONDS
         for i, place in enumerate(self._trace.places):
-            more = count(RELEASED, i) - count(FINISHED, i) - count(ABORTED, i)
+            more = count(parts.RELEASED, i) - count(parts.FINISHED, i) - count(parts.ABORTED, i)
             if more > self._count // 4:
                 return (
                     f"{place}: falls behind by {more} jobs in {seconds:g} s, and makes others late; expected less load"
                 )
         for m, place in enumerate(self._trace.messages):
-            more = count(QUEUED, m) - self._received(half, m)
+            more = count(parts.QUEUED, m) - self._received(half, m)
             if more > self._count // 4:
                 return f"{place}: falls behind by {more} messages in {seconds:g} s; expected less load"
         return (

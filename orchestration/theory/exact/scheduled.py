@@ -1,7 +1,5 @@
 """Systems with a scheduler, of computers, networks or sampling on arrival; and the randomness of their schedule."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

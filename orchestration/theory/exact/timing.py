@@ -1,7 +1,5 @@
 """The tasks and links of a system, with the randomness of its timing."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from orchestration.foundation.basics.errors import UsageError

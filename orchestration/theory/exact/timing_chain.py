@@ -4,8 +4,6 @@ Time is in whole attoseconds. The hyperperiod is cut at the nominal instants of 
 values measured before. The messages in transit at a cut are the mode; between two cuts all branches are followed.
 """
 
-from __future__ import annotations
-
 import bisect
 import itertools
 import math

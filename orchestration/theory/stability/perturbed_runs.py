@@ -23,16 +23,9 @@ from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System
+from orchestration.theory.stability import operating_point
 from orchestration.theory.stability.linearised_component import PULSE
 from orchestration.theory.stability.loop_at_rest import wrapping_loader
-from orchestration.theory.stability.operating_point import (
-    deterministic,
-    exchanged_signals,
-    expect_rest,
-    hyperperiod_of,
-    latest_offset,
-    longest_period,
-)
 
 LARGE, SMALL = 1e3, 1e-7
 """Factors on the initial difference: sizes between which it is followed, linear and above rounding"""
@@ -60,15 +53,15 @@ class Growth:
 
 def growth_of(system: System, instances: Instances) -> Growth:
     """The growth about the operating point of `system`; raises `UsageError` where the system does not rest there."""
-    nominal = deterministic(system)
-    period = hyperperiod_of(nominal) or longest_period(nominal)
+    nominal = operating_point.deterministic(system)
+    period = operating_point.hyperperiod_of(nominal) or operating_point.longest_period(nominal)
     horizon = max(exact_nanoseconds(nominal.stop_time), FEWEST_INSTANTS * period)
     nominal = replace(nominal, stop_time=float(horizon) / NANOSECONDS)
     interval = period * max(1, math.floor(horizon / period / MOST_INSTANTS))
     unperturbed, perturbed = (
         _exchanged_rows(nominal, load, interval) for load in (instances.load, wrapping_loader(instances, Pulsed))
     )
-    expect_rest(nominal, unperturbed[1:6])
+    operating_point.expect_rest(nominal, unperturbed[1:6])
     count = min(len(unperturbed), len(perturbed))
     scale = np.maximum(1.0, np.abs(unperturbed[0]))
     difference = (perturbed[:count] - unperturbed[:count]) / scale
@@ -125,9 +118,9 @@ def _exchanged_rows(system: System, load: Loader, interval: Fraction) -> Floats:
         result = simulation.result()
     times = np.round(result.rows[:, 0] * NANOSECONDS).astype(np.int64)
     count = math.floor(Fraction(int(times[-1])) / interval)  # at the stop itself nothing samples
-    instants = [math.floor(latest_offset(system) + k * interval) + 1 for k in range(count)]
+    instants = [math.floor(operating_point.latest_offset(system) + k * interval) + 1 for k in range(count)]
     rows = np.searchsorted(times, instants, side="right") - 1
-    columns = [result.columns.index(name) for name in exchanged_signals(system)]
+    columns = [result.columns.index(name) for name in operating_point.exchanged_signals(system)]
     found: Floats = result.rows[rows][:, columns]
     return found
 

@@ -1,7 +1,5 @@
 """A linear system in discrete time, and the controllable and observable part of a larger one."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
