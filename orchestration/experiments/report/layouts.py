@@ -50,10 +50,11 @@ def _of_components(system: System | None, columns: Sequence[str], about: About, 
     groups: dict[str, list[str]] = {}
     for name in columns:
         groups.setdefault(name.rpartition(".")[0], []).append(name)
-    for group, names in groups.items():
-        owner = None if system is None else system.components.get(component_of(names[0]))
+    for names in groups.values():
+        name = component_of(names[0])
+        owner = None if system is None else system.components.get(name)
         held = owner is not None and owner.sampling is not None
-        yield from _split(group, names, about, held=held, shown=shown)
+        yield from _split(name, names, about, held=held, shown=shown)
 
 
 def _split(
@@ -65,8 +66,6 @@ def _split(
         by_unit.setdefault(labels.unit(about[name].unit) if name in about else None, []).append(name)
     for unit, of_unit in by_unit.items():
         for first in range(0, len(of_unit), MAX_LINES):
-            lines = [
-                Line(column=name, label=labels.signal(name, about), held=held)
-                for name in of_unit[first : first + MAX_LINES]
-            ]
-            yield Panel(title=title, unit=unit, lines=(*lines,), shown=shown)
+            columns = of_unit[first : first + MAX_LINES]
+            lines = [Line(column=name, label=labels.signal(name, about), held=held) for name in columns]
+            yield Panel(title=labels.quantities(title, columns), unit=unit, lines=(*lines,), shown=shown)

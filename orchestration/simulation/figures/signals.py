@@ -31,7 +31,7 @@ def signals(runs: Sequence[DrawnRun], style: Style) -> Figure:
     for panel, (name, unit, columns) in zip(panels, contents):
         for run in runs:
             _draw(panel, run, columns, alone=len(runs) == 1)
-        panel.set_ylabel(wrapped(quantity(labels.words(name), unit), 16))
+        panel.set_ylabel(wrapped(quantity(labels.quantities(labels.words(name), columns), unit), 16))
         set_time_axis(panel, runs)
         handles, names = panel.get_legend_handles_labels()
         panel.legend(handles, names, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=abreast(names, style))

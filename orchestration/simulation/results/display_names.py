@@ -1,7 +1,7 @@
 """Display names of metrics, signals and settings, with their units, for figures and printed tables."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from orchestration.simulation.results.units import ColumnInfo
 from orchestration.systems.system.connection import component_of, variable_of
@@ -14,7 +14,7 @@ METRICS: Mapping[str, tuple[str, str | None]] = {
     "position_iae": ("integral of the position error", "m.s"),
     "position_itae": ("integral of time × position error", "m.s2"),
     "position_max": ("largest position error", "m"),
-    "settling_time": ("settling time, to 5 cm", "s"),
+    "settling_time": ("settling time", "s"),
     "ultimate_bound": ("largest position error, last third", "m"),
     "attitude_error_rmse": ("RMS attitude error", "rad"),
     "attitude_error_max": ("largest attitude error", "rad"),
@@ -136,6 +136,14 @@ def signal(name: str, described: Mapping[str, ColumnInfo]) -> str:
     if text and len(text) <= MAX_LEGEND_LENGTH:
         what = text if re.search(rf"\b{re.escape(what)}\b", text) else f"{what}, {text}"
     return f"{words(component_of(name))}: {what}"
+
+
+def quantities(owner: str, columns: Iterable[str]) -> str:
+    """The title of a panel: the connection or component that its columns are of, and what they are."""
+    stems = [variable_of(column).rpartition(".") for column in columns]
+    found = dict.fromkeys(words(stem if stem and axis in AXES else f"{stem}.{axis}") for stem, _, axis in stems)
+    text = ", ".join(found)
+    return f"{owner}: {text if len(text) <= MAX_LEGEND_LENGTH else f'{next(iter(found))}, …'}"
 
 
 MAX_LEGEND_LENGTH = 32

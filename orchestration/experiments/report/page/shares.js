@@ -92,7 +92,7 @@ function placesOfCells() {
 
 function startCells() {
   byId("map").hidden = false;
-  byId("map-title").textContent = `Share of the starts that is ${report.words[0]}`;
+  byId("map-title").textContent = "Share of the starts that survives";
   const plot = byId("map-plot");
   plot.setAttribute("aria-label", "Cells of the comparison. Arrow keys open the neighbouring cell.");
   plot.addEventListener("keydown", stepOverCells);

@@ -303,6 +303,10 @@ def test_a_click_on_a_cell_of_the_map_opens_the_run_behind_it(of_study: Any) -> 
     assert title(of_study).startswith("Run 0")
 
 
+def test_the_map_of_a_comparison_says_what_its_numbers_are(of_comparison: Any) -> None:
+    assert of_comparison.inner_text("#map-title") == "Share of the starts that survives"
+
+
 def test_the_slider_goes_over_the_flights_of_the_open_cell(of_comparison: Any) -> None:
     slider = of_comparison.get_by_label("2 of the cell")
     first = title(of_comparison)

@@ -75,13 +75,13 @@ def test_the_position_error_of_a_flight_is_computed_to_small_values() -> None:
     np.testing.assert_allclose(found[POSITION_ERROR], np.abs(np.sin(found["time"])), rtol=2e-2, atol=1e-3)
 
 
-def test_any_other_system_has_panels_by_unit_and_no_scene() -> None:
+def test_any_other_system_has_panels_by_unit_named_after_their_quantities_and_no_scene() -> None:
     blobs = Blobs()
     tracks = Tracks(blobs)
     tracks.whole(None, {"time": np.arange(3.0), "tank.level": np.arange(3.0), "tank.valve": np.ones(3)}, ABOUT, 10)
     (layout,) = tracks.layouts
     assert layout.scene is None
-    assert [(panel.title, panel.unit) for panel in layout.panels] == [("tank", "m"), ("tank", None)]
+    assert [(panel.title, panel.unit) for panel in layout.panels] == [("tank: level", "m"), ("tank: valve", None)]
 
 
 def test_a_page_of_many_signals_opens_with_the_first_of_their_panels() -> None:

@@ -39,3 +39,7 @@ def test_a_signal_goes_by_its_own_name_or_by_what_its_fmu_says_of_it() -> None:
     assert labels.signal("tank.level", about) == "tank: level of the water"
     assert labels.signal("ball.h", about) == "ball: h, Height of the ball"
     assert labels.signal("car.x1", about) == "car: x1"
+
+
+def test_an_objective_of_any_system_has_no_bound_of_the_quadrotor_in_its_name() -> None:
+    assert not [name for name, (text, _) in labels.METRICS.items() if " cm" in text]
