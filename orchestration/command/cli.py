@@ -26,6 +26,7 @@ from orchestration.command import (
     studies,
     systems,
 )
+from orchestration.command.options import option
 from orchestration.command.registry import OutputOptions, ask, option_group
 from orchestration.components.building import consent
 from orchestration.foundation.basics.errors import (
@@ -75,10 +76,7 @@ app = typer.Typer(
 def quadcosim(
     context: typer.Context,
     version: Annotated[
-        bool,
-        typer.Option(
-            "--version", metavar="", help="Print the version and exit; with -v also those of its dependencies."
-        ),
+        bool, option("--version", "Print the version and exit; with -v also those of its dependencies.", "")
     ] = False,
     *,
     output_options: OutputOptions,

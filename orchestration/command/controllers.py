@@ -8,6 +8,7 @@ import typer
 
 from orchestration.command import registry
 from orchestration.command.figure_flags import FigureFlags
+from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, build_option, option_group, result_of_files
 from orchestration.command.study_flags import Out, StudyEngineFlag, TimeLimit, Workers
 from orchestration.foundation.basics.errors import UsageError
@@ -16,22 +17,16 @@ from orchestration.foundation.basics.errors import UsageError
 @build_option
 @option_group("look", FigureFlags)
 def compare(
-    comparison: Annotated[Path, typer.Argument(help="Comparison file.", metavar="COMPARISON.toml", show_default=False)],
+    comparison: Annotated[Path, typer.Argument(help="Comparison file.", metavar="COMPARISON.toml")],
     out: Out = None,
     workers: Workers = 1,
     native: Annotated[
-        bool, typer.Option("--native", help="Use the native twins of this project's FMUs, built if need be.")
+        bool, option("--native", "Use the native twins of this project's FMUs, built if need be.")
     ] = False,
     engine: StudyEngineFlag = "auto",
     time_limit: TimeLimit = None,
-    cell: Annotated[
-        int | None,
-        typer.Option("--cell", help="Run only this cell again.", metavar="K", show_default=False),
-    ] = None,
-    start: Annotated[
-        int | None,
-        typer.Option("--start", help="One run of that cell, kept in --out DIR.", metavar="I", show_default=False),
-    ] = None,
+    cell: Annotated[int | None, option("--cell", "Run only this cell again.", "K")] = None,
+    start: Annotated[int | None, option("--start", "One run of that cell, kept in --out DIR.", "I")] = None,
     figures: Annotated[bool, typer.Option(help="Draw the pictures beside the tables.")] = True,
     *,
     look: FigureFlags,
@@ -58,8 +53,8 @@ def compare(
 
 @build_option
 def tune(
-    tuning: Annotated[Path, typer.Argument(help="Tuning file.", metavar="TUNING.toml", show_default=False)],
-    out: Annotated[Path, typer.Option("--out", help="Folder for the files of tuned parameters.", metavar="DIR")],
+    tuning: Annotated[Path, typer.Argument(help="Tuning file.", metavar="TUNING.toml")],
+    out: Annotated[Path, option("--out", "Folder for the files of tuned parameters.", "DIR")],
     workers: Workers = 1,
     engine: StudyEngineFlag = "auto",
 ) -> CommandResult:

@@ -1,12 +1,12 @@
 """The command `expect`, which needs no run."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from orchestration.command import registry
-from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
+from orchestration.command.flags import FlightFlags, ScenarioFile, Timing, flight_options, request_from
+from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
 from orchestration.foundation.basics.terminal import warn
 
@@ -21,17 +21,13 @@ if TYPE_CHECKING:
 
 @flight_options
 def expect(
-    scenario: Annotated[
-        Path | None,
-        typer.Argument(help="System or scenario file, or SSP; without one, the paper's flight.", show_default=False),
-    ] = None,
+    scenario: ScenarioFile = None,
     timing: Timing = None,
     as_simulated: Annotated[
-        bool, typer.Option("--as-simulated", help="The average of what runs print: noise held, means over their rows.")
+        bool, option("--as-simulated", "The average of what runs print: noise held, means over their rows.")
     ] = False,
     horizon: Annotated[
-        float | None,
-        typer.Option("--horizon", help="Means from the initial conditions to this time.", metavar="SECONDS"),
+        float | None, option("--horizon", "Means from the initial conditions to this time.", "SECONDS")
     ] = None,
     *,
     flags: FlightFlags,

@@ -7,6 +7,7 @@ import typer
 
 from orchestration.command import registry
 from orchestration.command.flags import FlightFlags, flight_options, request_from
+from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, option_group, result_of_files
 from orchestration.command.variant_flags import VariantFlags
 from orchestration.foundation.basics.terminal import inform, warn
@@ -14,7 +15,7 @@ from orchestration.foundation.basics.terminal import inform, warn
 
 @option_group("variant", VariantFlags)
 def export_c(
-    out: Annotated[Path, typer.Option("--out", help="Folder for NAME.h and NAME.c.", metavar="DIR")],
+    out: Annotated[Path, option("--out", "Folder for NAME.h and NAME.c.", "DIR")],
     slave: Annotated[
         str,
         typer.Argument(
@@ -22,7 +23,7 @@ def export_c(
         ),
     ] = "UnifiedController",
     single: Annotated[
-        bool, typer.Option("--single", help="Single precision, with functions of libm; default: double, without.")
+        bool, option("--single", "Single precision, with functions of libm; default: double, without.")
     ] = False,
     *,
     variant: VariantFlags,
@@ -37,18 +38,15 @@ def export_c(
 @flight_options
 def ssp(
     scenario: Annotated[
-        Path | None,
-        typer.Argument(help="System or scenario file; without one, the paper's flight.", show_default=False),
+        Path | None, typer.Argument(help="System or scenario file; without one, the paper's flight.")
     ] = None,
     out: Annotated[
-        Path | None,
-        typer.Option("--out", help="The file; default: QuadrotorLoop.ssp in fmus/, or NAME.ssp here.", metavar="FILE"),
+        Path | None, option("--out", "The file; default: QuadrotorLoop.ssp in fmus/, or NAME.ssp here.", "FILE")
     ] = None,
     read_back: Annotated[
         bool,
-        typer.Option(
-            "--read-back",
-            help="Load it in libcosim, ecos and fmpy, where installed, run the first steps, and report each.",
+        option(
+            "--read-back", "Load it in libcosim, ecos and fmpy, where installed, run the first steps, and report each."
         ),
     ] = False,
     *,

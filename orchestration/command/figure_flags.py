@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
+from orchestration.command.options import option
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.figures.names import COLUMNS, FORMATS, STYLES, WRITTEN
 
@@ -18,29 +17,17 @@ class FigureFlags:
 
     format: Annotated[
         list[str] | None,
-        typer.Option(
-            "--format", help=f"Format of the files; default: {' and '.join(WRITTEN)}; may be repeated.",
-            metavar="|".join(FORMATS), show_default=False,
+        option(
+            "--format", f"Format of the files; default: {' and '.join(WRITTEN)}; may be repeated.", "|".join(FORMATS)
         ),
-    ] = None  # fmt: skip
-    style: Annotated[
-        str,
-        typer.Option("--style", help="Fonts, lines and the default size.", metavar="|".join(STYLES)),
-    ] = STYLES[0]
+    ] = None
+    style: Annotated[str, option("--style", "Fonts, lines and the default size.", "|".join(STYLES))] = STYLES[0]
     width: Annotated[
         str | None,
-        typer.Option(
-            "--width", help="Width in mm, or a column of a journal: single is 88.9, double 181.",
-            metavar="MM|single|double",
-            show_default=False,
-        ),
-    ] = None  # fmt: skip
-    size: Annotated[
-        str | None, typer.Option("--size", help="Width and height in mm.", metavar="MMxMM", show_default=False)
+        option("--width", "Width in mm, or a column of a journal: single is 88.9, double 181.", "MM|single|double"),
     ] = None
-    font_size: Annotated[
-        float | None, typer.Option("--font-size", help="Size of the text in points.", metavar="PT", show_default=False)
-    ] = None
+    size: Annotated[str | None, option("--size", "Width and height in mm.", "MMxMM")] = None
+    font_size: Annotated[float | None, option("--font-size", "Size of the text in points.", "PT")] = None
 
     def __post_init__(self) -> None:
         for ending in self.format or ():

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 
 from orchestration.command import completion
+from orchestration.command.options import option
 from orchestration.command.registry import Command, build_option, option_group
 from orchestration.foundation.basics.attribute_docs import FieldDoc, attribute_docs
 from orchestration.foundation.basics.documents import toml_of
@@ -22,28 +23,28 @@ if TYPE_CHECKING:
 TIMING, EFFECTS, MODEL = "Timing", "Disturbances of the loop", "Model"
 
 
-def _option(*names: str, panel: str, text: str, metavar: str = "SECONDS", **options: Any) -> Any:
-    if "autocompletion" not in options and metavar.islower():  # alternatives, unlike P, N and R
-        options["autocompletion"] = completion.among(*metavar.split("|"))
-    return typer.Option(*names, help=text, metavar=metavar, rich_help_panel=panel, show_default=False, **options)
-
-
 def _of_timing(key: str, *, panel: str = EFFECTS, **options: Any) -> Any:
     """The flag of a key of `[timing]`, with the text of the record."""
     return _of_record("timing", "Timing", key, panel=panel, **options)
 
 
 def _of_record(
-    module: str, name: str, key: str, *, words: Any = None, tells_default: bool = False, repeated: bool = False,
-    **options: Any,
-) -> Any:  # fmt: skip
+    module: str,
+    name: str,
+    key: str,
+    *,
+    panel: str,
+    metavar: str = "SECONDS",
+    words: Any = None,
+    tells_default: bool = False,
+    repeated: bool = False,
+) -> Any:
     doc = attribute_docs(f"orchestration.quadrotor.scenarios.{module}", name).get(key, FieldDoc("", ""))
     text = doc.text.replace(" [s]", "")  # the metavar is SECONDS
     text = f"{text[:-1]}; default: {doc.default}." if tells_default else text
-    if words is not None:
-        options["metavar"] = "|".join(get_args(words))
-    flag = f"--{key.replace('_', '-')}"
-    return _option(flag, text=f"{text[:-1]}; may be repeated." if repeated else text, **options)
+    text = f"{text[:-1]}; may be repeated." if repeated else text
+    metavar = metavar if words is None else "|".join(get_args(words))
+    return option(f"--{key.replace('_', '-')}", text, metavar, panel=panel)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,11 +56,11 @@ class FlightFlags:
     plant_interval: Annotated[float | None, _of_timing("plant_interval", panel=TIMING, tells_default=True)] = None
     preset: Annotated[
         str | None,
-        _option(
+        option(
             "--preset",
+            "Sampling period and delay of a real flight stack; other flags override it.",
+            "px4|crazyflie|betaflight",
             panel=TIMING,
-            metavar="px4|crazyflie|betaflight",
-            text="Sampling period and delay of a real flight stack; other flags override it.",
             autocompletion=completion.presets,
         ),
     ] = None
@@ -72,7 +73,7 @@ class FlightFlags:
     jitter_distribution: Annotated[str | None, _of_timing("jitter_distribution", words=Spread)] = None
     measurement_loss: Annotated[str | None, _of_timing("measurement_loss", metavar="P|TABLE")] = None
     command_loss: Annotated[str | None, _of_timing("command_loss", metavar="P|TABLE")] = None
-    loss: Annotated[str | None, _option("--loss", panel=EFFECTS, metavar="P|TABLE", text="Both losses at once.")] = None
+    loss: Annotated[str | None, option("--loss", "Both losses at once.", "P|TABLE", panel=EFFECTS)] = None
     burst_length: Annotated[float | None, _of_timing("burst_length", metavar="N")] = None
     clock_ratio: Annotated[float | None, _of_timing("clock_ratio", metavar="R")] = None
     noise: Annotated[list[str] | None, _of_timing("noise", metavar="NAME=SIGMA", repeated=True)] = None
@@ -86,68 +87,68 @@ class FlightFlags:
     ] = None
     controller: Annotated[
         str | None,
-        _option(
+        option(
             "--controller",
+            "The controller: any FMU with its variables; default: UnifiedController.",
+            "NAME|PATH",
             panel=MODEL,
-            metavar="NAME|PATH",
-            text="The controller: any FMU with its variables; default: UnifiedController.",
             autocompletion=completion.controllers,
         ),
     ] = None
     plant: Annotated[
         str | None,
-        _option(
+        option(
             "--plant",
+            "The plant: any FMU with its variables; default: QuadrotorPlant.",
+            "NAME|PATH",
             panel=MODEL,
-            metavar="NAME|PATH",
-            text="The plant: any FMU with its variables; default: QuadrotorPlant.",
             autocompletion=completion.plants,
         ),
     ] = None
     vehicle: Annotated[
         str | None,
-        _option(
+        option(
             "--vehicle",
+            "Parameters of plant and controller by a file: paper, crazyflie, hummingbird, agilicious, or a path.",
+            "NAME|FILE",
             panel=MODEL,
-            metavar="NAME|FILE",
-            text="Parameters of plant and controller by a file: paper, crazyflie, hummingbird, agilicious, or a path.",
             autocompletion=completion.vehicles,
         ),
     ] = None
     reference: Annotated[
         str | None,
-        _option(
+        option(
             "--reference",
+            "The reference: hover, step, circle, lemniscate, helix, paper, or way-points; parameters by --set.",
+            "NAME|FILE.csv",
             panel=MODEL,
-            metavar="NAME|FILE.csv",
-            text="The reference: hover, step, circle, lemniscate, helix, paper, or way-points; parameters by --set.",
         ),
     ] = None
     disturbance: Annotated[
         str | None,
-        _option(
+        option(
             "--disturbance",
+            "Disturbance of the vehicle: dryden (gusts), or force or wind over time; parameters by --set.",
+            "NAME|FILE.csv",
             panel=MODEL,
-            metavar="NAME|FILE.csv",
-            text="Disturbance of the vehicle: dryden (gusts), or force or wind over time; parameters by --set.",
         ),
     ] = None
     native: Annotated[
         bool | None,
-        _option(
+        option(
             "--native",
+            "Use native twins (no Python inside) of FMUs with sources here; built if need be.",
+            "",
             panel=MODEL,
-            metavar="",
-            text="Use native twins (no Python inside) of FMUs with sources here; built if need be.",
         ),
     ] = None
     set: Annotated[
         list[str] | None,
-        _option(
+        option(
             "--set",
+            "A parameter, as controller.NAME=V, or of a system file a value by its path; may be repeated.",
+            "SIDE.NAME=V",
             panel=MODEL,
-            metavar="SIDE.NAME=V",
-            text="A parameter, as controller.NAME=V, or of a system file a value by its path; may be repeated.",
         ),
     ] = None
 
@@ -219,19 +220,14 @@ class FlightFlags:
 
 EngineFlag = Annotated[
     str | None,
-    typer.Option(
-        "--engine",
-        help="Simulation loop, with the same results; default: compiled where possible.",
-        metavar="python|compiled",
-        autocompletion=completion.among("python", "compiled"),
-        show_default=False,
-    ),
+    option("--engine", "Simulation loop, with the same results; default: compiled where possible.", "python|compiled"),
 ]
 
-Timing = Annotated[
-    Path | None,
-    typer.Argument(help="Of an SSP: the file with its timing, which SSP cannot express.", show_default=False),
+ScenarioFile = Annotated[
+    Path | None, typer.Argument(help="System or scenario file, or SSP; without one, the paper's flight.")
 ]
+
+Timing = Annotated[Path | None, typer.Argument(help="Of an SSP: the file with its timing, which SSP cannot express.")]
 
 _BY_MEASUREMENT = ("noise", "quantisation")
 

@@ -6,7 +6,8 @@ from typing import Annotated, Any
 
 import typer
 
-from orchestration.command import completion, registry
+from orchestration.command import registry
+from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, expect_positive, option_group, result_of_files
 from orchestration.command.variant_flags import VariantFlags
 from orchestration.components.building import consent
@@ -19,20 +20,16 @@ from orchestration.foundation.processes.limits import Limits
 class LimitFlags:
     """The limits of checks; raises `UsageError` for values that are not positive."""
 
-    time_limit: Annotated[
-        float,
-        typer.Option("--time-limit", help="Time limit for all checks of an FMU.", metavar="SECONDS"),
-    ] = Limits.time
+    time_limit: Annotated[float, option("--time-limit", "Time limit for all checks of an FMU.", "SECONDS")] = (
+        Limits.time
+    )
     memory_limit: Annotated[
-        float,
-        typer.Option("--memory-limit", help="Memory of the FMU's process and its children (Linux).", metavar="MB"),
+        float, option("--memory-limit", "Memory of the FMU's process and its children (Linux).", "MB")
     ] = Limits.memory
     size_limit: Annotated[
-        float, typer.Option("--size-limit", help="Size of an unpacked FMU, and of a file that it writes.", metavar="MB")
+        float, option("--size-limit", "Size of an unpacked FMU, and of a file that it writes.", "MB")
     ] = Limits.size
-    output_limit: Annotated[
-        float, typer.Option("--output-limit", help="Output that an FMU may print.", metavar="MB")
-    ] = Limits.output
+    output_limit: Annotated[float, option("--output-limit", "Output that an FMU may print.", "MB")] = Limits.output
 
     def __post_init__(self) -> None:
         for name in ("time", "memory", "size", "output"):
@@ -49,32 +46,27 @@ def build(
     slave: Annotated[
         str | None,
         typer.Argument(
-            metavar="[FOLDER]",
             help="Folder of modules that define slaves, FOLDER/NAME for one, or the name of a slave of this project; "
             "default: all of this project, or UnifiedController with --name.",
-            show_default=False,
+            metavar="[FOLDER]",
         ),
     ] = None,
     out: Annotated[
-        Path | None,
-        typer.Option("--out", help="Folder for the FMUs; default: FOLDER, or fmus/ for this project's."),
+        Path | None, option("--out", "Folder for the FMUs; default: FOLDER, or fmus/ for this project's.")
     ] = None,
     native: Annotated[
-        bool,
-        typer.Option("--native", help="Without Python inside, by a C compiler; default folder: native/."),
+        bool, option("--native", "Without Python inside, by a C compiler; default folder: native/.")
     ] = False,
     target: Annotated[
         str | None,
-        typer.Option(
+        option(
             "--target",
-            metavar="all|linux64,linux-aarch64,win64,darwin64",
-            autocompletion=completion.among("all", "linux64", "linux-aarch64", "win64", "darwin64"),
-            help="Systems to build --native for, with the compiler of the package ziglang.",
-            show_default=False,
+            "Systems to build --native for, with the compiler of the package ziglang.",
+            "all|linux64,linux-aarch64,win64,darwin64",
         ),
     ] = None,
     fmi: Annotated[
-        int, typer.Option("--fmi", min=2, max=3, help="Version of FMI, 3 with --native only; then in native/fmi3/.")
+        int, option("--fmi", "Version of FMI, 3 with --native only; then in native/fmi3/.", min=2, max=3)
     ] = 2,
     *,
     variant: VariantFlags,

@@ -6,7 +6,8 @@ from typing import Annotated
 import typer
 
 from orchestration.command import completion, registry
-from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
+from orchestration.command.flags import FlightFlags, ScenarioFile, Timing, flight_options, request_from
+from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
 from orchestration.foundation.basics.terminal import inform, progress_bar
 
@@ -19,18 +20,12 @@ def _tools(incomplete: str) -> list[str]:
 
 @flight_options
 def interop(
-    scenario: Annotated[
-        Path | None,
-        typer.Argument(help="System or scenario file, or SSP; without one, the paper's flight.", show_default=False),
-    ] = None,
+    scenario: ScenarioFile = None,
     timing: Timing = None,
     tool: Annotated[
-        list[str] | None,
-        typer.Option("--tool", help="Only this tool; may be repeated.", metavar="NAME", autocompletion=_tools),
+        list[str] | None, option("--tool", "Only this tool; may be repeated.", "NAME", autocompletion=_tools)
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", help="Draw the agreement, signal by signal, here.", metavar="DIR")
-    ] = None,
+    out: Annotated[Path | None, option("--out", "Draw the agreement, signal by signal, here.", "DIR")] = None,
     *,
     flags: FlightFlags,
 ) -> CommandResult:

@@ -5,76 +5,59 @@ from typing import Annotated
 
 import typer
 
-from orchestration.command import completion, registry
-from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
+from orchestration.command import registry
+from orchestration.command.flags import FlightFlags, ScenarioFile, Timing, flight_options, request_from
+from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
 from orchestration.foundation.basics.terminal import inform
 
 
 @flight_options
 def limit(
-    scenario: Annotated[
-        Path | None,
-        typer.Argument(help="System or scenario file, or SSP; without one, the paper's flight.", show_default=False),
-    ] = None,
+    scenario: ScenarioFile = None,
     timing: Timing = None,
     of: Annotated[
         str | None,
-        typer.Option(
+        option(
             "--of",
-            help="The quantity: of the quadrotor by name, of any system by path; default: the period of what is "
-            "sampled.",
-            metavar="period|delay|jitter|loss|PATH",
-            autocompletion=completion.among("period", "delay", "jitter", "loss"),
-            show_default=False,
+            "The quantity: of the quadrotor by name, of any system by path; default: the period of what is sampled.",
+            "period|delay|jitter|loss|PATH",
         ),
     ] = None,
-    first: Annotated[
-        float | None, typer.Option("--from", help="Start of the scan.", metavar="A", show_default=False)
-    ] = None,
-    last: Annotated[
-        float | None, typer.Option("--to", help="End of the scan.", metavar="B", show_default=False)
-    ] = None,
+    first: Annotated[float | None, option("--from", "Start of the scan.", "A")] = None,
+    last: Annotated[float | None, option("--to", "End of the scan.", "B")] = None,
     tolerance: Annotated[
         float | None,
-        typer.Option(
+        option(
             "--tolerance",
-            help="Width of the last bracket; default of a PATH: a fiftieth of --scan (of a period: a twentieth of it).",
-            show_default=False,
+            "Width of the last bracket; default of a PATH: a fiftieth of --scan (of a period: a twentieth of it).",
         ),
     ] = None,
     scan: Annotated[
         float | None,
-        typer.Option(
+        option(
             "--scan",
-            help="Step of the scan upward; default of a PATH: a twentieth of the range (of a period: half of it).",
-            metavar="STEP",
-            show_default=False,
+            "Step of the scan upward; default of a PATH: a twentieth of the range (of a period: half of it).",
+            "STEP",
         ),
     ] = None,
     confidence: Annotated[
         float,
-        typer.Option(
-            "--confidence",
-            help="With random effects: confidence (0 to 1) that at least nine runs in ten are good.",
-        ),
+        option("--confidence", "With random effects: confidence (0 to 1) that at least nine runs in ten are good."),
     ] = 0.95,
     continuous: Annotated[
-        bool, typer.Option("--continuous", help="Also run near continuous time (takes as long as ten runs at 1 ms).")
+        bool, option("--continuous", "Also run near continuous time (takes as long as ten runs at 1 ms).")
     ] = False,
-    workers: Annotated[int, typer.Option("--workers", help="Processes for the seeds.", metavar="N")] = 1,
+    workers: Annotated[int, option("--workers", "Processes for the seeds.", "N")] = 1,
     engine: Annotated[
         str,
-        typer.Option(
+        option(
             "--engine",
-            help="Simulation loop; auto: native twins of the FMUs where available, compiled where possible.",
-            metavar="auto|python|compiled",
-            autocompletion=completion.among("auto", "python", "compiled"),
+            "Simulation loop; auto: native twins of the FMUs where available, compiled where possible.",
+            "auto|python|compiled",
         ),
     ] = "auto",
-    out: Annotated[
-        Path | None, typer.Option("--out", help="Folder for the figure; default: beside the file.", metavar="DIR")
-    ] = None,
+    out: Annotated[Path | None, option("--out", "Folder for the figure; default: beside the file.", "DIR")] = None,
     figures: Annotated[bool, typer.Option(help="Draw the measurements with both limits.")] = True,
     *,
     flags: FlightFlags,

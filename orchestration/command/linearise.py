@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
+from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
 
 if TYPE_CHECKING:
@@ -15,20 +16,12 @@ if TYPE_CHECKING:
 @flight_options
 def linearise(
     scenario: Annotated[
-        Path | None,
-        typer.Argument(
-            help="System or scenario file, or SSP; without one, the paper's loop about hover.", show_default=False
-        ),
+        Path | None, typer.Argument(help="System or scenario file, or SSP; without one, the paper's loop about hover.")
     ] = None,
     timing: Timing = None,
     component: Annotated[
         str | None,
-        typer.Option(
-            "--component",
-            help="Where the loop is cut open; default: the only component that is sampled.",
-            metavar="NAME",
-            show_default=False,
-        ),
+        option("--component", "Where the loop is cut open; default: the only component that is sampled.", "NAME"),
     ] = None,
     *,
     flags: FlightFlags,

@@ -9,6 +9,7 @@ import typer
 from orchestration.command import registry
 from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
 from orchestration.command.linearise import linearise
+from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import inform
@@ -21,36 +22,27 @@ if TYPE_CHECKING:
 def margin(
     scenario: Annotated[
         Path | None,
-        typer.Argument(
-            help="System or scenario file, or SSP; without one, the paper's flight, or with --check none.",
-            show_default=False,
-        ),
+        typer.Argument(help="System or scenario file, or SSP; without one, the paper's flight, or with --check none."),
     ] = None,
     timing: Timing = None,
     of: Annotated[
         str | None,
-        typer.Option(
+        option(
             "--of",
-            help="The quantity that varies: the path of a delay_jitter, of a sampling.jitter, of a task's execution or "
+            "The quantity that varies: the path of a delay_jitter, of a sampling.jitter, of a task's execution or "
             "jitter, or of a loss (here the longest run of losses). Default: the delays of the quadrotor's command, by "
             "bounds.",
-            metavar="PATH",
-            show_default=False,
+            "PATH",
         ),
     ] = None,
     and_of: Annotated[
-        str | None,
-        typer.Option("--and", help="With --of: a second quantity that varies; draws a region.", metavar="PATH"),
+        str | None, option("--and", "With --of: a second quantity that varies; draws a region.", "PATH")
     ] = None,
     check: Annotated[
-        Path | None,
-        typer.Option(
-            "--check", help="Verify a certificate, and with a file that it belongs to that loop.", metavar="FILE"
-        ),
+        Path | None, option("--check", "Verify a certificate, and with a file that it belongs to that loop.", "FILE")
     ] = None,
     out: Annotated[
-        Path | None,
-        typer.Option("--out", help="File of the certificate; with --and the folder.", metavar="CERTIFICATE"),
+        Path | None, option("--out", "File of the certificate; with --and the folder.", "CERTIFICATE")
     ] = None,
     *,
     flags: FlightFlags,

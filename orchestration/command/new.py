@@ -6,6 +6,7 @@ from typing import Annotated, get_args
 import typer
 
 from orchestration.command import registry
+from orchestration.command.options import option
 from orchestration.command.registry import RUN, CommandResult, result_of_files
 from orchestration.components.scaffold import examples as shipped
 from orchestration.components.scaffold.folder import Kind, git_author, write
@@ -14,12 +15,10 @@ from orchestration.foundation.basics.terminal import inform
 
 
 def new(
-    kind: Annotated[str, typer.Argument(help="What to write.", metavar="controller|plant|filter", show_default=False)],
-    name: Annotated[str, typer.Argument(help="Name of the folder and its FMU, such as hover_pd.", show_default=False)],
-    author: Annotated[
-        str | None, typer.Option("--author", help="Author; default: git's user.name.", show_default=False)
-    ] = None,
-    license: Annotated[str, typer.Option("--license", help="Licence of the slave.", metavar="TEXT")] = "",
+    kind: Annotated[str, typer.Argument(help="What to write.", metavar="controller|plant|filter")],
+    name: Annotated[str, typer.Argument(help="Name of the folder and its FMU, such as hover_pd.")],
+    author: Annotated[str | None, option("--author", "Author; default: git's user.name.")] = None,
+    license: Annotated[str, option("--license", "Licence of the slave.", "TEXT")] = "",
 ) -> CommandResult:
     """Write a folder NAME here: a law in a few lines, its test, a system that uses it, a page of commands."""
     kinds = {each: each for each in get_args(Kind)}
@@ -34,7 +33,7 @@ def new(
 
 
 def examples(
-    out: Annotated[Path, typer.Option("--out", help="Folder for them.", metavar="DIR")] = Path(),
+    out: Annotated[Path, option("--out", "Folder for them.", "DIR")] = Path(),
 ) -> CommandResult:
     """Write the folders examples, studies and gains here: the files that the documentation uses."""
     written = result_of_files(shipped.write(out))

@@ -10,6 +10,7 @@ import typer
 
 from orchestration.command import registry
 from orchestration.command.figure_flags import FigureFlags
+from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, option_group, result_of_files
 from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.foundation.basics.terminal import Share, progress_bar
@@ -26,33 +27,21 @@ OVERLAY = "overlay"
 @option_group("look", FigureFlags)
 def plot(
     directory: Annotated[list[Path], typer.Argument(help="Directories of runs.", metavar="DIR…")],
-    start: Annotated[
-        float | None, typer.Option("--from", help="Start of the time axis, in seconds.", show_default=False)
-    ] = None,
-    end: Annotated[float | None, typer.Option("--to", help="End of the time axis.", show_default=False)] = None,
+    start: Annotated[float | None, option("--from", "Start of the time axis, in seconds.")] = None,
+    end: Annotated[float | None, option("--to", "End of the time axis.")] = None,
     figure: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--figure", help=f"One of {', '.join(FIGURES)}; default: all.", metavar="NAME", show_default=False
-        ),
+        list[str] | None, option("--figure", f"One of {', '.join(FIGURES)}; default: all.", "NAME")
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out", help=f"Folder of the figures; default: that of the run, or {OVERLAY}/ beside several.",
-            metavar="DIR", show_default=False,
-        ),
+        option("--out", f"Folder of the figures; default: that of the run, or {OVERLAY}/ beside several.", "DIR"),
     ] = None,
     film: Annotated[
-        Path | None,
-        typer.Option(
-            "--film", help="Write the flight as a film instead; .mp4 needs ffmpeg.", metavar="FILE.gif|FILE.mp4",
-            show_default=False,
-        ),
+        Path | None, option("--film", "Write the flight as a film instead; .mp4 needs ffmpeg.", "FILE.gif|FILE.mp4")
     ] = None,
     *,
     look: FigureFlags,
-) -> CommandResult:  # fmt: skip
+) -> CommandResult:
     """Draw the figures of a run again, or of several runs overlaid, for a screen, a paper or slides."""
     with progress_bar("drawing") as progress:  # first, as importing matplotlib takes time
         from orchestration.simulation.figures.style import save

@@ -7,12 +7,13 @@ import shlex
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path, PurePath
 from typing import Annotated, Any
 
 import typer
 
+from orchestration.command.options import option
 from orchestration.foundation.basics import terminal
 from orchestration.foundation.basics.documents import plain
 from orchestration.foundation.basics.errors import UsageError
@@ -40,8 +41,7 @@ def result_of_files(paths: Iterable[PurePath]) -> CommandResult:
     return CommandResult(document={"files": written}, lines=[str(path) for path in written])
 
 
-def _option(*names: str, text: str, metavar: str = "") -> Any:
-    return typer.Option(*names, help=text, rich_help_panel="Output", show_default=False, metavar=metavar)
+_output = partial(option, metavar="", panel="Output")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,14 +49,14 @@ class OutputOptions:
     """The output flags; raises `UsageError` for flags that contradict each other."""
 
     as_json: Annotated[
-        bool, _option("--json", text="Print the result as one JSON document; all else goes to standard error.")
+        bool, _output("--json", "Print the result as one JSON document; all else goes to standard error.")
     ] = False
-    quiet: Annotated[bool, _option("--quiet", "-q", text="Print only the result, warnings and errors.")] = False
-    verbose: Annotated[bool, _option("--verbose", "-v", text="Also report each step.")] = False
+    quiet: Annotated[bool, _output("--quiet", "Print only the result, warnings and errors.", short="-q")] = False
+    verbose: Annotated[bool, _output("--verbose", "Also report each step.", short="-v")] = False
     log: Annotated[
-        Path | None, _option("--log", metavar="FILE", text="Append all output and steps to FILE, with times.")
+        Path | None, _output("--log", "Append all output and steps to FILE, with times.", metavar="FILE")
     ] = None
-    debug: Annotated[bool, _option("--debug", text="Print the traceback of an error.")] = False
+    debug: Annotated[bool, _output("--debug", "Print the traceback of an error.")] = False
 
     def __post_init__(self) -> None:
         if self.quiet and self.verbose:
@@ -148,11 +148,7 @@ class BuildFlag:
 
     build: Annotated[
         bool,
-        typer.Option(
-            "--build",
-            help="Allow building FMUs from foreign modules beside a system file (it runs them); remembered.",
-            show_default=False,
-        ),
+        option("--build", "Allow building FMUs from foreign modules beside a system file (it runs them); remembered."),
     ] = False
 
 

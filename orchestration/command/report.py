@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from orchestration.command import registry
+from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, build_option, result_of_files
 from orchestration.foundation.basics.terminal import progress_bar
 
@@ -15,34 +16,23 @@ def report(
     what: Annotated[
         list[Path],
         typer.Argument(
-            help="Directories of runs, or one study file, its store, or a comparison file.",
-            metavar="WHAT...",
-            show_default=False,
+            help="Directories of runs, or one study file, its store, or a comparison file.", metavar="WHAT..."
         ),
     ],
     out: Annotated[
         Path | None,
-        typer.Option(
+        option(
             "--out",
-            help="The file; default: report_NAME.html here. Or the folder of the study's store, default results/NAME, "
+            "The file; default: report_NAME.html here. Or the folder of the study's store, default results/NAME, "
             "which the file is then written to.",
-            metavar="FILE.html|DIR",
+            "FILE.html|DIR",
         ),
     ] = None,
     flights: Annotated[
         int | None,
-        typer.Option(
-            "--flights",
-            min=0,
-            help="Number of runs of a study whose signals are embedded; default: 1000.",
-            metavar="N",
-            show_default=False,
-        ),
+        option("--flights", "Number of runs of a study whose signals are embedded; default: 1000.", "N", min=0),
     ] = None,
-    run: Annotated[
-        list[int] | None,
-        typer.Option("--run", help="A run of the study to embed; may be repeated.", metavar="K"),
-    ] = None,
+    run: Annotated[list[int] | None, option("--run", "A run of the study to embed; may be repeated.", "K")] = None,
 ) -> CommandResult:
     """Write runs, a study or a comparison as one HTML file: replay, plots, maps; it needs no network."""
     from orchestration.experiments.report.writing import report as write

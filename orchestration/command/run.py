@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from orchestration.command import exact, registry
-from orchestration.command.flags import EngineFlag, FlightFlags, Timing, flight_options, request_from
+from orchestration.command.flags import EngineFlag, FlightFlags, ScenarioFile, Timing, flight_options, request_from
+from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, expect_positive, option_group
 from orchestration.command.study_flags import TimeLimit
 from orchestration.foundation.basics.errors import UsageError
@@ -25,16 +26,11 @@ class ProcessFlags:
     """The limits of a run; raises `UsageError` for values that are not positive."""
 
     in_process: Annotated[
-        bool,
-        typer.Option(
-            "--in-process",
-            help="Load foreign FMUs into this process: if one crashes, everything ends.",
-            show_default=False,
-        ),
+        bool, option("--in-process", "Load foreign FMUs into this process: if one crashes, everything ends.")
     ] = False
     time_limit: TimeLimit = None
     memory_limit: Annotated[
-        float, typer.Option("--memory-limit", help="Memory of a run's process and its children (Linux).", metavar="MB")
+        float, option("--memory-limit", "Memory of a run's process and its children (Linux).", "MB")
     ] = Limits.memory
 
     def __post_init__(self) -> None:
@@ -45,23 +41,15 @@ class ProcessFlags:
 @option_group("process", ProcessFlags)
 @flight_options
 def run(
-    scenario: Annotated[
-        Path | None,
-        typer.Argument(help="System or scenario file, or SSP; without one, the paper's flight.", show_default=False),
-    ] = None,
+    scenario: ScenarioFile = None,
     timing: Timing = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", help="Directory for signals, events, metrics and figures.", metavar="DIR")
-    ] = None,
+    out: Annotated[Path | None, option("--out", "Directory for signals, events, metrics and figures.", "DIR")] = None,
     figures: Annotated[bool, typer.Option(help="Draw the figures into the directory.")] = True,
     pause_at: Annotated[
-        float | None, typer.Option("--pause-at", help="Pause here; the state is saved in --out DIR.", metavar="SECONDS")
+        float | None, option("--pause-at", "Pause here; the state is saved in --out DIR.", "SECONDS")
     ] = None,
     resume: Annotated[
-        Path | None,
-        typer.Option(
-            "--resume", help="Resume the run paused in DIR; the results are the same to the bit.", metavar="DIR"
-        ),
+        Path | None, option("--resume", "Resume the run paused in DIR; the results are the same to the bit.", "DIR")
     ] = None,
     engine: EngineFlag = None,
     *,

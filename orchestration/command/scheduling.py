@@ -9,6 +9,7 @@ import typer
 
 from orchestration.command import registry
 from orchestration.command.flags import assigned
+from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import inform
@@ -26,25 +27,17 @@ HEAD = (
 
 def schedule(
     system: Annotated[Path, typer.Argument(help="System file, or SSP; its FMUs need not exist.")],
-    until: Annotated[
-        float | None,
-        typer.Option("--until", help="End of the schedule; default: stop_time.", metavar="SECONDS", show_default=False),
-    ] = None,
+    until: Annotated[float | None, option("--until", "End of the schedule; default: stop_time.", "SECONDS")] = None,
     out: Annotated[
-        Path | None,
-        typer.Option("--out", help="Draw the Gantt chart, in the format of the ending.", metavar="FIGURE.png",
-                     show_default=False),
+        Path | None, option("--out", "Draw the Gantt chart, in the format of the ending.", "FIGURE.png")
     ] = None,
-    start: Annotated[
-        float | None, typer.Option("--from", help="Start of the chart, in seconds.", show_default=False)
-    ] = None,
-    end: Annotated[float | None, typer.Option("--to", help="End of the chart.", show_default=False)] = None,
+    start: Annotated[float | None, option("--from", "Start of the chart, in seconds.")] = None,
+    end: Annotated[float | None, option("--to", "End of the chart.")] = None,
     changes: Annotated[
         list[str] | None,
-        typer.Option("--set", help="A value by its path, as computers.NAME.scheduling=V; may be repeated.",
-                     metavar="PATH=V", show_default=False),
+        option("--set", "A value by its path, as computers.NAME.scheduling=V; may be repeated.", "PATH=V"),
     ] = None,
-) -> CommandResult:  # fmt: skip
+) -> CommandResult:
     """Simulate the computers and networks of a system: response times, missed deadlines, bounds of theory."""
     if until is not None and not 0.0 < until < float("inf"):
         raise UsageError(f"--until {until:g}: expected a positive number of seconds")

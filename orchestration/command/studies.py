@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from orchestration.command import completion, exact, registry
+from orchestration.command import exact, registry
 from orchestration.command.figure_flags import FigureFlags
+from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, build_option, option_group, result_of_files
 from orchestration.command.study_flags import Out, StudyEngineFlag, TimeLimit, Workers
 from orchestration.foundation.basics.terminal import inform, progress_bar
@@ -14,7 +15,7 @@ from orchestration.foundation.basics.terminal import inform, progress_bar
 if TYPE_CHECKING:
     from orchestration.experiments.studies.study import Study
 
-StudyFile = Annotated[Path, typer.Argument(help="Study file.", metavar="STUDY.toml", show_default=False)]
+StudyFile = Annotated[Path, typer.Argument(help="Study file.", metavar="STUDY.toml")]
 
 FIRST = 1000
 """Number of runs of a study that are checked for infinite means"""
@@ -25,10 +26,8 @@ def sweep(
     study: StudyFile,
     out: Out = None,
     workers: Workers = 1,
-    dask: Annotated[
-        str | None, typer.Option("--dask", help="A dask scheduler instead, e.g. tcp://host:8786.", metavar="URL")
-    ] = None,
-    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Repeat failed runs.")] = False,
+    dask: Annotated[str | None, option("--dask", "A dask scheduler instead, e.g. tcp://host:8786.", "URL")] = None,
+    retry_failed: Annotated[bool, option("--retry-failed", "Repeat failed runs.")] = False,
     engine: StudyEngineFlag = "auto",
     time_limit: TimeLimit = None,
 ) -> CommandResult:
@@ -90,25 +89,18 @@ def status(study: StudyFile, out: Out = None) -> CommandResult:
 
 
 def export(
-    what: Annotated[
-        Path,
-        typer.Argument(help="Study file, or the directory of a run.", metavar="STUDY.toml|DIR", show_default=False),
-    ],
+    what: Annotated[Path, typer.Argument(help="Study file, or the directory of a run.", metavar="STUDY.toml|DIR")],
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out", help="Folder of the study's store, default: results/NAME; of a run, of the files, default: DIR.",
-            metavar="DIR", show_default=False,
+        option(
+            "--out", "Folder of the study's store, default: results/NAME; of a run, of the files, default: DIR.", "DIR"
         ),
     ] = None,
     formats: Annotated[
         list[str] | None,
-        typer.Option(
-            "--format", help="Default: parquet and csv of a study, csv of a run; may be repeated.",
-            metavar="csv|mat|parquet", autocompletion=completion.among("csv", "mat", "parquet"), show_default=False,
-        ),
+        option("--format", "Default: parquet and csv of a study, csv of a run; may be repeated.", "csv|mat|parquet"),
     ] = None,
-) -> CommandResult:  # fmt: skip
+) -> CommandResult:
     """Write the rows of a study, or the signals and events of a run, as CSV, MAT or Parquet, with their units."""
     from orchestration.experiments.studies import exporting
     from orchestration.experiments.studies.store import store_path
@@ -124,7 +116,7 @@ def draw(
     study: StudyFile,
     out: Out = None,
     metric: Annotated[
-        str | None, typer.Option("--metric", help="Metric to draw; default: the first objective that varies.")
+        str | None, option("--metric", "Metric to draw; default: the first objective that varies.")
     ] = None,
     *,
     look: FigureFlags,

@@ -3,31 +3,22 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from orchestration.command.options import option
 
-from orchestration.command import completion
+Out = Annotated[Path | None, option("--out", "Folder of the store; default: results/NAME.", "DIR")]
 
-Out = Annotated[Path | None, typer.Option("--out", help="Folder of the store; default: results/NAME.", metavar="DIR")]
-
-Workers = Annotated[int, typer.Option("--workers", help="Processes on this machine.", metavar="N")]
+Workers = Annotated[int, option("--workers", "Processes on this machine.", "N")]
 
 StudyEngineFlag = Annotated[
     str,
-    typer.Option(
+    option(
         "--engine",
-        help="Simulation loop; batch: native FMUs, several runs at once in a SIMD batch; "
-        "auto: the fastest available one.",
-        metavar="auto|python|compiled|batch",
-        autocompletion=completion.among("auto", "python", "compiled", "batch"),
+        "Simulation loop; batch: native FMUs, several runs at once in a SIMD batch; auto: the fastest available one.",
+        "auto|python|compiled|batch",
     ),
 ]
 
 TimeLimit = Annotated[
     float | None,
-    typer.Option(
-        "--time-limit",
-        help="Limit on the processor time of a run, idle waiting included; default: none.",
-        metavar="SECONDS",
-        show_default=False,
-    ),
+    option("--time-limit", "Limit on the processor time of a run, idle waiting included; default: none.", "SECONDS"),
 ]

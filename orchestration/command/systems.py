@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from orchestration.command import registry
-from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
+from orchestration.command.flags import FlightFlags, ScenarioFile, Timing, flight_options, request_from
+from orchestration.command.options import option
 from orchestration.command.registry import RUN, CommandResult, build_option
 from orchestration.foundation.basics.terminal import inform
 
@@ -28,13 +29,10 @@ def connect(
     fmu: Annotated[
         list[str],
         typer.Argument(
-            help="FMUs: paths, or names of this project's; tables of tasks (.csv), databases of CAN buses (.dbc).",
-            show_default=False,
+            help="FMUs: paths, or names of this project's; tables of tasks (.csv), databases of CAN buses (.dbc)."
         ),
     ],
-    out: Annotated[
-        Path | None, typer.Option("--out", help="The system file; default: printed.", metavar="SYSTEM.toml")
-    ] = None,
+    out: Annotated[Path | None, option("--out", "The system file; default: printed.", "SYSTEM.toml")] = None,
 ) -> CommandResult:
     """Propose a system file for FMUs: outputs to inputs by name, type and unit; open points are marked in it."""
     from orchestration.components.building import fmus
@@ -65,14 +63,9 @@ def connect(
 
 @flight_options
 def show(
-    system: Annotated[
-        Path | None,
-        typer.Argument(help="System or scenario file, or SSP; without one, the paper's flight.", show_default=False),
-    ] = None,
+    system: ScenarioFile = None,
     timing: Timing = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", help="Draw it, in the format of the ending.", metavar="FIGURE.png")
-    ] = None,
+    out: Annotated[Path | None, option("--out", "Draw it, in the format of the ending.", "FIGURE.png")] = None,
     *,
     flags: FlightFlags,
 ) -> CommandResult:

@@ -4,10 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from orchestration.command import completion
 from orchestration.command.flags import assigned
+from orchestration.command.options import option
 from orchestration.foundation.basics.errors import UsageError
 
 if TYPE_CHECKING:
@@ -24,27 +23,22 @@ class VariantFlags:
 
     set: Annotated[
         list[str] | None,
-        typer.Option(
+        option(
             "--set",
-            metavar="NAME=V",
-            help="Fix a parameter of one slave as a constant; code that it turns off is removed; may be repeated.",
-            show_default=False,
+            "Fix a parameter of one slave as a constant; code that it turns off is removed; may be repeated.",
+            "NAME=V",
         ),
     ] = None
     vehicle: Annotated[
         str | None,
-        typer.Option(
+        option(
             "--vehicle",
-            metavar="NAME|FILE",
-            help="Fix the parameters of a vehicle, or of a controller for it; --set takes precedence.",
+            "Fix the parameters of a vehicle, or of a controller for it; --set takes precedence.",
+            "NAME|FILE",
             autocompletion=completion.vehicles,
-            show_default=False,
         ),
     ] = None
-    name: Annotated[
-        str | None,
-        typer.Option("--name", metavar="NAME", help="Name of the slave with fixed parameters.", show_default=False),
-    ] = None
+    name: Annotated[str | None, option("--name", "Name of the slave with fixed parameters.", "NAME")] = None
 
     @property
     def is_set(self) -> bool:
