@@ -9,7 +9,7 @@ from tests.places import ROOT
 
 PAGE = (ROOT / "docs" / "design" / "a_run_file_by_file.md").read_text(encoding="utf-8")
 STATIONS = re.findall(
-    r"^### (\d+\. [^\n]+)\n\n(.+?)\n\n`([^`\n]+)`\n\n```python\n(.+?)\n```$", PAGE, re.DOTALL | re.MULTILINE
+    r"^### (\d+\. [^\n]+)\n\n(.+?)\n\n`([^`\n]+)`\n\n```text\n(.+?)\n```$", PAGE, re.DOTALL | re.MULTILINE
 )
 
 
