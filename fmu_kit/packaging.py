@@ -27,6 +27,7 @@ from xml.etree.ElementTree import Element, ParseError, fromstring, tostring
 
 from fmu_kit import archive, bundle, documentation, loader
 from fmu_kit.archive import ICONS, PAGE, SOURCE_HASH_FILE, VARIANT_FILE, content_guid, write_archive
+from fmu_kit.assigned_names import expect_declared
 from fmu_kit.bundle import PackagingError, Target, bundled_sources, module_path, path_in_bundle, rename_imports
 from fmu_kit.documentation import BuildNotes
 from fmu_kit.errors import FmuError
@@ -174,6 +175,10 @@ def slave_class(target: Target) -> Any:
     if inspect.isabstract(slave):
         left = ", ".join(sorted(slave.__abstractmethods__))
         raise PackagingError(f"{target.module}:{target.model}: expected it to define {left}")
+    try:
+        expect_declared(slave)
+    except AttributeError as error:
+        raise PackagingError(str(error)) from error
     if "description" not in vars(slave):
         raise PackagingError(f"{target.module}:{target.model}: expected a docstring or a description")
     return slave if target.variant is None else _variant(slave, target.variant)

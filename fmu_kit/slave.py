@@ -20,7 +20,7 @@ from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
 from fmu_kit import model_description
-from fmu_kit.declared_names import expect_declared, expect_free_names, expect_variables
+from fmu_kit.declared_names import expect_free_names, expect_variables
 from fmu_kit.errors import DivergenceError, FmuError, require
 from fmu_kit.failure import Failure, printf_safe, report
 from fmu_kit.interface import Declaration, declarations_in, initial_values, variables_of
@@ -167,7 +167,6 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._quickly_settable: frozenset[int] = frozenset()
         self._warned: list[str] = []
         self._has_failed = False  # of this object, whatever the phase of a restored state
-        self._known_attributes = 0  # their number when they were last checked
         self._base_attributes = frozenset(vars(self))
 
     # -- methods of a model ------------------------------------------------------------------------------
@@ -252,7 +251,6 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         """fmi2ExitInitializationMode: parameters are checked together here."""
         self._expect(Phase.INITIALIZATION, "fmi2ExitInitializationMode")
         self._initialise()
-        expect_declared(self, self._initialise)
         self._phase = Phase.STEPPING
         self._initialised = True
         self._quickly_settable = self._inputs
@@ -263,8 +261,6 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._expect(Phase.STEPPING, "fmi2DoStep")
         self._expect_in_time(current_time, step_size)
         self._advance(current_time, step_size)
-        if len(self.__dict__) != self._known_attributes:
-            expect_declared(self, lambda: self._advance(current_time, step_size))
         self._reached = current_time + step_size
         return True
 

@@ -259,7 +259,6 @@ def test_first_outputs_depend_on_the_start_of_a_state_or_where_the_law_says_how_
 @pytest.mark.parametrize(
     ("statement", "words"),
     [
-        ("self.froce = 1.0", "self.froce: no such variable; expected angle, place, force, is_on, samples, or a name"),
         ("self.force = 1.0", "self.force = 1.0: expected a Vec3"),
         ("self.angle = Vec3(0.0, 0.0, 0.0)", "expected a number"),
         ("self.angle = None", "self.angle = None: expected a number"),

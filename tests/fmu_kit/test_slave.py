@@ -1,9 +1,11 @@
 """A slave of a few lines fulfils FMI: it needs only its variables and a step."""
 
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from fmu_kit.assigned_names import expect_declared
 from fmu_kit.failure import Failure
 from fmu_kit.interface import FixedParameter, Input, Output
 from fmu_kit.slave import Slave
@@ -100,3 +102,23 @@ def test_an_output_whose_dependencies_are_no_variables_is_refused_where_it_is_de
 
     with pytest.raises(TypeError, match=r"initial_dependencies of speed: there is no initial\.speed"):
         type("Faster", (Moving,), {"speed": Output("its speed", "m/s")})
+
+
+def test_an_attribute_that_a_method_sets_without_declaring_it_is_refused_with_its_line_whatever_sets_it() -> None:
+    class Mistyped(Sum):
+        @property
+        def twice(self) -> float:
+            return 2.0 * self.sum
+
+        def _keep(self) -> None:
+            self._kept = self.count = 1
+            if self._kept > 2:
+                self.sum, self.som = 1.0, 2.0  # never reached
+
+    with pytest.raises(AttributeError) as error:
+        expect_declared(Mistyped)
+    line = next(
+        i for i, text in enumerate(Path(__file__).read_text("utf-8").splitlines(), 1) if "never reached" in text
+    )
+    assert f"test_slave.py, line {line}: self.som: no such variable; expected sum, count, or a name" in str(error.value)
+    expect_declared(Sum)
