@@ -31,14 +31,17 @@ All times are in seconds, all values in the units that the FMUs declare. All err
 `UsageError` is an invalid request. Studies and tables need `pip install 'quadcosim[studies]'`.
 """
 
+import ast
+from functools import cache
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from orchestration.foundation.basics.errors import in_python, set_wording
 
 set_wording(in_python)
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # also what `__getattr__` finds public names by
     from orchestration.components.fmi.model import Model, read_model
     from orchestration.experiments.comparison.design import Comparison
     from orchestration.experiments.comparison.file import load_comparison
@@ -90,94 +93,6 @@ if TYPE_CHECKING:
     from orchestration.theory.exact.expect import Expected, expect
     from orchestration.theory.stability.linearise import Linearised, linearise
     from orchestration.theory.stability.state_space import StateSpace
-
-_HOMES = {
-    # run
-    "run": "orchestration.simulation.runs.simulation",
-    "Result": "orchestration.simulation.runs.result",
-    "save_run": "orchestration.simulation.runs.run_directory",
-    "load_run": "orchestration.simulation.runs.run_directory",
-    "Simulation": "orchestration.simulation.runs.stepping",
-    "fly_until": "orchestration.simulation.runs.pause",
-    "resume": "orchestration.simulation.runs.pause",
-    "report": "orchestration.experiments.report.writing",
-    # a flight of the quadrotor
-    "Scenario": "orchestration.quadrotor.scenarios.scenario",
-    "Timing": "orchestration.quadrotor.scenarios.timing",
-    "FmuChoice": "orchestration.quadrotor.scenarios.fmu_choice",
-    "ReferenceChoice": "orchestration.quadrotor.scenarios.translation",
-    "DisturbanceChoice": "orchestration.quadrotor.scenarios.translation",
-    "Record": "orchestration.quadrotor.scenarios.fmu_choice",
-    "Vehicle": "orchestration.systems.system.vehicle",
-    "load_vehicle": "orchestration.quadrotor.scenarios.vehicle",
-    "load_scenario": "orchestration.quadrotor.scenarios.file",
-    # any system
-    "System": "orchestration.systems.system.model",
-    "Component": "orchestration.systems.system.component",
-    "Sampling": "orchestration.systems.system.component",
-    "SamplingOnArrival": "orchestration.systems.system.component",
-    "Connection": "orchestration.systems.system.connection",
-    "Source": "orchestration.systems.system.source",
-    "Distribution": "orchestration.systems.system.distribution",
-    "Criterion": "orchestration.systems.system.model",
-    "Computer": "orchestration.systems.system.computers",
-    "Task": "orchestration.systems.system.computers",
-    "Network": "orchestration.systems.system.computers",
-    "Message": "orchestration.systems.system.computers",
-    "Arrivals": "orchestration.systems.system.computers",
-    "load_system": "orchestration.systems.system.file",
-    "changed": "orchestration.systems.system.paths",
-    "schedule": "orchestration.simulation.runs.scheduling",
-    "Scheduled": "orchestration.simulation.runs.scheduling",
-    "read_model": "orchestration.components.fmi.model",
-    "Model": "orchestration.components.fmi.model",
-    # many runs
-    "fly": "orchestration.simulation.runs.many_runs",
-    "Flights": "orchestration.simulation.runs.many_runs",
-    "limit": "orchestration.experiments.limits.limit",
-    "Limit": "orchestration.experiments.limits.limit_result",
-    "expect": "orchestration.theory.exact.expect",
-    "Expected": "orchestration.theory.exact.expect",
-    "linearise": "orchestration.theory.stability.linearise",
-    "Linearised": "orchestration.theory.stability.linearise",
-    "StateSpace": "orchestration.theory.stability.state_space",
-    "basin": "orchestration.theory.certificates.basin",
-    "Basin": "orchestration.theory.certificates.basin",
-    "margin": "orchestration.theory.certificates.margin",
-    "Certified": "orchestration.theory.certificates.margin",
-    "margin_region": "orchestration.theory.certificates.region",
-    "Region": "orchestration.theory.certificates.region",
-    "check_certificate": "orchestration.theory.certificates.check",
-    "Checked": "orchestration.theory.certificates.check",
-    "sweep": "orchestration.experiments.studies.sweep",
-    "Study": "orchestration.experiments.studies.study",
-    "Axis": "orchestration.experiments.studies.axes",
-    "Swept": "orchestration.experiments.studies.swept",
-    "load_study": "orchestration.experiments.studies.study_file",
-    "compare": "orchestration.experiments.comparison.run",
-    "Comparison": "orchestration.experiments.comparison.design",
-    "Compared": "orchestration.experiments.comparison.run",
-    "load_comparison": "orchestration.experiments.comparison.file",
-    "tune": "orchestration.experiments.tuning.tune",
-    "Tuning": "orchestration.experiments.tuning.tuning",
-    "ExactTuning": "orchestration.experiments.tuning.exact",
-    "Tuned": "orchestration.experiments.tuning.tune",
-    "load_tuning": "orchestration.experiments.tuning.tuning_file",
-    # errors
-    "QuadcosimError": "orchestration.foundation.basics.errors",
-    "UsageError": "orchestration.foundation.basics.errors",
-    "SimulatorError": "orchestration.foundation.basics.errors",
-    "RunInterrupted": "orchestration.simulation.runs.outcome",
-    "RunLost": "orchestration.simulation.runs.outcome",
-}
-_OTHERWISE = {
-    "limit": "find",
-    "check_certificate": "check",
-    "margin_region": "region",
-    "fly": "run_many",
-    "fly_until": "run_until",
-}
-"""Names that differ in their modules"""
 
 __all__ = [
     "Arrivals",
@@ -258,9 +173,18 @@ if not TYPE_CHECKING:  # else every name would seem to be there, of type Any
 
     def __getattr__(name):
         """Load only what is used: the command line answers `--help` without numpy."""
-        if name not in _HOMES:
+        if name not in __all__:
             raise AttributeError(f"module {__name__} has no attribute {name}")
-        return getattr(import_module(_HOMES[name]), _OTHERWISE.get(name, name))
+        module, its_name = _homes()[name]
+        return getattr(import_module(module), its_name)
+
+
+@cache
+def _homes() -> dict[str, tuple[str, str]]:
+    """The module of each public name, and its name there, by the imports above, which are not executed."""
+    tree = ast.parse(Path(__file__).read_text(encoding="utf-8"))
+    imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+    return {alias.asname or alias.name: (node.module or "", alias.name) for node in imports for alias in node.names}
 
 
 def __dir__() -> list[str]:
