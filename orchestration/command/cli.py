@@ -16,6 +16,7 @@ from orchestration.command import (
     fmus,
     interop,
     limit,
+    linearise,
     margin,
     new,
     plotting,
@@ -92,11 +93,37 @@ def quadcosim(
         raise UsageError("expected a command; quadcosim --help lists them")
 
 
-# In the order of the help.
-for commands in (
-    run, scheduling, plotting, report, new, systems, limit, studies, controllers, exact, margin, fmus, exports, interop,
-):  # fmt: skip
-    commands.register(app)
+COMMANDS = {
+    "Run": (
+        run.run,
+        scheduling.schedule,
+        plotting.plot,
+        report.report,
+        new.new,
+        new.examples,
+        systems.show,
+        systems.connect,
+        systems.schema,
+    ),
+    "Study": (
+        limit.limit,
+        studies.sweep,
+        studies.status,
+        studies.draw,
+        studies.export,
+        controllers.compare,
+        controllers.tune,
+        exact.expect,
+        margin.margin,
+        linearise.linearise,
+    ),
+    "FMUs": (fmus.build, fmus.validate, fmus.doctor),
+    "Other tools": (exports.export_c, exports.ssp, interop.interop),
+}
+"""Commands by their groups, in the order of the help"""
+
+for group, commands in COMMANDS.items():
+    registry.add(app, group, *commands)
 
 
 def main(arguments: list[str] | None = None) -> None:

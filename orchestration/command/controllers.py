@@ -6,7 +6,6 @@ from typing import Annotated
 
 import typer
 
-from orchestration.command import registry
 from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, build_option, option_group, result_of_files
@@ -66,8 +65,3 @@ def tune(
     command = f"quadcosim tune {tuning} --out {out}" + (f" --engine {engine}" if engine != "auto" else "")
     tuned = search_all(load_tuning(tuning), out=out, workers=workers, engine=engine_choice(engine), command=command)
     return result_of_files(tuned.written)
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands to the command line."""
-    registry.add(app, registry.STUDY, compare, tune)

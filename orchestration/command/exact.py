@@ -2,9 +2,6 @@
 
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from orchestration.command import registry
 from orchestration.command.flags import FlightFlags, ScenarioFile, Timing, flight_options, request_from
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
@@ -70,8 +67,3 @@ def _lines(expected: "Expected") -> list[str]:
     for name, reason in expected.reasons.items():
         names_by_reason.setdefault(reason, []).append(name)
     return [*lines, *(f"no {', '.join(names)}: {reason}" for reason, names in names_by_reason.items())]
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command to the command line."""
-    registry.add(app, registry.STUDY, expect)

@@ -5,7 +5,6 @@ from typing import Annotated
 
 import typer
 
-from orchestration.command import registry
 from orchestration.command.flags import FlightFlags, flight_options, request_from
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, option_group, result_of_files
@@ -73,8 +72,3 @@ def ssp(
         else:
             warn(f"{reading.master} does not run it: {reading.refusal}")
     return CommandResult(document={"files": [written, timing], "masters": masters}, lines=[str(written)])
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands to the command line."""
-    registry.add(app, registry.TOOLS, export_c, ssp)

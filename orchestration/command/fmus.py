@@ -6,7 +6,6 @@ from typing import Annotated, Any
 
 import typer
 
-from orchestration.command import registry
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, expect_positive, option_group, result_of_files
 from orchestration.command.variant_flags import VariantFlags
@@ -145,8 +144,3 @@ def doctor(
 
     report = examine(fmu or [fmus.locate(name, inform) for name in MODELS], limits.limits)
     return CommandResult(document=as_tables(report), lines=as_text(report).splitlines(), good=report.good)
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands to the command line."""
-    registry.add(app, registry.FMUS, build, validate, doctor)

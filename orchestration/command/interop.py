@@ -3,9 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from orchestration.command import completion, registry
+from orchestration.command import completion
 from orchestration.command.flags import FlightFlags, ScenarioFile, Timing, flight_options, request_from
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
@@ -52,8 +50,3 @@ def interop(
         inform(f"farther than {table.TOLERANCE:g} from this project's master: {'; '.join(far)}")
     document = [table.as_dict(agreement) for agreement in found]
     return CommandResult(document=document, lines=table.text(found).splitlines(), good=not far)
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command to the command line."""
-    registry.add(app, registry.TOOLS, interop)

@@ -5,7 +5,6 @@ from typing import Annotated
 
 import typer
 
-from orchestration.command import registry
 from orchestration.command.flags import FlightFlags, ScenarioFile, Timing, flight_options, request_from
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
@@ -81,8 +80,3 @@ def limit(
     return CommandResult(
         document=found, lines=[f"{name:<19}  {value}" for name, value in limits.as_text(found).items()]
     )
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command to the command line."""
-    registry.add(app, registry.STUDY, limit)

@@ -6,9 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from orchestration.command import registry
 from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
-from orchestration.command.linearise import linearise
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
 from orchestration.foundation.basics.errors import UsageError
@@ -135,8 +133,3 @@ def _of_hover(request: "Request") -> CommandResult:
 
 def _number(value: float | None, unit: str) -> str:
     return "-" if value is None else f"{value:.6g}{unit}"
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands to the command line."""
-    registry.add(app, registry.STUDY, margin, linearise)

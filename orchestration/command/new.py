@@ -5,9 +5,8 @@ from typing import Annotated, get_args
 
 import typer
 
-from orchestration.command import registry
 from orchestration.command.options import option
-from orchestration.command.registry import RUN, CommandResult, result_of_files
+from orchestration.command.registry import CommandResult, result_of_files
 from orchestration.components.scaffold import examples as shipped
 from orchestration.components.scaffold.folder import Kind, git_author, write
 from orchestration.foundation.basics.errors import UsageError
@@ -39,8 +38,3 @@ def examples(
     written = result_of_files(shipped.write(out))
     inform(f"next: quadcosim run {out / 'examples' / 'water_tank' / 'system.toml'}")
     return written
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands to the command line."""
-    registry.add(app, RUN, new, examples)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from orchestration.command import registry
 from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, option_group, result_of_files
@@ -91,8 +90,3 @@ def _window(results: "Sequence[Result]", start: float | None, end: float | None)
 def _beside(directories: Sequence[Path]) -> Path:
     """The folder of overlaid figures, in the nearest folder that contains all runs."""
     return Path(os.path.commonpath([path.absolute().parent for path in directories])) / OVERLAY
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command to the command line."""
-    registry.add(app, registry.RUN, plot)

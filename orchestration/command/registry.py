@@ -99,9 +99,6 @@ def option_group(name: str, declared: type[Any]) -> Callable[[Command], Command]
     return decorate
 
 
-RUN, STUDY, FMUS, TOOLS = "Run", "Study", "FMUs", "Other tools"
-"""Groups of commands in the help"""
-
 arguments: Sequence[str] = ()
 """Arguments of the command line"""
 output_options = OutputOptions()

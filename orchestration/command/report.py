@@ -5,7 +5,6 @@ from typing import Annotated
 
 import typer
 
-from orchestration.command import registry
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, build_option, result_of_files
 from orchestration.foundation.basics.terminal import progress_bar
@@ -39,8 +38,3 @@ def report(
 
     with progress_bar("running") as progress:
         return result_of_files([write(*what, out=out, flights=flights, runs=run or [], progress=progress)])
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command to the command line."""
-    registry.add(app, registry.RUN, report)

@@ -137,8 +137,3 @@ def _metrics(result: "Result") -> CommandResult:
     if result.termination is not None:
         lines.append(f"terminated: {result.termination}")
     return CommandResult(document=found, lines=lines)
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command to the command line."""
-    registry.add(app, registry.RUN, run)

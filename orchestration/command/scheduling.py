@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from orchestration.command import registry
 from orchestration.command.flags import assigned
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
@@ -122,8 +121,3 @@ def _row(of: "Responses") -> Sequence[str]:
         "-" if of.missed is None else f"{100.0 * of.missed:.4g} %",
         str(of.unfinished),
     )
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command to the command line."""
-    registry.add(app, registry.RUN, schedule)

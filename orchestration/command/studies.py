@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from orchestration.command import exact, registry
+from orchestration.command import exact
 from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, build_option, option_group, result_of_files
@@ -143,8 +143,3 @@ def _current_store(study: Path, out: Path | None) -> Path:
     with open_for_reading(path) as opened:
         expect_current(opened, loaded)
     return path
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands to the command line."""
-    registry.add(app, registry.STUDY, sweep, status, draw, export)

@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from orchestration.command import registry
 from orchestration.command.flags import FlightFlags, ScenarioFile, Timing, flight_options, request_from
 from orchestration.command.options import option
-from orchestration.command.registry import RUN, CommandResult, build_option
+from orchestration.command.registry import CommandResult, build_option
 from orchestration.foundation.basics.terminal import inform
 
 if TYPE_CHECKING:
@@ -101,8 +100,3 @@ def _from_fmus(system: "System") -> tuple[dict[str, str], str]:
     except QuadcosimError:
         return {}, ""
     return found.units, found.follows
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands to the command line."""
-    registry.add(app, RUN, show, connect, schema)
