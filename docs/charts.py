@@ -31,6 +31,19 @@ def gain_limits(factors: Array, ends: Mapping[str, Mapping[str, Array]], local: 
     return figure
 
 
+def energy(curves: Mapping[float, tuple[Array, Array, Array]]) -> Figure:
+    """The energy and the position error over time, by the weight of the coupling."""
+    figure = DOCS.figure(28.0)
+    left, right = figure.subplots(1, 2, sharex=True)
+    for (kappa, (time, energy, error)), color in zip(curves.items(), (BLUE, RED, ORANGE), strict=True):
+        left.plot(time, energy, color=color, linewidth=1.0, label=f"κ = {kappa:g}")
+        right.plot(time, error, color=color, linewidth=1.0)
+    left.set(yscale="log", xlabel="time [s]", ylabel="energy L_κ [J]", xlim=(0.0, 8.0), ylim=(1e-4, 1e5))
+    right.set(yscale="log", xlabel="time [s]", ylabel="position error |e| [m]", ylim=(1e-3, 30.0))
+    figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return figure
+
+
 def decay(curves: Mapping[float, tuple[Array, Array]], medians: Array) -> Figure:
     """Left: the error over time by exponent; right: median rates, shape (exponents, decades)."""
     figure = DOCS.figure(32.0)

@@ -1,4 +1,4 @@
-"""Runs the comparisons of `findings.md`, and stores the results of their cells beside the page: `docs/data/NAME.json`.
+"""Runs the comparisons of the findings, and stores the results of their cells: `docs/data/NAME.json`.
 
 `python -m docs.comparisons NAME …` runs the same flights as `quadcosim compare studies/comparisons/NAME.toml`, with the
 store in `results/comparisons/NAME`, and continues where it was stopped.
@@ -57,8 +57,10 @@ DATA = Path(__file__).parent / "data"
 RESULTS = ROOT / "results" / "comparisons"
 NAMES = (
     "periods", "fast_inner", "tuned", "tuned_mean", "delays", "inertias", "mismatches", "losses", "jitters", "vehicles",
-    "positions", "negative_thrust", "motors",
+    "positions", "negative_thrust", "motors", "cascade_ratios", "tuned_alike", "tuned_settling", "predictor_errors",
+    "predictor_jitter", "separation", "separation_rates", "vehicles_tuned",
 )  # fmt: skip
+RANDOM = ("losses", "predictor_jitter")
 RATES = 20.0
 """Ratio of the periods of outer and inner loops, where the inner ones are fast"""
 WIDE = replace(DOCS, width=254.0)
@@ -115,15 +117,24 @@ def run_missing(name: str) -> Any:
     minutes = round((time.perf_counter() - began) / 60.0, 1)
     content = {
         "flights": len(table),
-        "minutes": minutes if outcome.summary.flown else read_data(name)["minutes"],
+        "minutes": read_data(name)["minutes"] if _is_kept(name) and not outcome.summary.flown else minutes,
         "cells": [{**_short(cell, table[table["design_index"].isin(comparison.runs_of(comparison.cell(cell["cell"])))],
                             comparison), "on_path": _known(pushed[cell["cell"]])} for cell in found["cells"]],
         "limits": found["limits"],
         "fronts": [_point(point) for point in found["fronts"]],
     }  # fmt: skip
+    keep(name, content)
+    return read_data(name)
+
+
+def _is_kept(name: str) -> bool:
+    return (DATA / f"{name}.json").is_file()
+
+
+def keep(name: str, content: dict[str, Any]) -> None:
+    """Store results beside the pages."""
     DATA.mkdir(exist_ok=True)
     (DATA / f"{name}.json").write_text(_compact(content), encoding="utf-8")
-    return read_data(name)
 
 
 def on_path(comparison: Comparison) -> Comparison:
@@ -169,7 +180,7 @@ def _compact(content: dict[str, Any]) -> str:
 
     def rounded(value: Any) -> Any:
         if isinstance(value, float):
-            return float(f"{value:.5g}")
+            return _known(float(f"{value:.5g}"))
         if isinstance(value, dict):
             return {key: rounded(one) for key, one in value.items()}
         return [rounded(one) for one in value] if isinstance(value, list) else value
@@ -180,23 +191,21 @@ def _compact(content: dict[str, Any]) -> str:
             lines = ",\n".join(json.dumps(rounded(one), ensure_ascii=False) for one in value)
             parts.append(f'"{key}": [\n{lines}\n]')
         else:
-            parts.append(f'"{key}": {json.dumps(value)}')
+            parts.append(f'"{key}": {json.dumps(rounded(value), ensure_ascii=False)}')
     return "{\n" + ",\n".join(parts) + "\n}\n"
 
 
-def from_the_path() -> str:
+def from_the_path() -> dict[str, int]:
     """In how many cells the residual is that of a flight from the path, and in how many that flight comes to rest."""
     cells = [
-        cell for name in NAMES if name != "losses" for cell in read_data(name)["cells"]
-    ]  # one flight says nothing about random losses
+        cell for name in NAMES if name not in RANDOM for cell in read_data(name)["cells"]
+    ]  # one flight says nothing about random losses and delays
     settled = [cell for cell in cells if cell["settles"] == cell["count"]]
     alike = [one for one in settled if math.isclose(one["residual"][0], one["on_path"] or 0.0, rel_tol=0.02)]
     restless = [cell for cell in cells if cell["settles"] == 0 and 2 * cell["survives"] > cell["count"]]
     at_rest = [one for one in restless if (one["on_path"] or math.inf) < 0.05]
-    return (
-        f"of {len(settled)} cells in which all settle {len(alike)} have the residual from the path to 2 %; of "
-        f"{len(restless)} in which most survive and none settles {len(at_rest)} come to rest from the path"
-    )
+    return {"all_settle": len(settled), "as_from_the_path": len(alike), "survive_and_none_settles": len(restless),
+            "at_rest_from_the_path": len(at_rest)}  # fmt: skip
 
 
 # -- printed lines and figures ----------------------------------------------------------------------------

@@ -28,6 +28,24 @@ def steps_of(trace: str) -> list[float]:
         return [float(row[trace]) for row in csv.DictReader(file)]
 
 
+def at_ratios(velocity: int, attitude: int) -> Callable[[Sequence[float]], float]:
+    """The mean cost of a sample of the cascade at other ratios, from its longest steps with the same loops due.
+
+    In the trace the velocity loop is due every 20 steps, the attitude loop every 4.
+    """
+
+    def cost(steps: Sequence[float]) -> float:
+        due = {
+            True: max(steps[::20]),
+            False: max(step for i, step in enumerate(steps) if i % 4 == 0 and i % 20),
+            None: max(step for i, step in enumerate(steps) if i % 4),
+        }
+        kinds = [None if i % attitude else i % velocity == 0 for i in range(velocity)]
+        return statistics.mean(due[kind] for kind in kinds)
+
+    return cost
+
+
 @dataclass(frozen=True, kw_only=True)
 class Design:
     """A controller of a comparison, and the processor time of a sample."""
@@ -80,24 +98,45 @@ DESIGNS = {
         cost_of=statistics.mean,
         color="C6",
     ),
+    "cascade, all loops at one rate, no rate derivative": Design(
+        comparison="periods",
+        controller="cascade, no rate derivative",
+        trace="cascaded",
+        cost_of=max,
+        color="C9",
+    ),
+    "cascade, 4 to 2": Design(
+        comparison="cascade_ratios", controller="cascade, 4 to 2", trace="cascaded", cost_of=at_ratios(4, 2), color="C7"
+    ),
+    "cascade, 4 to 2, no rate derivative": Design(
+        comparison="cascade_ratios",
+        controller="cascade, 4 to 2, no rate derivative",
+        trace="cascaded",
+        cost_of=at_ratios(4, 2),
+        color="C8",
+    ),
 }
 
 
-def equal_share() -> list[str]:
+def equal_share() -> list[dict[str, Any]]:
     """The least share of the processor at which nine in ten flights settle and survive, by design."""
-    lines = [
-        "| design | a sample [µs] | settle: period | share | survive: period | share |",
-        "|---|---|---|---|---|---|",
-    ]
+    rows = []
     for name, design in DESIGNS.items():
-        found = [f"{1e6 * design.cost:.1f}"]
+        row: dict[str, Any] = {"design": name, "sample": design.cost}
         for fate in ("settles", "survives"):
             period = _longest(design, fate)
-            found += (
-                ["none", "-"] if period is None else [f"{1e3 * period:g} ms", f"{100 * design.cost / period:.3f} %"]
-            )
-        lines.append(f"| {name} | {' | '.join(found)} |")
-    return lines
+            row |= {f"{fate}_period": period, f"{fate}_share": period and design.cost / period}
+        rows.append(row)
+    return rows
+
+
+def share_table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The rows of a table: by design, the cost of a sample, and the period and share at which nine in ten settle."""
+    return [
+        f"| {row['design']} | {1e6 * row['sample']:.1f} | {1e3 * row['settles_period']:g} ms "
+        f"| {1e2 * row['settles_share']:.3f} % |"
+        for row in rows
+    ]
 
 
 def _longest(design: Design, fate: str) -> float | None:
@@ -161,13 +200,12 @@ def stalls() -> dict[str, quadcosim.Limit]:
     }
 
 
-def stall_table(found: Mapping[str, quadcosim.Limit]) -> list[str]:
-    """A table with a row for each law."""
-    rows = [
-        f"| {name} | {1e3 * (one.large_signal_limit or 0.0):.0f} ms | {one.note.partition(';')[0]} |"
+def stall_table(found: Mapping[str, quadcosim.Limit]) -> list[dict[str, Any]]:
+    """For each law, the largest stall that is good [s], and the least that is not, with why."""
+    return [
+        {"law": name, "stall": one.large_signal_limit or 0.0, "beyond": one.note.partition(";")[0]}
         for name, one in found.items()
     ]
-    return ["| law | largest stall that is good | the least that is not, and why |", "|---|---|---|", *rows]
 
 
 def errors(found: Mapping[str, quadcosim.Limit]) -> Figure:

@@ -99,6 +99,50 @@ def error_over_time(exponent: float) -> tuple[Array, Array, Array]:
     return signals["time"], error, signals["controller.energy"]
 
 
+def promised(exponent: float, time: Array, error: Array) -> dict[str, float | None]:
+    """The settling time on the surface that the theorem promises [s], and from when on the error is below 1 cm [s]."""
+    above = np.flatnonzero(error > 0.01)[-1]
+    since = float(time[above + 1]) if above + 1 < len(time) else None
+    gain = float(GAINS["k_s"]["gain.surface"])
+    bound = float(error[0] ** (1.0 - exponent) / (gain * (1.0 - exponent)))
+    return {"exponent": exponent, "promised": bound, "below_1_cm": since}
+
+
+ENERGIES = (0.0, 1.0, 15.0)
+"""κ of the flights whose energy is drawn"""
+RISES = 6.0
+"""Time over which its rises are counted [s]"""
+
+
+def energy_over_time(kappa: float) -> tuple[Array, Array, Array]:
+    """Time [s], L_κ [J] and |e| [m] of the paper's flight without wind at 1 ms, for 15 s."""
+    own = {**CALM, "controller.coupling": kappa}
+    signals = quadcosim.run(PAPER.with_changes(timing={"period": 0.001}, stop_time=15.0, parameters=own)).signals
+    e = [signals[f"plant.position.{axis}"] - signals[f"reference.position.{axis}"] for axis in "xyz"]
+    return signals["time"], signals["controller.energy"], np.linalg.norm(e, axis=0)
+
+
+def rises_of(kappa: float, time: Array, energy: Array, error: Array) -> dict[str, float | None]:
+    """The highest rise of L_κ, from trough to peak, the share of samples at which it rises, and where it misleads most.
+
+    That is where |e| is largest while L_κ is below 0.01 J; None: it never is.
+    """
+    early = time <= RISES
+    peak = int(np.argmax((energy - np.minimum.accumulate(energy))[early]))
+    trough = int(np.argmin(energy[: peak + 1]))
+    small = np.where(early & (energy < 0.01), error, 0.0)
+    far = int(np.argmax(small)) if small.any() else None
+    return {
+        "coupling": kappa, "begins": float(energy[0]),
+        "trough": float(energy[trough]), "trough_at": float(time[trough]),
+        "peak": float(energy[peak]), "peak_at": float(time[peak]),
+        "rises": float(np.mean(np.diff(energy[early]) > 0.0)),
+        "small": None if far is None else float(energy[far]),
+        "small_at": None if far is None else float(time[far]),
+        "error_there": None if far is None else float(error[far]),
+    }  # fmt: skip
+
+
 def energy_rates() -> list[float]:
     """The rates at which L_κ falls while the error falls from each bound to the next, β_t = 1 [1/s]."""
     time, error, energy = error_over_time(1.0)

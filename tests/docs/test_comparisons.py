@@ -10,13 +10,14 @@ import pytest
 from docs import comparisons
 from orchestration.experiments.comparison.run import rerun_cells
 
-PAGES = sorted((Path(comparisons.__file__).parent / "findings").glob("*.md"))
-FLOWN = sorted(path.stem for path in comparisons.DATA.glob("*.json"))
+DOCS = Path(comparisons.__file__).parent
+PAGES = (DOCS / "redesigns.md", *sorted((DOCS / "findings").glob("*.md")))
+FLOWN = sorted(comparisons.NAMES)
 
 
 def test_every_comparison_of_the_pages_is_kept_and_said_how_to_fly() -> None:
-    assert sorted(comparisons.NAMES) == FLOWN
-    text = "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
+    assert all((comparisons.DATA / f"{name}.json").is_file() for name in FLOWN)
+    text = " ".join(word for page in PAGES for word in page.read_text(encoding="utf-8").split())
     assert {*re.findall(r"quadcosim compare studies/comparisons/(\w+)\.toml", text)} >= {*FLOWN}
 
 
@@ -37,16 +38,12 @@ def test_every_cell_of_a_map_is_one_of_its_file(name: str) -> None:
 
 
 COUNTS = {
-    ("redesign", "mismatches", (0.02, 0.07, 0.1, 0.15)): {
+    ("redesigns", "mismatches", (0.02, 0.07, 0.1, 0.15)): {
         "as in the model": "nominal", "half the inertia": "half the inertia", "twice the inertia": "twice the inertia",
         "a lag of 30 ms": "lag of 30 ms", "half the mass": "half the mass", "twice the mass": "twice the mass",
         "wind of 0.5 N": "wind of 0.5 N",
     },
-    ("redesign", "losses", (0.2, 0.3, 0.4, 0.5)): {
-        "unified, κ = 1": "unified", "unified, κ = 0": "unified, no coupling", "geometric": "geometric",
-        "unified, κ = 1, `mean` over 20 ms": "unified, mean", "cascade at one rate": "cascade, one rate",
-    },
-    ("tuned_gains", "tuned", (0.01, 0.02, 0.05, 0.1, 0.15, 0.2)): {
+    ("findings/cascade", "tuned", (0.01, 0.02, 0.05, 0.1, 0.15, 0.2)): {
         "unified, paper's gains": "unified, paper's gains", "unified, tuned for 10 ms": "unified, tuned for 10 ms",
         "geometric, tuned for 10 ms": "geometric, tuned for 10 ms",
         "cascade at one rate, tuned for 10 ms": "cascade, one rate, tuned for 10 ms",
@@ -54,9 +51,16 @@ COUNTS = {
         "geometric, tuned for the period": "geometric, tuned for its period",
         "cascade at one rate, tuned for the period": "cascade, one rate, tuned for its period",
     },
-    ("real_vehicle", "vehicles", (0.005, 0.02, 0.06, 0.1)): {
+    ("findings/vehicles", "vehicles", (0.005, 0.02, 0.06, 0.1)): {
         "paper": "paper", "Crazyflie": "crazyflie", "Crazyflie without lag": "crazyflie without lag",
         "Hummingbird": "hummingbird", "Agilicious": "agilicious",
+    },
+    ("findings/terms", "separation", (1.8, 3.75, 7.5, 15.0)): {
+        "κ = 1": "unified", "κ/k_q held": "unified, coupling scaled", "κ = 0": "unified, no coupling",
+    },
+    ("findings/terms", "separation_rates", (1.8, 3.75, 7.5)): {
+        "k_q times f², κ = 1": "unified", "k_q times f², κ/k_q held": "unified, coupling scaled",
+        "k_q times f², κ = 0": "unified, no coupling",
     },
 }  # fmt: skip
 """Tables of a page with counts of a comparison at some values: the first cell of a row, and what it is in the map"""
@@ -65,7 +69,7 @@ COUNTS = {
 @pytest.mark.parametrize(("page", "name", "values"), COUNTS)
 def test_counts_of_the_pages_are_those_of_the_maps(page: str, name: str, values: tuple[float, ...]) -> None:
     """How many survive, and in brackets how many settle where these are fewer."""
-    text = (Path(comparisons.__file__).parent / "findings" / f"{page}.md").read_text(encoding="utf-8")
+    text = (DOCS / f"{page}.md").read_text(encoding="utf-8")
     table = text[text.index(f"studies/comparisons/{name}.toml") :]
     told, flown = {}, {}
     for row, where in COUNTS[page, name, values].items():
@@ -78,6 +82,39 @@ def test_counts_of_the_pages_are_those_of_the_maps(page: str, name: str, values:
             if where in (cell["vehicle"], cell["condition"], cell["controller"]) and cell["value"] in values
         ]
     assert told == flown
+
+
+SETTLING = {
+    "unified": ("tuned", "unified, tuned for its period"),
+    "unified without coupling": ("tuned_alike", "no coupling, tuned for its period"),
+    "geometric": ("tuned", "geometric, tuned for its period"),
+    "cascade at one rate": ("tuned", "cascade, one rate, tuned for its period"),
+    "unified, `mean`": ("tuned_mean", "unified, mean, tuned for its period"),
+    "unified, for settling time": ("tuned_settling", "unified, tuned for settling"),
+    "geometric, for settling time": ("tuned_settling", "geometric, tuned for settling"),
+}
+"""Rows of the table of settling times: the map and the controller in it"""
+
+
+def settling_rows() -> dict[str, str]:
+    """The rows of the table, from the maps."""
+    rows = {}
+    for row, (name, controller) in SETTLING.items():
+        cells = {
+            cell["value"]: cell for cell in comparisons.read_data(name)["cells"] if cell["controller"] == controller
+        }
+        medians = [
+            "{:.2f} ({:.2f} to {:.2f})".format(*cells[value]["settling_time"]) if value in cells else ""
+            for value in (0.05, 0.1, 0.15, 0.2)
+        ]
+        rows[row] = " | ".join(medians)
+    return rows
+
+
+def test_settling_times_of_the_page_are_those_of_the_maps() -> None:
+    text = (DOCS / "findings" / "cascade.md").read_text(encoding="utf-8")
+    for row, medians in settling_rows().items():
+        assert f"| {row} | {medians} |" in text
 
 
 @pytest.mark.parametrize("name", FLOWN)

@@ -1,4 +1,4 @@
-"""What the pages on the paper's flight say is what is run again; their conclusions are computed rightly."""
+"""What is kept of the paper's flight is what is run again; conclusions are computed rightly."""
 
 import re
 from collections.abc import Iterable
@@ -6,13 +6,11 @@ from collections.abc import Iterable
 import pandas as pd
 
 import quadcosim
-from docs.finding_texts import fates, up_to
+from docs.comparisons import read_data
+from docs.make_findings import ends, fates
 from docs.theory import ATTITUDE, PAPER, scaled
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from tests.places import ROOT
-
-PAGES = "\n".join(page.read_text(encoding="utf-8") for page in sorted((ROOT / "docs" / "findings").glob("*.md")))
-DECIMAL = re.compile(r"-?\d+\.?\d*")
 
 
 def outcomes(base: Scenario, periods: Iterable[float], kappas: Iterable[float] | float = 0.0) -> list[str]:
@@ -21,28 +19,20 @@ def outcomes(base: Scenario, periods: Iterable[float], kappas: Iterable[float] |
     return ["settled" if good else "diverged" if lost else "bounded" for good, lost in zip(*found.values())]
 
 
-def rows(section: str) -> dict[str, list[str]]:
-    """The first table of a section: cells of each row by its first one."""
-    text = PAGES[PAGES.index(f"\n## {section}") :]
-    (table, *_) = re.findall(r"(?:^\|.*\|\n)+", text, re.M)
-    return {first: rest for first, *rest in (line.strip("| ").split(" | ") for line in table.splitlines()[2:])}
-
-
-def test_limits_of_the_page_settle_and_what_lies_a_little_above_does_not() -> None:
-    limits = {
-        float(kappa.split()[0]): cells for kappa, cells in rows("What is local").items() if "none" not in cells[1]
-    }
+def test_limits_that_are_kept_settle_and_what_lies_a_little_above_does_not() -> None:
+    limits = {one["coupling"]: one for one in read_data("limits")["limits"] if one["settles"] is not None}
     assert len(limits) == 5
-    ends = {kappa: float(DECIMAL.findall(cells[1])[0]) * 1e-3 for kappa, cells in limits.items()}
+    ends = {kappa: one["settles"] for kappa, one in limits.items()}
     assert outcomes(PAPER, ends.values(), ends) == ["settled"] * 5
-    above = [cells[2].split()[0].replace("diverges", "diverged") for cells in limits.values()]
-    assert outcomes(PAPER, [period + 0.00025 for period in ends.values()], ends) == above
+    assert outcomes(PAPER, [period + 0.00025 for period in ends.values()], ends) == ["diverged"] * 5
 
 
-def test_with_the_gains_of_the_page_flights_settle_up_to_what_it_says() -> None:
-    ends = rows("Gains and period")["κ = 0"]
-    for factor, i in ((0.5, 2), (1.0, 4), (2.0, 6)):
-        end = float(DECIMAL.findall(ends[i])[0]) * 1e-3
+def test_with_other_gains_flights_settle_up_to_what_the_page_says() -> None:
+    page = (ROOT / "docs" / "findings" / "clock.md").read_text(encoding="utf-8")
+    (row,) = re.findall(r"^\| κ = 0 \| (.*ms) \|$", page, re.M)
+    ends = row.split(" | ")
+    for factor, i in ((0.5, 1), (1.0, 3), (2.0, 5)):
+        end = float(ends[i].removesuffix(" ms")) * 1e-3
         found = outcomes(scaled(ATTITUDE, factor, PAPER), (end, end + 0.02))
         assert [outcome == "settled" for outcome in found] == [True, False], factor
 
@@ -59,13 +49,14 @@ ISLANDS = table_of(
 )  # fmt: skip
 
 
-def test_an_island_is_told_beside_the_first_end_of_each_fate() -> None:
-    (line,) = up_to(ISLANDS, "k", "period")
-    assert line == "k 1: survive up to 0.03, again at 0.05; settle up to 0.01, again at 0.05"
+def test_an_island_is_kept_beside_the_first_end_of_each_fate() -> None:
+    assert ends(ISLANDS, "k", "period") == [
+        {"k": 1.0, "survive": 0.03, "survive_again": [0.05], "settle": 0.01, "settle_again": [0.05]}
+    ]
 
 
-def test_what_a_longer_horizon_adds_is_told() -> None:
-    assert (
-        fates(ISLANDS)
-        == "6 flights, 4 survive (diverged by 20/30/40/60 s: 1/1/2/2), 2 settle (inside from then on: 1/2/2/3)"
-    )
+def test_what_a_longer_horizon_adds_is_counted() -> None:
+    assert fates(ISLANDS) == {
+        "flights": 6, "survive": 4, "settle": 2, "diverged_by": {"20": 1, "30": 1, "40": 2, "60": 2},
+        "inside_from": {"20": 1, "30": 2, "40": 2, "60": 3},
+    }  # fmt: skip

@@ -1,0 +1,80 @@
+"""Claims are records: their numbers are in the data, their commands exist, and the pages say what they say."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from docs import claim_records as records
+from docs import make_findings
+from orchestration.foundation.basics.errors import UsageError
+
+CLAIMS = records.load_claims()
+
+
+def test_pages_say_what_the_records_say() -> None:
+    for page, texts in records.blocks().items():
+        content = (records.ROOT / page).read_text(encoding="utf-8")
+        for name, text in texts.items():
+            assert f"<!-- {name} -->\n\n{text}\n\n<!-- end -->" in content, f"{page}: python -m docs.claim_records"
+
+
+def test_every_marked_place_has_its_record() -> None:
+    pages = records.blocks()
+    for page in (records.ROOT / "README.md", *(records.ROOT / "docs").rglob("*.md")):
+        marked = records.MARKED.findall(page.read_text(encoding="utf-8"))
+        assert {*marked} == {*pages.get(str(page.relative_to(records.ROOT)), {})}, page
+
+
+@pytest.mark.parametrize("name", CLAIMS)
+def test_every_command_names_a_study_or_a_section_that_exists(name: str) -> None:
+    for place in records.files_of(CLAIMS[name]):
+        if place.startswith("section "):
+            assert place.removeprefix("section ") in make_findings.SECTIONS
+        else:
+            assert (records.ROOT / place).is_file()
+
+
+@pytest.mark.parametrize("name", CLAIMS)
+def test_every_number_of_a_record_is_said(name: str) -> None:
+    claim = CLAIMS[name]
+    text = " ".join([claim.claim, *(one.number for one in claim.tried)])
+    assert not [number for number in claim.numbers if f"{{{number}:" not in text]
+
+
+def record(folder: Path, **changes: object) -> Path:
+    """A record as a file, with changes."""
+    numbers = {"n": "periods.json#/cells/3/settles"}
+    of = {"vehicle": "one", "starts": "many", "horizon": "60 s", "constant": "all"}
+    tables = {"claim": "{n:g} of 200 settle.", "numbers": numbers, "command": "quadcosim sweep studies/period.toml",
+              "where": ["README.md"], "conditions": of, "not_tried": "all else", **changes}  # fmt: skip
+    path = folder / "one.toml"
+    path.write_text("\n".join(f"{key} = {inline(value)}" for key, value in tables.items()), encoding="utf-8")
+    return path
+
+
+def inline(value: object) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key} = {inline(one)}" for key, one in value.items()) + "}"
+    return f"[{', '.join(map(inline, value))}]" if isinstance(value, list) else json.dumps(value)
+
+
+def test_a_claim_with_fewer_than_two_refuters_is_marked(tmp_path: Path) -> None:
+    tried = {"against": "x", "command": "python -m docs.make_findings period", "number": "{n:g}", "verdict": "holds"}
+    texts = [records.sentence(records.load_claim(record(tmp_path, tried=[tried] * count))) for count in (0, 1, 2)]
+    assert [records.ONE_ONLY in text for text in texts] == [True, True, False]
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"numbers": {"n": "periods.json#/cells/3000/settles"}}, "leads to nothing"),
+        ({"numbers": {"n": "periods.json#/cells/3/controller"}}, "expected a number"),
+        ({"numbers": {"n": "no.json#/cells"}}, "leads to nothing"),
+        ({"claim": "{m:g} of 200 settle."}, "'m' is no number of the record"),
+        ({"proof": "none"}, "proof"),
+    ],
+)
+def test_what_a_record_may_not_say_is_refused(tmp_path: Path, changes: dict[str, object], said: str) -> None:
+    with pytest.raises(UsageError, match=said):
+        records.load_claim(record(tmp_path, **changes))
