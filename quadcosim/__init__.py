@@ -85,7 +85,7 @@ if TYPE_CHECKING:  # also what `__getattr__` finds public names by
     from orchestration.systems.system.source import Source
     from orchestration.systems.system.vehicle import Vehicle
     from orchestration.theory.certificates.basin import Basin, basin
-    from orchestration.theory.certificates.check import Checked
+    from orchestration.theory.certificates.certificate import Checked
     from orchestration.theory.certificates.check import check as check_certificate
     from orchestration.theory.certificates.margin import Certified, margin
     from orchestration.theory.certificates.region import Region

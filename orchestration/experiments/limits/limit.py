@@ -21,8 +21,8 @@ from orchestration.simulation.workers.choice import single_run_execution
 from orchestration.simulation.workers.executors import RunEvaluator
 from orchestration.systems.system.files import Files, files_of
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
-from orchestration.theory.exact.mean_square import MeanSquareLimit, mean_square_limit
-from orchestration.theory.stability.known_loops import LocalLimit
+from orchestration.theory.exact.mean_square import mean_square_limit
+from orchestration.theory.stability.known_loops import LinearLimit
 from orchestration.theory.stability.local_limit import local_limits
 
 GAP = 0.1
@@ -74,8 +74,8 @@ def find(
     units, metric = checks[0].units, judged_objective(varied.system)
     random = varied.at(span.last).depends_on_seed
     seeds = math.ceil(math.log(1.0 - confidence) / math.log(RELIABILITY)) if random else 1
-    local = _local(varied, span, files)
-    mean_square = _mean_square(varied, span, files, local) if random else MeanSquareLimit()
+    local = _by_theory("local", files, local_limits, varied, span)
+    mean_square = _mean_square(varied, span, files, local) if random else LinearLimit()
     with share_reporter(progress, "longest search") as report, RunEvaluator(files, workers, execution.engine) as pool:
         announce = announce or (lambda line: None)
         if engine == "auto":
@@ -127,21 +127,19 @@ def _checked(request: Request, of: str, confidence: float) -> tuple[Varied, File
     return varied, files_of(varied.system)
 
 
-def _local(varied: Varied, span: Range, files: Files) -> LocalLimit:
+def _by_theory(kind: str, files: Files, find: Callable[..., LinearLimit], *arguments: object) -> LinearLimit:
+    """A limit that a process of its own finds."""
     try:
-        return isolated_call(files.fmus.values(), local_limits, varied, span)
+        return isolated_call(files.fmus.values(), find, *arguments)
     except LostError as error:
-        return LocalLimit(reason=f"no local limit: {error}")
+        return LinearLimit(reason=f"no {kind} limit: {error}")
 
 
-def _mean_square(varied: Varied, span: Range, files: Files, local: LocalLimit) -> MeanSquareLimit:
+def _mean_square(varied: Varied, span: Range, files: Files, local: LinearLimit) -> LinearLimit:
     """The mean-square limit; with additive noise alone, which does not change the loop, it is the local limit."""
     if local.limit is not None and not varied.at(span.last).has_random_timing:
-        return MeanSquareLimit(limit=local.limit)
-    try:
-        return isolated_call(files.fmus.values(), mean_square_limit, varied, span, files.models_of(varied.system))
-    except LostError as error:
-        return MeanSquareLimit(reason=f"no mean-square limit: {error}")
+        return LinearLimit(limit=local.limit)
+    return _by_theory("mean-square", files, mean_square_limit, varied, span, files.models_of(varied.system))
 
 
 _ALWAYS = ("local_limit", "large_signal_limit")
@@ -162,7 +160,7 @@ def as_text(limit: Limit) -> dict[str, str]:
     return texts
 
 
-def _mean_square_note(found: MeanSquareLimit, span: Range) -> list[str]:
+def _mean_square_note(found: LinearLimit, span: Range) -> list[str]:
     """The note on the mean-square limit."""
     if found.limit is not None:
         return [f"from {found.limit:.6g}{span.unit} on means of squares have no finite expectation"]
@@ -193,7 +191,7 @@ def _continuous_run(near: Request, pool: RunEvaluator) -> ContinuousRun:
 
 
 def _note(
-    span: Range, bracket: Bracket | None, trials: Evaluator, refuted: float | None, found: LocalLimit
+    span: Range, bracket: Bracket | None, trials: Evaluator, refuted: float | None, found: LinearLimit
 ) -> list[str]:
     local = found.limit
     if bracket is None:

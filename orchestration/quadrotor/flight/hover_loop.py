@@ -6,7 +6,6 @@ transit. At an equilibrium the derivative of a period is the product of the deri
 """
 
 import itertools
-import math
 
 import numpy as np
 
@@ -16,10 +15,11 @@ from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.quadrotor.flight.hover import COORDINATES, STEP, displaced, hover_of, measurement_at
-from orchestration.quadrotor.flight.plant_step import INSTANT, PlantStep
+from orchestration.quadrotor.flight.plant_step import PlantStep
 from orchestration.quadrotor.scenarios import wiring
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.simulation.runs.prepared import prepared
+from orchestration.theory.stability.delay_bounds import turn_of
 
 _COMMANDS = len(wiring.COMMAND)
 _FORGOTTEN = 1e-9
@@ -30,7 +30,7 @@ class HoverLoop:
     """The linear closed loop of a scenario about hover, for any period and delay."""
 
     def __init__(self, feedback: Floats, step: PlantStep) -> None:
-        self._feedback = feedback
+        self._feedback = np.pad(feedback, ((0, 0), (0, step.size - len(COORDINATES))))
         self._step = step
 
     @classmethod
@@ -51,29 +51,12 @@ class HoverLoop:
         from scipy.linalg import logm
 
         size = self._step.size
-        generator = np.real(logm(self._step.one_interval())) / self._step.interval
-        feedback = np.zeros((_COMMANDS, size))
-        feedback[:, : len(COORDINATES)] = self._feedback
-        return generator[:size, :size], generator[:size, size:], feedback
+        generator = np.real(logm(self._step.one(self._step.interval))) / self._step.interval
+        return generator[:size, :size], generator[:size, size:], self._feedback
 
     def spectral_radius(self, period: float, delay: float) -> float:
         """The largest modulus of the eigenvalues of one sample period [s] with a delay [s]."""
-        return float(np.abs(np.linalg.eigvals(self.matrix(period, delay))).max())
-
-    def matrix(self, period: float, delay: float) -> Floats:
-        """d(state after one period)/d(state): vehicle, actuators, then commands in transit, oldest first."""
-        whole = math.floor(delay / period + 1e-9)
-        rest = delay - whole * period if delay - whole * period > INSTANT else 0.0
-        pending = whole + (rest > 0.0)
-        size = self._step.size + _COMMANDS * pending
-        newest = np.zeros((_COMMANDS, size))
-        newest[:, : len(COORDINATES)] = self._feedback
-        sent = [np.eye(_COMMANDS, size, self._step.size + _COMMANDS * i) for i in range(pending)] + [newest]
-        flow = np.eye(self._step.size, size)
-        for duration, command in ((rest, sent[0]), (period - rest, sent[1] if rest else sent[0])):
-            A, B = self._step.over(duration)
-            flow = A @ flow + B @ command
-        return np.vstack([flow, *sent[1:]])
+        return float(np.abs(np.linalg.eigvals(turn_of(self._step.over, self._feedback, period, delay))).max())
 
 
 def controller_at_hover(hover: Scenario, fleet: Instances) -> tuple[Floats, Floats]:

@@ -15,7 +15,7 @@ from orchestration.simulation.requests.ranges import Varied
 from orchestration.systems.system.distribution import lowest
 from orchestration.systems.system.paths import changed
 from orchestration.systems.system.request import Request
-from orchestration.theory.stability.known_loops import KnownLoop, LocalLimit
+from orchestration.theory.stability.known_loops import KnownLoop, LinearLimit
 from orchestration.theory.stability.local_limit import about_rest
 
 HOVER = "spectral radius of the sampled loop about hover, by differences through saved states"
@@ -25,17 +25,17 @@ KNOWN = ("period", "delay")
 """Quantities for which the loop about hover applies"""
 
 
-def local_limits(varied: Varied, span: Range) -> LocalLimit:
+def local_limits(varied: Varied, span: Range) -> LinearLimit:
     """The local limit of a quantity: of the loop about hover where that applies, else as for any system."""
     scenario = cast(Scenario, varied.request)
     if varied.of in ("jitter", "loss"):
-        return LocalLimit(reason=f"linear theory has no local limit of {varied.of}")
+        return LinearLimit(reason=f"linear theory has no local limit of {varied.of}")
     why = "the loop about hover is for period and delay only"
     try:
         if varied.of in KNOWN:
             return about_hover(scenario, varied.of)
     except NotSmooth as error:
-        return LocalLimit(reason=f"no local limit: {error}")
+        return LinearLimit(reason=f"no local limit: {error}")
     except UsageError as error:
         why = str(error)
     return _without_hover_loop(scenario, varied, span, why)
@@ -74,7 +74,7 @@ def radius(loop: HoverLoop, scenario: Scenario, of: str, value: float) -> float:
     return loop.spectral_radius(period, delay)
 
 
-def about_hover(scenario: Scenario, of: str) -> LocalLimit:
+def about_hover(scenario: Scenario, of: str) -> LinearLimit:
     """The local limits of the quadrotor in period or delay, inside its boundary layer and just outside of it.
 
     Raises `UsageError` for a scenario without a linear loop about hover.
@@ -84,7 +84,7 @@ def about_hover(scenario: Scenario, of: str) -> LocalLimit:
     loop = HoverLoop.of(scenario)
     edge = at_edge(scenario)
     limit = local_limit(loop, scenario, of)
-    return LocalLimit(
+    return LinearLimit(
         limit=limit,
         outside=None if edge is None else local_limit(loop.with_law(edge), edge, of),
         method=HOVER,
@@ -93,12 +93,12 @@ def about_hover(scenario: Scenario, of: str) -> LocalLimit:
     )
 
 
-def _without_hover_loop(scenario: Scenario, varied: Varied, span: Range, why: str) -> LocalLimit:
+def _without_hover_loop(scenario: Scenario, varied: Varied, span: Range, why: str) -> LinearLimit:
     """The local limit of the quadrotor as of any other system, with the reason `why`."""
     try:
         hover = at_hover(scenario)
     except UsageError as error:
-        return LocalLimit(reason=f"no local limit: {error}")
+        return LinearLimit(reason=f"no local limit: {error}")
     found = about_rest(lambda value: changed(hover, dict.fromkeys(varied.paths, value)), span)
     if found.method is None:
         return replace(found, reason=f"{found.reason} ({why})")

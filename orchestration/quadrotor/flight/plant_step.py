@@ -65,16 +65,12 @@ class PlantStep:
         """d(state)/d(state before) and d(state)/d(command) over `duration` [s]."""
         count = math.floor(duration / self.interval + 1e-9)
         rest = duration - count * self.interval
-        total = np.linalg.matrix_power(self._one(self.interval), count) if count else np.eye(self.size + _COMMANDS)
+        total = np.linalg.matrix_power(self.one(self.interval), count) if count else np.eye(self.size + _COMMANDS)
         if rest > INSTANT:
-            total = self._one(rest) @ total
+            total = self.one(rest) @ total
         return total[: self.size, : self.size], total[: self.size, self.size :]
 
-    def one_interval(self) -> Floats:
-        """The derivative of a plant interval, the command as further constant states."""
-        return self._one(self.interval)
-
-    def _one(self, h: float) -> Floats:
+    def one(self, h: float) -> Floats:
         """The derivative of one step of `h` [s], the command as further constant states."""
         if h not in self._known:
             derivatives = self._differences(h)

@@ -183,14 +183,6 @@ class Backlog:
             self._running.board.row[0] = seconds(self._running.now)
             self.tables.replace_rows(self._running.board.row.tobytes())
 
-    def rows(self) -> Floats:
-        """The rows of the board that are not handed over."""
-        return self.tables.rows()
-
-    def events(self) -> Integers:
-        """The events that are not handed over."""
-        return self.tables.events()
-
     def restore(self, rows: bytes, events: Integers, *, handed_over: int | None) -> None:
         """Continue with the rows and events of a paused run."""
         self.tables.replace_rows(rows)

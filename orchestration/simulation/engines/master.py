@@ -164,14 +164,14 @@ class Master:
             "row": self.board.row.tolist(),
             "handed_over": self.backlog.handed_over,
             "channels": [channel.state() for channel in self.channels],
-            "events": self.backlog.events().ravel().tolist(),
+            "events": self.backlog.tables.events().ravel().tolist(),
         }
 
     def saved(self) -> dict[str, bytes]:
         """The states of the components, and the rows that are not handed over, as bytes."""
         return {
             **{name: simulator.save() for name, simulator in self._running.simulators.items()},
-            ROWS_PENDING: self.backlog.rows().tobytes(),
+            ROWS_PENDING: self.backlog.tables.rows().tobytes(),
         }
 
     def restore(self, state: Mapping[str, Any], saved: Mapping[str, bytes]) -> None:

@@ -82,6 +82,24 @@ class Certificate:
         return json.dumps(document) + "\n"
 
 
+@dataclass(frozen=True, kw_only=True)
+class Checked:
+    """What a certificate proves, from its numbers."""
+
+    ranges: dict[str, tuple[tuple[float, float], ...]]
+    """Ranges of the values of an event of a period, by its letter [s]."""
+    runs: dict[str, int | None]
+    """Number of times in a row that a letter may come; None: any number."""
+    states: int
+    """The size of the state from period to period."""
+    radius: float
+    """Relative: the proof covers all matrices within it."""
+    of: tuple[str, ...] = ()
+    """The paths that vary in the system that it was compared with; empty without a system."""
+    up_to: float | None = None
+    """Largest value of a path of a computer or a network [s] that delays the loop no more than these ranges."""
+
+
 def words(certificate: Certificate, mode: int, length: int) -> Iterator[tuple[int, Word]]:
     """The words of labels of a length that may follow a mode, each with the mode that its first label leads to."""
     if length == 0:

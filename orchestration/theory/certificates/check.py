@@ -1,6 +1,6 @@
 """The check of a certificate's file: what it proves, and whether it is about a system."""
 
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,7 @@ from orchestration.foundation.basics.extras import needs
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.theory.certificates.causes import ScheduledLoop
-from orchestration.theory.certificates.certificate import Certificate, read_certificate
+from orchestration.theory.certificates.certificate import Certificate, Checked, read_certificate
 from orchestration.theory.certificates.family import LoopFamily
 from orchestration.theory.certificates.margin import cause_in, expect_without_scheduler, linear_loop_of, varying_of
 from orchestration.theory.certificates.timeline import LoopTimeline
@@ -23,24 +23,6 @@ ROUNDING = 1e-12
 
 class AnotherLoop(UsageError):
     """A certificate is about another loop than that of the system."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Checked:
-    """What a certificate proves, from its numbers."""
-
-    ranges: dict[str, tuple[tuple[float, float], ...]]
-    """Ranges of the values of an event of a period, by its letter [s]."""
-    runs: dict[str, int | None]
-    """Number of times in a row that a letter may come; None: any number."""
-    states: int
-    """The size of the state from period to period."""
-    radius: float
-    """Relative: the proof covers all matrices within it."""
-    of: tuple[str, ...]
-    """The paths that vary in the system that it was compared with; empty without a system."""
-    up_to: float | None = None
-    """Largest value of a path of a computer or a network [s] that delays the loop no more than these ranges."""
 
 
 @needs("flint")
@@ -66,10 +48,7 @@ def check(path: str | Path, request: RequestLike | None = None) -> Checked:
             up_to = scheduled.value_of(certificate.family)
             family = scheduled.family(up_to)
         expect_same_family(certificate, family)
-    return Checked(
-        ranges=proof.ranges, runs=proof.runs, states=proof.states, radius=proof.radius,
-        of=() if request is None else certificate.of, up_to=up_to,
-    )  # fmt: skip
+    return replace(proof, of=() if request is None else certificate.of, up_to=up_to)
 
 
 def _family_for(certificate: Certificate, timeline: LoopTimeline, varying: list[Varying]) -> LoopFamily | None:

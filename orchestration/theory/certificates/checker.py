@@ -12,13 +12,12 @@ X of the state: the tested matrices are congruent to the above. Nothing here dep
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from flint import arb, arb_mat, ctx
 
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.theory.certificates.certificate import Box, Certificate, Node, words
+from orchestration.theory.certificates.certificate import Box, Certificate, Checked, Node, words
 from orchestration.theory.certificates.family import Factor, Letter
 
 BITS = 106
@@ -31,19 +30,7 @@ class NotProven(QuadcosimError):
     """The numbers of a certificate do not prove anything."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Proof:
-    """What a certificate proves, from its numbers."""
-
-    ranges: dict[str, tuple[tuple[float, float], ...]]
-    """Ranges of each of its parameters, by letter"""
-    runs: dict[str, int | None]
-    """Number of times in a row that a letter may come; None: any number"""
-    states: int
-    radius: float
-
-
-def verified(certificate: Certificate) -> Proof:
+def verified(certificate: Certificate) -> Checked:
     """Verify `certificate`: what it proves; raises `NotProven` where it proves nothing."""
     before, ctx.prec = ctx.prec, BITS
     try:
@@ -54,7 +41,7 @@ def verified(certificate: Certificate) -> Proof:
     finally:
         ctx.prec = before
     letters = certificate.family.letters
-    return Proof(
+    return Checked(
         ranges={letter.name: letter.ranges for letter in letters},
         runs={letter.name: _longest_run(letter) for letter in letters},
         states=len(certificate.family.kept),

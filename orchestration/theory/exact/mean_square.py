@@ -1,7 +1,6 @@
 """The value of a random quantity at and above which mean squares are infinite."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from orchestration.components.fmi.model import Model
 from orchestration.foundation.basics.bisection import Range, first_failure
@@ -10,7 +9,7 @@ from orchestration.simulation.requests.ranges import Varied
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.exact.loops import Loops
-from orchestration.theory.stability.known_loops import rested
+from orchestration.theory.stability.known_loops import LinearLimit, rested
 
 LIMIT_TOLERANCE = 0.01
 """Share of the tolerance of a measured limit"""
@@ -18,31 +17,23 @@ RADIUS_TOLERANCE = 1e-6
 """Difference of a radius allowed from order to order"""
 
 
-@dataclass(frozen=True, kw_only=True)
-class MeanSquareLimit:
-    """The limit; None: there is none, for a reason."""
-
-    limit: float | None = None
-    reason: str = ""
-
-
-def mean_square_limit(varied: Varied, span: Range, models: Mapping[str, Model]) -> MeanSquareLimit:
+def mean_square_limit(varied: Varied, span: Range, models: Mapping[str, Model]) -> LinearLimit:
     """The first value of a quantity, from below, at which the mean-square radius of the loop is 1."""
     try:
         system = rested(varied.request)
         by_fmu = {component.fmu: models[name] for name, component in system.components.items()}
         return _crossing(system, varied.paths, span, Loops(by_fmu))
     except (UsageError, SimulatorError) as error:
-        return MeanSquareLimit(reason=f"no mean-square limit: {error}")
+        return LinearLimit(reason=f"no mean-square limit: {error}")
 
 
-def _crossing(system: System, paths: Sequence[str], span: Range, loops: Loops) -> MeanSquareLimit:
+def _crossing(system: System, paths: Sequence[str], span: Range, loops: Loops) -> LinearLimit:
     def fails(value: float) -> bool:
         return loops.radius(changed(system, dict.fromkeys(paths, value)), agree=RADIUS_TOLERANCE) >= 1.0
 
     bracket = first_failure(fails, span.values(), LIMIT_TOLERANCE * span.tolerance)
     if bracket is None:
-        return MeanSquareLimit(reason="second moments are bounded throughout the range")
+        return LinearLimit(reason="second moments are bounded throughout the range")
     if bracket.good is None:
-        return MeanSquareLimit(reason="second moments grow without bound throughout the range")
-    return MeanSquareLimit(limit=0.5 * (bracket.good + bracket.bad))
+        return LinearLimit(reason="second moments grow without bound throughout the range")
+    return LinearLimit(limit=0.5 * (bracket.good + bracket.bad))

@@ -15,7 +15,7 @@ P = (sI - A)⁻¹ B, S the sensitivity of the sampled loop with the delay d, and
 import functools
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,8 @@ from orchestration.foundation.basics.bisection import first_failure
 from orchestration.foundation.basics.simulator import Floats
 
 Complexes = npt.NDArray[np.complex128]
+Held = Callable[[float], tuple[Floats, Floats]]
+"""The state after a duration [s], by the state and the held command before"""
 
 FREQUENCIES = 800
 """Frequencies at which the bound is evaluated, from `LOWEST` to π by period"""
@@ -67,7 +69,7 @@ def certain_jitter(loop: SampledLoop) -> float:
 
     0 for a loop that is unstable without jitter.
     """
-    poles = np.linalg.eigvals(_turn(loop, (0.0,)))
+    poles = np.linalg.eigvals(turn_of(loop.held, loop.F, loop.period, loop.delay))
     if np.abs(poles).max() >= 1.0:
         return 0.0
     omega = np.concatenate([np.geomspace(LOWEST, math.pi, FREQUENCIES), *map(_around, poles)])
@@ -156,21 +158,23 @@ def patterns(longest: int) -> Iterator[tuple[int, ...]]:
 
 def _radius(loop: SampledLoop, late: Sequence[float]) -> float:
     """The spectral radius over one turn of delays d + `late` [s]."""
-    return float(np.abs(np.linalg.eigvals(_turn(loop, late))).max())
+    return float(np.abs(np.linalg.eigvals(turn_of(loop.held, loop.F, loop.period, loop.delay, late))).max())
 
 
-def _turn(loop: SampledLoop, late: Sequence[float]) -> Floats:
-    """The map over one turn of delays d + `late` [s], by sample: arrivals never overtake each other."""
-    T, n, m = loop.period, len(loop.A), len(loop.F)
-    count = len(late)
-    oldest = math.ceil((loop.delay + max(late)) / T - _INSTANT) + 1  # commands before this sample's that may matter
-    arrival = [k * T + loop.delay + late[k % count] for k in range(-oldest, count)]
+def turn_of(held: Held, F: Floats, T: float, delay: float, late: Sequence[float] = (0.0,)) -> Floats:
+    """The map over one turn of delays `delay` + `late` [s], one by sample: arrivals never overtake each other.
+
+    It is of the state and of the commands sent before, the newest first.
+    """
+    (m, n), count = F.shape, len(late)
+    oldest = math.ceil((delay + max(late)) / T - _INSTANT) + 1  # commands before this sample's that may matter
+    arrival = [k * T + delay + late[k % count] for k in range(-oldest, count)]
     arrival = np.maximum.accumulate(arrival).tolist()
-    held = functools.cache(lambda span: loop.held(span))  # the same few, turn after turn
+    held = functools.cache(held)  # the same few, turn after turn
     total = np.eye(n + m * oldest)
     for k in range(count):
         x, cursor = np.eye(n, n + m * oldest), k * T
-        sent = [np.hstack([loop.F, np.zeros((m, m * oldest))])]  # of sample k, then k - 1, …
+        sent = [np.hstack([F, np.zeros((m, m * oldest))])]  # of sample k, then k - 1, …
         sent += [np.eye(m, n + m * oldest, n + m * i) for i in range(oldest)]
         end = (k + 1) * T
         for at, acting in _pieces(arrival, k, oldest, cursor, end, T):

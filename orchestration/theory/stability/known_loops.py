@@ -16,15 +16,15 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class LocalLimit:
-    """A local limit; None: there is none, for a reason."""
+class LinearLimit:
+    """A limit of small deviations, or of their mean squares; None: there is none, for a reason."""
 
     limit: float | None = None
     outside: float | None = None
     """Limit of the quadrotor with the gain just outside of its boundary layer"""
     method: str | None = None
     accuracy: float | None = None
-    reason: str
+    reason: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +33,7 @@ class KnownLoop:
 
     at_rest: Callable[[Request], System]
     """the system of a request at its operating point"""
-    local_limits: Callable[[Varied, Range], LocalLimit]
+    local_limits: Callable[[Varied, Range], LinearLimit]
     """the local limit of a quantity"""
     radius_over: Callable[[Request, str], Callable[[float], float] | None]
     """the spectral radius as a function of a quantity; None for an unsupported quantity; raises `UsageError`"""

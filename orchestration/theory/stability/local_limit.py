@@ -9,7 +9,7 @@ from orchestration.foundation.basics.bisection import Range, first_failure
 from orchestration.foundation.basics.errors import SimulatorError, UsageError
 from orchestration.simulation.requests.ranges import Varied
 from orchestration.systems.system.model import System
-from orchestration.theory.stability.known_loops import LOOPS, LocalLimit
+from orchestration.theory.stability.known_loops import LOOPS, LinearLimit
 from orchestration.theory.stability.linearised_component import PULSE
 from orchestration.theory.stability.operating_point import NotAnEquilibriumError
 from orchestration.theory.stability.period_map import growth_of_loop
@@ -26,7 +26,7 @@ Growth = Callable[[float], float]
 """Growth rate of small deviations by the value of the quantity [1/s]"""
 
 
-def local_limits(varied: Varied, span: Range) -> LocalLimit:
+def local_limits(varied: Varied, span: Range) -> LinearLimit:
     """The local limit of a quantity, through saved states where the FMUs have them, else by perturbed twin runs.
 
     A kind of request in `LOOPS` has its own method.
@@ -35,28 +35,28 @@ def local_limits(varied: Varied, span: Range) -> LocalLimit:
     if known is not None:
         return known.local_limits(varied, span)
     if not varied.system.operating_point:
-        return LocalLimit(reason="no local limit: the system file names no operating_point")
+        return LinearLimit(reason="no local limit: the system file names no operating_point")
     return about_rest(varied.at, span)
 
 
-def about_rest(at: Callable[[float], System], span: Range) -> LocalLimit:
+def about_rest(at: Callable[[float], System], span: Range) -> LinearLimit:
     """The local limit of any system; `at` makes the system for a value of the quantity."""
     try:
         with closing(Instances()) as instances:
             return _through_saved_states(at, span, instances)
     except NotAnEquilibriumError as error:
-        return LocalLimit(reason=f"no local limit: {error}")
+        return LinearLimit(reason=f"no local limit: {error}")
     except (UsageError, SimulatorError) as error:
         why = str(error)
     try:
         with closing(Instances()) as instances:
             found = _first_growth(lambda value: growth_of(at(value), instances).rate, span, TWINS_TOLERANCE, TWINS)
     except (UsageError, SimulatorError) as error:
-        return LocalLimit(reason=f"no local limit: {error}")
+        return LinearLimit(reason=f"no local limit: {error}")
     return replace(found, method=f"{TWINS}, as saved states do not suffice: {why}")
 
 
-def _through_saved_states(at: Callable[[float], System], span: Range, instances: Instances) -> LocalLimit:
+def _through_saved_states(at: Callable[[float], System], span: Range, instances: Instances) -> LinearLimit:
     """Its accuracy includes the effect of another pulse size."""
     growths: dict[float, float] = {}
 
@@ -73,12 +73,12 @@ def _through_saved_states(at: Callable[[float], System], span: Range, instances:
     return replace(found, accuracy=found.accuracy + difference / slope)
 
 
-def _first_growth(growth: Growth, span: Range, finer: float, method: str) -> LocalLimit:
+def _first_growth(growth: Growth, span: Range, finer: float, method: str) -> LinearLimit:
     """The first value at which small deviations grow, by a scan and bisection."""
     width = span.tolerance * finer
     bracket = first_failure(lambda value: growth(value) > 0.0, span.values(), width)
     if bracket is None or bracket.good is None:
-        return LocalLimit(
+        return LinearLimit(
             method=method, reason=f"small deviations {'decay' if bracket is None else 'grow'} throughout the range"
         )
-    return LocalLimit(limit=0.5 * (bracket.good + bracket.bad), method=method, accuracy=width, reason="")
+    return LinearLimit(limit=0.5 * (bracket.good + bracket.bad), method=method, accuracy=width)

@@ -34,8 +34,7 @@ from orchestration.simulation.requests.ranges import Varied
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.systems.system.distribution import lowest
 from orchestration.systems.system.model import System
-from orchestration.theory.exact.mean_square import MeanSquareLimit
-from orchestration.theory.stability.known_loops import LocalLimit
+from orchestration.theory.stability.known_loops import LinearLimit
 from orchestration.theory.stability.local_limit import local_limits
 from quadcosim import Result, Scenario, Timing, UsageError
 from tests.fmus import source_tree
@@ -428,15 +427,15 @@ class StubPool:
 def stubbed(monkeypatch: pytest.MonkeyPatch) -> type[StubPool]:
     monkeypatch.setattr(limits, "RunEvaluator", StubPool)
     monkeypatch.setattr(limits, "local_limits", known_local_limits)
-    monkeypatch.setattr(limits, "mean_square_limit", lambda *given: MeanSquareLimit(reason="not looked for"))
-    monkeypatch.setattr(local, "about_rest", lambda at, span: LocalLimit(reason="not looked for"))
+    monkeypatch.setattr(limits, "mean_square_limit", lambda *given: LinearLimit(reason="not looked for"))
+    monkeypatch.setattr(local, "about_rest", lambda at, span: LinearLimit(reason="not looked for"))
     return StubPool
 
 
-_KNOWN: dict[str, LocalLimit] = {}
+_KNOWN: dict[str, LinearLimit] = {}
 
 
-def known_local_limits(varied: Varied, span: Range) -> LocalLimit:
+def known_local_limits(varied: Varied, span: Range) -> LinearLimit:
     """The local limits of linear theory, computed once for the tests with the same scenario."""
     key = f"{varied.of} {varied.request}"
     if key not in _KNOWN:
