@@ -1,8 +1,8 @@
 """The sampled closed loop linearised about hover, by differentiating the FMUs through their saved states.
 
 The state is the vehicle's twelve coordinates at a sampling instant (the attitude as its vector part: with all four
-components the norm of the quaternion would give an eigenvalue at one), the actuators if they lag, and the commands in
-transit. At an equilibrium the derivative of a period is the product of the derivatives of its steps.
+components the norm of the quaternion would give an eigenvalue at one), the actuators if they lag, and the commands
+sent before. At an equilibrium the derivative of a period is the product of the derivatives of its steps.
 """
 
 import itertools
@@ -56,7 +56,11 @@ class HoverLoop:
 
     def spectral_radius(self, period: float, delay: float) -> float:
         """The largest modulus of the eigenvalues of one sample period [s] with a delay [s]."""
-        return float(np.abs(np.linalg.eigvals(turn_of(self._step.over, self._feedback, period, delay))).max())
+        return float(np.abs(np.linalg.eigvals(self.matrix(period, delay))).max())
+
+    def matrix(self, period: float, delay: float) -> Floats:
+        """d(state after one period)/d(state): vehicle, actuators, then the commands sent before, newest first."""
+        return turn_of(self._step.over, self._feedback, period, delay)
 
 
 def controller_at_hover(hover: Scenario, fleet: Instances) -> tuple[Floats, Floats]:

@@ -17,16 +17,8 @@ from orchestration.foundation.basics import scratch
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.processes import subprocesses
 from orchestration.foundation.processes.child import Child, Died
+from orchestration.simulation.workers import task as tasks
 from orchestration.simulation.workers.provenance import sources, versions
-from orchestration.simulation.workers.task import (
-    EnvironmentFailure,
-    Ready,
-    RunTask,
-    TaskBatch,
-    TaskOutcome,
-    WorkerEnvironmentError,
-    row_of,
-)
 from orchestration.systems.system.files import Files, all_with_files, with_files
 
 ATTEMPTS = 3
@@ -69,7 +61,7 @@ class WorkerProcess:
             environment=subprocesses.environment(**dict.fromkeys(("TMPDIR", "TEMP", "TMP"), path)),
         )
 
-    def request(self, task: RunTask | TaskBatch) -> Any:
+    def request(self, task: tasks.RunTask | tasks.TaskBatch) -> Any:
         """Send a task and return the answer; raises `Died`, also at its time limit."""
         self._child.allow(task.time_limit)
         self._child.send(task)
@@ -77,11 +69,11 @@ class WorkerProcess:
         self._child.allow(None)
         return answer
 
-    def wait_until_ready(self) -> Ready:
+    def wait_until_ready(self) -> tasks.Ready:
         """The report of the process once it has started; raises `Died`."""
         self._child.send(sources())
         answer = self._child.receive()
-        assert isinstance(answer, Ready)
+        assert isinstance(answer, tasks.Ready)
         return answer
 
     def close(self) -> None:
@@ -100,7 +92,7 @@ class Supervisor:
         self._worker: WorkerProcess | None = None
         self._machine: str | None = None
 
-    def run(self, task: RunTask) -> TaskOutcome:
+    def run(self, task: tasks.RunTask) -> tasks.TaskOutcome:
         """The outcome of a run; a run that ends its process `ATTEMPTS` times has failed.
 
         Raises `QuadcosimError` for failures not caused by the run.
@@ -114,7 +106,7 @@ class Supervisor:
                 self._drop()
                 if death.ending.reached is not None:
                     message = f"it was ended: {death.ending.reached}"
-                    return TaskOutcome(row=row_of(task, None, message, 0.0, self._machine), ended=True)
+                    return tasks.TaskOutcome(row=tasks.row_of(task, None, message, 0.0, self._machine), ended=True)
                 _expect_no_interrupt(death)
                 if death.ending.code in _FROM_OUTSIDE:
                     killed += 1
@@ -122,19 +114,19 @@ class Supervisor:
                     crashes += 1
                 if crashes == ATTEMPTS:
                     message = f"its worker process {death}, {ATTEMPTS} times, the last times in a new process"
-                    return TaskOutcome(row=row_of(task, None, message, 0.0, self._machine))
+                    return tasks.TaskOutcome(row=tasks.row_of(task, None, message, 0.0, self._machine))
                 if killed == ATTEMPTS:
                     raise QuadcosimError(
                         f"the worker process of run {task.index} {death} {ATTEMPTS} times: not caused by the run, or "
                         "too little memory; start the sweep again, with fewer workers"
                     ) from None
                 continue
-            if isinstance(answer, EnvironmentFailure):
-                raise WorkerEnvironmentError(f"not a failure of a run: {answer.message}")
-            assert isinstance(answer, TaskOutcome)
+            if isinstance(answer, tasks.EnvironmentFailure):
+                raise tasks.WorkerEnvironmentError(f"not a failure of a run: {answer.message}")
+            assert isinstance(answer, tasks.TaskOutcome)
             return answer
 
-    def run_chunk(self, chunk: TaskBatch) -> list[TaskOutcome]:
+    def run_chunk(self, chunk: tasks.TaskBatch) -> list[tasks.TaskOutcome]:
         """The outcomes of many runs; they are run one by one if together they end their process or exceed their
         common time limit.
 
@@ -146,8 +138,8 @@ class Supervisor:
             self._drop()
             _expect_no_interrupt(death)
             return [self.run(task) for task in chunk.tasks]
-        if isinstance(answer, EnvironmentFailure):
-            raise WorkerEnvironmentError(f"not a failure of a run: {answer.message}")
+        if isinstance(answer, tasks.EnvironmentFailure):
+            raise tasks.WorkerEnvironmentError(f"not a failure of a run: {answer.message}")
         assert isinstance(answer, list)
         return answer
 
@@ -178,7 +170,7 @@ class Supervisor:
                 self._drop()
                 _expect_no_interrupt(death)
                 if attempt == ATTEMPTS - 1:
-                    raise WorkerEnvironmentError(f"worker processes cannot start: the last one {death}") from None
+                    raise tasks.WorkerEnvironmentError(f"worker processes cannot start: the last one {death}") from None
                 continue
             self._expect_same_software(ready)
             self._machine = ready.machine
@@ -187,10 +179,10 @@ class Supervisor:
                 return self._worker
         raise QuadcosimError("the sweep has ended")
 
-    def _expect_same_software(self, ready: Ready) -> None:
+    def _expect_same_software(self, ready: tasks.Ready) -> None:
         other = [name for name, version in self._inputs.versions.items() if ready.versions.get(name) != version]
         if other:
-            raise WorkerEnvironmentError(
+            raise tasks.WorkerEnvironmentError(
                 f"{os.uname().nodename if hasattr(os, 'uname') else 'a worker'}: has another version of "
                 f"{', '.join(other)} than the coordinator; expected the same"
             )
@@ -218,14 +210,14 @@ class Pool:
             self._scratch.remove()
             raise
 
-    def run(self, task: RunTask | TaskBatch) -> list[TaskOutcome]:
+    def run(self, task: tasks.RunTask | tasks.TaskBatch) -> list[tasks.TaskOutcome]:
         """The outcomes of runs; may be called from several threads, each of which gets its own process.
 
         Raises `QuadcosimError` once it is closed.
         """
         supervisor = self._supervisor()
         try:
-            if isinstance(task, TaskBatch):
+            if isinstance(task, tasks.TaskBatch):
                 systems = all_with_files([each.system for each in task.tasks], self._paths)
                 each = tuple(replace(one, system=system) for one, system in zip(task.tasks, systems))
                 return supervisor.run_chunk(replace(task, tasks=each))

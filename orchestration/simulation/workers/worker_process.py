@@ -8,16 +8,8 @@ from pathlib import Path
 
 from orchestration.foundation.basics import scratch
 from orchestration.foundation.processes.channel import Parent
+from orchestration.simulation.workers import task as tasks
 from orchestration.simulation.workers.provenance import Sources, machine, software
-from orchestration.simulation.workers.task import (
-    EnvironmentFailure,
-    Ready,
-    Runner,
-    RunTask,
-    TaskBatch,
-    TaskOutcome,
-    WorkerEnvironmentError,
-)
 
 
 def main(own_folder: str) -> None:
@@ -31,18 +23,18 @@ def main(own_folder: str) -> None:
     # An FMU must not be blamed for an interrupt.
     parent = Parent(interrupt=signal.SIG_DFL, on_orphaned=orphaned)
     coordinator_sources: Sources = parent.receive()
-    parent.send(Ready(versions=software(coordinator_sources.current()), machine=machine()))
-    runner = Runner(machine())
+    parent.send(tasks.Ready(versions=software(coordinator_sources.current()), machine=machine()))
+    runner = tasks.Runner(machine())
     for task in parent:
         parent.send(_run(runner, task))
     parent.leave()
 
 
-def _run(runner: Runner, task: RunTask | TaskBatch) -> TaskOutcome | list[TaskOutcome] | EnvironmentFailure:
+def _run(runner: tasks.Runner, task: tasks.RunTask | tasks.TaskBatch) -> object:
     try:
-        return runner.run_chunk(task) if isinstance(task, TaskBatch) else runner.run(task)
-    except WorkerEnvironmentError as error:
-        return EnvironmentFailure(message=str(error))
+        return runner.run_chunk(task) if isinstance(task, tasks.TaskBatch) else runner.run(task)
+    except tasks.WorkerEnvironmentError as error:
+        return tasks.EnvironmentFailure(message=str(error))
 
 
 if __name__ == "__main__":

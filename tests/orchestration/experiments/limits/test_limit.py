@@ -258,12 +258,12 @@ def expect_powers(matrix: Floats, scenario: Scenario, fleet: Instances) -> None:
 
 
 LOOPS: list[tuple[dict[str, Any], float, int]] = [
-    ({"period": 0.04}, 0.0, 12),
-    ({"period": 0.04, "delay": 0.013}, 0.0, 16),
-    ({"period": 0.02, "delay": 0.05}, 0.0, 24),  # beyond the period: two and a half of them
-    ({"period": 0.02, "delay": 0.04}, 0.0, 20),
-    ({"period": 0.04}, 0.05, 16),  # actuators that lag
-    ({"period": 0.02, "delay": 0.03}, 0.05, 24),
+    ({"period": 0.04}, 0.0, 16),
+    ({"period": 0.04, "delay": 0.013}, 0.0, 20),
+    ({"period": 0.02, "delay": 0.05}, 0.0, 28),  # beyond the period: two and a half of them
+    ({"period": 0.02, "delay": 0.04}, 0.0, 24),
+    ({"period": 0.04}, 0.05, 20),  # actuators that lag
+    ({"period": 0.02, "delay": 0.03}, 0.05, 28),
 ]
 
 
@@ -319,7 +319,7 @@ def test_the_default_lag_of_an_fmu_is_in_the_loop(tmp_path: Path) -> None:
     by_itself = dataclasses.replace(scenario_of(), plant=FmuChoice(fmu=str(lagging)))
     by_parameter = scenario_of().with_changes(parameters={"plant.actuator_time_constant": 0.05})
     own, set_to = (HoverLoop.of(scenario).matrix(0.04, 0.01) for scenario in (by_itself, by_parameter))
-    assert own.shape == (20, 20)
+    assert own.shape == (24, 24)
     assert own == pytest.approx(set_to, abs=1e-9)
     assert set_to[12:16, 12:16] == pytest.approx(math.exp(-0.04 / 0.05) * np.eye(4), abs=1e-6)
 
