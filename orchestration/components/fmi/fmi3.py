@@ -9,7 +9,7 @@ from fmpy import fmi3
 from orchestration.components.fmi.instance import INTEGERS
 from orchestration.components.fmi.native import NativeInstance
 from orchestration.components.fmi.slaves import WARNING
-from orchestration.foundation.basics.errors import SimulatorError, UsageError
+from orchestration.foundation.basics.errors import SimulatorError
 
 
 class Fmi3Instance(NativeInstance):
@@ -28,9 +28,7 @@ class Fmi3Instance(NativeInstance):
 
     def _expect_supported(self) -> None:
         super()._expect_supported()
-        clocks = [v.name for v in self.variables.values() if v.kind == "Clock"]
-        if clocks:
-            raise UsageError(f"{self.path}: has clocks, which are not supported: {', '.join(clocks)}; expected none")
+        self.model.expect_no_clocks()
 
     def _load_step(self, library: Any) -> None:
         self._do_step = self.guarded(library.fmi3DoStep)

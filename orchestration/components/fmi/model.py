@@ -168,6 +168,12 @@ class Model:
         parsed = {unit: named(unit, self.base_units(unit)) for unit in dict.fromkeys(declared.values())}
         return {name: parsed[unit] for name, unit in declared.items()}
 
+    def expect_no_clocks(self) -> None:
+        """Raise `UsageError` for an FMU with clocks, which tick in event mode only."""
+        clocks = [v.name for v in self.variables.values() if v.kind == "Clock"]
+        if clocks:
+            raise UsageError(f"{self.path}: has clocks, which are not supported: {', '.join(clocks)}; expected none")
+
     def names(self, *causalities: str, kinds: tuple[Kind, ...] = NUMERIC) -> tuple[str, ...]:
         """Variables of these causalities and types, in the order of the description."""
         return tuple(v.name for v in self.variables.values() if v.causality in causalities and v.kind in kinds)

@@ -58,12 +58,14 @@ def propose(fmus: Sequence[tuple[str, Model]], folder: Path, resources: Proposed
     Each FMU is given by the path or name that the user wrote, with its model description.
 
     An FMU whose outputs are all discrete is proposed as sampled, and so is the controller of a loop; any other in
-    continuous time. Raises `UsageError` without any FMU.
+    continuous time. Raises `UsageError` without any FMU, and for one with clocks.
     """
     resources = resources or ProposedResources()
     if not (fmus or resources.tables):
         raise UsageError("expected at least one FMU")
     models = [model for _, model in fmus]
+    for model in models:
+        model.expect_no_clocks()
     named = dict(zip(_names(models), models))
     matches = match(named)
     sampled = {name: "all its outputs are discrete" for name, model in named.items() if _is_discrete(model)}

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from orchestration.components.fmi.model import read_model
+from orchestration.foundation.basics.errors import UsageError
 from orchestration.systems.system.check import check
 from orchestration.systems.system.component import Sampling
 from orchestration.systems.system.connection import Connection
@@ -15,6 +16,7 @@ from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System
 from orchestration.systems.system.proposal import PERIOD, STEP, STOP, propose
 from tests.commands import Main
+from tests.orchestration.components.fmi.small import CLOCK, small
 from tests.orchestration.systems.system.described import described
 
 
@@ -35,6 +37,12 @@ def wires(system: System) -> set[str]:
 def only(system: System) -> Connection:
     (connection,) = system.connections
     return connection
+
+
+def test_nothing_is_proposed_for_an_fmu_that_no_run_takes(tmp_path: Path) -> None:
+    path = small(tmp_path, fmi=3, more=CLOCK)
+    with pytest.raises(UsageError, match=r"has clocks, which are not supported: tick"):
+        propose([(str(path), read_model(path))], tmp_path)
 
 
 # -- matches ----------------------------------------------------------------------------------------------

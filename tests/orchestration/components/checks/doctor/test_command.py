@@ -168,6 +168,8 @@ def test_model_exchange_alone_is_not_tried(plant: Path, tmp_path: Path) -> None:
     table = examined(path)
     assert table["kinds"] == ["ModelExchange"]
     assert table["failure"] == "not tried: it is for model exchange only"
+    needed = "an FMU for co-simulation; it is for model exchange"
+    assert [(host["ready"], needed in host["needs"]) for host in table["hosts"].values()] == [(False, True)] * 2
 
 
 def failure(path: Path, **limits: float) -> str | None:
