@@ -1,18 +1,14 @@
 """The components of a system about its rest as matrices, identified from responses of their FMUs.
 
-A component whose responses to pulses of 1 and 1e-3 agree is taken as linear: the larger pulse identifies it to
-rounding. Any other is identified by small differences, as accurately as pulses of ten times the size agree.
+A component whose response to a random input is predicted to rounding is taken as linear; any other is identified by
+small differences, as accurately as that response is predicted.
 """
 
 from __future__ import annotations
 
 import json
-from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 
-import numpy as np
-
-from orchestration.foundation.basics.errors import SimulatorError, UsageError
 from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.theory.stability.linearised_component import Tangent
 from orchestration.theory.stability.loop_at_rest import AtRest
@@ -26,12 +22,8 @@ from orchestration.theory.stability.matrices import (
     whole_nanoseconds,
 )
 
-LARGE_PULSE, SMALL_PULSE = 1.0, 1e-3
-"""pulses with the same response of a linear component"""
 SAME = 1e-9
-"""Difference allowed between both pulses, as a share of a response"""
-LARGER = 10.0
-"""factor of the pulses that check small ones"""
+"""Error of the predicted response, relative to the largest, up to which a component is linear"""
 ROUNDING = 1e-11
 """Least effect of rounding on a result, as a share of a response"""
 DIFFERS = 1e-9
@@ -86,7 +78,8 @@ def _cache_key(loop: AtRest, name: str) -> tuple[object, ...]:
 
 def _identified(loop: AtRest, name: str) -> IdentifiedComponent:
     component, step = loop.simulation.system.components[name], _informative_step(loop, name)
-    tangent, is_linear, discrepancy = _tangent_by_pulses(loop, name, step)
+    tangent = loop.tangent(name)
+    is_linear = tangent.accuracy <= SAME
     part: Continuous | SampledSystem
     if component.sampling is not None:
         part = SampledSystem(**vars(of_samples(tangent, step)), depends_on_step=depends_on_step(tangent, step))
@@ -94,18 +87,7 @@ def _identified(loop: AtRest, name: str) -> IdentifiedComponent:
         matrices = in_continuous_time(tangent, step, DIFFERS if is_linear else INEXACT)
         part = replace(matrices, step=tangent.derivatives)
     method = "saved states, to rounding" if is_linear else "saved states, by differences"
-    return IdentifiedComponent(part=part, method=method, accuracy=max(ROUNDING, discrepancy), tangent=tangent)
-
-
-def _tangent_by_pulses(loop: AtRest, name: str, step: float) -> tuple[Tangent, bool, float]:
-    """A component by suitable pulses, whether it is linear, and the accuracy of its responses."""
-    with suppress(UsageError, SimulatorError, ValueError, np.linalg.LinAlgError):  # it accepts no large pulses
-        large = loop.tangent(name, LARGE_PULSE)
-        discrepancy = large.prediction_error(SMALL_PULSE, step)
-        if discrepancy <= SAME:
-            return large, True, discrepancy
-    small = loop.tangent(name, loop.pulse)
-    return small, False, small.prediction_error(LARGER * loop.pulse, step)
+    return IdentifiedComponent(part=part, method=method, accuracy=max(ROUNDING, tangent.accuracy), tangent=tangent)
 
 
 def _informative_step(loop: AtRest, name: str) -> float:

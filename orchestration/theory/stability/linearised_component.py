@@ -1,90 +1,55 @@
 """A component about a point where it rests, as a linear simulator: its derivatives, measured through saved states.
 
 The saved state of an FMU is opaque. So states near rest are produced by pulses on inputs, and identified by the outputs
-afterwards, the inputs at rest again: these are its coordinates, reduced by their singular values to as many as there
-are. States that are not controllable from inputs, or not observable from outputs, are no part of a loop. Restored to
-such states, the component shows the derivatives of a step of any length.
+afterwards, the inputs at rest again: these are its coordinates, reduced by their singular values to as many as stand
+out of the errors of measurement. States that are not controllable from inputs, or not observable from outputs, are no
+part of a loop. Restored to such states, the component shows the derivatives of a step of any length. What is found then
+has to predict the response to a random input.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from orchestration.components.fmi.instance import Instance
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.theory.stability.excitation import ROUNDING, Errors, Excitation, Pair, Rung, SavedState
 from orchestration.theory.stability.linear_simulator import LinearSimulator
 
-PULSE = 1e-6
-"""Size of a pulse of an input, both ways, by its value, or absolute where that is smaller than 1"""
-LARGEST_RESPONSE = 1e4
-"""Largest response of an output to the pulse; later outputs are ignored"""
-NOISE = 100.0 * np.finfo(float).eps
-"""Effect of rounding on an output, likewise"""
-OBSERVABLE = 1e-11
-"""Share of the largest singular value: smaller ones count as 0"""
-TURN = 1e-3
-"""Difference of the response to a pulse on all inputs allowed from sample to sample"""
-FEWEST_POINTS = 6
-"""points of the ladder at which states are produced at least"""
-LATER = 4
-"""steps over which responses to pulses of several sizes are compared"""
+STANDS_OUT = 10.0
+"""Factor of the largest singular value of the errors: larger singular values are states"""
+SCALINGS = 4
+"""Rounds in which rows and columns are scaled to errors of one size"""
+UNPROVEN = 1e-5
+"""Error of a predicted response, relative to the largest of that output, from which a linear model is refused"""
+PROOF_STEPS = 256
+"""Steps of the random input, at most"""
 LINEAR = 1e-6
-"""Error of the derivatives allowed, by the outputs from a state, or absolute where these are smaller than 1"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Rest:
-    """An instance at rest, with its last inputs and time."""
-
-    fmu: Instance
-    inputs: tuple[str, ...]
-    """Reals that a connection feeds"""
-    held: Floats
-    """their values"""
-    outputs: tuple[str, ...]
-    """Reals that a connection reads"""
-    time: float
-    """Time of its next step, by its own clock [s]"""
-
-
-@dataclass(frozen=True)
-class _State:
-    saved: bytes
-    time: float
-
-
-_Pair = tuple[_State, _State]
-"""A state after a pulse up, and after one down"""
+"""Error allowed of outputs predicted from an initial state, relative, or absolute where these are smaller than 1"""
 
 
 class Tangent(LinearSimulator):
     """A component about rest; as a `Simulator` it is linear, and begins at rest.
 
-    `ladder` are the lengths of the steps [s] that produce and identify states; where the component only takes steps of
-    a `unit`, whole numbers of it. Raises `UsageError` for a component that has more states than these show.
+    The rungs of `ladder` produce and identify states, at `fewest` rungs at least. Where the component only takes steps
+    of a `unit`, these are whole numbers of it. Raises `UsageError` for a component with more states than these show.
     """
 
-    def __init__(self, rest: Rest, ladder: Sequence[float], pulse: float = PULSE, *, unit: float | None = None) -> None:
-        super().__init__(rest.inputs, rest.outputs, states=0)  # set below, once they are found
-        self.unit, self._fmu = unit, rest.fmu
-        self._held, self._inputs_now = rest.held, rest.held.copy()
-        self._write = rest.fmu.writer(rest.inputs, self._inputs_now)
-        self._outputs_now: Floats = np.zeros(len(rest.outputs))
-        self._read = rest.fmu.reader(rest.outputs, self._outputs_now)
-        self._pulse = pulse * np.maximum(1.0, np.abs(rest.held))
-        self._largest = LARGEST_RESPONSE * pulse
-        self._time = rest.time
-        self._rest = _State(rest.fmu.save(), rest.time)
-        self._read()
-        self._weight = np.maximum(1.0, np.abs(self._outputs_now))
-        self._ladder = list(ladder)
+    def __init__(
+        self, excitation: Excitation, ladder: Sequence[Rung], fewest: int, *, unit: float | None = None
+    ) -> None:
+        super().__init__(excitation.inputs, excitation.outputs, states=0)  # set below, once they are found
+        self.unit, self._excitation, self.ladder = unit, excitation, list(ladder)
         self._known: dict[int, tuple[Floats, Floats]] = {}
-        self._expect_one_rate()
-        self._find_coordinates()
-        self.state = np.zeros(self._axes.shape[1])
+        self.accuracy = 0.0
+        self._find_coordinates(excitation.errors_over(ladder), fewest)
+        self.state = np.zeros(len(self._inverse))
+
+    @property
+    def pulse(self) -> float:
+        """The pulse by which it was measured, relative."""
+        return self._excitation.pulse
 
     def step(self, t: float, h: float) -> None:
         """As `Simulator`; the same at any time."""
@@ -93,189 +58,128 @@ class Tangent(LinearSimulator):
         self.output[:] = found[: len(self.output)]
         self.state[:] = found[len(self.output) :]
 
-    def _expect_one_rate(self) -> None:
-        """Raise `UsageError` where the response differs from sample to sample: the component has several rates."""
-        if len(set(self._ladder)) > 1:  # no samples
-            return
-        rest, first, h = self._rest, None, self._ladder[0]
-        for _ in self._ladder:
-            perturbed = self._outputs_after(rest, self._held + self._pulse, [h])[0]
-            unperturbed, rest = self._stepped(rest, self._held, h)
-            response = (perturbed - unperturbed) / PULSE
-            first = response if first is None else first
-            if np.abs(response - first).max(initial=0.0) > TURN * max(1.0, np.abs(first).max(initial=0.0)):
-                raise UsageError(f"{self._fmu.name}: responds to a pulse differently from sample to sample")
-
-    # -- coordinates --------------------------------------------------------------------------------------------
-
-    def _find_coordinates(self) -> None:
-        """Produce states at points of the ladder until no further coordinates appear."""
-        sets, before, rank = [self._pulse_responses()], 0, 0
-        fewest = max([FEWEST_POINTS, *(self._dead_points(i) + 2 for i in range(len(self.inputs)))])
-        for shown in range(1, len(self._ladder) + 1):
-            self._shown = shown
-            columns = [self._futures(pairs) for pairs in sets]
-            while (len(sets) < fewest or not _is_spanned(columns)) and len(sets) < len(self._ladder):
-                later = self._after_free_motion(sets[-1], self._ladder[len(sets)])
-                if later is None:
-                    break
-                sets.append(later)
-                columns.append(self._futures(later))
-            futures = np.column_stack(columns)
-            rank = _rank(futures)
-            if rank == before and rank < len(futures):
-                break
-            before = rank
-        if 0 < rank == min(futures.shape):
-            raise UsageError(f"{self._fmu.name}: has more states than {len(sets)} pulses and {self._shown} steps show")
-        self._choose([pair for pairs in sets for pair in pairs], futures, rank)
-
-    def _choose(self, pairs: Sequence[_Pair], futures: Floats, rank: int) -> None:
-        """The coordinates that `futures` span, and states that span them."""
-        self._axes = np.linalg.svd(futures, full_matrices=False)[0][:, :rank]
-        coordinates = self._axes.T @ futures
-        chosen = _most_independent(coordinates, rank)
-        self._pairs = [pairs[i] for i in chosen]
-        self._inverse = np.linalg.inv(coordinates[:, chosen]) if rank else np.zeros((0, 0))
-
     def derivatives(self, h: float) -> tuple[Floats, Floats]:
         """Derivatives of the outputs and coordinates after a step of `h` [s], by coordinates and by inputs."""
         key = round(h * NANOSECONDS)
         if key not in self._known:
-            by_pair = [self._difference([self._stepped(s, self._held, h) for s in pair]) for pair in self._pairs]
+            excitation, rung = self._excitation, self._rung(h)
+            by_pair = [self._difference([excitation.stepped(s, rung) for s in pair]) for pair in self._pairs]
+            sizes = excitation.pulses / excitation.pulse
             by_input = [
-                self._difference([self._stepped(self._rest, self._pulses(i, sign), h) for sign in (1, -1)])
-                / (self._pulse[i] / PULSE)
+                self._difference([excitation.stepped(excitation.rest, rung, excitation.pulsed(i, x)) for x in (1, -1)])
+                / sizes[i]
                 for i in range(len(self.inputs))
             ]
-            size = len(self.outputs) + self._axes.shape[1]
+            size = len(self.outputs) + len(self._inverse)
             after, moved = (np.column_stack(c) if c else np.zeros((size, 0)) for c in (by_pair, by_input))
             self._known[key] = after @ self._inverse, moved
         return self._known[key]
-
-    def prediction_error(self, pulse: float, h: float) -> float:
-        """The error of the predicted responses to pulses of another size, relative to the largest of each output.
-
-        Over a step of `h` [s], and over the next ones, the inputs at rest again.
-        """
-        by_state, by_input = self.derivatives(h)
-        count, sizes = len(self.outputs), pulse * np.maximum(1.0, np.abs(self._held))
-        predicted, state = [by_input[:count]], by_input[count:]
-        for _ in range(LATER):
-            predicted.append(by_state[:count] @ state)
-            state = by_state[count:] @ state
-        measured = np.zeros((LATER + 1, count, len(self.inputs)))
-        for i, unit in enumerate(np.diag(sizes)):
-            perturbed = [self._stepped(self._rest, self._held + sign * unit, h) for sign in (1, -1)]
-            later = [self._outputs_after(state, self._held, [h] * LATER) for _, state in perturbed]
-            up, down = (np.vstack([first, rest]) for (first, _), rest in zip(perturbed, later))
-            measured[:, :, i] = (up - down) / (2.0 * sizes[i])
-        scale = np.abs(measured).max(axis=(0, 2), initial=0.0)[:, None]
-        return float((np.abs(measured - np.array(predicted)) / np.maximum(scale, 1e-300)).max(initial=0.0))
 
     def coordinates_of(self, saved: bytes) -> Floats:
         """The coordinates of a state saved at time 0 as its deviation from rest.
 
         Raises `UsageError` for one that no input reaches, or from which the component is not linear.
         """
-        state, h = _State(saved, 0.0), self._ladder[0]
+        state, rung = SavedState(saved, 0.0), self.ladder[0]
         found: Floats = self._axes.T @ self._deviation(state)
-        outputs, later = self._stepped(state, self._held, h)
-        at_rest, _ = self._stepped(self._rest, self._held, h)
+        outputs, later = self._excitation.stepped(state, rung)
+        at_rest, _ = self._excitation.stepped(self._excitation.rest, rung)
         seen = [self._deviation(state), outputs - at_rest, self._axes.T @ self._deviation(later)]
-        predicted = np.concatenate([self._axes @ found, self.derivatives(h)[0] @ found])
+        after = self.derivatives(rung.duration)[0] @ found
+        predicted = np.concatenate([self._back @ found, after])
         error = np.abs(np.concatenate(seen) - predicted).max(initial=0.0)
         if not error <= LINEAR * max(1.0, np.abs(predicted).max(initial=0.0)):
             raise UsageError(
-                f"{self._fmu.name}: its initial state is not linear about its operating point: expected initial values "
-                "near it that its inputs could reach"
+                f"{self._excitation.name}: its initial state is not linear about its operating point: expected initial "
+                "values near it that its inputs could reach"
             )
         return found
 
-    def _deviation(self, state: _State) -> Floats:
+    def prove(self, h: float, duration: float) -> None:
+        """Compare its response to a random input, in steps of `h` over a `duration` [s], with that of the component.
+
+        Raises `UsageError` where they differ; else `accuracy` is their largest difference, relative.
+        """
+        excitation, rung, rng = self._excitation, self._rung(h), np.random.default_rng(0)
+        count = int(np.clip(duration / h, 2, PROOF_STEPS))
+        moves = rng.uniform(-1.0, 1.0, (count, len(self.inputs))) * excitation.pulses
+        moves[(count + 1) // 2 :] = 0.0
+        measured, predicted = excitation.response_to(moves, rung), np.zeros((count, len(self.outputs)))
+        by_state, by_input = self.derivatives(h)
+        state, cut = np.zeros(len(self.state)), len(self.outputs)
+        for k, move in enumerate(moves):
+            after = by_state @ state + by_input @ move
+            predicted[k], state = after[:cut], after[cut:]
+        largest = np.abs(measured).max(axis=0, initial=0.0)
+        error = np.abs(measured - predicted).max(axis=0, initial=0.0)
+        beyond_rounding = np.maximum(error - STANDS_OUT * ROUNDING * excitation.weight, 0.0)
+        self.accuracy = float((beyond_rounding / np.where(largest > 0.0, largest, 1.0)).max(initial=0.0))
+        if not self.accuracy <= UNPROVEN:
+            raise UsageError(
+                f"{excitation.name}: its linear model, of {len(state)} states, does not predict the response to a "
+                f"random input over {count * h:.3g} s: off by {self.accuracy:.1g} of the largest, expected at most "
+                f"{UNPROVEN:g}"
+            )
+
+    # -- coordinates --------------------------------------------------------------------------------------------
+
+    def _find_coordinates(self, errors: Errors, fewest: int) -> None:
+        """Produce states at points of the ladder until no further coordinates appear."""
+        excitation, ladder = self._excitation, self.ladder
+        pairs = [excitation.after_pulse(i, ladder[0]) for i in range(len(self.inputs))]
+        produced, columns, noise, ranks = list[Pair](), list[Floats](), list[Floats](), list[int]()
+        for point, rung in enumerate(ladder):
+            produced += pairs
+            columns += [excitation.futures(pair, ladder) for pair in pairs]
+            noise += [errors.of_futures(i, point) for i in range(len(pairs))]
+            found = self._coordinates(np.column_stack(columns), np.column_stack(noise)) if pairs else None
+            ranks.append(0 if found is None else len(found[1]))
+            if len(ranks) >= fewest and len(set(ranks[-3:])) == 1:
+                break
+            pairs = [(excitation.stepped(up, rung)[1], excitation.stepped(down, rung)[1]) for up, down in pairs]
+        if found is None or not len(found[1]):
+            self._axes = self._back = np.zeros((len(ladder) * len(self.outputs), 0))
+            self._pairs, self._inverse = [], np.zeros((0, 0))
+            return
+        self._axes, chosen, self._back = found
+        if ranks[-1] == min(len(columns), len(self._axes)):
+            raise UsageError(
+                f"{excitation.name}: has more states than {len(ranks)} pulses and {len(ladder)} steps show"
+            )
+        self._pairs = [produced[k] for k in chosen]
+        self._inverse = np.linalg.inv(self._axes.T @ np.column_stack([columns[k] for k in chosen]))
+
+    def _coordinates(self, futures: Floats, errors: Floats) -> tuple[Floats, list[int], Floats]:
+        """The coordinates of what stands out of the errors: weights of the rows, columns that span, the way back."""
+        errors = errors + ROUNDING * np.abs(futures)
+        errors += 1e-30 * max(float(np.abs(futures).max(initial=0.0)), 1e-100)
+        rows, columns = np.ones((len(futures), 1)), np.ones(futures.shape[1])
+        for _ in range(SCALINGS):
+            columns = 1.0 / np.sqrt(np.mean((errors * rows) ** 2, axis=0))
+            by_output = (errors * columns).reshape(-1, len(self.outputs), futures.shape[1])
+            rows = np.tile(1.0 / np.sqrt(np.mean(by_output**2, axis=(0, 2))), len(by_output))[:, None]
+        left, values, _ = np.linalg.svd(futures * rows * columns, full_matrices=False)
+        rank = int((values > STANDS_OUT * np.linalg.norm(errors * rows * columns, 2)).sum())
+        axes = left[:, :rank] * rows
+        size = np.linalg.norm(axes, axis=0)
+        chosen = _most_independent(axes.T @ (futures * columns), rank)
+        return axes / size, chosen, left[:, :rank] / rows * size
+
+    def _deviation(self, state: SavedState) -> Floats:
         """The coordinates of a state before they are reduced."""
-        here, rest = (self._outputs_after(s, self._held, self._ladder[: self._shown]) for s in (state, self._rest))
-        found: Floats = ((here - rest) / self._weight).ravel()
+        here, rest = (self._excitation.outputs_after(s, self.ladder) for s in (state, self._excitation.rest))
+        found: Floats = ((here - rest) / self._excitation.weight).ravel()
         return found
 
-    def _stepped(self, start: _State, held: Floats, h: float) -> tuple[Floats, _State]:
-        outputs = self._outputs_after(start, held, [h])[0]
-        return outputs, _State(self._fmu.save(), self._time)
-
-    def _difference(self, both: Sequence[tuple[Floats, _State]]) -> Floats:
+    def _difference(self, both: Sequence[tuple[Floats, SavedState]]) -> Floats:
         """Outputs and coordinates after a step, per unit of the pulse up and down."""
         (up, after_up), (down, after_down) = both
-        future = self._axes.T @ self._future((after_up, after_down))
-        found: Floats = np.concatenate([(up - down) / (2.0 * PULSE), future])
+        future = self._axes.T @ self._excitation.futures((after_up, after_down), self.ladder)
+        found: Floats = np.concatenate([(up - down) / (2.0 * self.pulse), future])
         return found
 
-    def _pulse_responses(self) -> list[_Pair]:
-        """For each input the states after a pulse on it over the first step of the ladder."""
-        return [
-            (self._stepped(self._rest, self._pulses(i, 1), h)[1], self._stepped(self._rest, self._pulses(i, -1), h)[1])
-            for i, h in enumerate([self._ladder[0]] * len(self.inputs))
-        ]
-
-    def _dead_points(self, i: int) -> int:
-        """The number of points of the ladder before an output responds to an input; 0 if none does."""
-        for most in (FEWEST_POINTS, len(self._ladder)):
-            up, down = (self._outputs_after(self._rest, self._pulses(i, s), self._ladder[:most]) for s in (1, -1))
-            responds = (np.abs(up - down) / self._weight > NOISE).any(axis=1)
-            if responds.any():
-                return int(np.argmax(responds))
-        return 0
-
-    def _after_free_motion(self, pairs: Sequence[_Pair], h: float) -> list[_Pair] | None:
-        """The states `h` [s] later, the inputs at rest; None if one has become too large."""
-        later = []
-        for pair in pairs:
-            (up, after_up), (down, after_down) = (self._stepped(state, self._held, h) for state in pair)
-            if np.abs((up - down) / self._weight).max(initial=0.0) > self._largest:
-                return None
-            later.append((after_up, after_down))
-        return later
-
-    def _futures(self, pairs: Sequence[_Pair]) -> Floats:
-        columns = [self._future(pair) for pair in pairs]
-        return np.column_stack(columns) if columns else np.zeros((self._shown * len(self.outputs), 0))
-
-    def _future(self, pair: _Pair) -> Floats:
-        """The coordinates of a state before they are reduced: outputs at the points of the ladder, as differences."""
-        up, down = (self._outputs_after(state, self._held, self._ladder[: self._shown]) for state in pair)
-        found: Floats = ((up - down) / self._weight).ravel() / (2.0 * PULSE)
-        return found
-
-    def _pulses(self, i: int, sign: int) -> Floats:
-        held: Floats = self._held.copy()
-        held[i] += sign * self._pulse[i]
-        return held
-
-    def _outputs_after(self, start: _State, held: Floats, steps: Sequence[float]) -> Floats:
-        """Shape (steps, outputs); the inputs are `held` over all steps."""
-        self._fmu.restore(start.saved)
-        self._time, self._inputs_now[:] = start.time, held
-        self._write()
-        found: Floats = np.zeros((len(steps), len(self.outputs)))
-        for k, h in enumerate(steps):
-            count = 1 if self.unit is None else round(h / self.unit)
-            for _ in range(count):
-                self._fmu.step(self._time, h / count)
-                self._time += h / count
-            self._read()
-            found[k] = self._outputs_now
-        return found
-
-
-def _is_spanned(columns: Sequence[Floats]) -> bool:
-    """Whether the last states have added no coordinate."""
-    return _rank(np.column_stack(columns)) == _rank(np.column_stack(columns[:-2]))
-
-
-def _rank(futures: Floats) -> int:
-    if not futures.size:
-        return 0
-    values = np.linalg.svd(futures, compute_uv=False)
-    return int((values > max(OBSERVABLE * values[0], NOISE * np.sqrt(futures.size) / PULSE)).sum())
+    def _rung(self, h: float) -> Rung:
+        return Rung(1, h) if self.unit is None else Rung(round(h / self.unit), self.unit)
 
 
 def _most_independent(columns: Floats, count: int) -> list[int]:

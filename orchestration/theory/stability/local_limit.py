@@ -10,7 +10,6 @@ from orchestration.foundation.basics.errors import SimulatorError, UsageError
 from orchestration.simulation.requests.ranges import Varied
 from orchestration.systems.system.model import System
 from orchestration.theory.stability.known_loops import LOOPS, LinearLimit
-from orchestration.theory.stability.linearised_component import PULSE
 from orchestration.theory.stability.operating_point import NotAnEquilibriumError
 from orchestration.theory.stability.period_map import growth_of_loop
 from orchestration.theory.stability.perturbed_runs import growth_of
@@ -19,7 +18,7 @@ LOOP = "spectral radius of the sampled loop about the operating point, by differ
 LOOP_TOLERANCE, TWINS_TOLERANCE = 0.01, 0.2
 """Tolerances as shares of the tolerance of the measured limit"""
 TWINS = "growth of the difference of twin runs from the operating point, one of them perturbed by a pulse"
-OTHER_PULSE = 4.0
+OTHER_PULSE = 0.25
 """factor of the second pulse, whose growth is compared"""
 
 Growth = Callable[[float], float]
@@ -69,7 +68,7 @@ def _through_saved_states(at: Callable[[float], System], span: Range, instances:
         return found
     below, above = (max(v for v in growths if v < found.limit), min(v for v in growths if v > found.limit))
     slope = (growths[above] - growths[below]) / (above - below)
-    difference = abs(growth_of_loop(at(below), instances, OTHER_PULSE * PULSE) - growths[below])
+    difference = abs(growth_of_loop(at(below), instances, OTHER_PULSE) - growths[below])
     return replace(found, accuracy=found.accuracy + difference / slope)
 
 

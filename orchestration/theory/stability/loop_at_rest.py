@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -23,7 +23,9 @@ from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import expect_fixed_periods
-from orchestration.theory.stability.linearised_component import PULSE, Rest, Tangent
+from orchestration.theory.stability.excitation import Rest
+from orchestration.theory.stability.identification import in_continuous_time, of_samples
+from orchestration.theory.stability.linearised_component import Tangent
 from orchestration.theory.stability.operating_point import (
     deterministic,
     exchanged_signals,
@@ -36,14 +38,6 @@ SETTLED = 6
 """periods of the run to rest, after messages in transit have arrived"""
 HELD = 2
 """messages that a first-order hold remembers"""
-RUNGS, FINEST = 12, 0.25
-"""Ladder of a component in continuous time: points, each twice the one before; the first as a share of the period"""
-LONGER = (1, 4, 16, 64)
-"""factors of longer steps, tried in turn while they show more states: a fast loop leaves slow states no time"""
-RUNGS_OF_FIXED = 5
-"""Rungs where a component takes short steps of one length only"""
-RUNGS_OF_TASK = 32
-"""Rungs of a sampled component: samples"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +58,8 @@ class AtRest:
     """A system at rest, and its components about it."""
 
     simulation: PreparedRun
-    pulse: float
+    factor: float
+    """Factor of the pulses that are chosen"""
     extra: ExtraSignals
     saved_states: Mapping[str, bytes]
     """Saved states of the components at rest"""
@@ -76,12 +71,12 @@ class AtRest:
     @cached_property
     def tangents(self) -> dict[str, Tangent]:
         """The components about rest."""
-        return {name: self.tangent(name, self.pulse) for name in self.simulation.instances}
+        return {name: self.tangent(name) for name in self.simulation.instances}
 
-    def tangent(self, name: str, pulse: float) -> Tangent:
-        """A component about rest, by pulses of a size."""
+    def tangent(self, name: str) -> Tangent:
+        """A component about rest."""
         self.simulation.instances[name].restore(self.saved_states[name])
-        return _tangent(self, name, pulse)
+        return _tangent(self, name, self.factor)
 
     def rest_of(self, name: str) -> Rest:
         """A component at rest: the last inputs and time, and the variables that belong to the loop."""
@@ -104,7 +99,7 @@ class AtRest:
 def at_rest(
     system: System,
     instances: Instances,
-    pulse: float = PULSE,
+    factor: float = 1.0,
     extra: ExtraSignals = NO_SIGNALS,
     models: Mapping[str, Model] | None = None,
 ) -> Iterator[AtRest]:
@@ -124,7 +119,7 @@ def at_rest(
         _settle(simulation, begin, period)
         yield AtRest(
             simulation=simulation, saved_states={name: one.save() for name, one in simulation.instances.items()},
-            pulse=pulse, extra=extra, begin=begin, period=period,
+            factor=factor, extra=extra, begin=begin, period=period,
         )  # fmt: skip
 
 
@@ -162,34 +157,13 @@ def _settle(simulation: PreparedRun, begin: Fraction, period: Fraction) -> None:
     expect_rest(system, np.array(rows))
 
 
-def _tangent(loop: AtRest, name: str, pulse: float) -> Tangent:
-    fmu, rest, period = loop.simulation.instances[name], loop.rest_of(name), loop.period
-    component = loop.simulation.system.components[name]
+def _tangent(loop: AtRest, name: str, factor: float) -> Tangent:
+    model, rest = loop.simulation.instances[name].model, loop.rest_of(name)
+    component, period = loop.simulation.system.components[name], float(loop.period) / NANOSECONDS
     if component.sampling is not None:
-        return Tangent(rest, [component.sampling.period] * RUNGS_OF_TASK, pulse)
-    first = FINEST * float(period) / NANOSECONDS
-    if fmu.model.varies_step:
-        ladder = np.array([first * 2 ** max(i - 1, 0) for i in range(RUNGS)])
-        return _richest_tangent(rest, [(times * ladder).tolist() for times in LONGER], pulse)
-    assert component.step is not None
-    points = (round(first * 2**i / component.step) for i in range(RUNGS_OF_FIXED))
-    counts = np.diff(sorted({0, *(max(1, point) for point in points)}))
-    return Tangent(rest, [float(count * component.step) for count in counts], pulse, unit=component.step)
-
-
-def _richest_tangent(rest: Rest, ladders: Sequence[Sequence[float]], pulse: float) -> Tangent:
-    """A tangent by the first ladder that the next one does not improve on in states."""
-    saved = rest.fmu.save()
-    best = Tangent(rest, ladders[0], pulse)
-    for ladder in ladders[1:]:
-        rest.fmu.restore(saved)
-        with suppress(UsageError):  # an unstable state has become too large on it
-            other = Tangent(rest, ladder, pulse)
-            if len(other.state) > len(best.state):
-                best = other
-                continue
-        break
-    return best
+        return of_samples(rest, component.sampling.period, factor)
+    step = component.step or period
+    return in_continuous_time(rest, period, step, factor, unit=None if model.varies_step else step)
 
 
 # -- instances that trace what is written to them ----------------------------------------------------------------------

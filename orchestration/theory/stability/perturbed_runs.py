@@ -24,7 +24,7 @@ from orchestration.simulation.runs.prepared import prepared
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System
 from orchestration.theory.stability import operating_point
-from orchestration.theory.stability.linearised_component import PULSE
+from orchestration.theory.stability.excitation import PULSE
 from orchestration.theory.stability.loop_at_rest import wrapping_loader
 
 LARGE, SMALL = 1e3, 1e-7

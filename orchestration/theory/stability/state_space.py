@@ -54,8 +54,8 @@ class StateSpace:
 def reduced(A: Floats, B: Floats, C: Floats) -> tuple[Floats, Floats, Floats]:
     """The controllable and observable part of a system, in balanced coordinates.
 
-    By the singular values of the impulse responses (Ho and Kalman), over a finite time, so that the system need not be
-    stable.
+    By the singular values of the impulse responses (Ho and Kalman), over a finite time and scaled where they grow, so
+    that the system need not be stable.
     """
     if not (B.any() and C.any()):
         return np.zeros((0, 0)), np.zeros((0, B.shape[1])), np.zeros((C.shape[0], 0))
@@ -72,12 +72,13 @@ def reduced(A: Floats, B: Floats, C: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _powers(A: Floats, B: Floats) -> list[Floats]:
-    """A^k B for k in `SAMPLES`, while it is small."""
+    """A^k B for k in `SAMPLES`, each column no larger than that of B: growth would hide all else behind rounding."""
     found, state, k = [B], B, 0
+    largest = np.maximum(np.abs(B).max(axis=0), np.finfo(float).tiny)
     for sample in SAMPLES[1:]:
         while k < sample:
             state, k = A @ state, k + 1
-        if np.abs(state).max() > LARGEST_RESPONSE * np.abs(B).max():
+        if not np.abs(state).max() <= LARGEST_RESPONSE * np.abs(B).max():
             break
-        found.append(state)
+        found.append(state / np.maximum(1.0, np.abs(state).max(axis=0) / largest))
     return found

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from orchestration.foundation.basics.simulator import Floats, Transfer
-from orchestration.theory.stability.linearised_component import Rest, Tangent
+from orchestration.theory.stability.excitation import Excitation, Rest, Rung
+from orchestration.theory.stability.identification import of_samples
+from orchestration.theory.stability.linearised_component import Tangent
 from quadcosim import UsageError
 
 
@@ -41,8 +43,12 @@ class Line:
         self.kept = np.frombuffer(state).copy()
 
 
-def tangent(fmu: Any, points: int) -> Tangent:
-    return Tangent(Rest(fmu=fmu, inputs=("u",), held=np.zeros(1), outputs=("y",), time=0.0), [1.0] * points)
+def rest(fmu: Any) -> Rest:
+    return Rest(fmu=fmu, inputs=("u",), held=np.zeros(1), outputs=("y",), time=0.0)
+
+
+def tangent(fmu: Any) -> Tangent:
+    return of_samples(rest(fmu), 1.0, 1.0)
 
 
 def responses(simulator: Any, samples: int) -> list[float]:
@@ -60,14 +66,19 @@ def responses(simulator: Any, samples: int) -> list[float]:
 
 @pytest.mark.parametrize("samples", [1, 2, 5, 8, 20])
 def test_a_dead_time_within_the_ladder_is_a_state_for_each_sample(samples: int) -> None:
-    measured = tangent(Line(samples), 32)
+    measured = tangent(Line(samples))
     assert len(measured.state) == samples - 1
     assert responses(measured, samples + 3) == pytest.approx(responses(Line(samples), samples + 3), abs=1e-8)
 
 
 def test_more_states_than_the_ladder_shows_are_refused_by_name() -> None:
-    with pytest.raises(UsageError, match="line: has more states than"):
-        tangent(Line(6), 5)
+    with pytest.raises(UsageError, match="line: has more states than 5 pulses and 5 steps show"):
+        Tangent(Excitation(rest(Line(6))), [Rung(1, 1.0)] * 5, 5)
+
+
+def test_a_dead_time_beyond_the_ladder_is_refused() -> None:
+    with pytest.raises(UsageError, match="line: its linear model, of 0 states, does not predict the response"):
+        tangent(Line(40))
 
 
 class Bent(Line):
@@ -78,15 +89,28 @@ class Bent(Line):
 
 
 @pytest.mark.parametrize("samples", [1, 3])
-def test_the_error_of_responses_to_larger_pulses_is_the_nonlinear_part(samples: int) -> None:
-    assert tangent(Line(samples), 32).prediction_error(1.0, 1.0) < 1e-9
-    bent = tangent(Bent(samples), 32)
-    assert bent.prediction_error(0.1, 1.0) == pytest.approx(0.01 / 1.01, rel=1e-6)
-    assert bent.prediction_error(1e-5, 1.0) < 1e-9
+def test_pulses_are_as_large_as_the_response_is_linear(samples: int) -> None:
+    bent, line = tangent(Bent(samples)), tangent(Line(samples))
+    assert bent.pulse < 1e-4
+    assert responses(bent, samples + 3) == pytest.approx(responses(Line(samples), samples + 3), abs=1e-9)
+    assert bent.accuracy < 1e-9
+    assert line.accuracy < 1e-12
+
+
+class Drifting(Line):
+    """One that responds by a little more from sample to sample."""
+
+    def step(self, t: float, h: float) -> None:
+        self.kept = np.concatenate([[self.u * (1.0 + 2e-5 * t)], 0.9 * self.kept[:-1]])
+
+
+def test_a_model_that_does_not_predict_the_response_to_a_random_input_is_refused() -> None:
+    with pytest.raises(UsageError, match=r"line: its linear model, of 2 states, does not predict the response"):
+        tangent(Drifting(3))
 
 
 def test_states_are_saved_and_put_back() -> None:
-    measured = tangent(Line(3), 8)
+    measured = tangent(Line(3))
     responses(measured, 1)
     kept = measured.save()
     later = responses(measured, 4)

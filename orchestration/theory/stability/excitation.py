@@ -1,0 +1,258 @@
+"""An instance at rest, whose inputs are pulsed, and which is followed from saved states.
+
+Small deviations are linear as far as pulses of two sizes agree: this determines the size of pulses and how long a
+response is followed.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from orchestration.components.fmi.instance import Instance
+from orchestration.foundation.basics.simulator import Floats
+
+PULSE = 1e-6
+"""Pulse of an input, up and down, with which the search for the best one begins: relative to its value, or absolute
+where that is smaller than 1"""
+MIN_PULSE, MAX_PULSE = 1e-9, 1.0
+"""Ends of that search"""
+OTHER_SIZE = 1.5
+"""Factor of the pulses that are compared: no power of two, which would be rounded alike"""
+MAX_DEVIATION = 0.01
+"""Deviation of an output from rest, relative or absolute, beyond which it is not followed: it might end the FMU"""
+MAX_GROWTH = 100.0
+"""Response, in pulses, up to which longer steps are tried"""
+NONLINEAR = 1e-9
+"""Difference of two sizes, relative to the largest response so far, up to which a response is linear"""
+LEAST = 3.0
+"""Factor of the least difference that any size has, up to which it is linear, too"""
+ROUNDING = float(np.finfo(float).eps)
+ALIKE = 0.1
+"""Difference of a step to two of half its length, relative to the largest response, up to which it is used instead"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rest:
+    """An instance at rest, with its last inputs and time."""
+
+    fmu: Instance
+    inputs: tuple[str, ...]
+    """Reals that a connection feeds"""
+    held: Floats
+    """Values of these inputs"""
+    outputs: tuple[str, ...]
+    """Reals that a connection reads"""
+    time: float
+    """Time of its next step, by its own clock [s]"""
+
+
+class Rung(NamedTuple):
+    """Equal steps from one reading of the outputs to the next."""
+
+    steps: int
+    h: float
+    """Length of a step [s]"""
+
+    @property
+    def duration(self) -> float:
+        """From one reading to the next [s]."""
+        return self.steps * self.h
+
+
+@dataclass(frozen=True)
+class SavedState:
+    """A state of the instance, as its FMU saves it."""
+
+    saved: bytes
+    time: float
+    """Time of the next step [s]"""
+
+
+Pair = tuple[SavedState, SavedState]
+"""A state after a pulse up, and after one down"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Errors:
+    """Errors of responses to a pulse over the first rung of a ladder that is gone through twice."""
+
+    times: Floats
+    """Time of each rung's end [s]"""
+    values: Floats
+    """Shape (inputs, rungs, outputs), as `Excitation.response`"""
+
+    def of_futures(self, i: int, point: int) -> Floats:
+        """Those of the futures of a state produced by an input at a point of the ladder, in a row."""
+        ladder = self.times[: len(self.times) // 2]
+        at = np.searchsorted(self.times, (ladder[point] + ladder) * (1.0 - 1e-9))
+        found: Floats = np.maximum(self.values[i, at], self.values[i, np.maximum(at - 1, 0)]).ravel()
+        return found
+
+
+class Excitation:
+    """The responses of an instance about rest, per unit of a pulse; outputs relative to their values where above 1."""
+
+    def __init__(self, rest: Rest) -> None:
+        self.inputs, self.outputs = rest.inputs, rest.outputs
+        self.pulse = PULSE
+        self._fmu, self.held, self._inputs_now = rest.fmu, rest.held, rest.held.copy()
+        self._write = rest.fmu.writer(rest.inputs, self._inputs_now)
+        self._outputs_now: Floats = np.zeros(len(rest.outputs))
+        self._read = rest.fmu.reader(rest.outputs, self._outputs_now)
+        self._time = rest.time
+        self.rest = SavedState(rest.fmu.save(), rest.time)
+        self._read()
+        self.at_rest = self._outputs_now.copy()
+        self.weight = np.maximum(1.0, np.abs(self.at_rest))
+
+    @property
+    def name(self) -> str:
+        """The name of the instance."""
+        return self._fmu.name
+
+    @property
+    def pulses(self) -> Floats:
+        """The pulse of each input."""
+        return self.pulse * np.maximum(1.0, np.abs(self.held))
+
+    def pulsed(self, i: int, factor: float) -> Floats:
+        """The inputs with a pulse on one of them, times `factor`."""
+        held: Floats = self.held.copy()
+        held[i] += factor * self.pulses[i]
+        return held
+
+    def outputs_after(self, start: SavedState, rungs: Sequence[Rung], held: Floats | None = None) -> Floats:
+        """The outputs at the end of each rung, shape (rungs, outputs); the inputs are `held`, by default at rest."""
+        inputs = self.held if held is None else held
+        return self._course(start, [(inputs, rung) for rung in rungs])
+
+    def _course(self, start: SavedState, legs: Sequence[tuple[Floats, Rung]], largest: float = np.inf) -> Floats:
+        """The outputs at the end of each rung, with its inputs; ends with a deviation from rest above `largest`."""
+        self._fmu.restore(start.saved)
+        self._time, inputs = start.time, None
+        found = []
+        for held, rung in legs:
+            if held is not inputs:
+                self._inputs_now[:] = inputs = held
+                self._write()
+            for _ in range(rung.steps):
+                self._fmu.step(self._time, rung.h)
+                self._time += rung.h
+            self._read()
+            found.append(self._outputs_now.copy())
+            if not np.abs((found[-1] - self.at_rest) / self.weight).max(initial=0.0) <= largest:
+                break
+        return np.array(found).reshape(len(found), len(self.outputs))
+
+    def stepped(self, start: SavedState, rung: Rung, held: Floats | None = None) -> tuple[Floats, SavedState]:
+        """The outputs and the state after a rung."""
+        outputs = self.outputs_after(start, [rung], held)[0]
+        return outputs, SavedState(self._fmu.save(), self._time)
+
+    def futures(self, pair: Pair, rungs: Sequence[Rung]) -> Floats:
+        """What outputs do from a state, the inputs at rest: their differences at the end of each rung, in a row."""
+        up, down = (self.outputs_after(state, rungs) for state in pair)
+        found: Floats = ((up - down) / self.weight).ravel() / (2.0 * self.pulse)
+        return found
+
+    def after_pulse(self, i: int, rung: Rung) -> Pair:
+        """The states after a pulse on an input over a rung."""
+        up, down = (self.stepped(self.rest, rung, self.pulsed(i, sign))[1] for sign in (1, -1))
+        return up, down
+
+    def response(self, i: int, rungs: Sequence[Rung], *, factor: float = 1.0, lasting: bool = False) -> Floats:
+        """The response to a pulse on an input over the first rung, or all, shape (n, outputs); n ends with a large one.
+
+        The pulse is multiplied by `factor`, and the response divided by it.
+        """
+        courses = []
+        for sign in (factor, -factor):
+            pulsed = self.pulsed(i, sign)
+            later = pulsed if lasting else self.held
+            legs = [(later if k else pulsed, rung) for k, rung in enumerate(rungs)]
+            courses.append(self._course(self.rest, legs, MAX_DEVIATION))
+        up, down = (course[: min(map(len, courses))] for course in courses)
+        found: Floats = (up - down) / self.weight / (2.0 * factor * self.pulse)
+        return found
+
+    def response_to(self, moves: Floats, rung: Rung) -> Floats:
+        """The response to deviations of the inputs, shape (n, inputs), each over a rung; shape (n, outputs)."""
+        up, down = (self._course(self.rest, [(self.held + sign * x, rung) for x in moves]) for sign in (1.0, -1.0))
+        found: Floats = 0.5 * (up - down)
+        return found
+
+    # -- how far it is linear -------------------------------------------------------------------------------------
+
+    def choose_pulse(self, rungs: Sequence[Rung]) -> int:
+        """Choose the pulse; the number of rungs over which responses are linear.
+
+        It is the pulse that is linear for longest, and of these the one to whose size and another responses agree best:
+        smaller ones are lost in rounding. The search goes upward only from responses that are linear.
+        """
+        tried = {PULSE: self._nonlinearity(rungs, PULSE)}
+        early, pulse = len(tried[PULSE]) // 3, PULSE
+        rounding = tried[PULSE][early]
+        while (pulse := 10.0 * pulse) <= MAX_PULSE:
+            tried[pulse] = self._nonlinearity(rungs, pulse)
+            if len(tried[pulse]) <= early or not tried[pulse][early] < rounding:
+                break
+            rounding = tried[pulse][early]
+        linear = {size: _linear(tried[size], max(NONLINEAR, LEAST * rounding)) for size in tried}
+        best = max(linear, key=lambda size: linear[size])
+        pulse = PULSE
+        while best == pulse and linear[best][0] < len(rungs) and (pulse := 0.1 * pulse) >= MIN_PULSE:
+            linear[pulse] = _linear(self._nonlinearity(rungs, pulse), max(NONLINEAR, LEAST * rounding))
+            best = max(best, pulse, key=lambda size: linear[size][0])
+        self.pulse = best
+        return linear[best][0]
+
+    def _nonlinearity(self, rungs: Sequence[Rung], pulse: float) -> Floats:
+        """The difference of responses to two sizes, relative to the largest so far, up to each rung."""
+        self.pulse, courses = pulse, []
+        for i in range(len(self.inputs)):
+            once, other = self._two_sizes(i, rungs)
+            largest, apart = (np.abs(each).max(axis=1, initial=0.0) for each in (once, once - other))
+            courses.append((np.maximum.accumulate(apart), np.maximum.accumulate(largest)))
+        count = min(map(len, (apart for apart, _ in courses)), default=len(rungs))
+        found: Floats = np.zeros(count)
+        for apart, largest in courses:
+            found = np.maximum(found, apart[:count] / np.where(largest[:count] > 0.0, largest[:count], 1.0))
+        return found
+
+    def _two_sizes(self, i: int, rungs: Sequence[Rung]) -> tuple[Floats, Floats]:
+        once, other = (self.response(i, rungs, factor=factor) for factor in (1.0, OTHER_SIZE))
+        count = min(len(once), len(other))
+        return once[:count], other[:count]
+
+    def errors_over(self, ladder: Sequence[Rung]) -> "Errors":
+        """The errors of responses over a ladder gone through twice: by how much those to two sizes differ."""
+        twice = [*ladder, *ladder]
+        values = np.zeros((len(self.inputs), len(twice), len(self.outputs)))
+        for i in range(len(self.inputs)):
+            once, other = self._two_sizes(i, twice)
+            values[i] = np.inf  # where one is too large to be followed
+            values[i, : len(once)] = np.abs(once - other)
+        rounded = ROUNDING * np.abs(self.at_rest) / self.weight / self.pulse
+        return Errors(times=np.cumsum([rung.duration for rung in twice]), values=np.maximum(values, rounded))
+
+    def longest_step(self, own: float, most: float) -> float:
+        """The longest step [s] that is like two of half its length: the `own` one times a power of two."""
+        h = own
+        while 2.0 * h <= most and all(self._is_alike(i, h) for i in range(len(self.inputs))):
+            h *= 2.0
+        return h
+
+    def _is_alike(self, i: int, h: float) -> bool:
+        once, twice = (self.response(i, [Rung(1, d)] * n, lasting=True) for d, n in ((2.0 * h, 4), (h, 8)))
+        largest = np.abs(twice).max(initial=0.0)
+        if len(once) < 4 or len(twice) < 8 or not largest <= MAX_GROWTH:  # it would double once more
+            return False
+        return bool(np.abs(once - twice[1::2]).max(initial=0.0) <= ALIKE * largest)
+
+
+def _linear(nonlinearity: Floats, allowed: float) -> tuple[int, float]:
+    """The number of rungs up to the last that is linear, and how well it is, the larger the better."""
+    linear = np.flatnonzero(nonlinearity <= allowed)
+    return (int(linear[-1]) + 1, -float(nonlinearity[linear[-1]])) if len(linear) else (0, 0.0)

@@ -1,0 +1,109 @@
+"""The tangent of a component about rest: by pulses of the right size, over the right times."""
+
+from collections.abc import Sequence
+from copy import copy
+
+import numpy as np
+
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.theory.stability.excitation import Excitation, Rest, Rung
+from orchestration.theory.stability.linearised_component import Tangent
+
+HORIZONS = (16.0, 128.0, 1024.0)
+"""Lengths of ladders, in periods, tried in turn while they show more states: a fast loop leaves slow states no time"""
+FINEST = 0.25
+"""First rung of a ladder in continuous time, in periods, at most"""
+MIN_RUNGS, MAX_RUNGS = 8, 20
+"""Rungs of a ladder in continuous time, each time about twice the one before"""
+SPAN = 32.0
+"""Length of a ladder, in first rungs, at least"""
+PROBES = 40
+"""Points of time at which it is seen how long a response is linear"""
+LONGEST_STEP = 64.0
+"""Steps that make a ladder, in periods, at most"""
+SAMPLES = 32
+"""Samples of the ladder of a sampled component"""
+FEWEST = 6
+"""Samples at which its states are produced at least"""
+TURN = 1e-3
+"""Difference allowed of the response from sample to sample, to a pulse on all inputs"""
+
+
+def of_samples(rest: Rest, period: float, factor: float) -> Tangent:
+    """The tangent of a component that is sampled every `period` [s]; the pulses chosen are multiplied by `factor`.
+
+    Raises `UsageError` as `Tangent`, and where the response differs from sample to sample.
+    """
+    excitation, sample = Excitation(rest), Rung(1, period)
+    count = excitation.choose_pulse([sample] * (2 * SAMPLES))
+    excitation.pulse *= factor
+    _expect_one_rate(excitation, sample)
+    ladder = [sample] * max(1, count // 2)
+    tangent = Tangent(excitation, ladder, max(FEWEST, _dead_samples(excitation, ladder) + 2))
+    tangent.prove(period, 2.0 * len(ladder) * period)
+    return tangent
+
+
+def in_continuous_time(rest: Rest, period: float, step: float, factor: float, *, unit: float | None = None) -> Tangent:
+    """The tangent of a component in a loop of a `period`, whose own step is `step` [s]; else as `of_samples`.
+
+    Where the component only takes steps of one length, that is its `unit`.
+    """
+    excitation = Excitation(rest)
+    longest = step if unit is not None else excitation.longest_step(step, LONGEST_STEP * period)
+    first, found, linear_until = min(FINEST * period, step), None, -1.0
+    for end in (periods * period for periods in HORIZONS):
+        if linear_until < 0.0 or end > HORIZONS[1] * period:  # the pulse for the second length does for the first
+            probes = _rungs(np.geomspace(first, 2.0 * max(end, HORIZONS[1] * period), PROBES), longest, unit)
+            linear = probes[: excitation.choose_pulse(probes)]
+            excitation.pulse *= factor
+            linear_until = 0.5 * sum(rung.duration for rung in linear) if len(linear) < len(probes) else np.inf
+        ladder = _rungs(_points(first, min(end, linear_until)), longest, unit)
+        tangent, before = Tangent(copy(excitation), ladder, len(ladder), unit=unit), found
+        found = tangent if before is None or len(tangent.state) >= len(before.state) else before
+        if end >= linear_until or (before is not None and len(tangent.state) <= len(before.state)):
+            break
+    assert found is not None
+    found.prove(step, 2.0 * sum(rung.duration for rung in found.ladder))
+    return found
+
+
+def _points(first: float, end: float) -> Floats:
+    """Times [s] of the points of a ladder, each about twice the one before."""
+    if not end:
+        return np.array([first])
+    first = min(first, end / SPAN)
+    return np.geomspace(first, end, int(np.clip(np.ceil(np.log2(end / first)) + 1, MIN_RUNGS, MAX_RUNGS)))
+
+
+def _rungs(times: Floats, longest: float, unit: float | None) -> list[Rung]:
+    """Rungs that end at these times [s], of steps no longer than `longest`; where there is a `unit`, of that one."""
+    if unit is not None:
+        ends = np.unique([0, *(max(1, round(time / unit)) for time in times)])
+        return [Rung(int(count), unit) for count in np.diff(ends)]
+    lengths = np.diff(times, prepend=0.0)
+    counts = [max(1, int(np.ceil(length / longest - 1e-6))) for length in lengths]
+    return [Rung(count, float(length) / count) for count, length in zip(counts, lengths)]
+
+
+def _expect_one_rate(excitation: Excitation, sample: Rung) -> None:
+    """Raise `UsageError` where the response differs from sample to sample: the component has several rates."""
+    rest, first = excitation.rest, None
+    pulsed = excitation.held + excitation.pulses
+    for _ in range(SAMPLES):
+        perturbed, _ = excitation.stepped(rest, sample, pulsed)
+        unperturbed, rest = excitation.stepped(rest, sample)
+        response = (perturbed - unperturbed) / excitation.pulse
+        first = response if first is None else first
+        if np.abs(response - first).max(initial=0.0) > TURN * max(1.0, np.abs(first).max(initial=0.0)):
+            raise UsageError(f"{excitation.name}: responds to a pulse differently from sample to sample")
+
+
+def _dead_samples(excitation: Excitation, ladder: Sequence[Rung]) -> int:
+    """The samples before the last of the inputs is responded to, as far as there is a response."""
+    dead = [0]
+    for i in range(len(excitation.inputs)):
+        responds = (excitation.response(i, ladder) != 0.0).any(axis=1)
+        dead.append(int(np.argmax(responds)) if responds.any() else 0)
+    return max(dead)
