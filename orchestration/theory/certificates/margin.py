@@ -65,6 +65,11 @@ class Certified:
     certificate: str | None = None
     """The proof, as the text of a file that `check` verifies."""
 
+    def __post_init__(self) -> None:
+        """Raise `RuntimeError` for what cannot be: a value that is proved to be stable, and breaks the loop."""
+        if self.certified is not None and self.breaking is not None and self.breaking < self.certified:
+            raise RuntimeError(f"{self.of}: {self.certified} is certified, but {self.breaking} breaks the loop")
+
     def save(self, path: str | Path) -> Path:
         """Write the certificate; raises `UsageError` where there is none."""
         if self.certificate is None:

@@ -12,7 +12,7 @@ SAMPLES = (*range(32), 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024)
 """Samples of impulse responses, as long as they stay small"""
 LARGEST_RESPONSE = 1e6
 """Largest response, relative to the first"""
-MINIMAL = 1e-7
+MINIMAL = 1e-9
 """Share of the largest singular value between inputs and outputs, each by its own unit: smaller ones count as 0"""
 
 

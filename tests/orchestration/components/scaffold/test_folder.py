@@ -11,9 +11,13 @@ import pytest
 from orchestration.components.building import builder, fmus
 from orchestration.components.scaffold.folder import Kind, class_name, module_name, write
 from orchestration.experiments.limits import limit
+from orchestration.foundation.basics.bisection import Range
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.simulation.requests.ranges import Varied
 from orchestration.simulation.runs.simulation import run
 from orchestration.systems.system.file import load_system
+from orchestration.theory.stability.linearise import linearise
+from orchestration.theory.stability.local_limit import local_limits
 from tests.commands import Main
 
 LIMITS = {
@@ -78,6 +82,17 @@ def test_a_plant_and_a_filter_run_good_and_have_a_limit(name: str, here: Path) -
     of, first, last = LIMITS[name]
     found = limit.find(system, of, first=first, last=last, scan=last - first, tolerance=last)
     assert found.large_signal_limit == first
+
+
+def test_the_pendulum_has_the_local_limit_of_its_own_integrator(here: Path) -> None:
+    """The radius of the loop is 1 at .226652 s, by the matrices of its semi-implicit Euler steps about upright."""
+    write(KINDS["plant"], "plant", here, author="Ada", license="MIT")
+    builder.build_slaves(builder.slaves_of(here / "plant"), here / "plant" / "native", packing=builder.NATIVE)
+    system = fmus.native_twins(load_system(here / "plant" / "system.toml"))
+    varied = Varied(request=system, of="components.controller.sampling.period")
+    found = local_limits(varied, Range(first=0.05, step=0.05, last=0.25, tolerance=5e-4))
+    assert found.limit == pytest.approx(0.226652, abs=5e-6)
+    assert len(linearise(system).rest.A) == 2
 
 
 @pytest.mark.parametrize(
