@@ -86,9 +86,9 @@ def test_a_plant_and_a_filter_run_good_and_have_a_limit(name: str, here: Path) -
 
 def test_the_pendulum_has_the_local_limit_of_its_own_integrator(here: Path) -> None:
     """The radius of the loop is 1 at .226652 s, by the matrices of its semi-implicit Euler steps about upright."""
-    write(KINDS["plant"], "plant", here, author="Ada", license="MIT")
-    builder.build_slaves(builder.slaves_of(here / "plant"), here / "plant" / "native", packing=builder.NATIVE)
-    system = fmus.native_twins(load_system(here / "plant" / "system.toml"))
+    write("plant", "pendulum", here, author="Ada", license="MIT")
+    builder.build_slaves(builder.slaves_of(here / "pendulum"), here / "pendulum" / "native", packing=builder.NATIVE)
+    system = fmus.native_twins(load_system(here / "pendulum" / "system.toml"))
     varied = Varied(request=system, of="components.controller.sampling.period")
     found = local_limits(varied, Range(first=0.05, step=0.05, last=0.25, tolerance=5e-4))
     assert found.limit == pytest.approx(0.226652, abs=5e-6)
