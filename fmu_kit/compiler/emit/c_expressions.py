@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable
 from typing import ClassVar
 
 from fmu_kit.compiler.emit.c_names import c_type
 from fmu_kit.compiler.trace.errors import TraceError
-from fmu_kit.compiler.trace.symbols import Kind, Symbol, integer_of, node, value_of
+from fmu_kit.compiler.trace.symbols import Kind, Symbol, integer_of, node, unknown_below, value_of
 
 _BINARY = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
 _CALLED = {
@@ -91,7 +90,7 @@ class ExpressionWriter:
             return self._pin(symbol)
         if symbol.op in _OF_LOOP:
             raise TraceError(f"{self.name}: {symbol.op} {symbol.data} is used outside of its loop")
-        for waiting in _unknown_below(symbol, self._is_known):
+        for waiting in unknown_below(symbol, self._is_known, lambda one: reversed(one.args)):
             text = self._expression(waiting)
             is_part = waiting is not symbol and self.uses[id(waiting)] == 1 and waiting.kind == "real"
             if is_part and len(text) <= _LONGEST_PART:
@@ -205,17 +204,3 @@ def _constant(symbol: Symbol) -> str:
     if math.isinf(value):
         return "Q_INFINITY" if value > 0.0 else "(-Q_INFINITY)"
     return f"({value!r})" if value < 0 or repr(value).startswith("-") else repr(value)
-
-
-def _unknown_below(symbol: Symbol, is_known: Callable[[Symbol], bool]) -> list[Symbol]:
-    """The unknown symbols that must be computed for a symbol, in order."""
-    found: dict[int, Symbol] = {}
-    stack: list[tuple[Symbol, bool]] = [(symbol, False)]
-    while stack:
-        one, visited = stack.pop()
-        if visited:
-            found[id(one)] = one
-        elif id(one) not in found and not is_known(one):
-            stack.append((one, True))
-            stack += [(arg, False) for arg in reversed(one.args)]
-    return list(found.values())

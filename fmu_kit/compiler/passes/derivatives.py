@@ -12,7 +12,7 @@ from typing import Any
 
 from fmu_kit.compiler.trace.errors import TraceError
 from fmu_kit.compiler.trace.statements import TANGENT, Block, Call, Function, Statement, statement
-from fmu_kit.compiler.trace.symbols import Symbol, constant, lifted, node, select
+from fmu_kit.compiler.trace.symbols import Symbol, constant, lifted, node, select, unknown_below
 from fmu_kit.compiler.trace.tracing import Program
 
 Rule = Callable[[Symbol, tuple[Symbol, ...], tuple[Any, ...]], Any]
@@ -136,16 +136,8 @@ class _Body:
 
     def dual(self, symbol: Symbol) -> tuple[Symbol, Any]:
         """A symbol and its tangent; None is zero."""
-        waiting = [symbol]
-        while waiting:  # not by recursion: the graph is deep
-            one = waiting[-1]
-            before = [arg for arg in one.args if id(arg) not in self._known]
-            if id(one) in self._known or not before:
-                waiting.pop()
-                if id(one) not in self._known:
-                    self._known[id(one)] = self._dual(one)
-            else:
-                waiting += before
+        for one in unknown_below(symbol, lambda each: id(each) in self._known):
+            self._known[id(one)] = self._dual(one)
         return self._known[id(symbol)]
 
     def _dual(self, symbol: Symbol) -> tuple[Symbol, Any]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from fmu_kit.compiler.trace.statements import Block, Call, Function, Place, Statement, statement, symbols_of
-from fmu_kit.compiler.trace.symbols import Symbol, closure, node
+from fmu_kit.compiler.trace.symbols import Symbol, closure, node, unknown_below
 from fmu_kit.compiler.trace.tracing import Program
 
 TAKING = "take_parameters"
@@ -161,23 +161,16 @@ class _Body:
 
     def value(self, symbol: Symbol) -> Symbol:
         """The symbol of the rewritten function."""
-        waiting = [symbol]
-        while waiting:  # not by recursion: the graph is deep
-            one = waiting[-1]
-            found = self._at_once(one)
-            before = [] if found is not None else [arg for arg in one.args if id(arg) not in self._known]
-            if before:
-                waiting += before
-                continue
-            waiting.pop()
-            if found is None:
-                found = node(one.op, [self._known[id(arg)] for arg in one.args], one.kind, one.data)
-            self._known[id(one)] = found
+        for one in unknown_below(symbol, self._is_known):
+            self._known[id(one)] = node(one.op, [self._known[id(arg)] for arg in one.args], one.kind, one.data)
         return self._known[id(symbol)]
 
+    def _is_known(self, symbol: Symbol) -> bool:
+        if id(symbol) not in self._known and (found := self._at_once(symbol)) is not None:
+            self._known[id(symbol)] = found
+        return id(symbol) in self._known
+
     def _at_once(self, symbol: Symbol) -> Symbol | None:
-        if id(symbol) in self._known:
-            return self._known[id(symbol)]
         if symbol.op == "outcome":
             k, loop = symbol.data
             made = self._loops[loop] if loop in self._loops else self._made(loop)  # in a later branch

@@ -16,7 +16,7 @@ from typing import Any
 from fmu_kit.compiler.passes.precomputing import TAKING
 from fmu_kit.compiler.trace.memory import Memory, attribute_name
 from fmu_kit.compiler.trace.statements import all_statements
-from fmu_kit.compiler.trace.symbols import Symbol, value_of
+from fmu_kit.compiler.trace.symbols import Symbol, unknown_below, value_of
 from fmu_kit.compiler.trace.tracing import Program
 from fmu_kit.compiler.trace.tree import is_number, leaves
 from fmu_kit.errors import FmuError
@@ -103,16 +103,8 @@ class Values:
 
     def of(self, symbol: Symbol) -> list[float]:
         """A value for each state, NaN for none; raises `KeyError` if the state does not determine the value."""
-        waiting = [symbol]
-        while waiting:  # not by recursion: the graph is deep
-            one = waiting[-1]
-            before = [arg for arg in self._operands(one) if id(arg) not in self._known]
-            if before and id(one) not in self._known:
-                waiting += before
-                continue
-            waiting.pop()
-            if id(one) not in self._known:
-                self._known[id(one)] = list(self._values(one))
+        for one in unknown_below(symbol, lambda each: id(each) in self._known, self._operands):
+            self._known[id(one)] = list(self._values(one))
         return self._known[id(symbol)]
 
     def _operands(self, symbol: Symbol) -> tuple[Symbol, ...]:

@@ -25,6 +25,8 @@ from fmu_kit.compiler.trace.symbols import (
     node,
     select,
     truth,
+    unknown_below,
+    unmerged,
     value_of,
 )
 from fmu_kit.compiler.trace.tracing import Program
@@ -244,18 +246,9 @@ class _Frame:
 
     def value(self, symbol: Symbol) -> Symbol:
         """The value of a symbol of the function on the line."""
-        waiting = [symbol]
-        while waiting:  # not by recursion: the graph is deep
-            one = waiting[-1]
-            args = () if one.op == "phi" else one.args
-            before = [arg for arg in args if arg not in self.known]
-            if before and one not in self.known:
-                waiting += before
-                continue
-            waiting.pop()
-            if one not in self.known:
-                made = self._translated(one, [self.known[arg] for arg in args])
-                self.known[one] = constant(self.line.decided[made]) if made in self.line.decided else made
+        for one in unknown_below(symbol, lambda each: each in self.known, unmerged):
+            made = self._translated(one, [self.known[arg] for arg in unmerged(one)])
+            self.known[one] = constant(self.line.decided[made]) if made in self.line.decided else made
         return self.known[symbol]
 
     def _translated(self, symbol: Symbol, args: list[Symbol]) -> Symbol:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import operator
 import struct
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from ctypes import c_float
 from typing import Any, Literal, NamedTuple
 
@@ -568,13 +568,30 @@ def closure(symbols: Iterable[Symbol]) -> dict[int, Symbol]:
     """
     found: dict[int, Symbol] = {}
     for start in symbols:
-        stack: list[tuple[Symbol, bool]] = [(start, False)]
-        while stack:
-            symbol, visited = stack.pop()
-            if visited:
-                found[id(symbol)] = symbol
-            elif id(symbol) not in found:
-                stack.append((symbol, True))
-                if symbol.op != "phi":
-                    stack += [(arg, False) for arg in symbol.args]
+        for symbol in unknown_below(start, lambda one: id(one) in found, unmerged):
+            found[id(symbol)] = symbol
     return found
+
+
+def unmerged(symbol: Symbol) -> tuple[Symbol, ...]:
+    """The operands of a symbol; none of a merged value."""
+    return () if symbol.op == "phi" else symbol.args
+
+
+def unknown_below(
+    symbol: Symbol,
+    is_known: Callable[[Symbol], bool],
+    operands: Callable[[Symbol], Iterable[Symbol]] = lambda one: one.args,
+) -> Iterator[Symbol]:
+    """The unknown symbols from which one is computed, then itself: each after its operands, of which the last is first.
+
+    Each must be known when the next is asked for. Not by recursion: the graph is deep.
+    """
+    waiting = [(symbol, False)]
+    while waiting:
+        one, is_ready = waiting.pop()
+        if is_ready:
+            yield one
+        elif not is_known(one):
+            waiting.append((one, True))
+            waiting += [(arg, False) for arg in operands(one)]
