@@ -142,7 +142,7 @@ def told(claim: Claim) -> str:
     lines = [
         wrapped(f"**{sentence(claim)}**"),
         "",
-        wrapped(f"`{claim.command}`: {of.vehicle}; {of.starts}; {of.horizon}; held: {of.constant}. Tried against it:"),
+        wrapped(f"`{claim.command}` ({of.vehicle}; {of.starts}; {of.horizon}; held: {of.constant}). Tried against it:"),
         "",
     ]
     for one in claim.tried:

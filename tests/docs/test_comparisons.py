@@ -44,9 +44,7 @@ COUNTS = {
         "wind of 0.5 N": "wind of 0.5 N",
     },
     ("findings/cascade", "tuned", (0.01, 0.02, 0.05, 0.1, 0.15, 0.2)): {
-        "unified, paper's gains": "unified, paper's gains", "unified, tuned for 10 ms": "unified, tuned for 10 ms",
-        "geometric, tuned for 10 ms": "geometric, tuned for 10 ms",
-        "cascade at one rate, tuned for 10 ms": "cascade, one rate, tuned for 10 ms",
+        "unified, paper's gains": "unified, paper's gains",
         "unified, tuned for the period": "unified, tuned for its period",
         "geometric, tuned for the period": "geometric, tuned for its period",
         "cascade at one rate, tuned for the period": "cascade, one rate, tuned for its period",
