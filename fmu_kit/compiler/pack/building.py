@@ -22,15 +22,7 @@ from fmu_kit.compiler.emit.c_code import c_code
 from fmu_kit.compiler.emit.lane_code import lane_code
 from fmu_kit.compiler.emit.standards import STANDARDS, Standard
 from fmu_kit.compiler.emit.tables import places, tables
-from fmu_kit.compiler.pack.c_compiler import (
-    OPTIONS,
-    Mathematics,
-    compiled_for,
-    compiled_here,
-    host_platform,
-    library_path,
-    targets_of,
-)
+from fmu_kit.compiler.pack import c_compiler
 from fmu_kit.compiler.pack.freshness import source_hash
 from fmu_kit.compiler.passes.derivatives import with_tangents
 from fmu_kit.compiler.passes.precomputing import precompute
@@ -70,7 +62,7 @@ def build(
     *,
     version: int = 2,
     systems: Sequence[str] = (),
-    mathematics: Mathematics = "own",
+    mathematics: c_compiler.Mathematics = "own",
 ) -> Path:
     """Write `folder`/Model.fmu of FMI 2.0 or 3.0, replacing it atomically, and return its path.
 
@@ -100,19 +92,19 @@ def build(
     sources = {**sources, TABLES: sources[TABLES].replace(GUID_PLACEHOLDER.encode(), guid.encode())}
     files[NATIVE_TABLES] = sources[TABLES]
     compiled: dict[str, bytes] = {}
-    here = host_platform(version)
+    here = c_compiler.host_platform(version)
     if not systems and here is not None:
         compiled[here] = library(sources, standard.main, mathematics)
     for system in systems:
-        compiled |= compiled_for(system, sources, standard.main, version)
-    files |= {library_path(system, target.name): library for system, library in compiled.items()}
+        compiled |= c_compiler.compiled_for(system, sources, standard.main, version)
+    files |= {c_compiler.library_path(system, target.name): library for system, library in compiled.items()}
     return write_fmu(files, target, folder)
 
 
-def library(sources: dict[str, bytes], main: str, mathematics: Mathematics = "own") -> bytes:
+def library(sources: dict[str, bytes], main: str, mathematics: c_compiler.Mathematics = "own") -> bytes:
     """The library of a slave for this machine, from the sources of its FMU or from the cache."""
-    compile_ = functools.partial(compiled_here, sources, main, mathematics=mathematics, options=_OF_LIBRARY)
-    return libraries.cached_content("native", sources, (OPTIONS, _OF_LIBRARY, main, mathematics), compile_)
+    compile_ = functools.partial(c_compiler.compiled_here, sources, main, mathematics=mathematics, options=_OF_LIBRARY)
+    return libraries.cached_content("native", sources, (c_compiler.OPTIONS, _OF_LIBRARY, main, mathematics), compile_)
 
 
 def c_sources(program: Program, guid: str, standard: Standard) -> dict[str, bytes]:
@@ -152,7 +144,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--target")
     options, others = parser.parse_known_args(arguments)
     try:
-        systems = () if options.target is None else targets_of(options.target)
+        systems = () if options.target is None else c_compiler.targets_of(options.target)
     except PackagingError as error:
         print(error, file=sys.stderr)
         return 1

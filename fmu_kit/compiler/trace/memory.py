@@ -6,22 +6,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from fmu_kit.compiler.trace import tree
 from fmu_kit.compiler.trace.errors import TraceError
 from fmu_kit.compiler.trace.statements import Block, Place, Statement, statement
 from fmu_kit.compiler.trace.symbols import Kind, Symbol, common_kind, lifted, node
-from fmu_kit.compiler.trace.tree import (
-    USUAL_LEAVES,
-    Path,
-    Snapshot,
-    children,
-    deep_copy,
-    difference,
-    is_number,
-    leaves,
-    map_leaves,
-    path_text,
-    shape,
-)
 from fmu_kit.slave import Slave
 
 _KINDS: dict[str, Kind] = {"Real": "real", "Integer": "int", "Boolean": "bool", "Enumeration": "int"}
@@ -29,9 +17,9 @@ _TYPES: dict[Kind, str] = {"real": "a float", "int": "an integer", "bool": "a tr
 BASE_STATE = ("_reals", "_others", "_stale", "_start_time")
 
 
-def attribute_name(path: Path) -> str:
+def attribute_name(path: tree.Path) -> str:
     """The name of a place that is not a variable, as a model writes it."""
-    return f"self{path_text(path)}"
+    return f"self{tree.path_text(path)}"
 
 
 @dataclass(frozen=True)
@@ -55,7 +43,7 @@ class Memory:
         self.slave = slave
         self.known = known
         self.places: dict[str, Place] = {}
-        self._names: dict[Path, str] = {}
+        self._names: dict[tree.Path, str] = {}
         self._kinds = kinds
         """Kinds of places, as far as known from an earlier trace"""
         self.first_kinds: dict[str, Kind] = {}
@@ -88,9 +76,9 @@ class Memory:
                 raise TraceError(f"self.{name} hides the one of its class: expected another name, set by initialise")
             if name not in before and not may_add:
                 raise TraceError(f"self.{name} is first set {when}: expected it set by initialise")
-            if name in before and shape(before[name]) != shape(value):
+            if name in before and tree.shape(before[name]) != tree.shape(value):
                 what = "the state" if name in BASE_STATE else f"self.{name}"
-                found = difference({name: before[name]}, {name: value}, self.name)
+                found = tree.difference({name: before[name]}, {name: value}, self.name)
                 raise TraceError(
                     f"{what} changes {when} in more than numbers: {found}; expected one structure from the start"
                 )
@@ -101,14 +89,14 @@ class Memory:
         """The current state of the memory and of the arguments of a call."""
         return _MemoryState(self, args, kwargs)
 
-    def view(self, roots: Any) -> tuple[Any, dict[Path, int]]:
+    def view(self, roots: Any) -> tuple[Any, dict[tree.Path, int]]:
         """A copy of the memory and of `roots`, and the identity of the object at each path."""
         everything = {"self": self.attributes(), "arguments": roots}
-        holders: dict[Path, int] = {}
+        holders: dict[tree.Path, int] = {}
         _note_holders(everything, (), holders)
-        return deep_copy(everything), holders
+        return tree.deep_copy(everything), holders
 
-    def install(self, view: Any, holders: dict[Path, int], roots: Any) -> None:
+    def install(self, view: Any, holders: dict[tree.Path, int], roots: Any) -> None:
         """Set the memory to a view, keeping the objects that all paths left in place."""
         live = {"self": self.attributes(), "arguments": roots}
         grafted = _graft(live, view, (), holders)
@@ -116,7 +104,7 @@ class Memory:
 
     # -- places -------------------------------------------------------------------------------------------------
 
-    def name(self, path: Path) -> str:
+    def name(self, path: tree.Path) -> str:
         """The name of a place."""
         found = self._names.get(path)
         if found is None:
@@ -125,11 +113,11 @@ class Memory:
             found = self._names[path] = self.slave.variables[rest[0]].name if is_variable else attribute_name(path)
         return found
 
-    def name_in_view(self, path: Path) -> str:
+    def name_in_view(self, path: tree.Path) -> str:
         """The name of a part of a view, or of a returned value."""
-        return self.name(path[1:]) if path[:1] == ("self",) else f"it{path_text(path)}"
+        return self.name(path[1:]) if path[:1] == ("self",) else f"it{tree.path_text(path)}"
 
-    def place(self, path: Path, symbol: Symbol) -> Place:
+    def place(self, path: tree.Path, symbol: Symbol) -> Place:
         """The place of a path; it is created when first seen."""
         name = self.name(path)
         found = self.places.get(name)
@@ -157,14 +145,14 @@ class Memory:
         self.written = {}
         self.version = 0
 
-        def load(path: Path, leaf: Any) -> Any:
-            if not is_number(leaf):
+        def load(path: tree.Path, leaf: Any) -> Any:
+            if not tree.is_number(leaf):
                 return leaf
             place = self.place(path, lifted(leaf))
             loaded = self.written[place.name] = self._read(place, 0)
             return loaded
 
-        self._set_attributes({name: map_leaves(value, load, (name,)) for name, value in self.attributes().items()})
+        self._set_attributes({name: tree.map_leaves(value, load, (name,)) for name, value in self.attributes().items()})
 
     def _read(self, place: Place, version: int) -> Symbol:
         """The symbol for the value of a place in a version of the memory."""
@@ -175,8 +163,8 @@ class Memory:
     def flush(self) -> Block:
         """The stores of all values that were changed."""
         stores = []
-        for path, leaf in leaves(self.attributes()):
-            if not is_number(leaf):
+        for path, leaf in tree.leaves(self.attributes()):
+            if not tree.is_number(leaf):
                 continue
             symbol = lifted(leaf)
             place = self.place(path, symbol)
@@ -189,8 +177,8 @@ class Memory:
         """Update after a call: places that it stored are read anew, all others are unchanged."""
         stored = frozenset(stores)
 
-        def now(path: Path, leaf: Any) -> Any:
-            if not is_number(leaf):
+        def now(path: tree.Path, leaf: Any) -> Any:
+            if not tree.is_number(leaf):
                 return leaf
             place = self.place(path, lifted(leaf))
             if place.name in stored or self.known.needs_no_place(place):
@@ -202,7 +190,7 @@ class Memory:
             return self.written[place.name]
 
         self.written = dict(self.written)
-        self._set_attributes({name: map_leaves(value, now, (name,)) for name, value in exit_view.items()})
+        self._set_attributes({name: tree.map_leaves(value, now, (name,)) for name, value in exit_view.items()})
 
     def next_version(self, call: Statement) -> int:
         """The version after a call."""
@@ -229,7 +217,7 @@ class _MemoryState:
         self._memory = memory
         self._attributes = memory.attributes()
         self._written, self._version = dict(memory.written), memory.version
-        self._objects = Snapshot(*self._attributes.values(), args, kwargs)
+        self._objects = tree.Snapshot(*self._attributes.values(), args, kwargs)
 
     def restore(self) -> None:
         """Restore it."""
@@ -238,23 +226,23 @@ class _MemoryState:
         self._memory.written, self._memory.version = dict(self._written), self._version
 
 
-def _note_holders(value: Any, path: Path, found: dict[Path, int]) -> None:
-    inside = children(value)
+def _note_holders(value: Any, path: tree.Path, found: dict[tree.Path, int]) -> None:
+    inside = tree.children(value)
     if not isinstance(value, tuple) and (inside or isinstance(value, list | dict)):
         found[path] = id(value)
     for key, child in inside:
-        if type(child) not in USUAL_LEAVES:
+        if type(child) not in tree.USUAL_LEAVES:
             _note_holders(child, (*path, key), found)
 
 
-def _graft(live: Any, new: Any, path: Path, holders: dict[Path, int]) -> Any:
+def _graft(live: Any, new: Any, path: tree.Path, holders: dict[tree.Path, int]) -> Any:
     """`new`, but in the objects of `live` where all paths left these in place."""
-    if type(new) in USUAL_LEAVES or not children(new):
+    if type(new) in tree.USUAL_LEAVES or not tree.children(new):
         return new
-    held = dict(children(live)) if type(live) is type(new) else {}
+    held = dict(tree.children(live)) if type(live) is type(new) else {}
     if path not in holders or holders[path] != id(live):
-        if isinstance(new, tuple) and held.keys() == dict(children(new)).keys():
-            grafted = [_graft(held[key], child, (*path, key), holders) for key, child in children(new)]
+        if isinstance(new, tuple) and held.keys() == dict(tree.children(new)).keys():
+            grafted = [_graft(held[key], child, (*path, key), holders) for key, child in tree.children(new)]
             if all(a is b for a, b in zip(grafted, held.values())):
                 return live
             return type(new)(*grafted) if hasattr(new, "_fields") else tuple(grafted)
@@ -263,7 +251,7 @@ def _graft(live: Any, new: Any, path: Path, holders: dict[Path, int]) -> Any:
         return {
             key: _graft(held[key], child, (*path, key), holders) if key in held else child for key, child in new.items()
         }
-    for key, child in children(new):
+    for key, child in tree.children(new):
         now = _graft(held.get(key), child, (*path, key), holders) if key in held else child
         if now is not held.get(key):
             if isinstance(live, list | dict):

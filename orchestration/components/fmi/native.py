@@ -17,19 +17,9 @@ import fmpy
 import numpy as np
 from fmpy.fmi1 import FMICallException
 
+from orchestration.components.fmi import slaves
 from orchestration.components.fmi.instance import Instance, Value, convert_value, same
 from orchestration.components.fmi.model import Variable, read_model
-from orchestration.components.fmi.slaves import (
-    WARNING,
-    Messages,
-    binary_folders,
-    expect_readable_place,
-    failure_text,
-    folder_here,
-    instantiate,
-    load_slave,
-    status_name,
-)
 from orchestration.components.fmi.surroundings import FOLDER, ROUNDING, Surroundings, sentence
 from orchestration.components.fmi.transfers import Numbers, TransferCall, TransferLayout, TransferPart
 from orchestration.foundation.basics import scratch
@@ -68,7 +58,7 @@ class NativeInstance(Instance):
         self.name = instance_name
         self.warnings: list[str] = []
         self.failed = self.stopped = False
-        self._messages = Messages()
+        self._messages = slaves.Messages()
         self._initial_values: dict[str, Value] = {}  # until the end of initialisation
         self._arrays: dict[int, Numbers] = {}  # last values of arrays, by reference: a call sets a whole array
         self._calls: WeakKeyDictionary[Transfer, tuple[TransferCall, ...]] = WeakKeyDictionary()
@@ -80,7 +70,7 @@ class NativeInstance(Instance):
         self.guard = None if self.model.is_of_this_kit else Surroundings()
         try:
             with zipfile.ZipFile(path) as archive:
-                folder_here(self.model.version, binary_folders(archive.namelist()))
+                slaves.folder_here(self.model.version, slaves.binary_folders(archive.namelist()))
         except QuadcosimError as error:
             raise QuadcosimError(f"{path}: {error}") from None
         try:
@@ -92,7 +82,7 @@ class NativeInstance(Instance):
             if isinstance(error, OSError) and error.errno is not None:  # of the disk: of a library it has no number
                 what = f"cannot be unpacked in {tempfile.gettempdir()}, which TMPDIR names: {error.strerror}"
                 raise QuadcosimError(f"{path}: {what}") from error
-            raise self.no_instance(failure_text(self._messages, str(error))[0]) from error
+            raise self.no_instance(slaves.failure_text(self._messages, str(error))[0]) from error
         self._component = ctypes.c_void_p(self._fmu.component)
 
     # -- what differs between versions ---------------------------------------------------------------------------
@@ -307,7 +297,7 @@ class NativeInstance(Instance):
         """A folder with what the FMU needs to run, until it is closed."""
         self._folder = scratch.temporary()
         fmpy.extract(str(self.path), str(self._folder.path), include=_is_used if self.model.is_of_this_kit else None)
-        expect_readable_place(self._folder.path)
+        slaves.expect_readable_place(self._folder.path)
         return self._folder.path
 
     def no_instance(self, why: str) -> QuadcosimError:
@@ -318,8 +308,10 @@ class NativeInstance(Instance):
         """fmpy's instance of the FMU unpacked in `folder`, which logs to `_messages`."""
         description = self.description
         identifier = description.coSimulation.modelIdentifier
-        fmu = load_slave(self.model.version, folder, token=description.guid, identifier=identifier, name=self.name)
-        instantiate(fmu, self._messages)
+        fmu = slaves.load_slave(
+            self.model.version, folder, token=description.guid, identifier=identifier, name=self.name
+        )
+        slaves.instantiate(fmu, self._messages)
         self._load_step(fmu.dll)
         return fmu
 
@@ -343,7 +335,7 @@ class NativeInstance(Instance):
         failure = self.failure
 
         def transfer() -> None:
-            if (status := call(*arguments)) > WARNING:
+            if (status := call(*arguments)) > slaves.WARNING:
                 raise failure(function, status)
 
         return transfer
@@ -391,7 +383,7 @@ class NativeInstance(Instance):
     def collect_warnings(self) -> None:
         """Process the messages of the FMU: keep the warnings."""
         for status, _, message in self._messages:
-            if status == WARNING:
+            if status == slaves.WARNING:
                 self._keep_warning(message.decode("utf-8", "replace"))
         self._messages.clear()
 
@@ -404,9 +396,9 @@ class NativeInstance(Instance):
     def failure(self, function: str, status: int, otherwise: str | None = None) -> SimulatorError:
         """The error for a call that failed, with the message that the FMU logged; `otherwise` if it logged none."""
         self.failed = True
-        diverged = [m for m in self._messages if m[0] > WARNING and m[1] == DIVERGENCE_CATEGORY]
-        silent = f"returned {status_name(self.model.version, status)}, without a message"
-        summary, details = failure_text(diverged or self._messages, otherwise or silent)
+        diverged = [m for m in self._messages if m[0] > slaves.WARNING and m[1] == DIVERGENCE_CATEGORY]
+        silent = f"returned {slaves.status_name(self.model.version, status)}, without a message"
+        summary, details = slaves.failure_text(diverged or self._messages, otherwise or silent)
         if not diverged and self._names_initial_value(summary):
             return RefusedValueError(f"{self.name}.{summary}", details=details)
         return SimulatorError(self.reported(function, summary), divergence=bool(diverged), details=details)
@@ -420,7 +412,7 @@ class NativeInstance(Instance):
         self.stopped = True
         at = f" at {reached:g} s" if math.isfinite(reached) else ""
         what = f"ends the run{at}" if ends else f"discards the step to {end:g} s"
-        summary, details = failure_text(self._messages, "")
+        summary, details = slaves.failure_text(self._messages, "")
         self.collect_warnings()
         return StoppedStepError(
             self.reported(function, f"{what}: {summary}" if summary else what),

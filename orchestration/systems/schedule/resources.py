@@ -48,21 +48,13 @@ from orchestration.systems.schedule.streams import (
     LOSS,
     Streams,
 )
+from orchestration.systems.system import placement
 from orchestration.systems.system.choices import Spread
 from orchestration.systems.system.component import SamplingOnArrival, TaskSampling
 from orchestration.systems.system.computers import Arrivals
 from orchestration.systems.system.distribution import Distribution, Varying, spreads
 from orchestration.systems.system.frames import ERROR_BITS, frame_nanoseconds
 from orchestration.systems.system.model import System
-from orchestration.systems.system.placement import (
-    PlacedMessage,
-    PlacedTask,
-    messages_by_connection,
-    nodes_of,
-    placed_messages,
-    placed_tasks,
-    released_by,
-)
 
 _POLICIES = {
     "fixed-priority": FIXED_PRIORITY,
@@ -86,11 +78,14 @@ class Resources:
         self._links: list[NetworkLink] = []
         self._link_names: list[str] = []
         self._zero = self._stream(Constant(0))
-        placed, self._placed_messages = [*placed_tasks(system.computers)], [*placed_messages(system.networks)]
-        released = released_by(system)
+        placed, self._placed_messages = (
+            [*placement.placed_tasks(system.computers)],
+            [*placement.placed_messages(system.networks)],
+        )
+        released = placement.released_by(system)
         self.tasks = {each.task.component: i for i, each in enumerate(placed) if each.task.component is not None}
         """the task whose jobs are the steps of a component, by component"""
-        by_network = messages_by_connection(system)
+        by_network = placement.messages_by_connection(system)
         sending = {x.sender for x in system.connections if x.name in by_network or x.name in released}
         for name, component in system.components.items():
             sampling = component.sampling
@@ -157,7 +152,7 @@ class Resources:
 
     # -- tasks -----------------------------------------------------------------------------------------------------
 
-    def _task(self, of: PlacedTask) -> ScheduledTask:
+    def _task(self, of: placement.PlacedTask) -> ScheduledTask:
         task, ratio = of.task, Fraction(repr(float(of.computer.clock_ratio)))
         nominal = NONE
         if task.on is None:
@@ -198,7 +193,7 @@ class Resources:
 
     def _indices(self, released: tuple[str, ...]) -> tuple[int, ...]:
         """The indices of tasks, given by their paths or by components that messages release."""
-        paths = {each.place: i for i, each in enumerate(placed_tasks(self._system.computers))}
+        paths = {each.place: i for i, each in enumerate(placement.placed_tasks(self._system.computers))}
         return tuple(paths[one] if one in paths else self.tasks[one] for one in released)
 
     # -- messages --------------------------------------------------------------------------------------------------
@@ -223,7 +218,7 @@ class Resources:
             releases=releases,
         )
 
-    def _message(self, of: PlacedMessage) -> ScheduledFrame:
+    def _message(self, of: placement.PlacedMessage) -> ScheduledFrame:
         message, network = of.message, of.network
         nominal = NONE
         if message.period is not None or message.arrivals is not None:
@@ -240,14 +235,14 @@ class Resources:
             carrier=self.carriers.get(message.connection or "", NONE),
         )
 
-    def _legs(self, of: PlacedMessage) -> tuple[Leg, ...]:
+    def _legs(self, of: placement.PlacedMessage) -> tuple[Leg, ...]:
         network, name = of.network, of.network_name
         length = frame_nanoseconds(network, of.message)
         corrupted = frame_nanoseconds(network, of.message, ERROR_BITS) if network.kind != "tdma" else length
         slot = of.message.slot if network.kind == "tdma" and of.message.slot is not None else NONE
         ways = [name]
         if network.kind == "ethernet":
-            start, end = nodes_of(self._system, of)
+            start, end = placement.nodes_of(self._system, of)
             ways = [f"{name}: {start} -> switch", f"{name}: switch -> {end}"]
         links = [self._link(way, network.slots) for way in ways]
         return tuple(Leg(link=link, slot=slot, length=length, corrupted_length=corrupted) for link in links)
