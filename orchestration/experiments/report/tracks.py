@@ -72,8 +72,7 @@ def _instants(signals: Signals, most: int) -> Floats:
             moved += steps / steps.sum()
     share = np.diff(time) / (time[-1] - time[0]) + moved / max(moved.sum(), 1e-300)
     passed = np.concatenate([[0.0], np.cumsum(share)])
-    instants: Floats = np.interp(np.linspace(0.0, passed[-1], most), passed, time)
-    return instants
+    return np.interp(np.linspace(0.0, passed[-1], most), passed, time)
 
 
 def _rows(signals: Signals, most: int) -> np.ndarray[tuple[int], np.dtype[np.intp]]:

@@ -73,5 +73,4 @@ def surface(error: Floats, parameters: Mapping[str, float]) -> Floats | None:
         return None
     k_s, beta_t, epsilon = (parameters[name] for name in SURFACE)
     size = np.abs(error)
-    rate: Floats = np.where(size < epsilon, -k_s * error, -k_s * size**beta_t * np.sign(error))
-    return rate
+    return np.where(size < epsilon, -k_s * error, -k_s * size**beta_t * np.sign(error))

@@ -61,8 +61,7 @@ def _direction(generator: np.random.Generator) -> Floats:
     """A unit vector, uniform over the sphere; bit-identical on all machines, unlike a norm computed by BLAS."""
     vector = generator.standard_normal(3)
     x, y, z = vector.tolist()
-    unit: Floats = vector / math.sqrt(x * x + y * y + z * z)
-    return unit
+    return vector / math.sqrt(x * x + y * y + z * z)
 
 
 def _van_der_corput(index: int) -> float:

@@ -75,8 +75,7 @@ def _in_order(events: Integers) -> Integers:
     """A table of events sorted by time, a new one."""
     if (events[1:, 0] >= events[:-1, 0]).all():
         return np.array(events)
-    ordered: Integers = events[np.argsort(events[:, 0], kind="stable")]
-    return ordered
+    return events[np.argsort(events[:, 0], kind="stable")]
 
 
 class Tables(Protocol):

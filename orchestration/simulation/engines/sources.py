@@ -71,8 +71,7 @@ class TableValues:
         """As `over`, by the operations of `at`."""
         i = np.clip(np.searchsorted(self.time, t, side="right") - 1, 0, len(self.time) - 2)
         share = np.clip((t - self.time[i]) / (self.time[i + 1] - self.time[i]), 0.0, 1.0)
-        values: Floats = self.columns[i] + share[:, None] * (self.columns[i + 1] - self.columns[i])
-        return values
+        return self.columns[i] + share[:, None] * (self.columns[i + 1] - self.columns[i])
 
 
 class HeldValues(TableValues):
@@ -85,8 +84,7 @@ class HeldValues(TableValues):
 
     def over(self, t: Floats) -> Floats:
         """The values at times `t`."""
-        values: Floats = self.columns[np.maximum(np.searchsorted(self.time, t, side="right") - 1, 0)]
-        return values
+        return self.columns[np.maximum(np.searchsorted(self.time, t, side="right") - 1, 0)]
 
     at_each = over
 

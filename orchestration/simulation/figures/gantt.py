@@ -118,10 +118,7 @@ def _released(of: results.Jobs | results.Frames) -> Integers:
 
 
 def _are_skipped(of: results.Jobs | results.Frames) -> Booleans:
-    skipped: Booleans = (
-        of.outcome == results.SKIPPED if isinstance(of, results.Jobs) else np.zeros(len(of), dtype=np.bool_)
-    )
-    return skipped
+    return of.outcome == results.SKIPPED if isinstance(of, results.Jobs) else np.zeros(len(of), dtype=np.bool_)
 
 
 def _spans(begins: Integers, ends: Integers, scale: float) -> list[tuple[float, float]]:

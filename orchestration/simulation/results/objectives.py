@@ -205,8 +205,7 @@ class _Line:
         slopes = np.concatenate([[0.0], np.diff(heights) / np.diff(times)])
         latest = np.searchsorted(times, time[:-1], side="right") - 1
         self._last[name] = points[-2:]
-        line: Floats = held[:-1] + slopes[latest] * np.diff(time)
-        return line
+        return held[:-1] + slopes[latest] * np.diff(time)
 
 
 _HOLDS = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}

@@ -31,8 +31,7 @@ class Quantity:
 
     def of(self, values: object) -> Floats:
         """Stored values in its unit; of the same shape."""
-        scaled: Floats = self.factor * np.asarray(values, float)
-        return scaled
+        return self.factor * np.asarray(values, float)
 
     def text_of(self, value: float, digits: int = 6) -> str:
         """A stored value as text, in its unit and with it."""

@@ -49,8 +49,7 @@ class Basin:
     @property
     def reach(self) -> Floats:
         """The extent of the set along each coordinate, the others at 0."""
-        found: Floats = 1.0 / np.sqrt(np.diag(self.P))
-        return found
+        return 1.0 / np.sqrt(np.diag(self.P))
 
 
 @needs("flint", "clarabel")

@@ -63,8 +63,7 @@ class LoopFamily:
         for factor in letter.product:
             matrix = self.matrices[factor.matrix]
             total = (matrix if factor.times is None else expm(matrix * factor.lasts(point))) @ total
-        found: Floats = total[list(self.kept)]
-        return found
+        return total[list(self.kept)]
 
     def without_idle(self) -> "LoopFamily":
         """The family without coordinates on whose values at the beginning of a period nothing depends."""

@@ -245,8 +245,7 @@ class LoopEffects(ABC):
 def _noise_of(x: Connection) -> Floats:
     """The variance of noise and quantisation of each number of a message, as it arrives."""
     sigma, quantum = of_each(x, x.noise), of_each(x, x.quantisation)
-    found: Floats = x.scale**2 * (sigma**2 + quantum**2 / 12.0)
-    return found
+    return x.scale**2 * (sigma**2 + quantum**2 / 12.0)
 
 
 class ContinuousEffects(LoopEffects):

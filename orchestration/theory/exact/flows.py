@@ -35,8 +35,7 @@ class Flow:
     @functools.cached_property
     def matrix(self) -> Floats:
         """e^(Ft)"""
-        found: Floats = np.eye(len(self.change)) + self.change
-        return found
+        return np.eye(len(self.change)) + self.change
 
     def doubled(self) -> "Flow":
         """The flow over twice the time."""

@@ -105,10 +105,9 @@ def _gains(loop: SampledLoop, omega: Floats) -> Floats:
 def _response(loop: SampledLoop, omega: Floats) -> Complexes:
     """F P(jω), at frequencies in rad/s."""
     n = len(loop.A)
-    found: Complexes = loop.F @ np.linalg.solve(
+    return loop.F @ np.linalg.solve(
         1j * omega[..., None, None] * np.eye(n) - loop.A, np.broadcast_to(loop.B + 0j, (*omega.shape, *loop.B.shape))
     )
-    return found
 
 
 def _sampled_response(loop: SampledLoop, omega: Floats) -> Complexes:
@@ -118,8 +117,7 @@ def _sampled_response(loop: SampledLoop, omega: Floats) -> Complexes:
     (whole, _), (after, newer), (_, older) = (loop.held(t) for t in (loop.period, loop.period - rest, rest))
     z: Complexes = np.exp(1j * omega)[:, None, None]
     drive: Complexes = z**-late * (newer + after @ older / z)
-    found: Complexes = loop.F @ np.linalg.solve(z * np.eye(len(whole)) - whole + 0j, drive)
-    return found
+    return loop.F @ np.linalg.solve(z * np.eye(len(whole)) - whole + 0j, drive)
 
 
 def _periods(bound: float) -> float:

@@ -121,8 +121,7 @@ def _exchanged_rows(system: System, load: Loader, interval: Fraction) -> Floats:
     instants = [math.floor(operating_point.latest_offset(system) + k * interval) + 1 for k in range(count)]
     rows = np.searchsorted(times, instants, side="right") - 1
     columns = [result.columns.index(name) for name in operating_point.exchanged_signals(system)]
-    found: Floats = result.rows[rows][:, columns]
-    return found
+    return result.rows[rows][:, columns]
 
 
 class Pulsed:

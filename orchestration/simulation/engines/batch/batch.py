@@ -189,8 +189,7 @@ class Batch:
         floor[0, :count] = np.where(none, np.nan, least)
         self._library.grown(self._address, folds.kept[own], address(floor), address(grown))
         steps = self.arrays.state[folds.steps[own], :count]
-        share: Floats = np.where((steps > 0) & ~none, grown[0, :count] / np.where(steps > 0, steps, np.nan), np.nan)
-        return share
+        return np.where((steps > 0) & ~none, grown[0, :count] / np.where(steps > 0, steps, np.nan), np.nan)
 
     def _run(self, lane: int, system: System) -> LaneRun:
         streams, parameters = Streams(system.seed, system.streams), self.numbers.parameters(lane, system)

@@ -108,10 +108,7 @@ class Initialisation:
 
     def _received_values(self, i: int, values: Floats) -> Floats:
         c, kinds = self._structures.types, self._shape.ends[i].kinds[:, None]
-        received: Floats = np.where(
-            kinds == c.TRUTH, values != 0.0, np.where(kinds == c.WHOLE, np.rint(values), values)
-        )
-        return received
+        return np.where(kinds == c.TRUTH, values != 0.0, np.where(kinds == c.WHOLE, np.rint(values), values))
 
     def _compute(self, index: int) -> Booleans:
         """Compute the outputs of a component in initialisation mode; the lanes in which that fails."""
