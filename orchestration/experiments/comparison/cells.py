@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from orchestration.experiments.comparison.design import START, Comparison
+from orchestration.experiments.comparison.design import START, Case, Comparison
 from orchestration.experiments.comparison.survival import RESIDUAL, SETTLING, diverged_late, settled, survived
 from orchestration.experiments.studies.axes import Value
 from orchestration.foundation.basics.statistics import quantile, wilson
@@ -57,13 +57,10 @@ class Median:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CellSummary:
+class CellSummary(Case):
     """The outcomes of the runs of one cell."""
 
     cell: int
-    vehicle: str
-    condition: str
-    controller: str
     value: Value
     count: int
     """Number of runs"""

@@ -65,13 +65,19 @@ class Front:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cell:
-    """One controller on one vehicle under one condition at one value of the axis: a run from each initial condition."""
+class Case:
+    """A controller on a vehicle under a condition, by their names."""
 
-    index: int
     vehicle: str
     condition: str
     controller: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cell(Case):
+    """One controller on one vehicle under one condition at one value of the axis: a run from each initial condition."""
+
+    index: int
     value: Value
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from orchestration.experiments.comparison.bandwidth import Bandwidths
 from orchestration.experiments.comparison.cells import PEAK, CellSummary, Share
-from orchestration.experiments.comparison.design import CONDITION, CONTROLLER, VEHICLE, Comparison
+from orchestration.experiments.comparison.design import CONDITION, CONTROLLER, VEHICLE, Case, Comparison
 from orchestration.experiments.comparison.survival import survived
 from orchestration.experiments.studies.axes import Value
 
@@ -23,12 +23,9 @@ BUDGETS = 8
 
 
 @dataclass(frozen=True, kw_only=True)
-class AtPhase:
+class AtPhase(Case):
     """The shares that survive and settle at a fixed ratio of the axis to the time scale of the attitude loop."""
 
-    vehicle: str
-    condition: str
-    controller: str
     phase: float
     """axis times bandwidth [rad]"""
     survives: float
@@ -37,12 +34,9 @@ class AtPhase:
 
 
 @dataclass(frozen=True, kw_only=True)
-class WithinTorque:
+class WithinTorque(Case):
     """The share of the initial conditions that survive within a peak torque."""
 
-    vehicle: str
-    condition: str
-    controller: str
     value: Value
     torque: float
     """Torque [N.m]"""

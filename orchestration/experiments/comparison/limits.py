@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from orchestration.experiments.comparison.bandwidth import Bandwidths
-from orchestration.experiments.comparison.design import CONDITION, CONTROLLER, START, VEHICLE, Comparison
+from orchestration.experiments.comparison.design import CONDITION, CONTROLLER, START, VEHICLE, Case, Comparison
 from orchestration.experiments.comparison.survival import FATES
 from orchestration.foundation.basics.statistics import Estimate, first_end, quantile
 
@@ -20,12 +20,9 @@ SHARES = {"half": 0.5, "nine in ten": 0.9}
 
 
 @dataclass(frozen=True, kw_only=True)
-class GridLimit:
+class GridLimit(Case):
     """The value of the axis up to which a share of the initial conditions survives, or settles, at all values below."""
 
-    vehicle: str
-    condition: str
-    controller: str
     fate: str
     """survive, or settle"""
     share: str

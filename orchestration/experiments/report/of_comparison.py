@@ -8,7 +8,6 @@ from orchestration.experiments.comparison.cells import CellSummary, Median, cell
 from orchestration.experiments.comparison.cells import Share as CellShare
 from orchestration.experiments.comparison.design import START, Comparison
 from orchestration.experiments.report.model import ComparisonCells, Report, ReportCell, ReportShare
-from orchestration.experiments.report.number_format import number
 from orchestration.experiments.report.of_study import Stored, axes_of, read, study_report
 from orchestration.experiments.report.subset import Wanted, evenly
 from orchestration.experiments.report.tables import ColumnAxis
@@ -81,7 +80,7 @@ def _cell(summary: CellSummary, axis: Quantity) -> ReportCell:
 
 
 def _share(share: CellShare, value: float, runs: int) -> ReportShare:
-    return ReportShare(label=number(value), value=value, good=share.count, runs=runs, low=share.low, high=share.high)
+    return ReportShare(label=f"{value:.6g}", value=value, good=share.count, runs=runs, low=share.low, high=share.high)
 
 
 def _ends(median: Median) -> tuple[float | None, float | None, float | None]:

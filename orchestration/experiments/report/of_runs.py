@@ -6,7 +6,6 @@ import numpy as np
 
 from orchestration.experiments.report.blobs import Blobs
 from orchestration.experiments.report.model import Bars, Report, ReportRun, Setting
-from orchestration.experiments.report.number_format import number
 from orchestration.experiments.report.tracks import Tracks
 from orchestration.foundation.basics.documents import tables_in
 from orchestration.foundation.basics.errors import UsageError
@@ -71,7 +70,7 @@ def _run(name: str, result: Result, tracks: Tracks, blobs: Blobs, rows: int) -> 
         settings=_settings(result),
         metrics=result.metrics,
         message=result.divergence or result.termination,
-        note=None if result.interrupted_at is None else f"interrupted at {number(result.interrupted_at)} s",
+        note=None if result.interrupted_at is None else f"interrupted at {result.interrupted_at:.6g} s",
         track=tracks.whole(result.system, signals, result.described, rows),
         bars=_bars(result.system, blobs),
     )
@@ -113,7 +112,7 @@ def _summary(name: str, result: Result) -> str:
     if settled is not None:
         return f"{name}: {outcome} in {settled:.3g} s"
     ended = result.divergence is not None or result.termination is not None
-    return f"{name}: {outcome} {'at' if ended else 'in a run of'} {number(result.end)} s"
+    return f"{name}: {outcome} {'at' if ended else 'in a run of'} {result.end:.6g} s"
 
 
 def _contents(results: Mapping[str, Result], rows: int) -> Sequence[str]:

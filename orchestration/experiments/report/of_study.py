@@ -11,7 +11,6 @@ import numpy as np
 
 from orchestration.experiments.report.blobs import Blobs
 from orchestration.experiments.report.model import Report, ReportRun, ReportShare, Setting
-from orchestration.experiments.report.number_format import percent
 from orchestration.experiments.report.reruns import Rerun, fastest, rerun
 from orchestration.experiments.report.subset import MAX_IN_BATCHES, MAX_SINGLY, Wanted, points_for, select
 from orchestration.experiments.report.tables import ColumnAxis, Row, is_good, report_table, share_of, shares_along
@@ -171,14 +170,18 @@ def summary_of(overall: ReportShare, words: tuple[str, str], stored: Stored) -> 
     """A sentence with the outcomes of all runs."""
     total = int(stored.about.get("total", overall.runs))
     runs = f"{overall.runs} runs" if total == overall.runs else f"{overall.runs} of {total} runs are done so far"
-    text = f"{runs}: {overall.good} {words[0]} ({percent(overall.good / overall.runs)}"
+    text = f"{runs}: {overall.good} {words[0]} ({_percent(overall.good / overall.runs)}"
     if overall.low is not None and overall.high is not None:
-        text += f", 95 % interval {percent(overall.low)} to {percent(overall.high)}"
+        text += f", 95 % interval {_percent(overall.low)} to {_percent(overall.high)}"
     outcomes = Counter(row["outcome"] for row in stored.rows)
     failed = sum(row["status"] == "failed" for row in stored.rows)
     text += f"), {outcomes[DIVERGED]} diverged"
     text += f", {outcomes[TERMINATED]} terminated" if outcomes[TERMINATED] else ""
     return text + (f", {failed} failed" if failed else "") + "."
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.3g} %"
 
 
 def messages_of(rows: Sequence[Row], places: Mapping[int, int]) -> dict[int, str]:

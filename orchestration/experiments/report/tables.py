@@ -9,7 +9,6 @@ import numpy as np
 
 from orchestration.experiments.report.blobs import Blobs
 from orchestration.experiments.report.model import Column, ReportShare, ReportTable, Shares
-from orchestration.experiments.report.number_format import number
 from orchestration.experiments.report.subset import evenly
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.statistics import wilson
@@ -152,7 +151,7 @@ def _ordered(values: list[Any]) -> list[Any]:
 
 
 def _text(value: Any) -> str:
-    return number(value) if isinstance(value, float) else str(value)
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _displayed(value: Any, quantity: Quantity) -> Any:
