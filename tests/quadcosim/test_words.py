@@ -1,5 +1,7 @@
 """Errors of the API name arguments, those of the command line its flags."""
 
+from typing import Any
+
 import pytest
 
 import quadcosim
@@ -33,3 +35,23 @@ def test_the_api_names_the_argument_and_the_command_its_flag(main: Main) -> None
     assert "--of peroid: did you mean period? expected one of" in main("limit", "--of", "peroid", code=2).stderr
     with pytest.raises(UsageError, match=r"^of = peroid: "):  # and after it as before
         quadcosim.limit(Scenario(), "peroid")
+
+
+@pytest.mark.parametrize(("of", "name"), [("signals", "plant.positon.x"), ("metrics", "position_rms")])
+def test_a_name_that_a_result_does_not_have_is_answered_with_its_names(of: str, name: str, result: Result) -> None:
+    with pytest.raises(UsageError, match=rf"there is no {name}; did you mean"):
+        getattr(result, of)[name]
+    assert name not in getattr(result, of)
+
+
+@pytest.mark.parametrize("argument", ["outputs", "record"])
+def test_a_name_alone_is_no_list_of_names(argument: str) -> None:
+    name: Any = "position_rmse"
+    with pytest.raises(UsageError, match=f"{argument} = 'position_rmse': expected a list of names"):
+        quadcosim.fly(Scenario(stop_time=0.05), {"seed": [0, 1]}, **{argument: name})
+
+
+def test_text_that_could_be_a_number_is_in_quotes() -> None:
+    period: Any = "0.01"
+    with pytest.raises(UsageError, match=r"period = '0\.01': expected a positive number"):
+        quadcosim.Timing(period=period)

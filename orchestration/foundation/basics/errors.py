@@ -4,10 +4,13 @@ import difflib
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar
 
 MAX_MESSAGE_LENGTH = 4000
 """Largest number of characters in a message: names in it may come from a file and have any length"""
+
+
+Value = TypeVar("Value")
 
 
 class QuadcosimError(Exception):
@@ -17,7 +20,7 @@ class QuadcosimError(Exception):
         super().__init__(one_line(text))
 
     def __str__(self) -> str:
-        return _wording(super().__str__())
+        return _wording(str(self.args[0]))
 
 
 class UsageError(QuadcosimError):
@@ -92,6 +95,17 @@ def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
     """The end of a message about an unknown `name`: the `most` known names that are closest to it, if any is close."""
     close = difflib.get_close_matches(name, list(known), n=most)
     return f"; did you mean {' or '.join(close)}?" if close else ""
+
+
+class UnknownNameError(UsageError, KeyError):
+    """A mapping of results has no such name."""
+
+
+class Named(dict[str, Value]):
+    """Values by name, with the names that there are in the error for an unknown one."""
+
+    def __missing__(self, name: str) -> Value:
+        raise UnknownNameError(f"there is no {name}; {expected_name(name, [*self])}")
 
 
 def shown(value: object) -> str:

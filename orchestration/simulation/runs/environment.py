@@ -6,7 +6,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.requests.request import RequestLike
 from orchestration.simulation.runs.stepping import Simulation
@@ -68,7 +68,11 @@ class Environment(gymnasium.Env[Floats, Floats]):  # type: ignore[misc]
     def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
         """Go on to the next sample; returns observation, reward, whether terminated or truncated, and `info`."""
         observation = self.simulation.step(action)
-        reward, info = float(self._reward(self.simulation.values)), {}
+        value, info = self._reward(self.simulation.values), {}
+        try:
+            reward = float(value)
+        except (TypeError, ValueError):
+            raise UsageError(f"reward: returned {shown(value)}; expected a number") from None
         terminated = truncated = False
         if self.simulation.is_over:
             result = self.simulation.result

@@ -10,7 +10,7 @@ import numpy as np
 
 from orchestration.components.building import fmus
 from orchestration.components.fmi.model import Model, read_model
-from orchestration.foundation.basics.errors import QuadcosimError, UsageError, expected_name
+from orchestration.foundation.basics.errors import Named, QuadcosimError, UsageError, expected_name
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.engines.batch.batch import MAX_ROWS
 from orchestration.simulation.engines.batch.batches import Batches
@@ -45,7 +45,7 @@ class Flights(Mapping[str, Floats]):
 
     def __getitem__(self, name: str) -> Floats:
         """The array of a name."""
-        return self.arrays[name]
+        return Named(self.arrays)[name]
 
     def __iter__(self) -> Iterator[str]:
         """Over the names."""
@@ -182,6 +182,8 @@ def located(system: System) -> System:
 
 def _recording(system: System, models: Mapping[str, Model], record: Sequence[str]) -> System:
     """The system, recording these columns too; raises `UsageError` for one that cannot be recorded."""
+    if isinstance(record, str):
+        raise UsageError(f"record = {record!r}: expected a list of names")
     known, usual = {"time", *columns_of(system)}, recorded_variables(system, models)
     components = dict(system.components)
     for column in record:
@@ -198,6 +200,8 @@ def _recording(system: System, models: Mapping[str, Model], record: Sequence[str
 
 def _outputs(system: System, names: Sequence[str] | None) -> tuple[str, ...]:
     """The names of the results of a run; default: all. Raises `UsageError` for an unknown one."""
+    if isinstance(names, str):
+        raise UsageError(f"outputs = {names!r}: expected a list of names")
     known = [name for name in (*system.objectives, *system.optional, *FIXED) if name != "outcome"]
     for name in names or ():
         if name not in known:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from orchestration.foundation.basics.errors import SimulatorError
+from orchestration.foundation.basics.errors import Named, SimulatorError
 from orchestration.foundation.basics.interrupt import Interrupted
 from orchestration.foundation.recording.recording import Recorder
 from orchestration.simulation.engines.resolved import ResolvedRequest, uneven_steps
@@ -78,7 +78,7 @@ def result_of(
         request=resolved.request,
         system=resolved.system,
         recording=recording,
-        metrics=metrics,
+        metrics=Named(metrics),
         units=resolved.units,
         described=column_infos(resolved.system, resolved.models, recording.columns),
         parameters=resolved.parameters,

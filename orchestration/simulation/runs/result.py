@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal, TypedDict
 import numpy as np
 import numpy.typing as npt
 
+from orchestration.foundation.basics.errors import Named
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import instants_of
@@ -139,7 +140,7 @@ class Result:
     @cached_property
     def signals(self) -> dict[str, Floats]:
         """Every recorded column by its name, as an array of shape (n,)."""
-        return {name: self.rows[:, i] for i, name in enumerate(self.columns)}
+        return Named({name: self.rows[:, i] for i, name in enumerate(self.columns)})
 
     @cached_property
     def sampled(self) -> npt.NDArray[np.bool_]:

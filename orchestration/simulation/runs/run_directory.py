@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from orchestration.foundation.basics.documents import read_json
-from orchestration.foundation.basics.errors import SimulatorError, UsageError, one_line, shown
+from orchestration.foundation.basics.errors import Named, SimulatorError, UsageError, one_line, shown
 from orchestration.foundation.recording import tables
 from orchestration.foundation.recording.tables import ToFolder
 from orchestration.simulation.engines.resolved import columns_of
@@ -99,7 +99,7 @@ def load_run(folder: str | Path) -> Result:
         request=request,
         system=system,
         recording=recording,
-        metrics=metrics,
+        metrics=Named(metrics),
         units=notes.pop("units"),
         described={name: ColumnInfo(**one) for name, one in notes.pop("described").items()},
         parameters=notes.pop("parameters"),

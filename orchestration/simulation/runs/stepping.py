@@ -14,7 +14,7 @@ import numpy as np
 
 from orchestration.components.fmi.instance import Instance
 from orchestration.components.fmi.reuse import Instances
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import Named, UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import seconds
 from orchestration.foundation.recording.recording import InMemory
@@ -112,7 +112,7 @@ class Simulation:
             for name, each in self._sources.items()
             for signal, value in zip(self._resolved.system.sources[name].signals(name), each.at(t))
         }
-        return {**board, "time": t, **sources}
+        return Named({**board, "time": t, **sources})
 
     @property
     def result(self) -> Result:

@@ -25,18 +25,23 @@ def require(condition: bool, name: str, value: object, expected: str) -> None:
         raise UsageError(f"{name} = {shown(value)}: expected {expected}")
 
 
+def _quoted(value: object) -> object:
+    """The value; text, which may look like a number, in quotes."""
+    return repr(value) if isinstance(value, str) else value
+
+
 def require_positive(of: object, *names: str, place: str = "") -> None:
     """Require the fields `names` to be finite and above 0."""
     for name in names:
         value = getattr(of, name)
-        require(is_finite(value) and value > 0.0, place + name, value, "a positive number")
+        require(is_finite(value) and value > 0.0, place + name, _quoted(value), "a positive number")
 
 
 def require_not_negative(of: object, *names: str, place: str = "") -> None:
     """Require the fields `names` to be finite and not below 0."""
     for name in names:
         value = getattr(of, name)
-        require(is_finite(value) and value >= 0.0, place + name, value, "zero or a positive number")
+        require(is_finite(value) and value >= 0.0, place + name, _quoted(value), "zero or a positive number")
 
 
 def require_loss(of: object, name: str, burst_length: float | None, place: str) -> None:
