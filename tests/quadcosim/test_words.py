@@ -6,7 +6,7 @@ import pytest
 
 import quadcosim
 from orchestration.foundation.basics.errors import in_python
-from quadcosim import Scenario, UsageError
+from quadcosim import Result, Scenario, UsageError
 from tests.commands import Main
 
 EXPECTED = {
