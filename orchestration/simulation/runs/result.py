@@ -13,10 +13,8 @@ from orchestration.foundation.basics.errors import Named
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import instants_of
-from orchestration.foundation.recording import frames
 from orchestration.foundation.recording.recording import About, Event, Recording, events_of, rows_of
 from orchestration.simulation.results import display_names as labels
-from orchestration.simulation.results import exports, html
 from orchestration.simulation.results.objectives import Metrics, unmet
 from orchestration.simulation.results.units import ColumnInfo
 from orchestration.systems.system.model import System
@@ -96,6 +94,8 @@ class Result:
 
     def _repr_html_(self) -> str:
         """As notebooks show it."""
+        from orchestration.simulation.results import html
+
         good = self.metrics["good"]
         named = [name for name in self.metrics if name not in ("outcome", "good")]
         return html.card(
@@ -173,6 +173,8 @@ class Result:
 
         Raises `QuadcosimError` where pandas is not installed.
         """
+        from orchestration.foundation.recording import frames
+
         return frames.events(self.recording) if what == "events" else frames.signals(self.recording, self.about)
 
     def to_csv(self, folder: str | Path) -> list[Path]:
@@ -187,4 +189,6 @@ class Result:
 
         Raises `QuadcosimError` where SciPy is not installed.
         """
+        from orchestration.simulation.results import exports
+
         return exports.to_mat(Path(path), self.recording, self.about, self.metrics, self.units)
