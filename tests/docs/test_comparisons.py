@@ -3,6 +3,7 @@
 import math
 import random
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -37,7 +38,7 @@ def test_every_cell_of_a_map_is_one_of_its_file(name: str) -> None:
     assert [tuple(cell[key] for key in keys) for cell in kept] == expected
 
 
-COUNTS = {
+COUNTS: Mapping[tuple[str, str, tuple[float, ...]], Mapping[str, str]] = {
     ("redesigns", "mismatches", (0.02, 0.07, 0.1, 0.15)): {
         "as in the model": "nominal", "half the inertia": "half the inertia", "twice the inertia": "twice the inertia",
         "a lag of 30 ms": "lag of 30 ms",
