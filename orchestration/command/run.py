@@ -93,10 +93,11 @@ def run(
 
 
 def _plain(chosen: "Request", how: Any) -> "Result | None":
-    """The result of a run that stays in memory."""
+    """The result of a run of which nothing is kept."""
+    from orchestration.simulation.results.objectives import OnlyUsed
     from orchestration.simulation.runs.simulation import simulate
 
-    return simulate(chosen, **how)
+    return simulate(chosen, recorder=OnlyUsed(chosen), **how)
 
 
 def _kept(chosen: "Request", out: Path, figures: bool, how: Any) -> "Result | None":

@@ -1,7 +1,7 @@
 """The metrics of a run: the objectives and the criterion of its system."""
 
 import operator
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -10,10 +10,11 @@ import numpy as np
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Booleans, Floats
 from orchestration.foundation.basics.times import instants_of
-from orchestration.foundation.recording.recording import Events, Recording
+from orchestration.foundation.recording.recording import Chunk, Events, InMemory, Recording
 from orchestration.systems.expressions.over_run import Recorded, Spans, evaluate, expect_names, vectors
 from orchestration.systems.expressions.syntax import Name, Node, Number, Operation, names, parse
 from orchestration.systems.system.model import DIVERGED, TERMINATED, System, expressions
+from orchestration.systems.system.request import Request, system_of
 
 Metrics = dict[str, float | int | bool | str | None]
 
@@ -90,13 +91,35 @@ def outcome(system: System, good: bool | None) -> str | None:
     return None if good is None else system.criterion.outcomes[0 if good else 1]
 
 
+class OnlyUsed(InMemory):
+    """A recorder that keeps what the expressions of a request use."""
+
+    def __init__(self, request: Request) -> None:
+        super().__init__()
+        self._request, self._places = request, np.array([], dtype=np.int64)
+
+    def begin(self, columns: tuple[str, ...]) -> None:
+        """As `Recorder`."""
+        super().begin(columns_used(system_of(self._request), columns))
+        self._places = np.array([columns.index(name) for name in self.columns])
+
+    def take(self, chunk: Chunk) -> None:
+        """As `Recorder`."""
+        super().take(replace(chunk, columns=self.columns, rows=chunk.rows[:, self._places]))
+
+
+def columns_used(system: System, columns: Sequence[str]) -> tuple[str, ...]:
+    """The time, and the columns that expressions of a system use."""
+    named = {name for _, expression in expressions(system) for name in names(parse(expression))}
+    return tuple(c for c in columns if c == "time" or c in named or c.rpartition(".")[0] in named)
+
+
 def spans(system: System, recording: Recording, parameters: Mapping[str, float], end: float) -> Iterator[Recorded]:
     """The data that expressions of a run up to `end` [s] use, chunk by chunk, each with the last row of the one before.
 
     Their `stop_time` is the end, so that the last third of an interrupted run is that of its recording.
     """
-    named = {name for _, expression in expressions(system) for name in names(parse(expression))}
-    columns = [c for c in recording.columns if c == "time" or c in named or c.rpartition(".")[0] in named]
+    columns = columns_used(system, recording.columns)
     lines = {x.name: _Line() for x in system.connections if x.hold == "first"}
     before: Floats | None = None
     for chunk in recording.chunks(columns):

@@ -17,6 +17,7 @@ from orchestration.command import plotting
 from orchestration.components.building import fmus
 from orchestration.components.building.models import MODELS
 from orchestration.foundation.processes import subprocesses
+from orchestration.foundation.recording.recording import InMemory
 from orchestration.quadrotor.flight.names import FIGURES as FLIGHT
 from quadcosim import Scenario, Timing, load_run, run, save_run
 from tests.commands import Done, Main
@@ -563,3 +564,17 @@ def test_a_folder_whose_name_is_no_text_is_named_and_nothing_else_is_blamed(
         assert line.startswith("quadcosim: ")
         assert "caf\\udce9" in line
         assert line.endswith(": expected names of files and folders in UTF-8")
+
+
+def test_a_run_of_which_nothing_is_kept_holds_what_its_expressions_use_alone(
+    main: Main, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    held = []
+    finish = InMemory.finish
+    monkeypatch.setattr(InMemory, "finish", lambda self: (held.append(self.columns), finish(self))[1])
+    found = json.loads(main("run", *SHORT, "--json").stdout)
+    kept = run(native(stop_time=0.5))
+    (columns,) = held[:1]
+    assert {"time", "plant.torque.x"} < {*columns} < {*kept.columns}
+    assert "plant.acceleration.x" not in columns
+    assert {name: found[name] for name in kept.metrics} == kept.metrics
