@@ -139,12 +139,8 @@ def test_a_start_may_be_off_by_what_15_digits_leave_open(start: str, found: list
 
 
 @needs_compiler
-def test_a_slow_fmu_is_checked_with_fewer_steps_and_is_not_taken_for_one_that_hangs(tmp_path: Path) -> None:
+def test_a_slow_fmu_is_checked_with_fewer_steps(tmp_path: Path) -> None:
     assert summary(lag(tmp_path / "lag.fmu", "SLOW=5000"), time=8.0) == [("runs", True)]
-    slow, stopped = validate(lag(tmp_path / "slower.fmu", "SLOW=100000"), limits=Limits(time=2.0))
-    assert (slow.rule, slow.note) == ("runs", True)
-    assert (stopped.rule, stopped.note) == ("process", False)
-    assert "its calls return, it is slow" in stopped.text
 
 
 @needs_compiler
