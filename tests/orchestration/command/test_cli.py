@@ -569,12 +569,17 @@ def test_a_folder_whose_name_is_no_text_is_named_and_nothing_else_is_blamed(
 def test_a_run_of_which_nothing_is_kept_holds_what_its_expressions_use_alone(
     main: Main, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    held = []
-    finish = InMemory.finish
-    monkeypatch.setattr(InMemory, "finish", lambda self: (held.append(self.columns), finish(self))[1])
+    held: list[tuple[str, ...]] = []
+    begin = InMemory.begin
+
+    def noted(self: InMemory, columns: tuple[str, ...]) -> None:
+        begin(self, columns)
+        held.append(self.columns)
+
+    monkeypatch.setattr(InMemory, "begin", noted)
     found = json.loads(main("run", *SHORT, "--json").stdout)
     kept = run(native(stop_time=0.5))
-    (columns,) = held[:1]
+    columns = held[0]
     assert {"time", "plant.torque.x"} < {*columns} < {*kept.columns}
     assert "plant.acceleration.x" not in columns
     assert {name: found[name] for name in kept.metrics} == kept.metrics
