@@ -15,7 +15,7 @@ from benchmarks import stack
 from benchmarks.mathematics import table
 from docs.pages import fill
 from fmu_kit.bundle import Target
-from fmu_kit.compiler.pack.embedded import write
+from fmu_kit.compiler.pack.embedded_files import write
 from fmu_kit.variants import Value, Variant
 from orchestration.components.building.models import MODELS
 from tests.fmu_kit.compiler.compiled import HERE as BOARD_FILES

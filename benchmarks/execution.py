@@ -15,7 +15,7 @@ from pathlib import Path
 from benchmarks.embedded import count_instructions
 from benchmarks.mathematics import table
 from fmu_kit.bundle import Target
-from fmu_kit.compiler.pack.embedded import write
+from fmu_kit.compiler.pack.embedded_files import write
 from orchestration.components.building.models import MODELS
 from tests.fmu_kit.compiler.embedded import M4F, M7
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from benchmarks.embedded import FIXED
 from benchmarks.mathematics import table
 from fmu_kit.bundle import Target
-from fmu_kit.compiler.pack.embedded import write
+from fmu_kit.compiler.pack.embedded_files import write
 from fmu_kit.variants import Variant
 from orchestration.components.building.models import MODELS
 

@@ -28,8 +28,8 @@ from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.study_file import load_study
 from orchestration.experiments.studies.sweep import AGREEMENT, sweep
 from orchestration.foundation.basics.statistics import first_end, quantile, wilson
+from orchestration.quadrotor.flight.hover_limit import about_hover
 from orchestration.quadrotor.flight.hover_loop import HoverLoop
-from orchestration.quadrotor.flight.local_limit import about_hover
 from orchestration.quadrotor.flight.margin import margin_of
 from orchestration.simulation.figures.style import DOCS, save
 from orchestration.simulation.workers.batching import LaneAgreement

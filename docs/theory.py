@@ -13,8 +13,8 @@ from orchestration.experiments.studies.axes import Axis
 from orchestration.experiments.studies.linked_settings import LinkedSettings
 from orchestration.experiments.studies.study import Study
 from orchestration.quadrotor.flight.hover import at_hover
+from orchestration.quadrotor.flight.hover_limit import local_limit
 from orchestration.quadrotor.flight.hover_loop import HoverLoop
-from orchestration.quadrotor.flight.local_limit import local_limit
 from orchestration.quadrotor.scenarios import wiring
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
 from orchestration.quadrotor.scenarios.scenario import Scenario

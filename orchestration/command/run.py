@@ -13,7 +13,7 @@ from orchestration.command.registry import CommandResult, expect_positive, optio
 from orchestration.command.study_flags import TimeLimit
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import inform, progress_bar, warn
-from orchestration.foundation.basics.units import after
+from orchestration.foundation.basics.unit_algebra import after
 from orchestration.foundation.processes.limits import Limits
 
 if TYPE_CHECKING:

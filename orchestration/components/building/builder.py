@@ -198,7 +198,9 @@ def export_c(targets: Sequence[Target], folder: Path, *, single: bool = False) -
 
     `single`: in single precision. Raises `QuadcosimError` stating what could not be written.
     """
-    return _run_packer(["fmu_kit.compiler.pack.embedded", *(["--single"] if single else [])], targets, folder, None)
+    return _run_packer(
+        ["fmu_kit.compiler.pack.embedded_files", *(["--single"] if single else [])], targets, folder, None
+    )
 
 
 def _run_packer(

@@ -29,7 +29,7 @@ from orchestration.components.fmi.archive import (
 from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.foundation.basics.documents import readable
 from orchestration.foundation.basics.errors import UsageError, did_you_mean, listed, no_utf8
-from orchestration.foundation.basics.units import BaseUnits, Unit, named
+from orchestration.foundation.basics.unit_algebra import BaseUnits, Unit, named
 
 Kind = Literal["Real", "Integer", "Boolean", "Enumeration", "String", "Binary", "Clock"]
 """Types by their FMI 2.0 names; FMI 3.0's Float64 is a Real, its Int32 an Integer"""

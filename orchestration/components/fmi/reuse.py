@@ -5,9 +5,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from orchestration.components.fmi import instances
+from orchestration.components.fmi import opening
 from orchestration.components.fmi.instance import Instance
-from orchestration.components.fmi.instances import open_instance
+from orchestration.components.fmi.opening import open_instance
 from orchestration.foundation.basics.errors import SimulatorError
 
 
@@ -33,7 +33,7 @@ class Instances:
         try:
             yield instance
         finally:
-            if instance.failed or instance.stopped or not instances.repeatability_of(path).reset:
+            if instance.failed or instance.stopped or not opening.repeatability_of(path).reset:
                 instance.close()
             else:
                 self._kept[key] = instance

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestration.components.fmi.foreign import LostError, isolated_call
+from orchestration.components.fmi.foreign_calls import LostError, isolated_call
 from orchestration.experiments.limits.evaluation import RELIABILITY, Evaluation
 from orchestration.experiments.limits.limit_result import Limit
 from orchestration.experiments.studies import figures

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from typing import Literal
 
-from orchestration.components.fmi.foreign import LostError, isolated_call
+from orchestration.components.fmi.foreign_calls import LostError, isolated_call
 from orchestration.experiments.limits.evaluation import RELIABILITY, Evaluator, describe
 from orchestration.experiments.limits.limit_result import ContinuousRun, Limit
 from orchestration.foundation.basics.bisection import Bracket, Range, bisected, first_failure

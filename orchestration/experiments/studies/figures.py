@@ -14,7 +14,7 @@ from orchestration.experiments.studies.axes import Axis
 from orchestration.experiments.studies.axis_labels import SCALES, quantity_of
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.statistics import wilson
-from orchestration.foundation.basics.units import after
+from orchestration.foundation.basics.unit_algebra import after
 from orchestration.simulation.figures.palette import BLUE, GREY, ORANGE, RED, SHADES
 from orchestration.simulation.figures.shades import is_wide
 from orchestration.simulation.figures.style import SCREEN, Style

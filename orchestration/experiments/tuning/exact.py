@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from orchestration.components.fmi.foreign import isolated_call
+from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.experiments.tuning.tuning_problem import COST, SearchResult, TuningProblem, minimise
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.records import record

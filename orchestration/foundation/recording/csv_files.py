@@ -6,7 +6,7 @@ from typing import Any
 import pyarrow as pa
 from pyarrow import csv
 
-from orchestration.foundation.basics.units import in_brackets
+from orchestration.foundation.basics.unit_algebra import in_brackets
 from orchestration.foundation.recording import tables
 from orchestration.foundation.recording.frames import units_of
 from orchestration.foundation.recording.recording import About, Recording

@@ -39,7 +39,7 @@ def _layout() -> KnownLayout:
 
 
 def _loop() -> KnownLoop:
-    from orchestration.quadrotor.flight.local_limit import ABOUT_HOVER
+    from orchestration.quadrotor.flight.hover_limit import ABOUT_HOVER
 
     return ABOUT_HOVER
 

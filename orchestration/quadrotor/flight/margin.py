@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.quadrotor.flight.hover_limit import local_limit
 from orchestration.quadrotor.flight.hover_loop import HoverLoop
-from orchestration.quadrotor.flight.local_limit import local_limit
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.systems.system.distribution import lowest
 from orchestration.theory.stability.delay_bounds import SampledLoop, breaking_jitter, certain_jitter

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from orchestration.components.fmi.fmi2 import Fmi2Instance
-from orchestration.components.fmi.foreign import isolated_call
+from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.instance import Instance
-from orchestration.components.fmi.instances import open_instance
+from orchestration.components.fmi.opening import open_instance
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.foundation.basics.simulator import Floats, Transfer
 from orchestration.foundation.basics.times import exact_nanoseconds

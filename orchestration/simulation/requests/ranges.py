@@ -8,7 +8,7 @@ from functools import cached_property
 from orchestration.components.fmi.model import Model
 from orchestration.foundation.basics.bisection import Range
 from orchestration.foundation.basics.errors import UsageError, expected_name
-from orchestration.foundation.basics.units import after
+from orchestration.foundation.basics.unit_algebra import after
 from orchestration.simulation.results.quantities import is_in_seconds
 from orchestration.systems.system.component import TaskSampling
 from orchestration.systems.system.distribution import Distribution

@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from orchestration.components.fmi.model import Model
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.units import METRE, NUMBER, SECOND, Operand, Unit, agreed
+from orchestration.foundation.basics.unit_algebra import METRE, NUMBER, SECOND, Operand, Unit, agreed
 from orchestration.systems.expressions import syntax
 from orchestration.systems.expressions.operators import OPERATORS
 from orchestration.systems.expressions.over_run import STOP_TIME, TIME

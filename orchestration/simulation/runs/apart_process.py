@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.components.fmi.instance import Instance
-from orchestration.components.fmi.instances import open_instance
+from orchestration.components.fmi.opening import open_instance
 from orchestration.foundation.processes.channel import Parent, picklable
 from orchestration.foundation.recording.recording import About, Chunk, InMemory, Recording
 from orchestration.simulation.engines.memory import FolderMemory
-from orchestration.simulation.runs.apart import Order
 from orchestration.simulation.runs.prepared import prepared
+from orchestration.simulation.runs.run_in_process import Order
 
 _MESSAGES = logging.getLogger("quadcosim")
 

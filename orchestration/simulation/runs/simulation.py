@@ -102,9 +102,9 @@ def simulate(
     recorder = InMemory() if recorder is None else recorder
     resolved = resolve(request, announce)
     if not in_process and (resolved.foreign or time_limit is not None):
-        from orchestration.simulation.runs import apart  # not before: loads what starts processes
+        from orchestration.simulation.runs import run_in_process  # not before: loads what starts processes
 
-        return apart.simulate(
+        return run_in_process.simulate(
             resolved, course, recorder, progress=progress, engine=engine, time_limit=time_limit,
             memory_limit=memory_limit, started=started,
         )  # fmt: skip

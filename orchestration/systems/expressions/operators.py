@@ -13,8 +13,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from orchestration.foundation.basics import units
-from orchestration.foundation.basics.units import Rule
+from orchestration.foundation.basics import unit_algebra as units
+from orchestration.foundation.basics.unit_algebra import Rule
 
 Printer: TypeAlias = Callable[..., str]
 """Function from the texts of the operands to that of the result"""

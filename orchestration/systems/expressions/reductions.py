@@ -11,9 +11,9 @@ from functools import cached_property
 
 import numpy as np
 
-from orchestration.foundation.basics import units
+from orchestration.foundation.basics import unit_algebra as units
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.foundation.basics.units import Rule
+from orchestration.foundation.basics.unit_algebra import Rule
 
 
 class Course:

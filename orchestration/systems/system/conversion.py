@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from orchestration.components.fmi.model import Kind, Model, Variable
-from orchestration.foundation.basics.units import BaseUnits
+from orchestration.foundation.basics.unit_algebra import BaseUnits
 
 BECOMES: dict[Kind, tuple[Kind, ...]] = {
     "Real": ("Real",),

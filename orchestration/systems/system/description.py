@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from orchestration.foundation.basics.errors import listed
-from orchestration.foundation.basics.units import in_brackets
+from orchestration.foundation.basics.unit_algebra import in_brackets
 from orchestration.systems.system.component import Component, Sampling, SamplingOnArrival, TaskSampling
 from orchestration.systems.system.computers import Message, Task
 from orchestration.systems.system.connection import Connection, variable_of

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestration.components.fmi.foreign import isolated_call
+from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import needs

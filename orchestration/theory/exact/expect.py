@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from orchestration.components.fmi.foreign import isolated_call
+from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.systems.expressions.syntax import Call

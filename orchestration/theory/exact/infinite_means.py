@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from orchestration.components.fmi.foreign import isolated_call
+from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.model import Model
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.systems.system.files import Files

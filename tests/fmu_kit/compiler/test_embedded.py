@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from fmu_kit.bundle import Target
-from fmu_kit.compiler.emit.embedded_code import single_number
-from fmu_kit.compiler.pack.embedded import write
+from fmu_kit.compiler.emit.embedded_functions import single_number
+from fmu_kit.compiler.pack.embedded_files import write
 from orchestration.components.building import builder, fmus
 from orchestration.components.building.models import MODELS
 from tests.commands import Main

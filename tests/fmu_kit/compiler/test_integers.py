@@ -14,7 +14,7 @@ import pytest
 from fmu_kit.bundle import PackagingError, Target
 from fmu_kit.compiler.emit.standards import STANDARDS
 from fmu_kit.compiler.pack.building import build, c_sources, modules_of
-from fmu_kit.compiler.pack.embedded import write
+from fmu_kit.compiler.pack.embedded_files import write
 from fmu_kit.compiler.pack.lanes import compiled_lanes
 from fmu_kit.compiler.trace import integers
 from fmu_kit.compiler.trace.tracing import trace

@@ -13,7 +13,7 @@ from fmu_kit.compiler.emit.c_names import KEYWORDS
 from fmu_kit.compiler.emit.standards import STANDARDS
 from fmu_kit.compiler.pack.building import c_sources, modules_of
 from fmu_kit.compiler.pack.c_compiler import compiled_here
-from fmu_kit.compiler.pack.embedded import write
+from fmu_kit.compiler.pack.embedded_files import write
 from fmu_kit.compiler.pack.lanes import compiled_lanes
 from fmu_kit.compiler.passes.precomputing import precompute
 from fmu_kit.compiler.runtime import FOLDER

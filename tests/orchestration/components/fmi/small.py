@@ -12,7 +12,7 @@ import fmpy
 import platformdirs
 import pytest
 
-from orchestration.components.fmi import instances
+from orchestration.components.fmi import opening
 
 COMPILER = shutil.which("gcc") or shutil.which("cc")
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler")
@@ -129,7 +129,7 @@ def small(
 
 def known(fmu: Path) -> Path:
     """The FMU, of which it is known whether its runs repeat: else its first run finds it out, in most of a second."""
-    instances.repeatability_of(fmu)
+    opening.repeatability_of(fmu)
     return fmu
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.components.fmi.foreign import LostError, isolated_call
+from orchestration.components.fmi.foreign_calls import LostError, isolated_call
 from orchestration.experiments.limits.limit import find
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.systems.system.component import Component, Sampling

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from orchestration.components.building.fmus import locate
-from orchestration.components.fmi import instances, slaves
-from orchestration.components.fmi.isolated import IsolatedInstance
+from orchestration.components.fmi import opening, slaves
+from orchestration.components.fmi.isolated_instance import IsolatedInstance
 from orchestration.components.fmi.native import NativeInstance
 from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError
 from orchestration.foundation.processes import subprocesses
@@ -89,14 +89,14 @@ def test_types_and_enumerations_by_name(tmp_path: Path) -> None:
 
 
 def test_a_number_that_a_type_does_not_hold_is_refused(tmp_path: Path) -> None:
-    with instances.open_here(small(tmp_path), "it") as it:
+    with opening.open_here(small(tmp_path), "it") as it:
         it.writer(("mode",), np.array([1.6]))()
         assert it.get("mode") == 2.0
         with pytest.raises(SimulatorError, match=r"^it.mode = 3e\+09: expected a number that int32 holds$"):
             it.writer(("mode",), np.array([3e9]))()
     big = '<Int64 name="big" valueReference="9" causality="parameter" variability="fixed" start="0"/>'
     path = small(tmp_path / "3", fmi=3, more=big)
-    with instances.open_here(path, "it") as it:
+    with opening.open_here(path, "it") as it:
         with pytest.raises(SimulatorError, match=r"^it.gain = 1e\+39: expected a number that float32 holds$"):
             it.writer(("gain",), np.array([1e39]))()
         with pytest.raises(UsageError, match=r"^it.big = 9007199254740993: expected a whole number that a float holds"):
@@ -203,7 +203,7 @@ def test_a_task_without_a_sample_begins_at_the_start(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-@pytest.mark.parametrize("load", [instances.open_here, IsolatedInstance])
+@pytest.mark.parametrize("load", [opening.open_here, IsolatedInstance])
 def test_a_tolerance_is_that_of_the_file_else_of_the_declared_experiment(fmi: int, load: Any, tmp_path: Path) -> None:
     of_none, of_one = (
         small(tmp_path / f"{tolerance}", "TELLS_TOLERANCE", fmi=fmi, tolerance=tolerance) for tolerance in (None, 1e-3)
@@ -220,7 +220,7 @@ def test_a_tolerance_is_that_of_the_file_else_of_the_declared_experiment(fmi: in
 
 def test_a_tolerance_is_of_one_run(tmp_path: Path) -> None:
     path = small(tmp_path, "TELLS_TOLERANCE", tolerance=1e-3)
-    with instances.open_here(path, "it") as it:
+    with opening.open_here(path, "it") as it:
         it.set_tolerance(1e-7)
         it.reset()
         it.enter_initialization(0.0, 1.0)
@@ -316,7 +316,7 @@ def test_fmi_3_with_arrays_and_small_types(tmp_path: Path) -> None:
 
 
 def test_an_element_that_is_set_leaves_the_others_as_they_were_saved(tmp_path: Path) -> None:
-    with instances.open_here(small(tmp_path, fmi=3), "it") as it:
+    with opening.open_here(small(tmp_path, fmi=3), "it") as it:
         one, two = np.array([1.0]), np.array([2.0])
         write_one, write_two = it.writer(("u[1]",), one), it.writer(("u[2]",), two)
         it.enter_initialization(0.0, 1.0)
@@ -394,7 +394,7 @@ def test_a_crash_of_an_isolated_fmu_is_an_error_in_words(tmp_path: Path) -> None
 def test_what_an_isolated_fmu_refuses_reads_as_if_it_were_not(tmp_path: Path) -> None:
     path = small(tmp_path, "REFUSES")
     messages = []
-    for load in (instances.open_here, IsolatedInstance):
+    for load in (opening.open_here, IsolatedInstance):
         with pytest.raises(SimulatorError) as error:
             ran(alone(path), load=load)
         messages.append(str(error.value))
@@ -403,7 +403,7 @@ def test_what_an_isolated_fmu_refuses_reads_as_if_it_were_not(tmp_path: Path) ->
 
 def test_isolated_or_not_a_run_is_the_same_to_the_bit(tmp_path: Path) -> None:
     system = alone(small(tmp_path, "WARNS"), parameters={"gain": 0.3, "mode": "backward"})
-    here, there = ran(system, load=instances.open_here), ran(system, load=IsolatedInstance)
+    here, there = ran(system, load=opening.open_here), ran(system, load=IsolatedInstance)
     assert here.rows.tobytes() == there.rows.tobytes()
     assert here.warnings == there.warnings
 
@@ -414,7 +414,7 @@ def test_the_process_of_an_isolated_fmu_ends_with_its_parent(tmp_path: Path) -> 
     script = textwrap.dedent("""
         import os, sys
         from pathlib import Path
-        from orchestration.components.fmi.isolated import IsolatedInstance
+        from orchestration.components.fmi.isolated_instance import IsolatedInstance
 
         instance = IsolatedInstance(Path(sys.argv[1]), "it")
         print(instance._child.pid, flush=True)
@@ -436,8 +436,8 @@ def test_what_an_fmu_prints_is_not_among_what_the_command_prints(load: str, tmp_
     script = textwrap.dedent(f"""
         import sys
         from orchestration.foundation.basics.terminal import banners_to_stderr
-        from orchestration.components.fmi.instances import open_here
-        from orchestration.components.fmi.isolated import IsolatedInstance
+        from orchestration.components.fmi.opening import open_here
+        from orchestration.components.fmi.isolated_instance import IsolatedInstance
         from orchestration.systems.system.component import Component
         from orchestration.systems.system.model import System
         from orchestration.simulation.runs.prepared import prepared
@@ -479,7 +479,7 @@ def test_an_fmu_finds_all_of_its_archive_but_for_one_of_this_kit_what_is_for_peo
     plants = [locate("QuadrotorPlant"), locate("native/QuadrotorPlant")]
     found = []
     for fmu in (path, *plants):
-        with instances.open_here(fmu, "it") as it:
+        with opening.open_here(fmu, "it") as it:
             assert it._folder is not None
             found.append({each.name for each in it._folder.path.iterdir()})
     assert found[0] == {"modelDescription.xml", "binaries", "documentation", "sources", "extra"}
@@ -494,12 +494,12 @@ def test_on_other_processors_an_fmu_of_fmi_2_is_found_by_the_name_of_fmi_3(
     """As if this machine were one: the folder of the standard goes before that which tools have for all processors."""
     monkeypatch.setitem(slaves.FOLDERS, 2, ("aarch64-linux", fmpy.platform))
     path = small(tmp_path)
-    with instances.open_here(path, "it") as it:
+    with opening.open_here(path, "it") as it:
         assert it.get("gain") == 1.0
     content = {name.replace(fmpy.platform, "aarch64-linux"): each for name, each in files_of(path).items()}
     write_fmu(path, {**content, f"binaries/{fmpy.platform}/Small{fmpy.sharedLibraryExtension}": b"of x86"})
-    with instances.open_here(path, "it") as it:
+    with opening.open_here(path, "it") as it:
         assert it.get("gain") == 1.0
     write_fmu(path, {name.replace("aarch64-linux", "win64"): each for name, each in content.items()})
     with pytest.raises(QuadcosimError, match=f"no binary for aarch64-linux or {fmpy.platform}, only for win64$"):
-        instances.open_here(path, "it")
+        opening.open_here(path, "it")

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from orchestration.components.fmi.fmi2 import Fmi2Instance
-from orchestration.components.fmi.instances import open_instance
+from orchestration.components.fmi.opening import open_instance
 from orchestration.foundation.basics.errors import SimulatorError
 from tests.fmus.foreign import lag, needs_compiler
 from tests.orchestration.components.fmi.small import small

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.components.fmi.instances import Repeatability, repeatability_of
-from orchestration.components.fmi.isolated import IsolatedInstance
+from orchestration.components.fmi.isolated_instance import IsolatedInstance
 from orchestration.components.fmi.native import NativeInstance
+from orchestration.components.fmi.opening import Repeatability, repeatability_of
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.processes.child import Child, Ending
 from orchestration.simulation.runs.prepared import prepared
@@ -94,12 +94,12 @@ def test_the_repeatability_of_an_fmu_is_shown_once_on_a_machine(
 ) -> None:
     path = build("BROKEN_RESET", tmp_path)
     first = repeatability_of(path)
-    monkeypatch.setattr("orchestration.components.fmi.instances._known", {})
+    monkeypatch.setattr("orchestration.components.fmi.opening._known", {})
     monkeypatch.setattr(Child, "receive_all", lambda *_: pytest.fail("shown again"))
     assert repeatability_of(path) == first
     (stored,) = cache.rglob("*.json")
     stored.write_text("damaged")
-    monkeypatch.setattr("orchestration.components.fmi.instances._known", {})
+    monkeypatch.setattr("orchestration.components.fmi.opening._known", {})
     with pytest.raises(pytest.fail.Exception, match="shown again"):
         repeatability_of(path)
 

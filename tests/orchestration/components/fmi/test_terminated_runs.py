@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestration.components.fmi import instances
-from orchestration.components.fmi.instances import Repeatability
-from orchestration.components.fmi.isolated import IsolatedInstance
+from orchestration.components.fmi import opening
+from orchestration.components.fmi.isolated_instance import IsolatedInstance
+from orchestration.components.fmi.opening import Repeatability
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import SimulatorError, UsageError
 from orchestration.simulation.engines.master import Engine
@@ -36,7 +36,7 @@ def judged(system: System) -> System:
 
 def each(system: System) -> Result:
     """The result of both engines, which is the same."""
-    one, other = (ran(system, engine=engine, load=instances.open_here) for engine in ENGINES)
+    one, other = (ran(system, engine=engine, load=opening.open_here) for engine in ENGINES)
     assert_the_same(other, one)
     assert (one.termination, one.divergence) == (other.termination, None)
     return one
@@ -75,7 +75,7 @@ def test_a_discarded_step_ends_the_run_if_it_is_the_last_one(tmp_path: Path) -> 
     assert result.signals["time"][-1] == 0.09
     for engine in ENGINES:
         with pytest.raises(SimulatorError, match=r"^it \(Small\): fmi2DoStep: discards the step to 0.1 s$"):
-            ran(alone(path, stop=0.11), engine=engine, load=instances.open_here)
+            ran(alone(path, stop=0.11), engine=engine, load=opening.open_here)
 
 
 def test_the_instant_at_which_a_run_ends_is_gone_through_by_all(tmp_path: Path) -> None:
@@ -109,19 +109,17 @@ def test_a_task_that_ends_the_run_has_its_sample_if_the_step_was_whole(end: str,
 
 def test_isolated_or_not_a_run_ends_the_same(tmp_path: Path) -> None:
     system = judged(alone(small(tmp_path, "ENDS_AT=0.05")))
-    here, there = ran(system, load=instances.open_here), ran(system, load=IsolatedInstance)
+    here, there = ran(system, load=opening.open_here), ran(system, load=IsolatedInstance)
     assert here.rows.tobytes() == there.rows.tobytes()
     assert here.termination == there.termination
     assert here.metrics == there.metrics
 
 
-@pytest.mark.parametrize("load", [instances.open_here, IsolatedInstance])
+@pytest.mark.parametrize("load", [opening.open_here, IsolatedInstance])
 def test_an_instance_that_has_ended_a_run_is_for_no_other(
     load: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(
-        "orchestration.components.fmi.instances.repeatability_of", lambda path: Repeatability(reset=True)
-    )
+    monkeypatch.setattr("orchestration.components.fmi.opening.repeatability_of", lambda path: Repeatability(reset=True))
     monkeypatch.setattr("orchestration.components.fmi.reuse.open_instance", load)
     kept = Instances()
     used = []

@@ -24,10 +24,10 @@ from orchestration.foundation.basics.bisection import Range, first_failure
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.statistics import wilson
 from orchestration.foundation.basics.times import NANOSECONDS
-from orchestration.quadrotor.flight import local_limit as local
+from orchestration.quadrotor.flight import hover_limit as local
 from orchestration.quadrotor.flight.hover import COORDINATES, hover_of
+from orchestration.quadrotor.flight.hover_limit import local_limit
 from orchestration.quadrotor.flight.hover_loop import HoverLoop
-from orchestration.quadrotor.flight.local_limit import local_limit
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice, Record
 from orchestration.quadrotor.scenarios.wiring import COMMAND
 from orchestration.simulation.requests.ranges import Varied

@@ -12,7 +12,7 @@ import pytest
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
-from orchestration.components.fmi.foreign import LostError
+from orchestration.components.fmi.foreign_calls import LostError
 from orchestration.experiments.limits import figure as limit_figure
 from orchestration.experiments.limits.evaluation import Evaluation
 from orchestration.experiments.limits.figure import draw_limit, spectral_radius

@@ -21,9 +21,9 @@ from hypothesis import strategies as st
 
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.components.fmi.instance import Instance
-from orchestration.components.fmi.instances import open_here
 from orchestration.components.fmi.model import read_model
 from orchestration.components.fmi.native import NativeInstance
+from orchestration.components.fmi.opening import open_here
 from orchestration.components.fmi.transfers import range_of
 from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError
 from orchestration.foundation.basics.times import Grid, exact_nanoseconds

@@ -6,7 +6,7 @@ import pytest
 
 from fmu_kit.units import BASE
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.units import BaseUnits, Unit, named
+from orchestration.foundation.basics.unit_algebra import BaseUnits, Unit, named
 from orchestration.simulation.results.units import unit_of
 from orchestration.systems.expressions.syntax import parse
 

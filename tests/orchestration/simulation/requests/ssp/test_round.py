@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from orchestration.simulation.requests.request import load_request
-from orchestration.simulation.requests.ssp import package, writing
+from orchestration.simulation.requests.ssp import archive, writing
 from orchestration.simulation.runs.result import Result
 from orchestration.simulation.runs.simulation import run
 from orchestration.systems.system.model import Criterion, System
@@ -21,7 +21,7 @@ from tests.places import EXAMPLES
 
 @pytest.fixture(autouse=True)
 def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(package, "_cache", lambda: tmp_path / "cache")
+    monkeypatch.setattr(archive, "_cache", lambda: tmp_path / "cache")
 
 
 def bits(result: Result) -> dict[str, bytes]:
@@ -84,9 +84,9 @@ def test_without_a_file_the_timing_of_the_annotation_is_used_and_checked(
 
 def load_structure(ssp: Path, folder: Path) -> Path:
     """Unpacked, its document."""
-    with zipfile.ZipFile(ssp) as archive:
-        archive.extractall(folder)
-    return folder / package.STRUCTURE
+    with zipfile.ZipFile(ssp) as opened:
+        opened.extractall(folder)
+    return folder / archive.STRUCTURE
 
 
 def test_additional_timing_is_used(tmp_path: Path) -> None:

@@ -118,7 +118,9 @@ def open_instance(path: Path, instance_name: str) -> Instance:
     """
     content = content_hash(path)
     if content in _opened and not repeatability_of(path).second_instance:
-        from orchestration.components.fmi.isolated import IsolatedInstance  # not before: loads what starts processes
+        from orchestration.components.fmi.isolated_instance import (
+            IsolatedInstance,  # not before: loads what starts processes
+        )
 
         return IsolatedInstance(path, instance_name)
     _opened.add(content)

@@ -1,6 +1,6 @@
 """A slave as two files in C for a microcontroller: Model.h and Model.c.
 
-Writing them imports the slave, so it runs in a separate process: `python -m fmu_kit.compiler.pack.embedded`.
+Writing them imports the slave, so it runs in a separate process: `python -m fmu_kit.compiler.pack.embedded_files`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from string import Template
 from fmu_kit import packaging
 from fmu_kit.bundle import PackagingError, Target
 from fmu_kit.compiler.emit.c_names import c_name, c_string
-from fmu_kit.compiler.emit.embedded_code import (
+from fmu_kit.compiler.emit.embedded_functions import (
     GROUPS,
     MessageTable,
     comment,
@@ -184,7 +184,7 @@ def _apply_function(program: Program, *, whole: bool) -> str:
 
 
 def main(arguments: list[str]) -> int:
-    """`python -m fmu_kit.compiler.pack.embedded [--single] FOLDER …`: as `fmu_kit.packaging`, two files each."""
+    """`python -m fmu_kit.compiler.pack.embedded_files [--single] FOLDER …`: as `fmu_kit.packaging`, two files each."""
     single = arguments[:1] == ["--single"]
     return packaging.main(arguments[single:], functools.partial(write, single=single))
 
