@@ -100,20 +100,24 @@ void quadcosim_initialise(double *memory, const uint64_t *active, const double *
 }
 
 /* Counts how often the straight line was tried, and left, in which case the step is done twice. If it is left too
-   often, it is no longer tried. This changes no bit of the results. */
-static struct { int64_t tried, left; } line;
+   often, it is not tried for a while: other runs may come. This changes no bit of the results. */
+static struct { int64_t tried, left, waited; } line;
 
 EXPORT void quadcosim_line(int64_t *tried, int64_t *left);
 void quadcosim_line(int64_t *tried, int64_t *left) { *tried = line.tried, *left = line.left; }
 
 #ifdef STRAIGHT_STEP
 
-enum { TRIALS = 256, OF_WHICH_ONE = 20 }; /* after the trials, one step of so many may leave the line */
+/* After the trials, one step of so many may leave the line; the steps until it is tried again. */
+enum { TRIALS = 256, OF_WHICH_ONE = 20, PAUSE = 64 * TRIALS };
 
 static int step_straight(q_place *v, q_mask live, const uint8_t *wanted, q_real t, q_real h)
 {
-    if (line.tried >= TRIALS && line.left * OF_WHICH_ONE > line.tried)
-        return 0;
+    if (line.tried >= TRIALS && line.left * OF_WHICH_ONE > line.tried) {
+        if (++line.waited < PAUSE)
+            return 0;
+        memset(&line, 0, sizeof line);
+    }
     line.tried++;
     if (q_any(STRAIGHT_STEP(v, live, wanted, t, h)))
         return 1;

@@ -208,3 +208,25 @@ def test_without_a_compiler_what_to_install_is_reported(monkeypatch: pytest.Monk
     preferred_lanes.cache_clear()
     with pytest.raises(PackagingError, match="install one"):
         preferred_lanes()
+
+
+def test_the_straight_line_is_tried_again_after_other_runs_have_left_it(tmp_path: Path) -> None:
+    compiler("cc")
+    path = Path(fmpy.extract(str(fmus.locate("native/UnifiedController")), str(tmp_path)))
+    in_lanes({file.name: file.read_bytes() for file in (path / "sources").iterdir()}, 8, tmp_path)
+    together = Together(tmp_path / "lanes.so")
+    variables = slave_class(Target.parse(MODELS["UnifiedController"])).variables
+    (period,) = (k for k, variable in enumerate(variables) if variable.name == "sample_period")
+    every, h = np.ones(together.count, np.bool_), np.full(together.count, 0.01)
+    left = []
+    for periods, count in (((0.05, 0.0), 300), ((0.0, 0.0), 20_000)):
+        together.begin()
+        for lane in range(together.count):
+            together.put(lane, {period: periods[lane % 2]})
+        together.initialise(every, 0.0 * h)
+        for step in range(count):
+            together.step(every, step * h, h)
+        left.append(together.lanes.line)
+    (tried, often), (again, never) = left
+    assert often * 20 > tried
+    assert (again > 1000, never) == (True, 0)
