@@ -56,6 +56,7 @@ class Design:
     cost_of: Callable[[Sequence[float]], float]
     """the cost of a sample from the steps of the trace [s]: for a cascade at one rate, every step runs all loops"""
     color: str
+    line: str = ".-"
 
     @property
     def cost(self) -> float:
@@ -103,7 +104,8 @@ DESIGNS = {
         controller="cascade, no rate derivative",
         trace="cascaded",
         cost_of=max,
-        color="C9",
+        color="C5",
+        line=".--",
     ),
     "cascade, 4 to 2": Design(
         comparison="cascade_ratios", controller="cascade, 4 to 2", trace="cascaded", cost_of=at_ratios(4, 2), color="C7"
@@ -113,7 +115,8 @@ DESIGNS = {
         controller="cascade, 4 to 2, no rate derivative",
         trace="cascaded",
         cost_of=at_ratios(4, 2),
-        color="C8",
+        color="C7",
+        line=".--",
     ),
 }
 
@@ -162,7 +165,7 @@ def figure() -> Figure:
             panel.plot(
                 shares,
                 [cell[fate] / cell["count"] for cell in cells],
-                ".-",
+                design.line,
                 color=design.color,
                 label=name.replace("`", ""),
             )

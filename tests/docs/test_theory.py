@@ -9,6 +9,7 @@ import pytest
 
 import quadcosim
 from docs import theory
+from docs.comparisons import read_data
 from orchestration.quadrotor.flight.hover_loop import HoverLoop
 from orchestration.systems.system.files import files_of
 from orchestration.theory.exact.expect import expected_of
@@ -92,6 +93,16 @@ def test_a_flight_with_the_papers_exponent_decays_and_one_with_a_small_exponent_
     assert np.isnan(times[1, 2])
     assert np.isnan(rates[1, 1:]).all()
     assert 1e-3 < remains[1] < 1e-2
+
+
+@pytest.mark.parametrize("place", range(len(theory.ENERGIES)))
+def test_the_energy_rises_along_the_flight_as_is_kept(place: int) -> None:
+    kappa = theory.ENERGIES[place]
+    kept = read_data("energy")["flights"][place]
+    found = theory.rises_of(kappa, *theory.energy_over_time(kappa))
+    assert {name: value for name, value in found.items() if value is not None} == pytest.approx(
+        {name: value for name, value in kept.items() if value is not None}, rel=1e-4
+    )
 
 
 @pytest.mark.parametrize(("period", "delay"), [(0.011, 0.0), (0.04, 0.0225), (0.065, 0.01)])
