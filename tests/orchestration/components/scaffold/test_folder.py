@@ -1,5 +1,6 @@
 """What `quadcosim new` writes works as it stands: it is packed, flown, tested, and has a limit."""
 
+import json
 import subprocess
 import sys
 import zipfile
@@ -126,3 +127,13 @@ def test_names_are_in_the_case_that_python_has_them_in() -> None:
     names = ("hover_pd", "HoverPd", "hover-pd", "PID")
     assert [class_name(name) for name in names] == ["HoverPd", "HoverPd", "HoverPd", "PID"]
     assert [module_name(class_name(name)) for name in names] == ["hover_pd", "hover_pd", "hover_pd", "pid"]
+
+
+def test_the_page_of_a_controller_says_how_far_from_the_target_wind_keeps_it_on_a_small_vehicle(
+    here: Path, main: Main
+) -> None:
+    write("controller", "hover_pd", here, author="", license="")
+    page = (here / "hover_pd" / "README.md").read_text(encoding="utf-8")
+    flown = ("run", "--controller", "hover_pd/HoverPd.fmu", "--vehicle", "crazyflie", "--native", "--json")
+    bound = json.loads(main(*flown).stdout)["ultimate_bound"]
+    assert f"{100.0 * bound:.0f} cm in the wind of a Crazyflie" in page
