@@ -44,7 +44,7 @@ class Conditions:
     starts: str
     horizon: str
     constant: str
-    """What was held constant."""
+    """Settings that were held constant."""
 
 
 @record()
@@ -57,7 +57,7 @@ class Tried:
     number: str
     """Its result, with numbers by name."""
     verdict: Literal["holds", "limited", "refuted"]
-    """What it makes of the claim."""
+    """Verdict on the claim, after it."""
 
 
 @record()
