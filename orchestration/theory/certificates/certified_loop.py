@@ -66,7 +66,10 @@ def certified_loop(rest: AtRest) -> CertifiedLoop:
             assert component.step is not None
             matrices = in_continuous_time(tangent, min(component.step, period))
             if matrices.unfit is not None:
-                raise UsageError(f"{name}: {matrices.unfit}, so it is no linear system in continuous time")
+                raise UsageError(
+                    f"{name}: {matrices.unfit}, so it is no linear system in continuous time: expected a component "
+                    "that integrates more accurately, as by more internal steps or a method of higher order"
+                )
             components[name] = in_output_coordinates(matrices, expm(matrices.A * period))
     for x in system.connections:
         for start, end in zip(x.start, x.end):
