@@ -127,10 +127,10 @@ def test_signals_of_any_system_share_a_panel_by_unit_and_none_is_left_out_up_to_
     result = quadcosim.run(replace(bare, stop_time=0.05))
     figure = draw(result)["signals"]
     figure.draw_without_rendering()
-    labels = [axes.get_ylabel().replace("\u00a0", " ") for axes in figure.axes]
-    assert labels == [
-        *(f"measurement [{unit}]" for unit in ("m", "m/s", "1", "rad/s")), *(f"command [{u}]" for u in ("N", "N·m"))
-    ]  # fmt: skip
+    labels = [axes.get_ylabel().replace("\u00a0", " ").replace("\n", " ") for axes in figure.axes]
+    measured = ("position [m]", "velocity [m/s]", "quaternion [1]", "angular velocity [rad/s]")
+    commanded = ("thrust [N]", "torque [N·m]")
+    assert labels == [*(f"measurement: {name}" for name in measured), *(f"command: {name}" for name in commanded)]
     assert sum(len(axes.get_lines()) for axes in figure.axes) == sum(len(x.start) for x in whole.connections)
     for axes in figure.axes:
         legend = axes.get_legend()
