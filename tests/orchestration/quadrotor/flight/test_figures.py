@@ -127,7 +127,7 @@ def test_signals_of_any_system_share_a_panel_by_unit_and_none_is_left_out_up_to_
     result = quadcosim.run(replace(bare, stop_time=0.05))
     figure = draw(result)["signals"]
     figure.draw_without_rendering()
-    labels = [axes.get_ylabel().replace("\u00a0", " ").replace("\n", " ") for axes in figure.axes]
+    labels = [" ".join(axes.get_ylabel().split()) for axes in figure.axes]
     measured = ("position [m]", "velocity [m/s]", "quaternion [1]", "angular velocity [rad/s]")
     commanded = ("thrust [N]", "torque [N·m]")
     assert labels == [*(f"measurement: {name}" for name in measured), *(f"command: {name}" for name in commanded)]
@@ -140,7 +140,7 @@ def test_signals_of_any_system_share_a_panel_by_unit_and_none_is_left_out_up_to_
     left_out = sum(len(axes.get_lines()) for axes in figure.axes[2:])
     monkeypatch.setattr(signals, "MAX_PANELS", 2)
     figure = draw(result)["signals"]
-    assert [axes.get_ylabel().replace("\u00a0", " ") for axes in figure.axes] == labels[:2]
+    assert [" ".join(axes.get_ylabel().split()) for axes in figure.axes] == labels[:2]
     assert figure.get_supxlabel() == f"and {left_out} more signals"
 
 

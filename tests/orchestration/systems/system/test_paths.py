@@ -63,7 +63,7 @@ def test_the_execution_time_of_a_task_takes_a_distribution() -> None:
             "late",
             "connections.command.delay = late: expected zero or a positive number, or",
         ),
-        ("components.plant.step", "{uniform=[0,1]}", "components.plant.step = {uniform=[0,1]}: expected a positive"),
+        ("components.plant.step", "{uniform=[0,1]}", "components.plant.step = '{uniform=[0,1]}': expected a positive"),
     ],
 )
 def test_an_invalid_table_is_rejected_in_one_line_with_its_path(path: str, written: str, line: str) -> None:
