@@ -92,7 +92,7 @@ def in_continuous_time(tangent: Tangent, first: float, differs: float = INEXACT)
         A = _logarithm(change) / h
         B = np.asarray(np.linalg.solve(_mean_exponential(A * h), moved)) / h
         C = by_state[:count] @ np.linalg.inv(state)
-        D = _feedthrough(by_input[:count], C @ moved)
+        D = _feedthrough(by_input[:count], C, moved)
     return Continuous(inputs=tangent.inputs, outputs=tangent.outputs, A=A, B=B, C=C, D=D, unfit=unfit)
 
 
@@ -125,10 +125,11 @@ def in_output_coordinates(of: M, after: Floats) -> M:
     return replace(of, A=onto @ of.A @ back, B=onto @ of.B, C=of.C @ back)
 
 
-def _feedthrough(whole: Floats, by_states: Floats) -> Floats:
-    """The direct feedthrough; 0 where it may be rounding."""
-    found: Floats = whole - by_states
-    found[np.abs(found) <= NO_FEEDTHROUGH * np.abs(whole).max(axis=1, keepdims=True, initial=0.0)] = 0.0
+def _feedthrough(whole: Floats, C: Floats, moved: Floats) -> Floats:
+    """The direct feedthrough: responses less what comes by the states; 0 where it may be rounding."""
+    found: Floats = whole - C @ moved
+    terms = np.maximum(np.abs(whole), np.abs(C) @ np.abs(moved))  # they may cancel
+    found[np.abs(found) <= NO_FEEDTHROUGH * terms.max(axis=1, keepdims=True, initial=0.0)] = 0.0
     return found
 
 
