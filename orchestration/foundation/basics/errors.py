@@ -105,7 +105,8 @@ class Named(dict[str, Value]):
     """Values by name, with the names that there are in the error for an unknown one."""
 
     def __missing__(self, name: str) -> Value:
-        raise UnknownNameError(f"there is no {name}; {expected_name(name, [*self])}")
+        near = did_you_mean(name, [*self], most=3)
+        raise UnknownNameError(f"there is no {name}{near or '; expected one of ' + listed(self)}")
 
 
 def shown(value: object) -> str:
