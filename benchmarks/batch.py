@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from orchestration.components.building import fmus
-from orchestration.components.fmi.model import read_model
+from orchestration.components.fmi.read_description import read_model
 from orchestration.experiments.studies.axes import Axis
 from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.sweep import sweep

@@ -20,15 +20,15 @@ from fmu_kit.integrator import rk4_step
 from fmu_kit.rigid_body import Body, RigidState, Wrench, derivative
 from fmu_kit.trajectory import Trajectory
 from orchestration.components.fmi.fmi2 import Fmi2Instance
-from orchestration.components.fmi.model import read_model
+from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.quadrotor.scenarios import wiring
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.quadrotor.scenarios.timing import Timing
-from orchestration.simulation.engines.wires import Board
+from orchestration.simulation.engines.wiring_by_index import Board
 from orchestration.simulation.runs.prepared import prepared
-from orchestration.systems.schedule.schedule import Cursor
+from orchestration.systems.schedule.instant_arrays import Cursor
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.check import recorded_variables

@@ -16,9 +16,9 @@ from scipy.linalg import expm, solve_discrete_are
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.theory.certificates.breaking import least_breaking
 from orchestration.theory.certificates.certificate import Certificate, read_certificate
-from orchestration.theory.certificates.certify import find_certificate
-from orchestration.theory.certificates.checker import verified
 from orchestration.theory.certificates.family import LoopFamily
+from orchestration.theory.certificates.find_certificate import find_certificate
+from orchestration.theory.certificates.verify_certificate import verified
 from tests.orchestration.theory.certificates.loops import HOVER_A, HOVER_B, HOVER_F, late_command, switched
 
 EACH = 50

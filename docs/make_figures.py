@@ -12,7 +12,7 @@ from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.simulation.figures.palette import BLUE, GREEN, GREY, RED
 from orchestration.simulation.figures.style import DOCS, save
 from orchestration.simulation.runs.draw import draw
-from orchestration.systems.schedule.schedule import Cursor
+from orchestration.systems.schedule.instant_arrays import Cursor
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from quadcosim import run

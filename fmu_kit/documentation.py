@@ -14,8 +14,8 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
-from fmu_kit.model_description import PYTHON_REQUIRED
 from fmu_kit.variables import Variable
+from fmu_kit.write_description import PYTHON_REQUIRED
 
 TEMPLATE = Path(__file__).with_name("page.html")
 """The template of the page, around the hand-written part."""

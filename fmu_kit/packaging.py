@@ -32,9 +32,9 @@ from fmu_kit.bundle import PackagingError, Target, bundled_sources, module_path,
 from fmu_kit.documentation import BuildNotes
 from fmu_kit.errors import FmuError
 from fmu_kit.failure import place_of
-from fmu_kit.model_description import GUID_PLACEHOLDER, PYTHON_REQUIRED, to_xml
 from fmu_kit.variants import Variant
 from fmu_kit.versions import generation_tool, version_of
+from fmu_kit.write_description import GUID_PLACEHOLDER, PYTHON_REQUIRED, to_xml
 
 _LICENCES = {
     "quadcosim": "quadcosim, which packed this FMU.",

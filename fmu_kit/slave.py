@@ -19,7 +19,7 @@ from pythonfmu.default_experiment import DefaultExperiment
 from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
-from fmu_kit import model_description
+from fmu_kit import write_description
 from fmu_kit.declared_names import expect_free_names, expect_variables
 from fmu_kit.errors import DivergenceError, FmuError, require
 from fmu_kit.failure import Failure, printf_safe, report
@@ -384,7 +384,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
         """The model description; called when the FMU is built."""
-        return model_description.to_xml(type(self))
+        return write_description.to_xml(type(self))
 
     # -- internals ------------------------------------------------------------------------------------------
 

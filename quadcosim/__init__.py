@@ -42,7 +42,7 @@ from orchestration.foundation.basics.errors import in_python, set_wording
 set_wording(in_python)
 
 if TYPE_CHECKING:  # also what `__getattr__` finds public names by
-    from orchestration.components.fmi.model import Model, read_model
+    from orchestration.components.fmi.read_description import Model, read_model
     from orchestration.experiments.comparison.design import Comparison
     from orchestration.experiments.comparison.file import load_comparison
     from orchestration.experiments.comparison.run import Compared, compare
@@ -86,7 +86,7 @@ if TYPE_CHECKING:  # also what `__getattr__` finds public names by
     from orchestration.systems.system.vehicle import Vehicle
     from orchestration.theory.certificates.basin import Basin, basin
     from orchestration.theory.certificates.certificate import Checked
-    from orchestration.theory.certificates.check import check as check_certificate
+    from orchestration.theory.certificates.check_file import check as check_certificate
     from orchestration.theory.certificates.margin import Certified, margin
     from orchestration.theory.certificates.region import Region
     from orchestration.theory.certificates.region import region as margin_region

@@ -24,7 +24,7 @@ from docs.lateral_basin.intervals import Intervals, OutOfReachError
 from docs.lateral_basin.period import Loop
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.theory.certificates.checker import is_positive
+from orchestration.theory.certificates.verify_certificate import is_positive
 
 HALVINGS = 9
 """Halvings of the box around the ellipsoid, before the inner box is given up"""

@@ -12,7 +12,7 @@ from orchestration.command.variant_flags import VariantFlags
 from orchestration.components.building import consent
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import inform, progress_bar
-from orchestration.foundation.processes.limits import Limits
+from orchestration.foundation.processes.resource_limits import Limits
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -95,7 +95,7 @@ def _region(request: "Request", of: str, and_of: str, out: Path | None) -> Comma
 
 
 def _checked(path: Path, request: "Request | None") -> CommandResult:
-    from orchestration.theory.certificates.check import check
+    from orchestration.theory.certificates.check_file import check
 
     found = check(path, request)
     lines = []

@@ -14,7 +14,7 @@ from orchestration.command.study_flags import TimeLimit
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import inform, progress_bar, warn
 from orchestration.foundation.basics.unit_algebra import after
-from orchestration.foundation.processes.limits import Limits
+from orchestration.foundation.processes.resource_limits import Limits
 
 if TYPE_CHECKING:
     from orchestration.simulation.runs.result import Result

@@ -35,7 +35,7 @@ def connect(
 ) -> CommandResult:
     """Propose a system file for FMUs: outputs to inputs by name, type and unit; open points are marked in it."""
     from orchestration.components.building import fmus
-    from orchestration.components.fmi.model import read_model
+    from orchestration.components.fmi.read_description import read_model
     from orchestration.foundation.basics.errors import UsageError
     from orchestration.simulation.requests.resource_files import resources_of
     from orchestration.systems.system.proposal import propose
@@ -87,7 +87,7 @@ def _from_fmus(system: "System") -> tuple[dict[str, str], str]:
     Empty if FMUs are missing or do not fit: nothing is built, so that no foreign module runs.
     """
     from orchestration.components.building import fmus
-    from orchestration.components.fmi.model import read_model
+    from orchestration.components.fmi.read_description import read_model
     from orchestration.foundation.basics.errors import QuadcosimError
     from orchestration.simulation.engines.resolved import check_against_fmus
 

@@ -20,7 +20,7 @@ from docs.lateral_basin.search import largest_ellipsoid
 from fmu_kit.scalar import FLOAT
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.theory.certificates.checker import is_positive
+from orchestration.theory.certificates.verify_certificate import is_positive
 from tests.places import ROOT
 
 PERIODS = (0.01, 0.04)

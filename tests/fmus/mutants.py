@@ -251,7 +251,7 @@ WHOLE = (
     ),
     Mutant(
         name="slave does not describe itself", rule="own-description", words=("SyntaxError",),
-        damage=source("fmu_kit/model_description.py", "import os", "import os as"), versions=(2,),
+        damage=source("fmu_kit/write_description.py", "import os", "import os as"), versions=(2,),
     ),
 )  # fmt: skip
 

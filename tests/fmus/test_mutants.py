@@ -16,7 +16,7 @@ from orchestration.components.checks.validation.confined_process import PLATFORM
 from orchestration.components.checks.validation.finding import Finding, name_of
 from orchestration.components.checks.validation.progress import ReceivedReport, Reporter
 from orchestration.components.checks.validation.validator import PROCESS, validate
-from orchestration.foundation.processes.limits import Limits
+from orchestration.foundation.processes.resource_limits import Limits
 from tests.fmus.damage import Mutant, every
 from tests.fmus.faulty import faulty
 from tests.fmus.making import PAIR

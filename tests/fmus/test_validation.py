@@ -24,10 +24,10 @@ from orchestration.components.checks.validation.units import dimensions, unit_me
 from orchestration.components.checks.validation.validator import validate
 from orchestration.components.checks.validation.variables import aliases, names
 from orchestration.components.fmi.instance import start_value
-from orchestration.components.fmi.model import attribute, scalars_of
+from orchestration.components.fmi.read_description import attribute, scalars_of
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.processes.child import Child, Ending
-from orchestration.foundation.processes.limits import Limits
+from orchestration.foundation.processes.resource_limits import Limits
 from tests.fmus.archive import files_of, view_of
 from tests.fmus.damage import Damage, description, root, source, without, write_fmu
 from tests.fmus.foreign import lag, needs_compiler

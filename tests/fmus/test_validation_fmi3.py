@@ -14,7 +14,7 @@ from orchestration.components.checks.validation.validator import validate
 from orchestration.components.checks.validation.variables import arrays, bounds, names
 from orchestration.components.fmi.archive import UnreadableFmuError
 from orchestration.components.fmi.instance import start_value
-from orchestration.components.fmi.model import scalars_of
+from orchestration.components.fmi.read_description import scalars_of
 from tests.fmus.archive import files_of, view_of
 from tests.fmus.damage import DESCRIPTION, write_fmu
 from tests.fmus.making import PAIR

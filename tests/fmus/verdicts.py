@@ -10,7 +10,7 @@ from fmpy.validation import validate_fmu
 
 from orchestration.components.checks.validation.finding import Finding
 from orchestration.components.checks.validation.validator import validate
-from orchestration.foundation.processes.limits import Limits
+from orchestration.foundation.processes.resource_limits import Limits
 from tests.fmus.damage import Mutant
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
-from fmu_kit import model_description
-from fmu_kit.model_description import GUID_PLACEHOLDER, NATIVE_LOG_CATEGORIES
+from fmu_kit import write_description
 from fmu_kit.variables import Variable
+from fmu_kit.write_description import GUID_PLACEHOLDER, NATIVE_LOG_CATEGORIES
 
 TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration"}
 """Types of variables, by their names in FMI 2.0"""
@@ -20,7 +20,7 @@ def to_xml(slave: Any) -> Element:
     """
     root = Element(
         "fmiModelDescription",
-        {"fmiVersion": "3.0", "instantiationToken": GUID_PLACEHOLDER, **model_description.about(slave)},
+        {"fmiVersion": "3.0", "instantiationToken": GUID_PLACEHOLDER, **write_description.about(slave)},
     )
     SubElement(
         root,
@@ -34,12 +34,12 @@ def to_xml(slave: Any) -> Element:
         canHandleVariableCommunicationStepSize="true",
         hasEventMode="false",
     )
-    model_description.add_units(root, slave.variables)
-    model_description.add_types(
+    write_description.add_units(root, slave.variables)
+    write_description.add_types(
         root, slave.variables, lambda types, name: SubElement(types, "EnumerationType", name=name)
     )
-    model_description.add_log_categories(root, {**slave.log_categories, **NATIVE_LOG_CATEGORIES})
-    model_description.add_experiment(root, slave)
+    write_description.add_log_categories(root, {**slave.log_categories, **NATIVE_LOG_CATEGORIES})
+    write_description.add_experiment(root, slave)
     variables = SubElement(root, "ModelVariables")
     for value_reference, variable in enumerate(slave.variables):
         variables.append(_variable(variable, value_reference))
@@ -51,7 +51,7 @@ def to_xml(slave: Any) -> Element:
 def _variable(variable: Variable, value_reference: int) -> Element:
     return Element(
         TYPES[variable.type],
-        {**model_description.attributes(variable, value_reference), **model_description.type_attributes(variable)},
+        {**write_description.attributes(variable, value_reference), **write_description.type_attributes(variable)},
     )
 
 
@@ -69,7 +69,7 @@ def _time(value_reference: int) -> Element:
 
 def _add_structure(root: Element, slave: Any) -> None:
     structure = SubElement(root, "ModelStructure")
-    known = model_description.initial_dependencies(slave)
+    known = write_description.initial_dependencies(slave)
     for reference in known:
         SubElement(structure, "Output", valueReference=str(reference), dependencies="")
     for reference, needed in known.items():

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, tostring
 
-from fmu_kit import model_description
+from fmu_kit import write_description
 from fmu_kit.compiler.emit import description_3, terminals
 
 
@@ -50,7 +50,7 @@ STANDARDS = {
     2: Standard(
         version=2,
         main="fmi2.c",
-        describe=lambda slave, main: model_description.to_xml(slave, [main]),
+        describe=lambda slave, main: write_description.to_xml(slave, [main]),
         beside=lambda slave, main: {},
         calls={
             "SETUP_EXPERIMENT": "fmi2SetupExperiment",

@@ -31,8 +31,8 @@ from fmu_kit.compiler.runtime import FOLDER
 from fmu_kit.compiler.trace.errors import TraceError
 from fmu_kit.compiler.trace.tracing import Program, trace
 from fmu_kit.documentation import BuildNotes
-from fmu_kit.model_description import GUID_PLACEHOLDER
 from fmu_kit.packaging import add_description, insert_guid, licences_and_icon, origin, slave_class, write_fmu
+from fmu_kit.write_description import GUID_PLACEHOLDER
 
 BESIDE = ("instance.h", "integers.h", "lanes.c", "lanes.h", "mathematics.h", "text.h")
 """Source files beside the file to compile, the same for every slave."""

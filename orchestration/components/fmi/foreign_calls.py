@@ -5,11 +5,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
-from orchestration.components.fmi.model import read_model
+from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.basics.errors import SimulatorError
 from orchestration.foundation.processes import subprocesses
 from orchestration.foundation.processes.child import Child, Died
-from orchestration.foundation.processes.limits import UNLIMITED, Limits
+from orchestration.foundation.processes.resource_limits import UNLIMITED, Limits
 
 T = TypeVar("T")
 

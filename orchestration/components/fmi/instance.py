@@ -9,7 +9,7 @@ from typing import Any, Protocol, TypeAlias, TypeVar
 import numpy as np
 from fmpy.model_description import ModelDescription
 
-from orchestration.components.fmi.model import Kind, Model, Variable
+from orchestration.components.fmi.read_description import Kind, Model, Variable
 from orchestration.foundation.basics.errors import UsageError, expected_name, shown
 from orchestration.foundation.basics.simulator import Floats, Simulator
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from orchestration.components.fmi.instance import Instance, Value
-from orchestration.components.fmi.model import read_model
+from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.basics.errors import SimulatorError, StoppedStepError
 from orchestration.foundation.basics.simulator import Floats, Transfer
 from orchestration.foundation.processes import subprocesses

@@ -19,7 +19,7 @@ from fmpy.fmi1 import FMICallException
 
 from orchestration.components.fmi import slaves
 from orchestration.components.fmi.instance import Instance, Value, convert_value, same
-from orchestration.components.fmi.model import Variable, read_model
+from orchestration.components.fmi.read_description import Variable, read_model
 from orchestration.components.fmi.surroundings import FOLDER, ROUNDING, Surroundings, sentence
 from orchestration.components.fmi.transfers import Numbers, TransferCall, TransferLayout, TransferPart
 from orchestration.foundation.basics import scratch

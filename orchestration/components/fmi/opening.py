@@ -19,10 +19,10 @@ from fmu_kit.libraries import write_atomically
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.components.fmi.fmi3 import Fmi3Instance
 from orchestration.components.fmi.instance import Instance
-from orchestration.components.fmi.model import read_model
 from orchestration.components.fmi.native import NativeInstance
+from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.processes import subprocesses
-from orchestration.foundation.processes.limits import Limits
+from orchestration.foundation.processes.resource_limits import Limits
 
 _RULES = "2"
 """The version of the test; another one repeats all tests"""

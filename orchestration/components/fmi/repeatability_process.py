@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 
 from orchestration.components.fmi.instance import Value, start_number, within
-from orchestration.components.fmi.model import Variable
 from orchestration.components.fmi.native import NativeInstance
 from orchestration.components.fmi.opening import open_here
+from orchestration.components.fmi.read_description import Variable
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.processes.channel import Parent
-from orchestration.foundation.processes.limits import Limits, restrict
+from orchestration.foundation.processes.resource_limits import Limits, restrict
 
 _STEPS = 25
 _PARAMETERS = 200

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orchestration.components.fmi.instance import number_of
-from orchestration.components.fmi.model import Model, Variable
+from orchestration.components.fmi.read_description import Model, Variable
 from orchestration.foundation.basics.errors import SimulatorError
 from orchestration.foundation.basics.simulator import Floats
 

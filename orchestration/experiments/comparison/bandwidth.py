@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from orchestration.components.building import fmus
 from orchestration.components.fmi.foreign_calls import isolated_call
-from orchestration.components.fmi.model import read_model
+from orchestration.components.fmi.read_description import read_model
 from orchestration.experiments.comparison.crossovers import CROSSOVERS
 from orchestration.experiments.comparison.design import FMU, Comparison, Controller, VehicleEntry
 from orchestration.experiments.studies.axes import Value

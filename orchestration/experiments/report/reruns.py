@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from orchestration.components.fmi.model import Model
+from orchestration.components.fmi.read_description import Model
 from orchestration.experiments.report.known_layouts import layout_for
 from orchestration.experiments.report.subset import Progress
 from orchestration.experiments.report.tracks import Signals

@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import Any
 
 from orchestration.components.building.fmus import look_up, python_twin, python_twins
-from orchestration.components.fmi.model import Model, Variable
+from orchestration.components.fmi.read_description import Model, Variable
 from orchestration.simulation.workers.batching import TOLERATED, LaneAgreement, Pair, sample
 from orchestration.simulation.workers.executors import TaskRunner
 from orchestration.simulation.workers.row import Row

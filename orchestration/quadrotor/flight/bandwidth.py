@@ -6,7 +6,7 @@ from typing import cast
 import numpy as np
 
 from orchestration.components.building import fmus
-from orchestration.components.fmi.model import read_model
+from orchestration.components.fmi.read_description import read_model
 from orchestration.components.fmi.reuse import Instances
 from orchestration.quadrotor.flight.hover import at_hover
 from orchestration.quadrotor.scenarios import wiring

@@ -61,7 +61,7 @@ def _vehicle(name: str, tables: dict[str, Any]) -> Vehicle:
 def _expect_parameters(fmu: str, parameters: Mapping[str, Parameter], folder: Path) -> None:
     """Raise `UsageError` for an invalid parameter of a controller, also of one that this flight does not use."""
     from orchestration.components.building.fmus import locate  # not before: a vehicle is also made where no FMU is read
-    from orchestration.components.fmi.model import read_model
+    from orchestration.components.fmi.read_description import read_model
     from orchestration.systems.system.check import expect_parameter
 
     model = read_model(locate(str(folder / fmu) if fmu.endswith(".fmu") else fmu))

@@ -31,7 +31,7 @@ from orchestration.simulation.engines.memory import Allocator, SharedTables, all
 from orchestration.simulation.engines.run_structures import RunStructures
 from orchestration.simulation.engines.running_system import RunningSystem, Terminated
 from orchestration.simulation.engines.structures import HEADER, ONE_LANE, address, declared, expect_same_sizes, shared
-from orchestration.systems.schedule.schedule import Schedule
+from orchestration.systems.schedule.instant_arrays import Schedule
 
 INSTANTS = Path(__file__).with_name("instants.h")
 """C of what happens at an instant, for runs of FMUs and of kernels in SIMD lanes"""

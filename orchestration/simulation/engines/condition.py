@@ -12,7 +12,7 @@ from typing import TypeAlias
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.engines.sources import SourceValues
 from orchestration.simulation.engines.structures import constants
-from orchestration.simulation.engines.wires import Board
+from orchestration.simulation.engines.wiring_by_index import Board
 from orchestration.systems.expressions.at_instant import Current, compiled, scalars
 from orchestration.systems.expressions.operators import OPERATORS
 from orchestration.systems.expressions.syntax import Call, Name, Node, Number, Operation, names, parse, text

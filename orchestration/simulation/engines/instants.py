@@ -46,7 +46,7 @@ from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.foundation.recording.recording import ARRIVED, LOST, SAMPLED, SENT, Recorder
 from orchestration.simulation.engines.backlog import Backlog, ListTables, events_of_a_chunk, rows_of_a_chunk
 from orchestration.simulation.engines.running_system import RunningSystem, SampledComponent, Terminated
-from orchestration.systems.schedule.schedule import Message, SampleInstant
+from orchestration.systems.schedule.instant_arrays import Message, SampleInstant
 
 
 class PythonLoop:

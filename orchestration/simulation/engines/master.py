@@ -16,14 +16,14 @@ from orchestration.foundation.basics.times import nanoseconds, seconds
 from orchestration.foundation.recording.recording import Chunk, Recorder
 from orchestration.simulation.engines import initial
 from orchestration.simulation.engines.backlog import Backlog
-from orchestration.simulation.engines.channel import Channel
 from orchestration.simulation.engines.compiled import CompiledLoop, reason_unavailable
 from orchestration.simulation.engines.condition import NEVER, Condition
+from orchestration.simulation.engines.connection_hold import Channel
 from orchestration.simulation.engines.feeds import Feed
 from orchestration.simulation.engines.instants import PythonLoop
 from orchestration.simulation.engines.memory import Allocator
 from orchestration.simulation.engines.running_system import Diverged, RunningSystem, Sources, Terminated
-from orchestration.simulation.engines.wires import clock_of
+from orchestration.simulation.engines.wiring_by_index import clock_of
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.model import System

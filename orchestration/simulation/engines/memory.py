@@ -14,7 +14,7 @@ from orchestration.foundation.basics.times import nanoseconds
 from orchestration.simulation.engines.backlog import events_of_a_chunk, rows_of_a_chunk
 from orchestration.simulation.engines.running_system import RunningSystem
 from orchestration.simulation.engines.structures import ONE_LANE, address
-from orchestration.systems.schedule.schedule import Schedule
+from orchestration.systems.schedule.instant_arrays import Schedule
 
 LOOP, ROWS, EVENTS = "loop", "rows", "events"
 Bytes = npt.NDArray[np.uint8]

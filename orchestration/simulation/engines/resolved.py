@@ -9,7 +9,7 @@ from fmu_kit.trajectory import Trajectory
 from orchestration.components.building import fmus
 from orchestration.components.fmi.instance import number_of
 from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD, TRAJECTORY
-from orchestration.components.fmi.model import NUMERIC, Model, read_model
+from orchestration.components.fmi.read_description import NUMERIC, Model, read_model
 from orchestration.foundation.basics.errors import UsageError, at_place
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import Grid, exact_nanoseconds

@@ -9,7 +9,7 @@ import numpy as np
 from orchestration.components.fmi.native import NativeInstance
 from orchestration.components.fmi.transfers import TransferCall, range_of
 from orchestration.foundation.basics.simulator import Floats, Transfer
-from orchestration.simulation.engines.channel import of_each
+from orchestration.simulation.engines.connection_hold import of_each
 from orchestration.simulation.engines.feeds import Feed
 from orchestration.simulation.engines.running_system import RunningSystem, SampledComponent
 from orchestration.simulation.engines.structures import ONE_LANE, SystemStructures

@@ -12,12 +12,12 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import SimulatorError, StoppedStepError
 from orchestration.foundation.basics.simulator import Floats, Simulator, Transfer
-from orchestration.simulation.engines.channel import Channel
 from orchestration.simulation.engines.condition import Condition
+from orchestration.simulation.engines.connection_hold import Channel
 from orchestration.simulation.engines.feeds import Feed
 from orchestration.simulation.engines.sources import SourceValues
-from orchestration.simulation.engines.wires import Wires
-from orchestration.systems.schedule.schedule import Cursor, Schedule
+from orchestration.simulation.engines.wiring_by_index import Wires
+from orchestration.systems.schedule.instant_arrays import Cursor, Schedule
 from orchestration.systems.schedule.streams import NOISE, Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.connection import variable_of

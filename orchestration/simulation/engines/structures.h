@@ -21,7 +21,7 @@ enum { REAL, TRUTH, WHOLE };
 /* The events of a message, as in recording.py; MEASURED is not recorded. */
 enum { SAMPLED, SENT, ARRIVED, LOST, MEASURED };
 
-/* -- schedules, as in orchestration/systems/schedule/schedule.py ----------------------------------------------------------- */
+/* -- schedules, as in orchestration/systems/schedule/instant_arrays.py ----------------------------------------------------------- */
 
 typedef struct {
     int64_t connection, k, sent, arrival; /* arrival -1: lost */

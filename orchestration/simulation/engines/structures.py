@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orchestration.foundation.basics.errors import QuadcosimError
-from orchestration.simulation.engines.wires import Wires
+from orchestration.simulation.engines.wiring_by_index import Wires
 
 HEADER = Path(__file__).with_name("structures.h")
 _SCALARS: Mapping[str, Any] = {

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from orchestration.components.fmi.model import Kind
+from orchestration.components.fmi.read_description import Kind
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.interop.job import End
 from orchestration.simulation.requests.ssp.export import Export

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from fmu_kit.archive import write_archive
 from fmu_kit.loader import PLATFORM, compiler
-from orchestration.components.fmi.model import Kind, Model, read_model
+from orchestration.components.fmi.read_description import Kind, Model, read_model
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.simulation.interop.assignment import Ports
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.components.fmi.instance import number_of
-from orchestration.components.fmi.model import read_model
+from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.simulation.interop.assignment import AssignedLoop
 from orchestration.simulation.interop.copies import log_of

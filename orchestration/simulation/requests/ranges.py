@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from orchestration.components.fmi.model import Model
+from orchestration.components.fmi.read_description import Model
 from orchestration.foundation.basics.bisection import Range
 from orchestration.foundation.basics.errors import UsageError, expected_name
 from orchestration.foundation.basics.unit_algebra import after

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TypeAlias
 
-from orchestration.components.fmi.model import Model
+from orchestration.components.fmi.read_description import Model
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.unit_algebra import METRE, NUMBER, SECOND, Operand, Unit, agreed
 from orchestration.systems.expressions import syntax

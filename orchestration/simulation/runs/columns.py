@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestration.components.fmi.model import Model
+from orchestration.components.fmi.read_description import Model
 from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.systems.system.check import check_parameter

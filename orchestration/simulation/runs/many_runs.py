@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from orchestration.components.building import fmus
-from orchestration.components.fmi.model import Model, read_model
+from orchestration.components.fmi.read_description import Model, read_model
 from orchestration.foundation.basics.errors import Named, QuadcosimError, UsageError, expected_name
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.engines.batch.batch import MAX_ROWS

@@ -10,7 +10,7 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import nanoseconds
-from orchestration.foundation.processes.limits import Limits
+from orchestration.foundation.processes.resource_limits import Limits
 from orchestration.foundation.recording.recording import InMemory, Recorder
 from orchestration.foundation.recording.tables import InFolder, ToFolder
 from orchestration.simulation.engines.master import Engine

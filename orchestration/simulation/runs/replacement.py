@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from orchestration.components.building import fmus
-from orchestration.components.fmi.model import Model, read_model
+from orchestration.components.fmi.read_description import Model, read_model
 from orchestration.foundation.basics.errors import UsageError, expected_name
 from orchestration.simulation.engines.resolved import ResolvedRequest, check_against_fmus
 from orchestration.systems.system.connection import component_of, variable_of

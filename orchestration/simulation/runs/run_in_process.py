@@ -11,7 +11,7 @@ from orchestration.foundation.basics.interrupt import deferred_interrupts
 from orchestration.foundation.basics.times import nanoseconds
 from orchestration.foundation.processes import subprocesses
 from orchestration.foundation.processes.child import Child, Died
-from orchestration.foundation.processes.limits import UNLIMITED
+from orchestration.foundation.processes.resource_limits import UNLIMITED
 from orchestration.foundation.recording.recording import Chunk, Recorder
 from orchestration.simulation.engines.backlog import RunEvents
 from orchestration.simulation.engines.master import Engine

@@ -4,7 +4,7 @@ import time
 from typing import TYPE_CHECKING, Any, overload
 
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.processes.limits import Limits
+from orchestration.foundation.processes.resource_limits import Limits
 from orchestration.foundation.recording.recording import InMemory, Recorder
 from orchestration.simulation.engines.master import Engine
 from orchestration.simulation.engines.resolved import Announce, resolve

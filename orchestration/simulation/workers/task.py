@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from orchestration.components.fmi.instance import Instance
-from orchestration.components.fmi.model import read_model
+from orchestration.components.fmi.read_description import read_model
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError
 from orchestration.simulation.engines.master import Engine

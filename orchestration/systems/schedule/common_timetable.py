@@ -13,8 +13,8 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Booleans, Integers
 from orchestration.foundation.basics.times import Grid, exact_nanoseconds, nanoseconds
 from orchestration.systems.schedule.fixed_step import FixedStep, in_seconds
+from orchestration.systems.schedule.instant_arrays import Schedule
 from orchestration.systems.schedule.plan import Plan, expect_no_longer
-from orchestration.systems.schedule.schedule import Schedule
 from orchestration.systems.system.component import has_scheduled_instants
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System

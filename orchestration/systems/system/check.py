@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from orchestration.components.fmi.instance import convert_value
 from orchestration.components.fmi.kit import TRAJECTORY, USE_REFERENCE_INPUTS
-from orchestration.components.fmi.model import NUMERIC, Model, Variable
+from orchestration.components.fmi.read_description import NUMERIC, Model, Variable
 from orchestration.foundation.basics.errors import UsageError, did_you_mean, expected_name, listed
 from orchestration.systems.expressions.syntax import Name, names, parse, parts
 from orchestration.systems.system.component import Parameter

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from orchestration.components.fmi.model import Kind, Model, Variable
+from orchestration.components.fmi.read_description import Kind, Model, Variable
 from orchestration.foundation.basics.unit_algebra import BaseUnits
 
 BECOMES: dict[Kind, tuple[Kind, ...]] = {

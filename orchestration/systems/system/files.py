@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from orchestration.components.building import fmus
-from orchestration.components.fmi.model import Model, read_model
+from orchestration.components.fmi.read_description import Model, read_model
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.basics.records import replaced
 from orchestration.systems.system.component import Component

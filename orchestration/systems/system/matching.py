@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from orchestration.components.fmi.model import NUMERIC, Model, Variable
+from orchestration.components.fmi.read_description import NUMERIC, Model, Variable
 from orchestration.systems.system.conversion import BECOMES, Conversion, OtherQuantity, conversion
 
 NOISE = frozenset(

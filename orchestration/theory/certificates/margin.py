@@ -172,7 +172,7 @@ def _of_times(timeline: LoopTimeline, varying: Varying, progress: Share) -> Cert
 
 
 def _of_losses(timeline: LoopTimeline, varying: Varying, progress: Share) -> Certified:
-    from orchestration.theory.certificates.certify import find_certificate
+    from orchestration.theory.certificates.find_certificate import find_certificate
 
     searched = (
         f"sequences that repeat after at most the run and {LONGEST_SEQUENCE // 2} messages, runs up to {MOST_LOST}"
@@ -224,7 +224,7 @@ def largest_certified(
     shares: Sequence[float] | None = None,
 ) -> tuple[float | None, str | None]:
     """The largest value below `top` with a certificate, and that certificate; None where even 0 has none."""
-    from orchestration.theory.certificates.certify import find_certificate
+    from orchestration.theory.certificates.find_certificate import find_certificate
 
     first, *more = shares or SHARES
     best: tuple[float | None, str | None] = (None, None)

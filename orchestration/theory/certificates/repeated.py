@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
-from orchestration.components.fmi.model import Model
+from orchestration.components.fmi.read_description import Model
 from orchestration.foundation.basics.bisection import bisected
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import NANOSECONDS

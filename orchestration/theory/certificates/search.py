@@ -10,7 +10,7 @@ import numpy as np
 
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.theory.certificates.certificate import Certificate, Node
-from orchestration.theory.certificates.checker import edges_of
+from orchestration.theory.certificates.verify_certificate import edges_of
 
 FALL = 1e-7
 """Least fall of a form, relative to the largest one: a smaller one counts as none"""

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from orchestration.components.fmi.foreign_calls import isolated_call
-from orchestration.components.fmi.model import Model
+from orchestration.components.fmi.read_description import Model
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.systems.system.files import Files
 from orchestration.systems.system.model import System

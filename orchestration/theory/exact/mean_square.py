@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from orchestration.components.fmi.model import Model
+from orchestration.components.fmi.read_description import Model
 from orchestration.foundation.basics.bisection import Range, first_failure
 from orchestration.foundation.basics.errors import SimulatorError, UsageError
 from orchestration.simulation.requests.ranges import Varied

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from orchestration.components.fmi.model import Model
+from orchestration.components.fmi.read_description import Model
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.systems.expressions.syntax import Call, names
 from orchestration.systems.system.check import AT_REST

@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 
 from orchestration.components.fmi.instance import Instance, Loader
-from orchestration.components.fmi.model import Model
+from orchestration.components.fmi.read_description import Model
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats, Transfer

@@ -14,7 +14,7 @@ from pathlib import Path
 from orchestration.components.checks.validation import confined_process, description, rules, run_rules, structure
 from orchestration.components.checks.validation.finding import Rule, Subject, name_of
 from orchestration.components.checks.validation.progress import Frame, ReceivedReport, Reporter
-from orchestration.foundation.processes.limits import Limits
+from orchestration.foundation.processes.resource_limits import Limits
 from tests.fmus.damage import Mutant
 from tests.fmus.mutants import MUTANTS
 from tests.fmus.process import in_a_copy

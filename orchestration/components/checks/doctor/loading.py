@@ -18,7 +18,7 @@ from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.foundation.processes import subprocesses
 from orchestration.foundation.processes.channel import Parent
 from orchestration.foundation.processes.child import Child, Ending
-from orchestration.foundation.processes.limits import Limits, restrict
+from orchestration.foundation.processes.resource_limits import Limits, restrict
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,7 +12,7 @@ from orchestration.components.checks.doctor.loading import Trial, try_loading
 from orchestration.components.checks.doctor.machine import Library, Machine, this_machine
 from orchestration.components.checks.doctor.verdict import UnexaminedFmu, Verdict, judge
 from orchestration.components.fmi.archive import OtherVersionError
-from orchestration.foundation.processes.limits import Limits
+from orchestration.foundation.processes.resource_limits import Limits
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,11 +18,11 @@ from orchestration.components.checks.validation.probe import Probe
 from orchestration.components.checks.validation.progress import Reporter
 from orchestration.components.checks.validation.structure import indices
 from orchestration.components.fmi.archive import DESCRIPTION, UnreadableFmuError, read_archive, read_root
-from orchestration.components.fmi.model import Model, read_model
+from orchestration.components.fmi.read_description import Model, read_model
 from orchestration.components.fmi.slaves import FOLDERS, expect_readable_place
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.processes.channel import Parent
-from orchestration.foundation.processes.limits import Limits, restrict
+from orchestration.foundation.processes.resource_limits import Limits, restrict
 
 READABLE, PLATFORM = "readable", "platform"
 """Rules of this module: the FMU is readable, and this machine can run it"""

@@ -13,7 +13,7 @@ from orchestration.components.checks.validation.instance import CheckedInstance,
 from orchestration.components.checks.validation.probe import Probe
 from orchestration.components.checks.validation.run_comparison import same
 from orchestration.components.fmi.instance import start_value
-from orchestration.components.fmi.model import Variable
+from orchestration.components.fmi.read_description import Variable
 from orchestration.foundation.basics.errors import SimulatorError
 
 MAX_SWITCHES = 16

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from orchestration.components.checks.validation.instance import Value, Values
 from orchestration.components.fmi.instance import start_number, start_value, within
-from orchestration.components.fmi.model import Variable
+from orchestration.components.fmi.read_description import Variable
 
 STEPS = 100
 """communication steps of a run"""

@@ -10,7 +10,7 @@ from fmpy.model_description import ModelDescription, ModelVariable
 
 from fmu_kit.archive import SOURCE_HASH_FILE
 from orchestration.components.fmi.archive import Archive, UnreadableFmuError
-from orchestration.components.fmi.model import attribute, kind_of, read_description, starts_of
+from orchestration.components.fmi.read_description import attribute, kind_of, read_description, starts_of
 from orchestration.components.fmi.slaves import binary_folders
 from orchestration.foundation.basics.errors import UsageError
 

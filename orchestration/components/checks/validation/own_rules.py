@@ -12,7 +12,7 @@ from orchestration.components.checks.validation.fmu import Fmu
 from orchestration.components.checks.validation.roles import ROLES
 from orchestration.components.checks.validation.units import dimensions
 from orchestration.components.fmi.archive import TOKENS
-from orchestration.components.fmi.model import attribute, kind_of, starts_of
+from orchestration.components.fmi.read_description import attribute, kind_of, starts_of
 
 PAGE = "documentation/index.html"
 _PNG = b"\x89PNG\r\n\x1a\n"

@@ -18,7 +18,7 @@ from orchestration.components.checks.validation.excitation import (
 from orchestration.components.checks.validation.fmu import Fmu, is_clocked
 from orchestration.components.checks.validation.instance import CheckedInstance, Row, Value, instance_of
 from orchestration.components.checks.validation.run_comparison import deviations, difference
-from orchestration.components.fmi.model import Model, Variable
+from orchestration.components.fmi.read_description import Model, Variable
 from orchestration.components.fmi.slaves import Message
 from orchestration.foundation.basics.errors import SimulatorError
 from orchestration.foundation.processes.waiting import own_clock

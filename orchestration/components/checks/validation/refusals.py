@@ -7,7 +7,7 @@ from orchestration.components.checks.validation.excitation import PLAIN
 from orchestration.components.checks.validation.instance import Value
 from orchestration.components.checks.validation.probe import Probe
 from orchestration.components.fmi.instance import start_value
-from orchestration.components.fmi.model import Variable
+from orchestration.components.fmi.read_description import Variable
 from orchestration.foundation.basics.errors import SimulatorError
 
 

@@ -12,7 +12,7 @@ from orchestration.components.checks.validation.instance import Row, Value
 from orchestration.components.checks.validation.probe import MIN_STEPS, Probe
 from orchestration.components.checks.validation.run_comparison import same
 from orchestration.components.fmi.instance import start_value
-from orchestration.components.fmi.model import Variable
+from orchestration.components.fmi.read_description import Variable
 from orchestration.components.fmi.slaves import WARNING
 from orchestration.foundation.basics.errors import SimulatorError
 

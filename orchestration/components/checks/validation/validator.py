@@ -8,7 +8,7 @@ from orchestration.components.checks.validation.progress import ReceivedReport
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.processes import subprocesses
 from orchestration.foundation.processes.child import Child, Ending
-from orchestration.foundation.processes.limits import Limits
+from orchestration.foundation.processes.resource_limits import Limits
 
 PROCESS = "process"
 """Rule of this module: the process of the FMU reaches its end"""

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from fmpy.model_description import ModelVariable
 
 from orchestration.components.checks.validation.fmu import NUMBERS, Fmu
-from orchestration.components.fmi.model import attribute, kind_of, starts_of
+from orchestration.components.fmi.read_description import attribute, kind_of, starts_of
 
 _QUOTED = r"""'(?:[0-9A-Za-z_!#$%&()*+,\-./:;<>=?@\[\]^{}|~ ]|\\['"?\\abfnrtv])+'"""
 _PART = rf"(?:[A-Za-z_][0-9A-Za-z_]*|{_QUOTED})(?:\[[0-9]+(?:,[0-9]+)*\])?"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestration.components.fmi.model import read_model
+from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import seconds
 from orchestration.simulation.engines.batch.batch import Batch, BatchResult, Group

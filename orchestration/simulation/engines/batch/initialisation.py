@@ -12,10 +12,10 @@ from orchestration.simulation.engines.batch.arrays import BatchArrays
 from orchestration.simulation.engines.batch.batch_structures import BatchStructures
 from orchestration.simulation.engines.batch.run_numbers import RunNumbers, end_of
 from orchestration.simulation.engines.batch.shape import Shape
-from orchestration.simulation.engines.channel import of_each
+from orchestration.simulation.engines.connection_hold import of_each
 from orchestration.simulation.engines.sources import SourceValues
 from orchestration.simulation.engines.structures import address
-from orchestration.simulation.engines.wires import clock_of
+from orchestration.simulation.engines.wiring_by_index import clock_of
 from orchestration.systems.expressions.syntax import Call
 from orchestration.systems.system.model import System
 

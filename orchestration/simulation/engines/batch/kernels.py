@@ -13,7 +13,7 @@ from fmu_kit.compiler.pack.c_compiler import FOR_THIS_PROCESSOR, OPTIONS, compil
 from fmu_kit.compiler.pack.lanes import MAIN, Lanes, compiled_lanes
 from fmu_kit.compiler.pack.lanes import preferred_lanes as lanes_of_fmus
 from fmu_kit.compiler.runtime import FOLDER
-from orchestration.components.fmi.model import Model
+from orchestration.components.fmi.read_description import Model
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.simulation.engines.compiled import INSTANTS
 from orchestration.simulation.engines.structures import HEADER, expect_same_sizes, shared

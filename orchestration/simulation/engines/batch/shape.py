@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fmu_kit.compiler.pack.lanes import Lanes
-from orchestration.components.fmi.model import Model, Variable
+from orchestration.components.fmi.read_description import Model, Variable
 from orchestration.foundation.basics.identity import IdentityCache
 from orchestration.foundation.basics.simulator import Booleans
 from orchestration.simulation.engines import initial
@@ -18,7 +18,7 @@ from orchestration.simulation.engines.batch.code import ExpressionCode, expressi
 from orchestration.simulation.engines.batch.kernels import batch, component, preferred_lanes
 from orchestration.simulation.engines.batch.writing import Kind, Leaf
 from orchestration.simulation.engines.structures import ONE_LANE
-from orchestration.simulation.engines.wires import Board, Wires
+from orchestration.simulation.engines.wiring_by_index import Board, Wires
 from orchestration.simulation.results.objectives import GOOD
 from orchestration.systems.expressions.at_instant import scalars
 from orchestration.systems.expressions.over_run import STOP_TIME, TIME, inlined, reductions, vectors

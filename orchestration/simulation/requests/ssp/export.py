@@ -6,7 +6,7 @@ from pathlib import Path
 
 from orchestration.components.building import fmus
 from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
-from orchestration.components.fmi.model import Model, Variable, read_model
+from orchestration.components.fmi.read_description import Model, Variable, read_model
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.engines.resolved import source_values
 from orchestration.systems.schedule.plan import Plan

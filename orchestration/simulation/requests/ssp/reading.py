@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
-from orchestration.components.fmi.model import Model, read_model
+from orchestration.components.fmi.read_description import Model, read_model
 from orchestration.foundation.basics.errors import UsageError, listed
 from orchestration.foundation.basics.unit_algebra import BaseUnits
 from orchestration.simulation.requests.ssp.archive import open_package

@@ -12,10 +12,10 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from fmu_kit.archive import write_archive
-from fmu_kit.model_description import generation_date
 from fmu_kit.units import BASE
 from fmu_kit.versions import generation_tool
-from orchestration.components.fmi.model import Kind, Variable
+from fmu_kit.write_description import generation_date
+from orchestration.components.fmi.read_description import Kind, Variable
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.requests.ssp import timing
 from orchestration.simulation.requests.ssp.document import add, document, element

@@ -14,7 +14,7 @@ from fmu_kit.bundle import Target, bundled_sources
 from orchestration.components.building import builder, fmus
 from orchestration.components.building.models import MODELS
 from orchestration.components.fmi.fmi2 import Fmi2Instance
-from orchestration.components.fmi.model import read_model
+from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.processes import subprocesses
 from quadcosim import QuadcosimError, UsageError
 

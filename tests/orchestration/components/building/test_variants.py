@@ -9,7 +9,7 @@ from fmpy.validation import validate_fmu
 from orchestration.command.variant_flags import VariantFlags
 from orchestration.components.building import builder, fmus
 from orchestration.components.checks.validation.validator import validate
-from orchestration.components.fmi.model import read_model
+from orchestration.components.fmi.read_description import read_model
 from orchestration.quadrotor.scenarios.vehicle import load_vehicle
 from orchestration.simulation.interop.catalogue import chosen
 from orchestration.simulation.interop.compare import agreements

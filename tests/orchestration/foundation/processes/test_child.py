@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from orchestration.foundation.processes.child import Child, Died, Ending
-from orchestration.foundation.processes.limits import UNLIMITED, Limits
+from orchestration.foundation.processes.resource_limits import UNLIMITED, Limits
 from tests.patience import PATIENCE
 
 linux_only = pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="no /proc")
@@ -102,7 +102,7 @@ def test_the_memory_of_what_a_process_has_started_counts(tmp_path: Path) -> None
 
 
 def test_no_file_may_grow_beyond_its_limit(tmp_path: Path) -> None:
-    program = "import sys; from orchestration.foundation.processes.limits import restrict; restrict(1.0)\n" + (
+    program = "import sys; from orchestration.foundation.processes.resource_limits import restrict; restrict(1.0)\n" + (
         "with open(sys.argv[1], 'wb') as file: file.write(bytes(2_000_000))"
     )
     assert "File too large" in python(program, tmp_path / "file").last_line
@@ -122,7 +122,7 @@ def test_the_system_limits_a_process_whose_parent_is_killed() -> None:
 UNDER_A_LIMIT = """
 import resource, sys
 from orchestration.foundation.processes.child import Child
-from orchestration.foundation.processes.limits import Limits
+from orchestration.foundation.processes.resource_limits import Limits
 resource.setrlimit(resource.RLIMIT_CPU, ({soft}, {hard}))
 with Child([sys.executable, "-c", sys.argv[1]], limits=Limits()) as child:
     child.send("limited")
@@ -291,7 +291,7 @@ def test_an_allowance_of_time_counts_from_when_it_is_given(child: Callable[..., 
 NESTED = """
 import sys
 from orchestration.foundation.processes.child import Child
-from orchestration.foundation.processes.limits import Limits
+from orchestration.foundation.processes.resource_limits import Limits
 parent.receive()
 sleep = [sys.executable, "-c", "import time; time.sleep(3.0)"]
 with Child(sleep, limits=Limits(time=60.0), communicates=False) as inner:

@@ -11,7 +11,7 @@ import pytest
 
 from orchestration.foundation.processes import fork_server, subprocesses
 from orchestration.foundation.processes.child import Child
-from orchestration.foundation.processes.limits import Limits
+from orchestration.foundation.processes.resource_limits import Limits
 from tests.orchestration.foundation.processes.test_child import gone
 from tests.patience import PATIENCE
 

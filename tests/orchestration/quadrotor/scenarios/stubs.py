@@ -17,7 +17,7 @@ from orchestration.quadrotor.scenarios.wiring import COMMAND, MEASUREMENT, POSIT
 from orchestration.simulation.engines.condition import Condition
 from orchestration.simulation.engines.master import Master
 from orchestration.simulation.engines.sources import ConstantValues, SourceValues
-from orchestration.systems.schedule.schedule import Cursor
+from orchestration.systems.schedule.instant_arrays import Cursor
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 

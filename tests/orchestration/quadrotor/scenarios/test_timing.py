@@ -19,8 +19,8 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import Grid, nanoseconds
 from orchestration.quadrotor.scenarios.timing import TIMING_KEYS, Timing
 from orchestration.quadrotor.scenarios.translation import quadrotor
-from orchestration.systems.schedule import schedule
-from orchestration.systems.schedule.schedule import INSTANTS, Cursor
+from orchestration.systems.schedule import instant_arrays
+from orchestration.systems.schedule.instant_arrays import INSTANTS, Cursor
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.system.distribution import highest
 from quadcosim import Scenario
@@ -313,7 +313,7 @@ def test_a_timetable_made_again_and_moved_on_continues_identically(case: Case, d
     before = list(itertools.islice(stubs.instants_of(first), at))
     assert first.past == at
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(schedule, "INSTANTS", size)
+        patch.setattr(instant_arrays, "INSTANTS", size)
         passed = list(again.move_to(at))
         assert again.past == sum(map(len, passed)) == at
         assert before + list(stubs.instants_of(again)) == whole

@@ -21,9 +21,9 @@ from hypothesis import strategies as st
 
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.components.fmi.instance import Instance
-from orchestration.components.fmi.model import read_model
 from orchestration.components.fmi.native import NativeInstance
 from orchestration.components.fmi.opening import open_here
+from orchestration.components.fmi.read_description import read_model
 from orchestration.components.fmi.transfers import range_of
 from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError
 from orchestration.foundation.basics.times import Grid, exact_nanoseconds
@@ -35,7 +35,7 @@ from orchestration.simulation.runs.outcome import RunInterrupted
 from orchestration.simulation.runs.pause import resume, run_until
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.simulation.runs.result import Result
-from orchestration.systems.schedule import schedule
+from orchestration.systems.schedule import instant_arrays
 from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.file import load_system
@@ -113,7 +113,7 @@ def expect_that_a_pause_changes_nothing(
     first, then = engines
     whole = ran(system, "python", load=load)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(schedule, "INSTANTS", size)
+        patch.setattr(instant_arrays, "INSTANTS", size)
         with prepared(system, engine=first, load=load) as run:
             run.master.initialise()
             if run.master.run(pause_at=int(share * 1e9 * system.stop_time)):
@@ -140,7 +140,7 @@ def test_random_systems_run_the_same_in_schedules_of_any_length(
     fmu: Path, kept: Kept, what: System, instants: int
 ) -> None:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(schedule, "INSTANTS", instants)
+        patch.setattr(instant_arrays, "INSTANTS", instants)
         both(of(what, fmu), load=kept.load)
 
 
@@ -324,7 +324,7 @@ def test_a_run_that_one_engine_pauses_another_ends(first: Any, then: Any, fmu: P
 
 
 @settings(max_examples=30, derandomize=True, deadline=None)
-@given(systems(most=4), st.floats(0.0, 1.0), st.tuples(ENGINES, ENGINES), st.sampled_from((5, schedule.INSTANTS)))
+@given(systems(most=4), st.floats(0.0, 1.0), st.tuples(ENGINES, ENGINES), st.sampled_from((5, instant_arrays.INSTANTS)))
 def test_random_systems_go_on_from_a_pause_as_if_there_was_none(
     fmu: Path, kept: Kept, what: System, share: float, engines: tuple[Any, Any], size: int
 ) -> None:

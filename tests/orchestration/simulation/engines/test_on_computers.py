@@ -16,7 +16,7 @@ from orchestration.foundation.recording.recording import KINDS
 from orchestration.simulation.engines.batch.batches import Batches
 from orchestration.simulation.runs.pause import resume, run_until
 from orchestration.simulation.runs.run_directory import load_run
-from orchestration.systems.schedule import schedule
+from orchestration.systems.schedule import instant_arrays
 from orchestration.systems.schedule.resources import timeline_of
 from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.computers import Computer, Message, Network, Task
@@ -60,13 +60,16 @@ def test_random_systems_on_computers_run_the_same_in_schedules_of_any_length(
 ) -> None:
     whole = ran(of(what, fmu), "python", load=kept.load)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(schedule, "INSTANTS", instants)
+        patch.setattr(instant_arrays, "INSTANTS", instants)
         assert_the_same(both(of(what, fmu), load=kept.load), whole)
 
 
 @settings(max_examples=30, derandomize=True, deadline=None)
 @given(
-    systems_on_computers(), st.floats(0.0, 1.0), st.tuples(ENGINES, ENGINES), st.sampled_from((5, schedule.INSTANTS))
+    systems_on_computers(),
+    st.floats(0.0, 1.0),
+    st.tuples(ENGINES, ENGINES),
+    st.sampled_from((5, instant_arrays.INSTANTS)),
 )
 def test_systems_on_computers_go_on_from_a_pause_as_if_there_was_none(
     fmu: Path, kept: Kept, what: System, share: float, engines: tuple[Any, Any], size: int

@@ -21,7 +21,7 @@ from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.quadrotor.scenarios.translation import quadrotor
 from orchestration.quadrotor.scenarios.wiring import MEASUREMENT
 from orchestration.simulation.engines.master import Master
-from orchestration.systems.schedule import schedule as position
+from orchestration.systems.schedule import instant_arrays as position
 from orchestration.systems.schedule.fixed_step import FixedStep
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable

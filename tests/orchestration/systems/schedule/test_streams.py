@@ -7,7 +7,7 @@ from hypothesis import given, settings
 
 from orchestration.foundation.recording.recording import InMemory
 from orchestration.simulation.engines.master import Master
-from orchestration.systems.schedule.schedule import Cursor
+from orchestration.systems.schedule.instant_arrays import Cursor
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from tests.orchestration.simulation.engines.random_systems import systems_with_more

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.systems.schedule import schedule
-from orchestration.systems.schedule.schedule import Cursor
+from orchestration.systems.schedule import instant_arrays
+from orchestration.systems.schedule.instant_arrays import Cursor
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.component import Component, SamplingOnArrival
@@ -190,7 +190,7 @@ def test_windows_of_any_length_are_one_schedule(monkeypatch):
     )  # fmt: skip
     found = instants(what)
     for size in (1, 7, 11, 100):
-        monkeypatch.setattr(schedule, "INSTANTS", size)
+        monkeypatch.setattr(instant_arrays, "INSTANTS", size)
         assert instants(what) == found
 
 

@@ -6,10 +6,10 @@ import pytest
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import Grid, exact_nanoseconds
-from orchestration.systems.schedule import schedule
+from orchestration.systems.schedule import instant_arrays
 from orchestration.systems.schedule.fixed_step import FixedStep
+from orchestration.systems.schedule.instant_arrays import Cursor
 from orchestration.systems.schedule.plan import MAX_TIME
-from orchestration.systems.schedule.schedule import Cursor
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.paths import changed
@@ -127,8 +127,8 @@ def test_between_two_points_of_a_fixed_step_is_an_error_that_names_them():
 def test_the_error_comes_when_all_instants_before_it_are_past(monkeypatch):
     what = loop(sampled(0.2), command={"delay": 0.03, "loss": 0.5}, stop_time=2.0, seed=5)
     first = next(time for time in instants(what) if time.arrivals).time
-    for size in (1, 3, schedule.INSTANTS):
-        monkeypatch.setattr(schedule, "INSTANTS", size)
+    for size in (1, 3, instant_arrays.INSTANTS):
+        monkeypatch.setattr(instant_arrays, "INSTANTS", size)
         begun = Cursor(Timetable(what, Streams(what.seed), fixed_plant(False)))
         with pytest.raises(UsageError, match=rf"arrival over connections\.command at t = {first / 1e9:g} s"):
             list(begun.instants())

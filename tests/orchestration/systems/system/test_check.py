@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.components.fmi.model import read_model
+from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.results import objectives
 from orchestration.systems.system.check import check, recorded_variables

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.components.fmi.model import read_model
+from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.systems.system.check import check
 from orchestration.systems.system.component import Sampling

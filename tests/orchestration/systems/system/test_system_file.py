@@ -8,7 +8,7 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.quadrotor.scenarios import translation
 from orchestration.quadrotor.scenarios.translation import quadrotor
 from orchestration.simulation.requests.request import load_request
-from orchestration.systems.schedule.schedule import Cursor
+from orchestration.systems.schedule.instant_arrays import Cursor
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.file import load_system, schema

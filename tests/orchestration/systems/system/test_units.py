@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from orchestration.components.building import fmus
-from orchestration.components.fmi.model import read_model
+from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.quadrotor.scenarios.translation import quadrotor
 from orchestration.simulation.engines.resolved import check_against_fmus

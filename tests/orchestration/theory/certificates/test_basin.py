@@ -12,9 +12,9 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.certificates import basin as module
 from orchestration.theory.certificates.basin import Basin, basin, largest_basin
-from orchestration.theory.certificates.check import check
-from orchestration.theory.certificates.checker import NotProven
+from orchestration.theory.certificates.check_file import check
 from orchestration.theory.certificates.family import Letter
+from orchestration.theory.certificates.verify_certificate import NotProven
 from tests.examples.common import example
 from tests.orchestration.theory.certificates.loops import late_command
 

@@ -23,8 +23,8 @@ from orchestration.theory.certificates import margin as certificates
 from orchestration.theory.certificates.breaking import unstable_sequence
 from orchestration.theory.certificates.causes import ScheduledLoop, cause_at
 from orchestration.theory.certificates.certified_loop import CertifiedLoop
-from orchestration.theory.certificates.certify import find_certificate
-from orchestration.theory.certificates.check import AnotherLoop, check
+from orchestration.theory.certificates.check_file import AnotherLoop, check
+from orchestration.theory.certificates.find_certificate import find_certificate
 from orchestration.theory.certificates.margin import Certified, linear_loop_of, margin
 from orchestration.theory.certificates.region import region
 from orchestration.theory.certificates.repeated import least_repeated

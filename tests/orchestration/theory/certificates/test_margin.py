@@ -16,12 +16,12 @@ from orchestration.theory.certificates import margin as certificates
 from orchestration.theory.certificates import region as regions
 from orchestration.theory.certificates.breaking import breaking_at
 from orchestration.theory.certificates.certified_loop import CertifiedLoop
-from orchestration.theory.certificates.certify import find_certificate, parts_of
-from orchestration.theory.certificates.check import check
-from orchestration.theory.certificates.checker import verified
+from orchestration.theory.certificates.check_file import check
+from orchestration.theory.certificates.find_certificate import find_certificate, parts_of
 from orchestration.theory.certificates.margin import Certified, linear_loop_of, margin, small_gain, varying_of
 from orchestration.theory.certificates.region import region
 from orchestration.theory.certificates.timeline import LoopTimeline
+from orchestration.theory.certificates.verify_certificate import verified
 from orchestration.theory.stability import delay_bounds
 from orchestration.theory.stability.delay_bounds import breaking_jitter
 from quadcosim import Timing

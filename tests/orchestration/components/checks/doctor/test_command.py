@@ -14,7 +14,7 @@ from orchestration.components.building.models import MODELS
 from orchestration.components.checks.doctor import loading
 from orchestration.components.checks.doctor.as_lines import as_text
 from orchestration.components.checks.doctor.report import DoctorReport, as_tables, examine
-from orchestration.foundation.processes.limits import Limits
+from orchestration.foundation.processes.resource_limits import Limits
 from tests.commands import Main
 from tests.fmus.foreign import lag, needs_compiler
 from tests.fmus.process import run

@@ -10,7 +10,7 @@ from orchestration.components.checks.doctor.fmu import InspectedFmu, inspected
 from orchestration.components.checks.doctor.loading import try_loading
 from orchestration.components.checks.doctor.report import DoctorReport, examine
 from orchestration.components.checks.doctor.verdict import judge
-from orchestration.foundation.processes.limits import Limits
+from orchestration.foundation.processes.resource_limits import Limits
 from tests.orchestration.components.checks.doctor.common import (
     AARCH64,
     changed,

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from orchestration.components.building import fmus
-from orchestration.components.fmi.model import read_model
+from orchestration.components.fmi.read_description import read_model
 from orchestration.simulation.engines.batch.batch import Batch, BatchResult, Group
 from orchestration.simulation.engines.batch.shape import Shape, outline
 from orchestration.simulation.engines.resolved import check_against_fmus

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from fmu_kit.archive import write_archive
-from orchestration.components.fmi.model import read_model
+from orchestration.components.fmi.read_description import read_model
 from orchestration.simulation.requests.request import load_request
 from orchestration.simulation.requests.ssp import archive, writing
 from orchestration.systems.system.check import check

@@ -10,7 +10,7 @@ import fmpy
 import pytest
 from fmpy.model_description import ModelDescription, ScalarVariable
 
-from fmu_kit.model_description import PYTHON_REQUIRED
+from fmu_kit.write_description import PYTHON_REQUIRED
 from orchestration.components.building.models import MODELS
 from orchestration.foundation.basics.documents import read_toml
 from tests.fmus.archive import files_of

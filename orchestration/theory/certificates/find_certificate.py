@@ -8,9 +8,9 @@ import numpy as np
 
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.theory.certificates.certificate import Cells, Certificate
-from orchestration.theory.certificates.checker import NotProven, verified
 from orchestration.theory.certificates.family import LoopFamily
 from orchestration.theory.certificates.search import forms_for, inequalities_of
+from orchestration.theory.certificates.verify_certificate import NotProven, verified
 
 RADIUS = 1e-6
 """relative, of measured matrices"""

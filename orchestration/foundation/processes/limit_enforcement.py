@@ -6,8 +6,8 @@ import time
 from typing import Protocol
 
 from orchestration.foundation.processes.family import Family
-from orchestration.foundation.processes.limits import Limits
 from orchestration.foundation.processes.process import Process
+from orchestration.foundation.processes.resource_limits import Limits
 from orchestration.foundation.processes.used_time import UsedTime
 
 _POLL = 0.05

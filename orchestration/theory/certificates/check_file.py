@@ -32,7 +32,7 @@ def check(path: str | Path, request: RequestLike | None = None) -> Checked:
     Raises `QuadcosimError` for a certificate that proves nothing, `UsageError` for a file that is none and for one of
     another loop.
     """
-    from orchestration.theory.certificates.checker import verified
+    from orchestration.theory.certificates.verify_certificate import verified
 
     certificate = read_certificate(Path(path))
     proof, up_to = verified(certificate), None
@@ -76,7 +76,7 @@ def expect_same_family(certificate: Certificate, family: LoopFamily | None) -> N
 
 def _is_within(own: Floats, theirs: Floats, radius: float) -> bool:
     """Whether a matrix is in the set that the proof covers."""
-    from orchestration.theory.certificates.checker import OF_THE_LARGEST
+    from orchestration.theory.certificates.verify_certificate import OF_THE_LARGEST
 
     if own.shape != theirs.shape:
         return False

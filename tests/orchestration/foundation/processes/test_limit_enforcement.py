@@ -8,8 +8,8 @@ from typing import cast
 import pytest
 
 from orchestration.foundation.processes.family import Family, Member
-from orchestration.foundation.processes.limits import UNLIMITED, Limits
-from orchestration.foundation.processes.watch import Watch
+from orchestration.foundation.processes.limit_enforcement import Watch
+from orchestration.foundation.processes.resource_limits import UNLIMITED, Limits
 from tests.patience import PATIENCE
 
 CHECKS = 4

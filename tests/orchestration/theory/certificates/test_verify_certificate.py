@@ -15,12 +15,12 @@ import pytest
 from flint import arb
 
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.theory.certificates import checker
+from orchestration.theory.certificates import verify_certificate
 from orchestration.theory.certificates.breaking import least_breaking
 from orchestration.theory.certificates.certificate import Certificate, read_certificate
-from orchestration.theory.certificates.certify import find_certificate
-from orchestration.theory.certificates.checker import NotProven, verified
 from orchestration.theory.certificates.family import LoopFamily
+from orchestration.theory.certificates.find_certificate import find_certificate
+from orchestration.theory.certificates.verify_certificate import NotProven, verified
 from tests.orchestration.theory.certificates.loops import (
     HOVER_A,
     HOVER_B,
@@ -74,7 +74,7 @@ def test_a_cell_holds_every_map_of_it(hover: Certificate, cell: tuple[float, flo
     """Between the corners, each as wide as it is, lies the map in the coordinates of the forms."""
     letter, X = hover.family.letters[0], hover.coordinates
     exact = dataclasses.replace(hover, radius=0.0)
-    low, high = (np.array(c.tolist()) for c in checker._Enclosures(exact)._corners(letter, (cell,)))
+    low, high = (np.array(c.tolist()) for c in verify_certificate._Enclosures(exact)._corners(letter, (cell,)))
     for share in np.linspace(0.0, 1.0, 21):
         M = X @ hover.family.at(letter, [cell[0] + share * (cell[1] - cell[0])]) @ np.linalg.inv(X)
         line = (1.0 - share) * low + share * high
