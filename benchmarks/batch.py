@@ -23,6 +23,7 @@ from orchestration.components.fmi.read_description import read_model
 from orchestration.experiments.studies.axes import Axis
 from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.sweep import sweep
+from orchestration.foundation.basics.c_structures import address
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.simulation.engines.batch.batch import Batch, Group
@@ -30,7 +31,6 @@ from orchestration.simulation.engines.batch.batches import Batches
 from orchestration.simulation.engines.batch.kernels import preferred_lanes
 from orchestration.simulation.engines.batch.shape import Shape
 from orchestration.simulation.engines.resolved import check_against_fmus
-from orchestration.simulation.engines.structures import address
 from orchestration.simulation.runs.many_runs import located, run_many
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.systems.schedule.schedule_cache import ScheduleCache, schedule_key

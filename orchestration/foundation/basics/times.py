@@ -87,6 +87,15 @@ class Grid:
             k += 1
         return k
 
+    def in_parts(self) -> tuple[int, int, int, int, int] | None:
+        """Offset and period, each as whole nanoseconds and a rest in parts of one, and how many parts one has.
+
+        None if these do not fit into 62 bits.
+        """
+        if self._denominator >= 2**62:
+            return None
+        return *divmod(self._offset, self._denominator), *divmod(self._period, self._denominator), self._denominator
+
     def between(self, first: int, end: int) -> "npt.NDArray[np.int64]":
         """The instants with indices from `first` to before `end`, as an array."""
         import numpy as np  # not needed to read a system

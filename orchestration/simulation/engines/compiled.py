@@ -21,6 +21,7 @@ from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.components.fmi.fmi3 import Fmi3Instance
 from orchestration.components.fmi.native import NativeInstance
 from orchestration.components.fmi.surroundings import ROUNDING
+from orchestration.foundation.basics.c_structures import address, declared, expect_same_sizes
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.basics.simulator import Floats, Integers, Simulator
 from orchestration.foundation.basics.times import seconds
@@ -30,7 +31,7 @@ from orchestration.simulation.engines.backlog import Backlog
 from orchestration.simulation.engines.memory import Allocator, SharedTables, allocated_loop
 from orchestration.simulation.engines.run_structures import RunStructures
 from orchestration.simulation.engines.running_system import RunningSystem, Terminated
-from orchestration.simulation.engines.structures import HEADER, ONE_LANE, address, declared, expect_same_sizes, shared
+from orchestration.simulation.engines.structures import HEADER, ONE_LANE, shared
 from orchestration.systems.schedule.instant_arrays import Schedule
 
 INSTANTS = Path(__file__).with_name("instants.h")

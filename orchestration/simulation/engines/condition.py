@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias
 
+from orchestration.foundation.basics.c_structures import constants
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.engines.sources import SourceValues
-from orchestration.simulation.engines.structures import constants
 from orchestration.simulation.engines.wiring_by_index import Board
 from orchestration.systems.expressions.at_instant import Current, compiled, scalars
 from orchestration.systems.expressions.operators import OPERATORS

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from orchestration.foundation.basics.c_structures import address
 from orchestration.foundation.basics.simulator import Floats, Integers
 from orchestration.foundation.basics.times import nanoseconds
 from orchestration.simulation.engines.backlog import events_of_a_chunk, rows_of_a_chunk
 from orchestration.simulation.engines.running_system import RunningSystem
-from orchestration.simulation.engines.structures import ONE_LANE, address
+from orchestration.simulation.engines.structures import ONE_LANE
 from orchestration.systems.schedule.instant_arrays import Schedule
 
 LOOP, ROWS, EVENTS = "loop", "rows", "events"

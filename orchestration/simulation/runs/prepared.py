@@ -30,8 +30,8 @@ from orchestration.simulation.engines.resolved import Announce, ResolvedRequest,
 from orchestration.simulation.engines.sources import SourceValues
 from orchestration.simulation.runs.outcome import Course, Progress, RunOutcome, result_of
 from orchestration.simulation.runs.result import Provenance, Result
+from orchestration.systems.schedule.compiled_timetable import timetable
 from orchestration.systems.schedule.streams import Streams
-from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.check import recorded_variables
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.connection import component_of, variable_of
@@ -141,10 +141,10 @@ def prepared(
     with deferred_interrupts() as interrupt, ExitStack() as stack:
         instances = {name: stack.enter_context(load(path, name)) for name, path in resolved.paths.items()}
         with errors_in_own_terms(request):
-            timetable = Timetable(system, streams, fixed_steps(system, models))
+            schedule = timetable(system, streams, fixed_steps(system, models))
             for name, component in system.components.items():
                 set_parameters(instances[name], component)
-                _set_clock(instances[name], component, models[name], timetable.first_samples.get(name, 0))
+                _set_clock(instances[name], component, models[name], schedule.first_samples.get(name, 0))
             recorder.describe({name: one.as_metadata() for name, one in resolved.described.items()})
             sources = resolved.sources(streams)
             signals = {name: system.sources[name].signals(name) for name in sources}
@@ -152,7 +152,7 @@ def prepared(
                 engine,
                 system,
                 instances,
-                timetable=timetable,
+                timetable=schedule,
                 streams=streams,
                 recorded=recorded_variables(system, models),
                 recorder=recorder,

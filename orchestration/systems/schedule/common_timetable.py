@@ -1,7 +1,7 @@
 """Spans of a timetable: regular instants, which no seed changes and many runs share, and those of a single run."""
 
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -198,6 +198,8 @@ class CommonTimetable:
             for source in system.sources.values()
             if source.period is not None
         ]
+        self.outlines: dict[Hashable, object] = {}
+        """Outlines for C, by the numbers of streams"""
         self._kept: OrderedDict[tuple[int, int], Instants] = OrderedDict()
 
     @cached_property

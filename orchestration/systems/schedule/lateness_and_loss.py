@@ -35,7 +35,7 @@ def times(of: Varying, stream: Stream) -> Lateness:
     if not isinstance(of, Distribution):
         return Constant(nanoseconds(of))
     if of.order == "as recorded":
-        return in_order(_whole(of.table()))
+        return in_order(whole(of.table()))
     draw, value = stream().random, times_from(of)
     return lambda count: value(draw(count))
 
@@ -47,7 +47,7 @@ def times_from(of: Distribution) -> Callable[[Floats], Integers]:
         return lambda u: least + (u * (most - least)).astype(np.int64)
     if of.normal is not None:
         return _cut_normal(of)
-    values, index = _whole(of.table()), index_from(of)
+    values, index = whole(of.table()), index_from(of)
     return lambda u: values[index(u)]
 
 
@@ -88,7 +88,7 @@ def _cut_normal(of: Distribution) -> Callable[[Floats], Integers]:
     return lambda u: np.array([value(each) for each in u.tolist()], dtype=np.int64)
 
 
-def _whole(seconds: Floats) -> Integers:
+def whole(seconds: Floats) -> Integers:
     """Times in nanoseconds, rounded as `nanoseconds` does."""
     about = seconds * NANOSECONDS
     result = np.rint(about).astype(np.int64)

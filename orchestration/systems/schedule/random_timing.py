@@ -183,7 +183,7 @@ class ClockedComponent(TimedComponent):
         super().__init__(name, plan, links, fixed, misaligned)
         sampling = plan.system.components[name].sampling
         assert sampling is not None
-        self._grid = _grid(sampling.offset, sampling.period, sampling.clock_ratio)
+        self._grid = clock_grid(sampling.offset, sampling.period, sampling.clock_ratio)
         generator = partial(streams.of, self._name, JITTER)
         self._late = lateness(sampling.jitter, sampling.jitter_distribution, generator)
         self._k, self._next = 0, self._times(0, 1, -1)
@@ -210,7 +210,7 @@ class ClockedComponent(TimedComponent):
 
 
 @lru_cache(64)  # most are common to the runs of a study
-def _grid(offset: float, period: float, ratio: float) -> Grid:
+def clock_grid(offset: float, period: float, ratio: float) -> Grid:
     """The instants of a clock that counts `ratio` seconds per true second."""
     exact = Fraction(repr(float(ratio)))
     return Grid(exact_nanoseconds(offset) / exact, exact_nanoseconds(period) / exact)

@@ -20,14 +20,18 @@ class Streams:
     """
 
     def __init__(self, seed: int, numbered: Mapping[str, int] | None = None) -> None:
-        self._seed, self._numbered = seed, dict(numbered or {})
+        self.seed, self.numbered = seed, dict(numbered or {})
 
     def of(self, owner: str, cause: str) -> np.random.Generator:
         """A new generator at the start of the stream of a cause, `owner` as `components.NAME` or `connections.NAME`."""
+        sequence = np.random.SeedSequence(self.seed, spawn_key=self.key(owner, cause))
+        return np.random.Generator(np.random.PCG64(sequence))
+
+    def key(self, owner: str, cause: str) -> tuple[int, ...]:
+        """The key of that stream."""
         name = f"{owner}.{cause}"
-        number = self._numbered.get(name)
-        key = (number,) if number is not None else _words(name)
-        return np.random.Generator(np.random.PCG64(np.random.SeedSequence(self._seed, spawn_key=key)))
+        number = self.numbered.get(name)
+        return (number,) if number is not None else _words(name)
 
 
 @lru_cache(4096)  # they are common to the runs of a study
@@ -36,11 +40,11 @@ def _words(name: str) -> tuple[int, ...]:
     return tuple(int.from_bytes(digest[i : i + 4], "big") for i in range(0, 16, 4))
 
 
-_NORMAL = NormalDist(0.5, 1.0 / 6.0)
-_LOWEST, _HIGHEST = 0.0013498980316301035, 0.9986501019683699
-"""`_NORMAL.cdf` of 0 and 1, written down: versions of Python compute it by formulas that differ in the last digits."""
+NORMAL = NormalDist(0.5, 1.0 / 6.0)
+LOWEST, HIGHEST = 0.0013498980316301035, 0.9986501019683699
+"""`NORMAL.cdf` of 0 and 1, written down: versions of Python compute it by formulas that differ in the last digits."""
 
 
 def cut_normal(uniform: float) -> float:
     """A normal variate around 0.5 with standard deviation 1/6, cut to [0, 1], from a uniform one."""
-    return min(1.0, max(0.0, _NORMAL.inv_cdf(_LOWEST + uniform * (_HIGHEST - _LOWEST))))
+    return min(1.0, max(0.0, NORMAL.inv_cdf(LOWEST + uniform * (HIGHEST - LOWEST))))

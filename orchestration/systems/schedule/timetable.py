@@ -47,6 +47,13 @@ class Timetable:
         self._plan, self._fixed, self.stop = common.plan, common.fixed, common.stop
         self._begin, self._end = 0, self.stop + 1
         self._misaligned: list[Misalignment] = []
+        self._ahead: Schedule | None = None
+        self.first_samples = {name: first for name, first in self._set_out(streams).items() if first < self.stop}
+        """Times of the first samples [ns], by sampled component, of those that sample before the end"""
+
+    def _set_out(self, streams: Streams) -> Mapping[str, int]:
+        """Prepare to draw; the times of first samples [ns], by sampled component."""
+        common = self._common
         self._connections = common.system.connections
         self._links: list[Link] = []
         for i, x in enumerate(self._connections):
@@ -54,16 +61,12 @@ class Timetable:
             self._links.append(Link(i, x, streams, stepped, self._misaligned))
         self._lookahead = _lookahead(common, streams) if common.system.uses_scheduler else None
         self._tasks = [self._timed(name, streams) for name in self._plan.sampled]
-        self.first_samples = {
-            name: task.first for name, task in zip(self._plan.sampled, self._tasks) if task.first < self.stop
-        }
-        """Times of the first samples [ns], by sampled component, of those that sample before the end"""
         own = [j for j in self._plan.posted if j not in self._plan.over_networks]
         self._posted = {i: [self._links[j] for j in own if common.sender[j] == i] for i in common.points}
         self._over_networks = [self._links[j] for j in self._plan.posted if j in self._plan.over_networks]
         self._posted_before = dict.fromkeys((link.index for link in self._over_networks), 0)
         self._in_flight = _NO_MESSAGES
-        self._ahead: Schedule | None = None
+        return {name: task.first for name, task in zip(self._plan.sampled, self._tasks)}
 
     def _timed(self, name: str, streams: Streams) -> TimedComponent:
         if self._lookahead is not None and name in self._lookahead.samples:
@@ -111,6 +114,10 @@ class Timetable:
         """The next window, of about `most` instants, or none."""
         begin = self._begin
         self._begin = end = min(self._end, begin + max(int(most * self._common.mean_interval), 1))
+        return self._drawn(begin, end)
+
+    def _drawn(self, begin: int, end: int) -> Span:
+        """The window from `begin` to before `end` [ns], the first that is not drawn yet."""
         for task in self._tasks:
             task.draw_until(end)
         found = InstantCollector(len(self._common.continuous))

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from orchestration.foundation.basics.c_structures import address
 from orchestration.foundation.basics.simulator import Booleans, Floats, Integers
 from orchestration.simulation.engines.batch.shape import Shape
-from orchestration.simulation.engines.structures import address
 
 _ALIGNED = 64
 """Size of the largest vector registers and of cache lines [byte]"""

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestration.foundation.basics.c_structures import address
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.basics.simulator import Booleans, Floats, Integers
 from orchestration.foundation.basics.times import nanoseconds, seconds
@@ -19,7 +20,7 @@ from orchestration.simulation.engines.batch.run_numbers import NO_COLUMNS, Param
 from orchestration.simulation.engines.batch.shape import Shape
 from orchestration.simulation.engines.resolved import source_values
 from orchestration.simulation.engines.sources import SourceValues
-from orchestration.simulation.engines.structures import address, structures
+from orchestration.simulation.engines.structures import structures
 from orchestration.systems.expressions.over_run import STOP_TIME
 from orchestration.systems.expressions.syntax import Call
 from orchestration.systems.schedule.common_timetable import Instants, Span

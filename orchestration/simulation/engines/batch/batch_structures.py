@@ -4,9 +4,10 @@ import ctypes
 from dataclasses import fields
 from typing import Any
 
+from orchestration.foundation.basics.c_structures import address
 from orchestration.simulation.engines.batch.arrays import BatchArrays
 from orchestration.simulation.engines.batch.shape import Shape
-from orchestration.simulation.engines.structures import SystemStructures, address
+from orchestration.simulation.engines.structures import SystemStructures
 
 
 class BatchStructures(SystemStructures):

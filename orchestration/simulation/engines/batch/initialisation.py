@@ -6,6 +6,7 @@ import numpy as np
 
 from orchestration.components.fmi.instance import convert_value, number_of
 from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
+from orchestration.foundation.basics.c_structures import address
 from orchestration.foundation.basics.simulator import Booleans, Floats
 from orchestration.simulation.engines import initial
 from orchestration.simulation.engines.batch.arrays import BatchArrays
@@ -14,7 +15,6 @@ from orchestration.simulation.engines.batch.run_numbers import RunNumbers, end_o
 from orchestration.simulation.engines.batch.shape import Shape
 from orchestration.simulation.engines.connection_hold import of_each
 from orchestration.simulation.engines.sources import SourceValues
-from orchestration.simulation.engines.structures import address
 from orchestration.simulation.engines.wiring_by_index import clock_of
 from orchestration.systems.expressions.syntax import Call
 from orchestration.systems.system.model import System

@@ -14,9 +14,10 @@ from fmu_kit.compiler.pack.lanes import MAIN, Lanes, compiled_lanes
 from fmu_kit.compiler.pack.lanes import preferred_lanes as lanes_of_fmus
 from fmu_kit.compiler.runtime import FOLDER
 from orchestration.components.fmi.read_description import Model
+from orchestration.foundation.basics.c_structures import expect_same_sizes
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.simulation.engines.compiled import INSTANTS
-from orchestration.simulation.engines.structures import HEADER, expect_same_sizes, shared
+from orchestration.simulation.engines.structures import HEADER, shared
 
 FILES = (Path(__file__).with_name("batch.c"), INSTANTS, HEADER, FOLDER / "lanes.h", FOLDER / "mathematics.h")
 """The sources of a batch, besides those that are generated for a system"""

@@ -7,11 +7,12 @@ from typing import Any
 
 import pytest
 
+from orchestration.foundation.basics.c_structures import constants, declared
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.recording.recording import ARRIVED, LOST, SAMPLED, SENT
 from orchestration.simulation.engines import compiled
 from orchestration.simulation.engines.batch import kernels
-from orchestration.simulation.engines.structures import constants, declared, shared, structures
+from orchestration.simulation.engines.structures import shared, structures
 from tests.orchestration.components.fmi.small import needs_compiler
 from tests.orchestration.simulation.engines.batch.lanes import shape_of
 from tests.orchestration.simulation.engines.moving import moving
@@ -57,9 +58,7 @@ def test_a_loop_whose_structures_have_another_size_is_refused(monkeypatch: pytes
     size = ctypes.sizeof(structures(1).Channel)
     monkeypatch.setattr(compiled, "shared", longer)
     compiled.library.cache_clear()
-    with pytest.raises(
-        QuadcosimError, match=f"^structures.h: Channel has {size} bytes in C: expected {size + 8}, as in"
-    ):
+    with pytest.raises(QuadcosimError, match=f"^structure Channel has {size} bytes in C: expected {size + 8}, as in"):
         compiled.library()
 
 
@@ -69,9 +68,7 @@ def test_lanes_whose_structures_have_another_size_are_refused(tmp_path: Path, mo
     size = ctypes.sizeof(structures(shape.lanes).Channel)
     monkeypatch.setattr(kernels, "shared", longer)
     kernels.batch.cache_clear()
-    with pytest.raises(
-        QuadcosimError, match=f"^structures.h: Channel has {size} bytes in C: expected {size + 8}, as in"
-    ):
+    with pytest.raises(QuadcosimError, match=f"^structure Channel has {size} bytes in C: expected {size + 8}, as in"):
         _ = shape.library
 
 
