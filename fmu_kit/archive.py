@@ -8,6 +8,7 @@ import zipfile
 from pathlib import Path
 
 from fmu_kit.loader import GUID_FILE
+from fmu_kit.new_files import new_file
 from fmu_kit.variants import Variant
 
 PAGE = "documentation/index.html"
@@ -64,7 +65,7 @@ def write_archive(path: Path, files: dict[str, bytes], *, first: str) -> None:
 
     Files are stored uncompressed, so that the bytes do not depend on a version of zlib.
     """
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
+    with new_file(path) as new, zipfile.ZipFile(new, "w", zipfile.ZIP_STORED) as archive:
         for name in sorted(files, key=lambda name: (name != first, name)):
             entry = zipfile.ZipInfo(name, _STAMP)
             entry.create_system = 3

@@ -3,12 +3,13 @@
 import contextlib
 import functools
 import hashlib
-import os
 import platform
 import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
+
+from fmu_kit.new_files import write_atomically
 
 
 def cached_library(folder: str, sources: Mapping[str, bytes], how: Any, compiled: Callable[[], bytes]) -> Path:
@@ -49,11 +50,3 @@ def _processor() -> tuple[str, ...]:
     info = Path("/proc/cpuinfo")
     lines = info.read_text().splitlines() if info.is_file() else [platform.processor()]
     return platform.machine(), *sorted({line for line in lines if line.lower().startswith(("flags", "features"))})
-
-
-def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file and its folders, which other processes and threads may write at the same time; raises `OSError`."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    fresh = path.with_name(f"{path.name}.{os.urandom(6).hex()}")
-    fresh.write_bytes(content)
-    fresh.replace(path)

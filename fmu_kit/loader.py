@@ -9,10 +9,10 @@ import platform
 import shutil
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 from fmu_kit import libraries
+from fmu_kit.scratch import temporary_folder
 
 SOURCE = Path(__file__).with_name("loader.c")
 PLATFORM = "binaries/linux64"
@@ -57,8 +57,8 @@ def compiled() -> bytes:
 
 
 def _compiled_by(cc: str) -> bytes:
-    with tempfile.TemporaryDirectory() as folder:
-        library = Path(folder, "loader.so")
+    with temporary_folder() as folder:
+        library = folder / "loader.so"
         command = [
             cc,
             "-x",

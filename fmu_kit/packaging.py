@@ -14,7 +14,6 @@ import importlib
 import importlib.metadata
 import inspect
 import json
-import os
 import posixpath
 import re
 import sys
@@ -32,6 +31,7 @@ from fmu_kit.bundle import PackagingError, Target, bundled_sources, module_path,
 from fmu_kit.documentation import BuildNotes
 from fmu_kit.errors import FmuError
 from fmu_kit.failure import place_of
+from fmu_kit.new_files import WriteError
 from fmu_kit.variants import Variant
 from fmu_kit.versions import generation_tool, version_of
 from fmu_kit.write_description import GUID_PLACEHOLDER, PYTHON_REQUIRED, to_xml
@@ -105,7 +105,7 @@ def origin(target: Target, digest: str) -> dict[str, bytes]:
 
 
 def build(target: Target, folder: Path) -> Path:
-    """Write `folder`/Model.fmu, replacing it atomically, and return its path."""
+    """Write `folder`/Model.fmu and return its path."""
     sources = bundled_sources(target)
     digest = source_hash(target)
     name = f"quadcosim_{digest[:16]}"
@@ -149,12 +149,9 @@ def insert_guid(files: dict[str, bytes]) -> str:
 
 
 def write_fmu(files: dict[str, bytes], target: Target, folder: Path) -> Path:
-    """Write the FMU, replacing it atomically, and return its path."""
-    folder.mkdir(parents=True, exist_ok=True)
+    """Write the FMU and return its path."""
     path = folder / f"{target.name}.fmu"
-    temporary = path.with_suffix(f".{os.getpid()}.partial")
-    write_archive(temporary, files, first="modelDescription.xml")
-    os.replace(temporary, path)
+    write_archive(path, files, first="modelDescription.xml")
     return path
 
 
@@ -289,7 +286,7 @@ def main(arguments: list[str], build: Callable[[Target, Path], Path] = build) ->
     try:
         for text in targets:
             print(build(replace(Target.parse(text, root), variant=variant), Path(folder)), flush=True)
-    except PackagingError as error:
+    except (PackagingError, WriteError) as error:
         print(error, file=sys.stderr)
         return 1
     return 0

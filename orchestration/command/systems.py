@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from fmu_kit.new_files import write_atomically
 from orchestration.command.flags import FlightFlags, ScenarioFile, Timing, flight_options, request_from
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, build_option
@@ -55,8 +56,7 @@ def connect(
     document = {"file": out, "text": proposal.text, "guessed": proposal.guessed, "undecided": proposal.undecided}
     if out is None:
         return CommandResult(document=document, lines=proposal.text.splitlines())
-    out.parent.mkdir(parents=True, exist_ok=True)
-    out.write_text(proposal.text, encoding="utf-8")
+    write_atomically(out, proposal.text)
     return CommandResult(document=document, lines=[str(out)])
 
 

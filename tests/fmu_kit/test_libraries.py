@@ -1,6 +1,5 @@
 """A library is compiled once: the same sources, options and compiler find it in the user's cache."""
 
-import threading
 from pathlib import Path
 
 import pytest
@@ -59,20 +58,3 @@ def test_where_nothing_can_be_kept_it_is_compiled_each_time(cache: Path) -> None
     ]
     with pytest.raises(OSError, match="quadcosim"):
         libraries.cached_library("made", SOURCES, "-O2", compiler)
-
-
-def test_threads_may_keep_the_same_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path, genuine = tmp_path / "kept.so", Path.replace
-
-    def replace(fresh: Path, target: Path) -> Path:
-        """Another thread keeps it just before this one does."""
-        monkeypatch.setattr(Path, "replace", genuine)
-        other = threading.Thread(target=libraries.write_atomically, args=(path, b"library"))
-        other.start()
-        other.join()
-        return genuine(fresh, target)
-
-    monkeypatch.setattr(Path, "replace", replace)
-    libraries.write_atomically(path, b"library")
-    assert [*tmp_path.iterdir()] == [path]
-    assert path.read_bytes() == b"library"

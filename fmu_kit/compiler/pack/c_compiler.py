@@ -8,12 +8,11 @@ import shutil
 import struct
 import subprocess
 import sys
-import tempfile
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Literal
 
 from fmu_kit.bundle import PackagingError
+from fmu_kit.scratch import temporary_folder
 
 OPTIONS = (
     *("-std=gnu11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno"),
@@ -113,16 +112,16 @@ def _compiler_for(target: str, called: str) -> list[str]:
 
 
 def _compiled(command: list[str], sources: dict[str, bytes], main: str, after: Sequence[str] = ()) -> bytes:
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         for name, content in sources.items():
-            Path(folder, name).write_bytes(content)
+            (folder / name).write_bytes(content)
         done = subprocess.run(
             [*command, main, "-o", "library", *after], cwd=folder, capture_output=True, text=True, check=False
         )
         if done.returncode != 0:
             lines = done.stderr.strip().splitlines() or ["no output"]
             raise PackagingError(f"{command[0]}: {next((line for line in lines if 'error' in line), lines[-1])}")
-        return Path(folder, "library").read_bytes()
+        return (folder / "library").read_bytes()
 
 
 _FAT_MAGIC, _ALIGNMENT = 0xCAFEBABE, 14

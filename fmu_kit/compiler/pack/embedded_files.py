@@ -31,6 +31,7 @@ from fmu_kit.compiler.runtime import FOLDER
 from fmu_kit.compiler.trace.errors import TraceError
 from fmu_kit.compiler.trace.memory import attribute_name
 from fmu_kit.compiler.trace.tracing import Program, trace
+from fmu_kit.new_files import new_files, write_atomically
 from fmu_kit.packaging import slave_class
 from fmu_kit.versions import generation_tool, version_of
 
@@ -67,11 +68,10 @@ def write(target: Target, folder: Path, *, single: bool = False) -> Path:
         header, source = files(program, single=single)
     except TraceError as error:
         raise PackagingError(f"{target.name}: {error}") from error
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / f"{target.name}.h").write_text(header, "utf-8")
-    path = folder / f"{target.name}.c"
-    path.write_text(source, "utf-8")
-    return path
+    with new_files(folder) as new:
+        write_atomically(new / f"{target.name}.h", header)
+        write_atomically(new / f"{target.name}.c", source)
+    return folder / f"{target.name}.c"
 
 
 def files(program: Program, *, single: bool) -> tuple[str, str]:

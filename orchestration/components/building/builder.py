@@ -19,7 +19,7 @@ from fmu_kit.archive import read_source_hash
 from fmu_kit.bundle import SHARED_PACKAGES, PackagingError, Target, module_path
 from fmu_kit.compiler.pack import freshness
 from fmu_kit.discovery import slave_beside, slaves_in
-from fmu_kit.libraries import write_atomically
+from fmu_kit.new_files import write_atomically
 from fmu_kit.variants import Variant
 from orchestration.components.building.models import MODELS
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
@@ -98,7 +98,7 @@ def _cached_source_hash(
         return path.read_text(encoding="ascii")
     source_hash = packing.source_hash(target)
     with contextlib.suppress(OSError):
-        write_atomically(path, source_hash.encode())
+        write_atomically(path, source_hash)
     return source_hash
 
 

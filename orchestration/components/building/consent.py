@@ -10,6 +10,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from fmu_kit.new_files import write_atomically
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.processes.subprocesses import ROOT
 
@@ -50,10 +51,8 @@ def is_allowed() -> bool:
 
 def agree(folder: Path) -> None:
     """Record the consent to `folder`; where nothing can be written, it is asked for again."""
-    place = _place(folder)
     with suppress(OSError):
-        place.parent.mkdir(parents=True, exist_ok=True)
-        place.write_text(f"{folder.resolve()}\n", encoding="utf-8")
+        write_atomically(_place(folder), f"{folder.resolve()}\n")
 
 
 def expect(fmu: Path, folder: Path) -> None:

@@ -17,12 +17,13 @@ import fmpy
 import numpy as np
 from fmpy.fmi1 import FMICallException
 
+from fmu_kit import scratch
+from fmu_kit.scratch import Scratch
 from orchestration.components.fmi import slaves
 from orchestration.components.fmi.instance import Instance, Value, convert_value, same
 from orchestration.components.fmi.read_description import Variable, read_model
 from orchestration.components.fmi.surroundings import FOLDER, ROUNDING, Surroundings, sentence
 from orchestration.components.fmi.transfers import Numbers, TransferCall, TransferLayout, TransferPart
-from orchestration.foundation.basics import scratch
 from orchestration.foundation.basics.errors import (
     QuadcosimError,
     RefusedValueError,
@@ -30,7 +31,6 @@ from orchestration.foundation.basics.errors import (
     StoppedStepError,
     UsageError,
 )
-from orchestration.foundation.basics.scratch import Scratch
 from orchestration.foundation.basics.simulator import Floats, Transfer
 
 DIVERGENCE_CATEGORY = b"divergence"

@@ -11,11 +11,11 @@ import hashlib
 import json
 import platform
 import sys
-import tempfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from fmu_kit.libraries import write_atomically
+from fmu_kit.new_files import write_atomically
+from fmu_kit.scratch import temporary_folder
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.components.fmi.fmi3 import Fmi3Instance
 from orchestration.components.fmi.instance import Instance
@@ -90,11 +90,11 @@ def _tested(content: str, path: Path) -> Repeatability:
     result = Repeatability()
     for manner in MANNERS:
         shown: dict[str, bool] = {}
-        with tempfile.TemporaryDirectory(prefix="quadcosim-", ignore_cleanup_errors=True) as folder:
+        with temporary_folder() as folder:
             module = subprocesses.Module.of(
                 "orchestration.components.fmi.repeatability_process", path.absolute(), manner
             )
-            with Child(module, environment=subprocesses.environment(TMPDIR=folder), limits=Limits()) as child:
+            with Child(module, environment=subprocesses.environment(TMPDIR=str(folder)), limits=Limits()) as child:
                 ending = child.receive_all(shown.update)
         if ending.reached is not None:
             return Repeatability()
@@ -102,7 +102,7 @@ def _tested(content: str, path: Path) -> Repeatability:
             result = Repeatability(**shown)
             break
     with contextlib.suppress(OSError):  # where nothing can be written, each process repeats the test
-        write_atomically(_place(content), json.dumps(asdict(result)).encode())
+        write_atomically(_place(content), json.dumps(asdict(result)))
     return result
 
 

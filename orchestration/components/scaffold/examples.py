@@ -1,8 +1,8 @@
 """`quadcosim examples`: writes the examples and studies of the documentation, also without a checkout."""
 
-import shutil
 from pathlib import Path
 
+from fmu_kit.new_files import new_files, write_atomically
 from orchestration.components.building import consent
 from orchestration.components.scaffold.folder import expect_new
 
@@ -23,12 +23,11 @@ def write(where: Path) -> list[Path]:
     written = [where / name for name in FOLDERS]
     for folder in written:
         expect_new(folder)
-    for name, folder in zip(FOLDERS, written):
-        for file in sorted((origin / name).rglob("*")):
-            if file.suffix in KEPT:
-                copy = folder / file.relative_to(origin / name)
-                copy.parent.mkdir(parents=True, exist_ok=True)
-                shutil.copyfile(file, copy)
+    with new_files(where) as new:
+        for name in FOLDERS:
+            for file in sorted((origin / name).rglob("*")):
+                if file.suffix in KEPT:
+                    write_atomically(new / file.relative_to(origin), file.read_bytes())
     for system in where.glob(f"{FOLDERS[0]}/*/system.toml"):
         consent.agree(system.parent)
     return written

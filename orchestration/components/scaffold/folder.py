@@ -9,6 +9,7 @@ from pathlib import Path
 from string import Template
 from typing import Literal
 
+from fmu_kit.new_files import new_files, write_atomically
 from orchestration.components.building import consent
 from orchestration.components.building.models import MODELS
 from orchestration.foundation.basics.errors import UsageError
@@ -35,10 +36,10 @@ def write(kind: Kind, name: str, where: Path, *, author: str, license: str) -> l
         "system.toml": "system.toml",
         "README.md": "README.md",
     }
-    folder.mkdir(parents=True)
-    for file, template in files.items():
-        text = (_HERE / f"{kind}_{template}.tmpl").read_text(encoding="utf-8")
-        (folder / file).write_text(Template(text).substitute(names), encoding="utf-8")
+    with new_files(where) as new:
+        for file, template in files.items():
+            text = (_HERE / f"{kind}_{template}.tmpl").read_text(encoding="utf-8")
+            write_atomically(new / name / file, Template(text).substitute(names))
     consent.agree(folder)
     return [folder / file for file in files]
 

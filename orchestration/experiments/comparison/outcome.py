@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fmu_kit.new_files import new_files, write_atomically
 from orchestration.experiments.comparison import equal_terms, fronts
 from orchestration.experiments.comparison.bandwidth import Bandwidths
 from orchestration.experiments.comparison.cells import CellSummary, cell_summaries
@@ -69,7 +70,8 @@ def write(comparison: Comparison, outcome: Outcome, bandwidths: Bandwidths, fold
     medians = [name for cell in outcome.cells[:1] for name in cell.medians]
     table = table.astype({f"{name}{end}": float for name in medians for end in ("", ".low", ".high")})
     written = [folder / f"{CELLS}.parquet", folder / f"{CELLS}.csv", folder / OUTCOME]
-    table.to_parquet(written[0], index=False)
-    table.to_csv(written[1], index=False)
-    written[2].write_text(json.dumps(as_json(comparison, outcome, bandwidths), indent=2) + "\n", encoding="utf-8")
+    with new_files(folder) as new:
+        table.to_parquet(new / written[0].name, index=False)
+        table.to_csv(new / written[1].name, index=False)
+        write_atomically(new / written[2].name, json.dumps(as_json(comparison, outcome, bandwidths), indent=2) + "\n")
     return written

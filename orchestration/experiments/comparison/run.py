@@ -6,6 +6,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from fmu_kit.new_files import new_files
 from orchestration.experiments.comparison.bandwidth import Bandwidths, bandwidths
 from orchestration.experiments.comparison.cells import CellSummary, cell_summaries, table_of_runs
 from orchestration.experiments.comparison.design import Comparison
@@ -109,15 +110,17 @@ def compare(
     place = summary.path.parent
     table = frame(summary.path)
     outcome = outcome_of(comparison, table, known)
-    written = [*export(summary.path, place), *write(comparison, outcome, known, place)]
-    if figures:
-        from orchestration.experiments.comparison import pictures
-        from orchestration.simulation.figures.style import SCREEN  # with it comes matplotlib
+    with new_files(place) as new:
+        written = [*export(summary.path, new), *write(comparison, outcome, known, new)]
+        if figures:
+            from orchestration.experiments.comparison import pictures
+            from orchestration.simulation.figures.style import SCREEN  # with it comes matplotlib
 
-        written += pictures.draw(comparison, outcome, table, place, style or SCREEN, units=units_in(summary.path))
+            written += pictures.draw(comparison, outcome, table, new, style or SCREEN, units=units_in(summary.path))
     return Compared(
-        axis=comparison.axis.name, summary=summary, table=table, bandwidths=known, outcome=outcome, written=written
-    )
+        axis=comparison.axis.name, summary=summary, table=table, bandwidths=known, outcome=outcome,
+        written=[place / path.name for path in written],
+    )  # fmt: skip
 
 
 def rerun_cells(

@@ -6,8 +6,8 @@ import re
 from importlib import resources
 from pathlib import Path
 
+from fmu_kit.new_files import write_atomically
 from orchestration.experiments.report.model import Report, as_json
-from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.figures import palette, shades
 
 SCRIPTS = (
@@ -29,12 +29,8 @@ _PLACE = re.compile(r"\{\{(\w+)\}\}")
 
 
 def write(report: Report, out: Path) -> Path:
-    """Write the file of a report; raises `UsageError` if it cannot be written."""
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        out.write_text(as_html(report), encoding="utf-8")
-    except OSError as error:
-        raise UsageError(f"--out {out}: expected a file that can be written: {error.strerror}") from error
+    """Write the file of a report; raises `WriteError`."""
+    write_atomically(out, as_html(report))
     return out
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
+from fmu_kit.new_files import new_files
 from orchestration.experiments.studies import figures, sensitivity
 from orchestration.experiments.studies.axes import Axis, unit_points
 from orchestration.experiments.studies.default_metric import default_metric
@@ -46,8 +47,10 @@ def draw_study(
     """
     path = store_path(study.name, folder)
     drawn, indices = study_figures(study, path, metric, style)
-    tables = [sensitivity.write(indices, (path.parent / next(iter(drawn))).with_suffix(".csv"))] if indices else []
-    return tables + save(drawn, path.parent, style, progress)
+    with new_files(path.parent) as new:
+        tables = [sensitivity.write(indices, (new / next(iter(drawn))).with_suffix(".csv"))] if indices else []
+        written = [*tables, *save(drawn, new, style, progress)]
+    return [path.parent / each.name for each in written]
 
 
 def study_figures(

@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from fmu_kit.new_files import new_file
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 
@@ -78,7 +79,8 @@ def write(indices: list[Index], path: Path) -> Path:
     """Write the indices as CSV."""
     import pandas as pd
 
-    pd.DataFrame([asdict(index) for index in indices]).to_csv(path, index=False)
+    with new_file(path) as new:
+        pd.DataFrame([asdict(index) for index in indices]).to_csv(new, index=False)
     return path
 
 

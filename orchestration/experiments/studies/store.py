@@ -4,13 +4,13 @@ import json
 import math
 import shutil
 import sqlite3
-import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fmu_kit.scratch import temporary_folder
 from orchestration.experiments.studies import store_columns as columns
 from orchestration.experiments.studies import store_integrity as integrity
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
@@ -208,11 +208,11 @@ def open_for_reading(path: Path) -> Iterator[Store]:
     """
     if not path.is_file():
         raise UsageError(f"{path}: expected the store of a study; there is no such file")
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         try:
             connection = _read_only(path)
         except sqlite3.OperationalError:  # WAL writes beside the file, so open a copy
-            copy = Path(folder) / path.name
+            copy = folder / path.name
             with integrity.store_errors(path):
                 for suffix in ("", "-wal"):
                     if Path(f"{path}{suffix}").is_file():

@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from fmu_kit.new_files import write_atomically
 from orchestration.experiments.studies import store
 from orchestration.experiments.studies.checks import check_design, describe_run
 from orchestration.experiments.studies.lane_agreement import lane_agreement, with_python_twins
@@ -230,11 +231,7 @@ def _keep(outcomes: Sequence[TaskOutcome], opened: store.Store) -> None:
     """Write signals first, then the rows, so that every row has its signals."""
     for outcome in outcomes:
         if outcome.signals is not None:
-            target = _signals_path(opened, outcome.row.key)
-            target.parent.mkdir(exist_ok=True)
-            partial = target.with_suffix(".partial")
-            partial.write_bytes(outcome.signals)
-            partial.replace(target)
+            write_atomically(_signals_path(opened, outcome.row.key), outcome.signals)
     opened.add([outcome.row for outcome in outcomes])
 
 

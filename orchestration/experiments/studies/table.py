@@ -10,6 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from pyarrow import csv
 
+from fmu_kit.new_files import new_files
 from orchestration.experiments.studies.store import Store, open_for_reading
 from orchestration.experiments.studies.store_columns import SETTINGS, TEXTS, UNITS
 from orchestration.foundation.basics.errors import UsageError
@@ -105,12 +106,11 @@ def export(path: Path, folder: Path, formats: Collection[str] = ("parquet", "csv
     and `units` with the same fields.
     """
     table = _with_units(pa.Table.from_pandas(frame(path), preserve_index=False), units_in(path))
-    folder.mkdir(parents=True, exist_ok=True)
     writers = {"parquet": pq.write_table, "csv": csv.write_csv, "mat": _write_mat}
-    written = [folder / f"runs.{kind}" for kind in formats]
-    for kind, file in zip(formats, written):
-        writers[kind](table, file)
-    return written
+    with new_files(folder) as new:
+        for kind in formats:
+            writers[kind](table, new / f"runs.{kind}")
+    return [folder / f"runs.{kind}" for kind in formats]
 
 
 def _write_mat(table: Any, file: Path) -> None:

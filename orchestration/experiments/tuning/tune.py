@@ -4,11 +4,12 @@ import dataclasses
 import functools
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
+from fmu_kit.new_files import new_files, write_atomically
 from orchestration.experiments.tuning.exact import ExactTuning, ExactTuningResult, search_exactly
 from orchestration.experiments.tuning.tuning import Tuning, TuningResult, search
 from orchestration.experiments.tuning.tuning_file import gains_text
@@ -166,13 +167,16 @@ def run_searches(
     return done
 
 
-def write(tuning: TuningProblem, done: Sequence[SearchResult], out: Path, command: str) -> Iterator[Path]:
+def write(tuning: TuningProblem, done: Sequence[SearchResult], out: Path, command: str) -> list[Path]:
     """Write the files of tuned parameters, one for each period; their paths."""
-    out.mkdir(parents=True, exist_ok=True)
-    for best in best_by_period(done):
-        path = out / f"{tuning.name}_{1000.0 * best.period:g}ms.toml"
-        path.write_text(gains_text(tuning, best, done, command))
-        yield path
+    texts = {
+        f"{tuning.name}_{1000.0 * best.period:g}ms.toml": gains_text(tuning, best, done, command)
+        for best in best_by_period(done)
+    }
+    with new_files(out) as new:
+        for name, text in texts.items():
+            write_atomically(new / name, text)
+    return [out / name for name in texts]
 
 
 def _part(progress: Callable[[float], None], index: int, count: int) -> Callable[[float], None]:

@@ -6,6 +6,7 @@ from typing import Any
 import pyarrow as pa
 from pyarrow import csv
 
+from fmu_kit.new_files import new_files
 from orchestration.foundation.basics.unit_algebra import in_brackets
 from orchestration.foundation.recording import tables
 from orchestration.foundation.recording.frames import units_of
@@ -19,15 +20,17 @@ def write(recording: Recording, about: About, folder: Path) -> list[Path]:
 
     Numbers have as many digits as are needed to read back the same values.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    written = [folder / SIGNALS, folder / EVENTS]
     units = [units_of(about), {"time": "s"}]
     schemas = [_with_units(schema, of) for schema, of in zip(tables.schemas(recording.columns), units)]
-    with csv.CSVWriter(written[0], schemas[0]) as signals, csv.CSVWriter(written[1], schemas[1]) as events:
+    with (
+        new_files(folder) as new,
+        csv.CSVWriter(new / SIGNALS, schemas[0]) as signals,
+        csv.CSVWriter(new / EVENTS, schemas[1]) as events,
+    ):
         for chunk in recording.chunks():
             for writer, schema, table in zip((signals, events), schemas, tables.both(chunk)):
                 writer.write_table(table.rename_columns(schema.names))
-    return written
+    return [folder / SIGNALS, folder / EVENTS]
 
 
 def _with_units(schema: Any, units: dict[str, str]) -> Any:

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from fmu_kit.new_files import new_file
+
 MAX_NAME_LENGTH = 63
 """characters of a name in MATLAB"""
 _KEYWORDS = {
@@ -25,9 +27,9 @@ def write(path: Path, variables: Mapping[str, Any]) -> Path:
     """
     from scipy.io import savemat
 
-    path.parent.mkdir(parents=True, exist_ok=True)
     values = {name: _as_matlab(value) for name, value in variables.items()}
-    savemat(path, values, do_compression=True, long_field_names=True, oned_as="column")
+    with new_file(path) as new:
+        savemat(new, values, do_compression=True, long_field_names=True, oned_as="column")
     return path
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 
+from fmu_kit.new_files import new_file
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.terminal import Share
@@ -61,7 +62,6 @@ def film(runs: Sequence[DrawnRun], path: Path, style: Style, progress: Share = l
     times = np.linspace(start, end, count)
     pace = (end - start) * RATE / (count - 1)
     style = replace(style, dpi=DPI)
-    path.parent.mkdir(parents=True, exist_ok=True)
     with style.applied():
         figure, axes = stage(runs, style)
         for line in axes.get_lines():
@@ -70,7 +70,7 @@ def film(runs: Sequence[DrawnRun], path: Path, style: Style, progress: Share = l
         fill(figure, axes)
         size = SIZE * max(float(np.ptp(limits)) for limits in (axes.get_xlim(), axes.get_ylim(), axes.get_zlim()))
         vehicles = [_Vehicle.on(axes, run, size) for run in runs]
-        with movie.saving(figure, str(path), DPI):
+        with new_file(path) as new, movie.saving(figure, str(new), DPI):
             for place, now in enumerate(times, start=1):
                 title.set_text(f"{now:.2f} s" + ("" if abs(pace - 1.0) < 0.1 else f", {pace:.2g} times as fast"))
                 for vehicle in vehicles:

@@ -13,6 +13,7 @@ from matplotlib.backend_bases import get_registered_canvas_class
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from fmu_kit.new_files import new_files
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import Share
 from orchestration.simulation.figures.names import COLUMNS, FORMATS, WRITTEN
@@ -153,17 +154,16 @@ def save(
 
     The same data give the same bytes: files have no date. `progress` receives the share that is written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     written = []
-    with style.applied():
+    with new_files(folder) as new, style.applied():
         for name, figure in figures.items():
             with laid_out_once(figure):
                 for ending in style.formats:
-                    path = folder / f"{name}.{ending}"
+                    path = new / f"{name}.{ending}"
                     write(figure, path, ending)
                     if ending == "png" and style.colors is not None:
                         _reduce(path, style.colors)
-                    written.append(path)
+                    written.append(folder / path.name)
                     progress(len(written) / (len(figures) * len(style.formats)))
     return written
 

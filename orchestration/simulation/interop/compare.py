@@ -2,15 +2,14 @@
 
 import math
 import os
-import tempfile
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fmu_kit.scratch import temporary_folder
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.interop.catalogue import Tool
@@ -62,9 +61,9 @@ def agreements(
     system that an SSP cannot express or whose times are no multiples of that step, `QuadcosimError` with the last
     output of a tool that fails.
     """
-    with tempfile.TemporaryDirectory(prefix="quadcosim_") as folder:
+    with temporary_folder() as folder:
         versions = {tool.name: tool.versions() for tool in tools}
-        runs = ToolRuns(request, Path(folder), announce)
+        runs = ToolRuns(request, folder, announce)
         tools = _capable(tools, runs.loop.converted, announce)
         with ThreadPoolExecutor(os.cpu_count()) as pool, runs:
             traces = [pool.submit(runs.trace, tool) for tool in tools]

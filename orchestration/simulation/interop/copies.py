@@ -6,13 +6,13 @@ A copy has a library in front of the FMU's own, which forwards every call: `reco
 import functools
 import re
 import subprocess
-import tempfile
 import uuid
 import zipfile
 from pathlib import Path
 
 from fmu_kit.archive import write_archive
 from fmu_kit.loader import PLATFORM, compiler
+from fmu_kit.scratch import temporary_folder
 from orchestration.components.fmi.read_description import Kind, Model, read_model
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.simulation.interop.assignment import Ports
@@ -78,8 +78,8 @@ def _library(model: Model) -> str:
 @functools.cache
 def _recorder() -> bytes:
     """The compiled library."""
-    with tempfile.TemporaryDirectory() as folder:
-        library = Path(folder, "recorder.so")
+    with temporary_folder() as folder:
+        library = folder / "recorder.so"
         command = [str(compiler()), "-std=gnu11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", str(SOURCE)]
         done = subprocess.run([*command, "-o", str(library), "-ldl"], capture_output=True, text=True, check=False)
         if done.returncode != 0:

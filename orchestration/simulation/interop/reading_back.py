@@ -1,11 +1,12 @@
 """Whether installed third-party masters read a written SSP: each runs its first steps."""
 
 import importlib.metadata
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from fmu_kit.new_files import write_atomically
+from fmu_kit.scratch import temporary_folder
 from orchestration.foundation.processes.child import Child
 from orchestration.simulation.interop.catalogue import TOOLS
 from orchestration.simulation.interop.job import Job
@@ -30,7 +31,7 @@ class Reading:
 
 def readings(ssp: Path, export: Export) -> Iterator[Reading]:
     """The result of each installed master that reads SSPs, one after the other, in separate processes."""
-    with tempfile.TemporaryDirectory() as temporary:
+    with temporary_folder() as temporary:
         job = Job(
             fmus={part.name: part.fmu for part in export.parts},
             ssp=ssp.absolute(),
@@ -39,10 +40,10 @@ def readings(ssp: Path, export: Export) -> Iterator[Reading]:
             parameters={part.name: part.parameters for part in export.parts},
             connections=(),
             signals=tuple(f"{part.name}.{name}" for part in export.parts for name in part.outputs),
-            recorded=Path(temporary),
-            folder=Path(temporary),
+            recorded=temporary,
+            folder=temporary,
         )
-        (job.folder / "job.json").write_text(job.to_json(), encoding="utf-8")
+        write_atomically(job.folder / "job.json", job.to_json())
         for name in READERS:
             tool = TOOLS[name]
             try:

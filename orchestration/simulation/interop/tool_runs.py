@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from fmu_kit.new_files import write_atomically
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.instance import Instance
@@ -101,7 +102,7 @@ class ToolRuns:
             recorded=self._folder / "recorded.npy",
             folder=folder,
         )
-        (folder / "job.json").write_text(job.to_json(), encoding="utf-8")
+        write_atomically(folder / "job.json", job.to_json())
         ending = self._start(tool.command(folder / "job.json", folder / "rows.npy"), folder).ending()
         if ending.code != 0:
             raise QuadcosimError(f"{tool.name}: {ending.last_line or ending.description.removeprefix('ended with ')}")

@@ -1,20 +1,12 @@
 """Writes a folder of results beside its place and renames it when complete: a killed process leaves no partial one."""
 
-import os
-import re
-import secrets
-import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from orchestration.foundation.basics import scratch
+from fmu_kit.new_files import NewFiles, WriteError
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
-from orchestration.foundation.basics.scratch import Scratch
-
-_HIDDEN = re.compile(r"\.(?P<name>.+)\.(?P<mark>[0-9a-f]{12})\.(?P<kind>new|old)", re.DOTALL)
-"""`new`: being written; `old`: being replaced by the new one with the same mark, which is complete."""
 
 
 @dataclass(kw_only=True)
@@ -33,32 +25,32 @@ class NewFolder:
 def new_folder(place: Path, replaceable: Callable[[Path], bool], expected: str) -> Iterator[NewFolder]:
     """A folder that is moved to its `place` on success and removed on failure, unless it is `precious`.
 
-    Remains of ended processes in the parent are cleaned up. Raises `UsageError` at once if `place` holds something
-    that is not `replaceable`, stating what was `expected`, or if nothing can be written there; `QuadcosimError`
-    stating where a precious one is kept.
+    Raises `UsageError` at once if `place` holds something that is not `replaceable`, stating what was `expected`, or if
+    nothing can be written there; `WriteError`; `QuadcosimError` stating where a precious one is kept.
     """
     _expect_place(place, replaceable, expected)
-    mark = secrets.token_hex(6)
     try:
-        place.parent.mkdir(parents=True, exist_ok=True)
-        _clear(place.parent)
-        partial = Scratch(place.parent / f".{place.name}.{mark}.new")
-    except OSError as error:
-        raise UsageError(f"{place}: expected a directory that can be written: {error}") from error
-    new = NewFolder(path=partial.path, place=place)
+        files = NewFiles(place.parent)
+    except WriteError as error:
+        raise UsageError(f"{place}: expected a directory that can be written: {error.strerror}") from error
+    new = NewFolder(path=files.path / place.name, place=place)
     try:
+        new.path.mkdir()
         yield new
         if new.replaces or _is_free(place):
             _expect_place(place, replaceable, expected)
-            _exchange(partial.path, place, place.parent / f".{place.name}.{mark}.old")
+            files.publish(replaces_folders=True)
         else:
-            new.place = _beside(partial.path, place)
+            new.place = _beside(new.path, place)
     except BaseException as error:
+        told = files.error_of(error) if isinstance(error, OSError) else None
         if new.precious and isinstance(error, Exception):
-            raise QuadcosimError(f"{error}; what was written is in {_beside(partial.path, place)}") from error
+            raise QuadcosimError(f"{told or error}; what was written is in {_beside(new.path, place)}") from error
+        if told is not None:
+            raise told from error
         raise
     finally:
-        partial.remove()  # does nothing after success
+        files.remove()  # does nothing after success
 
 
 def _expect_place(place: Path, replaceable: Callable[[Path], bool], expected: str) -> None:
@@ -73,20 +65,6 @@ def _is_free(place: Path) -> bool:
     return not place.exists() or (place.is_dir() and not any(place.iterdir()))
 
 
-def _exchange(new: Path, place: Path, old: Path) -> None:
-    """Move `new` to its place; what was there moves to `old` and is removed."""
-    if not place.exists():
-        new.rename(place)
-        return
-    place.rename(old)
-    try:
-        new.rename(place)
-    except OSError:
-        old.rename(place)
-        raise
-    shutil.rmtree(old, ignore_errors=True)
-
-
 def _beside(new: Path, place: Path) -> Path:
     """Move `new` to the first free name beside its place; returns that."""
     number = 1
@@ -94,17 +72,3 @@ def _beside(new: Path, place: Path) -> Path:
         number += 1
     new.rename(beside)
     return beside
-
-
-def _clear(parent: Path) -> None:
-    """Finish what ended processes have begun: move complete folders to their place, remove the rest."""
-    hidden = {path: match for path in parent.glob(".*") if (match := _HIDDEN.fullmatch(path.name))}
-    for path in scratch.abandoned(path for path, match in hidden.items() if match["kind"] == "new"):
-        place, old = parent / hidden[path]["name"], path.with_suffix(".old")
-        if old.exists() and not place.exists():
-            os.replace(path, place)
-        else:
-            shutil.rmtree(path, ignore_errors=True)
-    for path, match in hidden.items():
-        if match["kind"] == "old" and not path.with_suffix(".new").exists() and (parent / match["name"]).exists():
-            shutil.rmtree(path, ignore_errors=True)

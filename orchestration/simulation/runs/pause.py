@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fmu_kit.new_files import new_file, write_atomically
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import nanoseconds
 from orchestration.foundation.processes.resource_limits import Limits
@@ -141,9 +142,10 @@ def _write(simulation: PreparedRun, folder: Path) -> None:
     state, parts = simulation.master.state(), simulation.master.saved()
     text = json.dumps({**state, "of": _hashes(simulation)})
     arrays = {name: np.frombuffer(part, dtype=np.uint8) for name, part in parts.items()}
-    (folder / SCENARIO).write_text(simulation.request.to_toml(), encoding="utf-8")
+    write_atomically(folder / SCENARIO, simulation.request.to_toml())
     strings = {"json": np.array(text), "digest": np.array(_digest(text, parts))}
-    np.savez(folder / STATE, allow_pickle=False, **strings, **arrays)
+    with new_file(folder / STATE) as new:
+        np.savez(new, allow_pickle=False, **strings, **arrays)
 
 
 def _digest(text: str, parts: dict[str, bytes]) -> str:

@@ -8,6 +8,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, cast
 
+from fmu_kit.new_files import write_atomically
 from orchestration.foundation.basics.documents import read_json
 from orchestration.foundation.basics.errors import Named, SimulatorError, UsageError, one_line, shown
 from orchestration.foundation.recording import tables
@@ -57,10 +58,10 @@ def _write(result: Result, folder: Path, *, figures: bool) -> None:
         "interrupted_at": result.interrupted_at,
         "warnings": list(result.warnings),
     }
-    (folder / METRICS).write_text(json.dumps(result.metrics, indent=2) + "\n", encoding="utf-8")
-    (folder / SCENARIO).write_text(result.request.to_toml(), encoding="utf-8")
+    write_atomically(folder / METRICS, json.dumps(result.metrics, indent=2) + "\n")
+    write_atomically(folder / SCENARIO, result.request.to_toml())
     notes[CHECKSUMS] = _checksums(folder, notes)
-    (folder / PROVENANCE).write_text(json.dumps(notes, indent=2) + "\n", encoding="utf-8")
+    write_atomically(folder / PROVENANCE, json.dumps(notes, indent=2) + "\n")
     if figures:
         from orchestration.simulation.figures import style
         from orchestration.simulation.runs import (

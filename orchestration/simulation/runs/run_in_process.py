@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from orchestration.foundation.basics import scratch
+from fmu_kit import scratch
 from orchestration.foundation.basics.interrupt import deferred_interrupts
 from orchestration.foundation.basics.times import nanoseconds
 from orchestration.foundation.processes import subprocesses

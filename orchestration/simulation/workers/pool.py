@@ -13,7 +13,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from orchestration.foundation.basics import scratch
+from fmu_kit import scratch
+from fmu_kit.new_files import write_atomically
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.processes import subprocesses
 from orchestration.foundation.processes.child import Child, Died
@@ -250,7 +251,7 @@ class Pool:
     def _unpack(self, number: int, name: str) -> Path:
         path = self._root / f"{number}-{Path(name).stem}{'.csv' if Path(name).suffix == '.csv' else '.fmu'}"
         try:
-            path.write_bytes(self._inputs.contents[name])
+            write_atomically(path, self._inputs.contents[name])
         except OSError as error:
             raise QuadcosimError(f"{path}: expected to be written, for the workers: {error.strerror}") from error
         return path

@@ -6,7 +6,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from orchestration.foundation.basics import scratch
+from fmu_kit import scratch
 from orchestration.foundation.processes.channel import Parent
 from orchestration.simulation.workers import task as tasks
 from orchestration.simulation.workers.provenance import Sources, machine, software

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fmu_kit.new_files import write_atomically
 from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
@@ -74,7 +75,7 @@ class Certified:
         """Write the certificate; raises `UsageError` where there is none."""
         if self.certificate is None:
             raise UsageError("there is no certificate to write")
-        Path(path).write_text(self.certificate, encoding="utf-8")
+        write_atomically(Path(path), self.certificate)
         return Path(path)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from fmu_kit.new_files import new_files, write_atomically
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import needs
 from orchestration.foundation.basics.progress import ShareProgress, share_reporter
@@ -49,13 +50,14 @@ class Region:
     def save(self, folder: str | Path, style: Style = SCREEN) -> list[Path]:
         """Write the certificates, `1.json` and so on, and the figure, into a folder; the paths."""
         folder = Path(folder)
-        folder.mkdir(parents=True, exist_ok=True)
-        written = [folder / f"{i}.json" for i in range(1, len(self.certificates) + 1)]
-        for path, text in zip(written, self.certificates):
-            path.write_text(text, encoding="utf-8")
         with style.applied():
             figure = self.figure(style)
-        return [*written, *save({"region": figure}, folder, style)]
+        with new_files(folder) as new:
+            written = [new / f"{i}.json" for i in range(1, len(self.certificates) + 1)]
+            for path, text in zip(written, self.certificates):
+                write_atomically(path, text)
+            written += save({"region": figure}, new, style)
+        return [folder / path.name for path in written]
 
     def figure(self, style: Style = SCREEN) -> Figure:
         """The pairs that are certified, and those that break the loop."""

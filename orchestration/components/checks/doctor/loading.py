@@ -6,12 +6,12 @@ folder, an empty one, and sends an `error`, or the `fmu` and whether it `loads`,
 
 import importlib
 import sys
-import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fmu_kit.scratch import temporary_folder
 from orchestration.components.checks.doctor.fmu import CO_SIMULATION, KINDS, InspectedFmu, inspected
 from orchestration.components.fmi.archive import OtherVersionError, UnreadableFmuError
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
@@ -52,7 +52,7 @@ def try_loading(path: Path, limits: Limits) -> Trial:
 
 
 def _try_loading(path: Path, limits: Limits, environment: Mapping[str, str]) -> Trial:
-    with tempfile.TemporaryDirectory(prefix="quadcosim-", ignore_cleanup_errors=True) as folder:
+    with temporary_folder() as folder:
         module = subprocesses.Module.of(
             "orchestration.components.checks.doctor.loading", path.resolve(), folder, limits.size
         )

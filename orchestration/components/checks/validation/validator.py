@@ -1,8 +1,8 @@
 """All rules, tried in a confined process: a crash is a finding, and so is a missing answer."""
 
-import tempfile
 from pathlib import Path
 
+from fmu_kit.scratch import temporary_folder
 from orchestration.components.checks.validation.finding import Finding
 from orchestration.components.checks.validation.progress import ReceivedReport
 from orchestration.foundation.basics.errors import QuadcosimError
@@ -23,7 +23,7 @@ def validate(path: str | Path, *, limits: Limits | None = None) -> list[Finding]
     standard apply to FMUs that quadcosim built. Raises `QuadcosimError` if the validation itself fails.
     """
     path, limits = Path(path), limits or Limits()
-    with tempfile.TemporaryDirectory(prefix="quadcosim-", ignore_cleanup_errors=True) as folder:
+    with temporary_folder() as folder:
         module = subprocesses.Module.of(
             "orchestration.components.checks.validation.confined_process",
             path.resolve(),

@@ -1,14 +1,13 @@
 """The files of an SSP: a folder with its SystemStructure.ssd; an archive is unpacked once into the user's cache."""
 
 import hashlib
-import shutil
-import tempfile
 import zipfile
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
+from fmu_kit.new_files import new_files
 from orchestration.foundation.basics.documents import readable
 from orchestration.foundation.basics.errors import UsageError
 
@@ -63,20 +62,14 @@ def _unpack(path: Path, folder: Path) -> None:
     """Unpack all files or none; zipfile cuts names that lead out of the folder."""
     if not zipfile.is_zipfile(path):
         raise UsageError(f"{path}: expected an SSP archive, which is a zip file")
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    partial = Path(tempfile.mkdtemp(prefix=f"{folder.name}.", dir=folder.parent))
     try:
-        with zipfile.ZipFile(path) as archive:
+        with new_files(folder.parent) as new, zipfile.ZipFile(path) as archive:
             size = sum(info.file_size for info in archive.infolist())
             if size > MAX_UNPACKED_BYTES:
                 raise UsageError(f"{path}: expected an SSP archive of at most {MAX_UNPACKED_BYTES} bytes, unpacked")
-            archive.extractall(partial)
-        if not folder.is_dir():
-            partial.rename(folder)
+            archive.extractall(new / folder.name)
     except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError) as error:
         raise UsageError(f"{path}: expected an SSP archive: {error}") from error
     except OSError:
         if not folder.is_dir():  # else another process was first
             raise
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from fmu_kit.new_files import write_atomically
 from orchestration.foundation.basics.documents import toml_of
 from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.systems.system.file_tables import tables_of
@@ -17,7 +18,7 @@ ANNOTATION = "quadcosim.timing"
 def write(system: System, ssp: Path) -> Path:
     """Write the file beside an SSP with which it loads as `system`; return its path."""
     path = ssp.with_suffix(ENDING)
-    path.write_text(as_text(system, ssp=ssp.name), encoding="utf-8")
+    write_atomically(path, as_text(system, ssp=ssp.name))
     return path
 
 

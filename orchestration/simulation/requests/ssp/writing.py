@@ -12,6 +12,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from fmu_kit.archive import write_archive
+from fmu_kit.new_files import new_files
 from fmu_kit.units import BASE
 from fmu_kit.versions import generation_tool
 from fmu_kit.write_description import generation_date
@@ -54,7 +55,6 @@ def write(
     files[SYSTEM_PARAMETERS] = document(_parameter_set({f"{part.name}.": part for part in export.parts}))
     about = {"description": request.description} if request.description else {}
     files["SystemStructure.ssd"] = document(_structure(export, request.title or path.stem, about))
-    path.parent.mkdir(parents=True, exist_ok=True)
     write_archive(path, files, first="SystemStructure.ssd")
     return path
 
@@ -66,8 +66,9 @@ def write_with_timing(
     warn: Callable[[str], None] | None = None,
 ) -> tuple[Path, Path]:
     """As `write`, with the file beside it with which it loads as the same system."""
-    write(request, path, announce, warn)
-    return path, timing.write(request.as_system(), path)
+    with new_files(path.parent) as new:
+        written = timing.write(request.as_system(), write(request, new / path.name, announce, warn))
+    return path, path.with_name(written.name)
 
 
 def _sources(parts: Iterable[Part]) -> dict[str, Path]:

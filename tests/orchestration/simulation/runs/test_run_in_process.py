@@ -247,7 +247,7 @@ def test_ctrl_c_ends_the_run_at_an_instant_and_keeps_its_rows(tmp_path: Path) ->
         env=subprocesses.environment(), stderr=subprocess.PIPE, text=True, start_new_session=True,
     )  # fmt: skip
     assert process.stderr is not None
-    while not list(tmp_path.glob(".out.*.new/signals.parquet")):  # the process of the run has begun
+    while not list(tmp_path.glob(".quadcosim-*.new/partial/out/signals.parquet")):  # the process of the run has begun
         assert process.poll() is None
         time.sleep(0.05)
     process.send_signal(signal.SIGINT)

@@ -9,8 +9,8 @@ from pathlib import Path
 import fmpy
 import pytest
 
+from fmu_kit import scratch
 from orchestration.components.fmi.fmi2 import Fmi2Instance
-from orchestration.foundation.basics import scratch
 from orchestration.foundation.basics.errors import QuadcosimError
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="folders have no locks there")

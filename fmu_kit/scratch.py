@@ -4,7 +4,8 @@ import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 if sys.platform != "win32":
@@ -15,18 +16,20 @@ _cleared: set[Path] = set()
 
 
 class Scratch:
-    """A new folder at `path`, created and locked under another name before it is renamed.
+    """A new folder at `path`, locked before anything is in it.
 
-    The lock is the operating system's, on the folder itself, and ends with the process however that ends. Windows has
-    no such lock: folders of killed processes remain.
+    The lock is the operating system's, on the folder itself, and ends with the process however that ends. Windows and
+    some network file systems have no such lock: folders of killed processes remain there.
     """
 
     def __init__(self, path: Path, *, mode: int = 0o777) -> None:
         self.path = path
-        fresh = path.with_name(f"{path.name}.new")
-        fresh.mkdir(mode)
-        self._lock = _locked(fresh)
-        fresh.rename(path)
+        while True:
+            path.mkdir(mode)
+            self._lock = _locked(path, wait=True)
+            if path.is_dir():
+                break
+            self.release()  # another process took the folder for an abandoned one before it was locked
 
     def release(self) -> None:
         """Release the lock."""
@@ -50,10 +53,20 @@ def temporary() -> Scratch:
     return Scratch(parent / f"{PREFIX}{os.urandom(6).hex()}{SUFFIX}", mode=0o700)
 
 
-def abandoned(folders: Iterator[Path]) -> Iterator[Path]:
+@contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """As `temporary`, removed at the end of the block."""
+    scratch = temporary()
+    try:
+        yield scratch.path
+    finally:
+        scratch.remove()
+
+
+def abandoned(folders: Iterable[Path]) -> Iterator[Path]:
     """Those of `folders` whose process has ended; each stays locked until the next one is requested."""
     for folder in folders:
-        lock = _locked(folder)
+        lock = _locked(folder, wait=False)
         if lock is not None:
             try:
                 yield folder
@@ -61,7 +74,7 @@ def abandoned(folders: Iterator[Path]) -> Iterator[Path]:
                 os.close(lock)
 
 
-def _locked(folder: Path) -> int | None:
+def _locked(folder: Path, *, wait: bool) -> int | None:
     """A lock on `folder`, held by this process until it is closed; None if unavailable."""
     if sys.platform == "win32":
         return None
@@ -70,7 +83,7 @@ def _locked(folder: Path) -> int | None:
     except OSError:  # removed meanwhile, or owned by another user
         return None
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(handle, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:
         os.close(handle)
         return None
