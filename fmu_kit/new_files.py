@@ -19,7 +19,7 @@ from fmu_kit.scratch import Scratch, abandoned, temporary_folder
 _HIDDEN = re.compile(r"\.quadcosim-[0-9a-f]{12}\.new")
 _PRIVATE = re.compile(rf"{_HIDDEN.pattern}|quadcosim-[0-9a-f]{{12}}\.scratch")
 _PARTIAL, _WHOLE, _OLD = "partial", "whole", "old"
-"""What is in the folder beside the place: files being written; all of them, to be moved; those that they replace"""
+"""Names in the folder beside the place: of files being written, of all of them, and of those that they replace"""
 _OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
 _cleared: set[Path] = set()
 

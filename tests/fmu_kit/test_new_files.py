@@ -56,7 +56,12 @@ def calls_of(name: str, tmp_path: Path) -> int:
         counted: list[object] = []
         (tmp_path / "counted").mkdir()
         genuine = getattr(os, name)
-        patch.setattr(os, name, lambda *each, **named: (counted.append(each), genuine(*each, **named))[1])
+
+        def count(*arguments: object, **named: object) -> None:
+            counted.append(arguments)
+            genuine(*arguments, **named)
+
+        patch.setattr(os, name, count)
         write(tmp_path / "counted", NEW)
     return len(counted)
 
@@ -135,17 +140,19 @@ def test_a_file_that_grows_too_large_is_named_and_the_old_one_kept(before: dict[
 def test_where_nothing_may_be_written_the_reason_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The superuser may write everywhere, so the system's answers are made here."""
     write(tmp_path, OLD)
-    with monkeypatch.context() as patch, pytest.raises(WriteError) as raised:
+    with monkeypatch.context() as patch:
         patch.setattr(os, "access", lambda path, mode: Path(path).name != "model.c")
-        write(tmp_path, NEW)
+        with pytest.raises(WriteError) as raised:
+            write(tmp_path, NEW)
     assert str(raised.value) == f"{tmp_path / 'model.c'}: could not be written: Permission denied"
 
     def refuse(*_: object) -> None:
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
-    with monkeypatch.context() as patch, pytest.raises(WriteError) as raised:
+    with monkeypatch.context() as patch:
         patch.setattr(os, "mkdir", refuse)
-        write(tmp_path, NEW)
+        with pytest.raises(WriteError) as raised:
+            write(tmp_path, NEW)
     assert str(raised.value) == f"{tmp_path}: could not be written: Permission denied"
     assert contents(tmp_path) == OLD
 

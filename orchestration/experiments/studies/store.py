@@ -212,12 +212,11 @@ def open_for_reading(path: Path) -> Iterator[Store]:
         try:
             connection = _read_only(path)
         except sqlite3.OperationalError:  # WAL writes beside the file, so open a copy
-            copy = folder / path.name
             with integrity.store_errors(path):
                 for suffix in ("", "-wal"):
                     if Path(f"{path}{suffix}").is_file():
-                        shutil.copyfile(f"{path}{suffix}", f"{copy}{suffix}")
-                connection = _read_only(copy)
+                        shutil.copyfile(f"{path}{suffix}", folder / f"{path.name}{suffix}")
+                connection = _read_only(folder / path.name)
         except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
             raise QuadcosimError(f"{path}: expected the store of a study: {integrity.error_text(error)}") from error
         with closing(connection):

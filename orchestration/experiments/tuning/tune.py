@@ -162,8 +162,7 @@ def run_searches(
         one = find(period, seed, _part(progress, i, len(searches)))
         done.append(one)
         announce(f"period {period:g} s, seed {seed}: cost {one.cost:.5g}; {one.judgement}")
-        folder.mkdir(parents=True, exist_ok=True)
-        record.write_text(json.dumps([dataclasses.asdict(each) for each in done], indent=2))
+        write_atomically(record, json.dumps([dataclasses.asdict(each) for each in done], indent=2))
     return done
 
 

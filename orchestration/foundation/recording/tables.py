@@ -132,9 +132,9 @@ def copy(recording: Recording, folder: Path, about: About) -> None:
     recorder.finish()
 
 
-def write_signals(path: Path | BinaryIO, recording: Recording, about: About) -> None:
+def write_signals(file: BinaryIO, recording: Recording, about: About) -> None:
     """Write all signals, a float64 column each, with unit and description in its metadata."""
-    with pq.ParquetWriter(path, _signals_schema(recording.columns, about), write_page_checksum=True) as writer:
+    with pq.ParquetWriter(file, _signals_schema(recording.columns, about), write_page_checksum=True) as writer:
         for chunk in recording.chunks():
             writer.write_table(_signals_table(chunk))
 

@@ -84,8 +84,8 @@ def test_rows_are_on_disk_before_the_flight_is_over(tmp_path: Path) -> None:
     sizes: list[int] = []
 
     def look(share: float) -> None:
-        (hidden,) = tmp_path.iterdir()
-        sizes.append((hidden / "signals.parquet").stat().st_size)
+        (signals,) = tmp_path.glob(".quadcosim-*.new/partial/run/signals.parquet")
+        sizes.append(signals.stat().st_size)
 
     scenario = SCENARIO.with_changes(stop_time=1.5)
     keep_run(tmp_path / "run", lambda to: quadcosim.run(scenario, recorder=to, progress=look), figures=False)
