@@ -15,11 +15,10 @@ from fmu_kit.libraries import cached_library
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.basics.simulator import Integers
 from orchestration.foundation.basics.times import Constant
+from orchestration.systems.computers import note
 from orchestration.systems.computers import parts as constants
 from orchestration.systems.computers.parts import (
-    ALL_KINDS,
     AT_ONCE,
-    COLUMNS,
     IS_CONSTANT,
     LATER,
     Carrier,
@@ -85,7 +84,7 @@ class Schedules(Protocol):
         """The notes since the last call, one per row: time, kind, owner, index of its job or frame, one more value."""
 
 
-def scheduler(parts: Parts, kinds: Collection[int] = ALL_KINDS) -> Schedules:
+def scheduler(parts: Parts, kinds: Collection[int] = note.ALL_KINDS) -> Schedules:
     """A scheduler of `parts` that keeps notes of these `kinds`; in C where there is a compiler."""
     try:
         _library()
@@ -97,7 +96,7 @@ def scheduler(parts: Parts, kinds: Collection[int] = ALL_KINDS) -> Schedules:
 class CompiledScheduler:
     """The scheduler in C; raises `QuadcosimError` without a compiler."""
 
-    def __init__(self, parts: Parts, kinds: Collection[int] = ALL_KINDS) -> None:
+    def __init__(self, parts: Parts, kinds: Collection[int] = note.ALL_KINDS) -> None:
         self._library, self._parts = _library(), parts
         self._tables = tables = _tables(
             tuple(parts.processors),
@@ -107,7 +106,7 @@ class CompiledScheduler:
             tuple(parts.links),
         )
         self._numbers, self._notes = _Numbers(parts.streams), _Notes()
-        self._kept = np.array([kind in kinds for kind in range(len(ALL_KINDS))], dtype=np.uint8)
+        self._kept = np.array([kind in kinds for kind in range(len(note.ALL_KINDS))], dtype=np.uint8)
         self._draw, self._take = _DRAW(self._numbers.draw), _TAKE(self._notes.collect)
         arguments = _Arguments(
             stop=parts.stop,
@@ -178,7 +177,7 @@ class _Notes:
     """The notes from C, likewise."""
 
     def __init__(self) -> None:
-        self.room = np.empty((_ROOM, COLUMNS), dtype=np.int64)
+        self.room = np.empty((_ROOM, note.COLUMNS), dtype=np.int64)
         self._batches: list[Integers] = []
 
     def collect(self, count: int) -> None:
@@ -238,8 +237,9 @@ def _library() -> Any:
 
 
 def _constants() -> str:
-    """The constants and columns of parts.py as a C header."""
-    found = {name: value for name, value in vars(constants).items() if name.isupper() and isinstance(value, int)}
+    """The constants and columns of parts.py and note.py as a C header."""
+    defined = {**vars(constants), **vars(note)}
+    found = {name: value for name, value in defined.items() if name.isupper() and isinstance(value, int)}
     found |= {name: i for i, name in enumerate(_KINDS)} | {"PART_KINDS": len(_KINDS)}
     for table, columns in _TABLES.items():
         found |= {f"{table}_{column.upper()}": i for i, column in enumerate(columns)}

@@ -1,5 +1,5 @@
-/* The scheduler of scheduler.py, to the bit. constants.h is generated from parts.py, with a name for each column of the
-   tables of parts. Python provides more numbers of a stream, and room for notes, when there are none left. */
+/* The scheduler of scheduler.py, to the bit. constants.h is generated from parts.py and note.py, with a name for each
+   column of the tables of parts. Python provides more numbers of a stream, and room for notes, when there are none left. */
 
 #include <stdint.h>
 #include <stdlib.h>

@@ -11,34 +11,16 @@ from collections.abc import Collection
 import numpy as np
 
 from orchestration.foundation.basics.simulator import Integers
+from orchestration.systems.computers import note
 from orchestration.systems.computers.parts import (
     ABORT,
-    ABORTED,
-    ALL_KINDS,
-    ARRIVES,
     AT_ONCE,
-    COLUMNS,
     EARLIEST_DEADLINE,
-    FINISHED,
     FIXED_PRIORITY,
-    FRAME_CORRUPTED,
-    FRAME_STARTED,
-    FRAME_TRANSMITTED,
-    INTERRUPTED,
     LATER,
     MAX_WAITING,
     NONE,
-    PREEMPTED,
-    QUEUED,
-    RELEASED,
-    RESUMED,
-    SAMPLED,
-    SENT,
     SKIP,
-    SKIPPED,
-    STARTED,
-    SWITCHING,
-    WRITTEN,
     Leg,
     Parts,
     ScheduledFrame,
@@ -144,10 +126,10 @@ class _LinkState:
 class Scheduler:
     """Processes the instants in order, and keeps notes of them."""
 
-    def __init__(self, parts: Parts, kinds: Collection[int] = ALL_KINDS) -> None:
+    def __init__(self, parts: Parts, kinds: Collection[int] = note.ALL_KINDS) -> None:
         """`kinds` are the kinds of notes that are kept."""
         self._parts, self._stop = parts, parts.stop
-        self._kept = [kind in kinds for kind in range(len(ALL_KINDS))]
+        self._kept = [kind in kinds for kind in range(len(note.ALL_KINDS))]
         self._notes: list[int] = []
         self._numbers = [_Numbers(stream) for stream in parts.streams]
         carriers = range(len(parts.carriers))
@@ -210,7 +192,7 @@ class Scheduler:
 
     def take_notes(self) -> Integers:
         """The notes since the last call, one per row: time, kind, owner, index of its job or frame, one more value."""
-        found = np.array(self._notes, dtype=np.int64).reshape(-1, COLUMNS)
+        found = np.array(self._notes, dtype=np.int64).reshape(-1, note.COLUMNS)
         self._notes.clear()
         return found
 
@@ -313,13 +295,13 @@ class Scheduler:
         number = task.number
         task.number += 1
         if task.part.overrun == SKIP and task.jobs:
-            self._note(now, SKIPPED, i, number, nominal)
+            self._note(now, note.SKIPPED, i, number, nominal)
             return
         job = _Job(number, nominal, now, nominal + task.part.deadline, execution)
         if len(task.jobs) == MAX_WAITING:
             raise self._parts.queue_overflow(i)
         task.jobs.append(job)
-        self._note(now, RELEASED, i, number, nominal)
+        self._note(now, note.RELEASED, i, number, nominal)
         if task.part.reads_at_release and task.part.overrun != ABORT:
             self._sample(i, task, job, now)
         if task.part.overrun == ABORT:
@@ -332,7 +314,7 @@ class Scheduler:
         job.sample, task.samples = task.samples, task.samples + 1
         task.sampled_at = max(time, task.sampled_at + 1)
         if task.part.reports_samples:
-            self._note(now, SAMPLED, i, job.number, task.sampled_at)
+            self._note(now, note.SAMPLED, i, job.number, task.sampled_at)
 
     def _set_deadline(self, i: int, now: int) -> None:
         task, due = self._tasks[i], LATER
@@ -347,7 +329,7 @@ class Scheduler:
         task = self._tasks[i]
         job = task.jobs.popleft()
         processor.running, processor.executing = NONE, False
-        self._note(now, FINISHED, i, job.number, 0)
+        self._note(now, note.FINISHED, i, job.number, 0)
         if task.part.writes_at_deadline and now <= job.deadline:
             task.unwritten.append(job)
         else:
@@ -358,20 +340,20 @@ class Scheduler:
     def _abort(self, i: int, task: _TaskState, now: int) -> None:
         job, processor = task.jobs.popleft(), self._processors[task.part.processor]
         if processor.running == i:
-            self._note(now, INTERRUPTED, i, job.number, 0)
+            self._note(now, note.INTERRUPTED, i, job.number, 0)
             processor.running, processor.executing = NONE, False
             self._due[self._busy + task.part.processor] = LATER
-        self._note(now, ABORTED, i, job.number, 0)
+        self._note(now, note.ABORTED, i, job.number, 0)
         processor.changed = True
         if job.sample != NONE:
             for c in task.carriers:
                 carrier = self._parts.carriers[c]
                 self._numbers[carrier.late].next()
                 self._numbers[carrier.lost].next()
-                self._note(now, SENT, c, job.sample, 2)
+                self._note(now, note.SENT, c, job.sample, 2)
 
     def _write(self, i: int, job: _Job, now: int) -> None:
-        self._note(now, WRITTEN, i, job.number, job.sample)
+        self._note(now, note.WRITTEN, i, job.number, job.sample)
         for c in self._tasks[i].carriers:
             self._send(c, job.sample, now, now)
 
@@ -399,7 +381,7 @@ class Scheduler:
             self._preempt(processor, now)
             processor.running, processor.ready_at = chosen, now + part.switch
             if part.switch:
-                self._note(now, SWITCHING, chosen, self._tasks[chosen].jobs[0].number, 0)
+                self._note(now, note.SWITCHING, chosen, self._tasks[chosen].jobs[0].number, 0)
         then = LATER
         if processor.running != NONE:
             if not processor.executing and processor.ready_at <= now:
@@ -425,9 +407,9 @@ class Scheduler:
         job = self._tasks[i].jobs[0]
         if processor.executing:
             job.left -= now - processor.ready_at
-            self._note(now, PREEMPTED, i, job.number, 0)
+            self._note(now, note.PREEMPTED, i, job.number, 0)
         else:
-            self._note(now, INTERRUPTED, i, job.number, 0)
+            self._note(now, note.INTERRUPTED, i, job.number, 0)
         processor.running, processor.executing = NONE, False
 
     def _resume(self, processor: _ProcessorState, now: int) -> None:
@@ -436,7 +418,7 @@ class Scheduler:
         task = self._tasks[i]
         job = task.jobs[0]
         processor.executing, processor.ready_at = True, now
-        self._note(now, RESUMED if job.started else STARTED, i, job.number, 0)
+        self._note(now, note.RESUMED if job.started else note.STARTED, i, job.number, 0)
         if not job.started:
             job.started, task.started_at = True, now
             if job.sample == NONE:
@@ -467,7 +449,7 @@ class Scheduler:
         """Send a message of a connection."""
         carrier = self._parts.carriers[c]
         late, lost = self._numbers[carrier.late].next(), self._numbers[carrier.lost].next()
-        self._note(now, SENT, c, sample, lost)
+        self._note(now, note.SENT, c, sample, lost)
         if carrier.message == NONE:
             self._receive(c, sample, late, lost, now)
         else:
@@ -479,14 +461,14 @@ class Scheduler:
         if lost:
             return
         arrival = self._last_arrival[c] = max(self._last_arrival[c], now + late)
-        self._note(now, ARRIVES, c, sample, arrival)
+        self._note(now, note.ARRIVES, c, sample, arrival)
         if self._parts.carriers[c].releases:
             self._pending[c].append(arrival)
             self._due[self._arrival + c] = self._pending[c][0]
 
     def _enqueue(self, m: int, frame: _Frame, now: int) -> None:
         self._frame_number[m] += 1
-        self._note(now, QUEUED, m, frame.number, frame.nominal)
+        self._note(now, note.QUEUED, m, frame.number, frame.nominal)
         self._queue(self._first_leg[m], frame, now)
 
     def _queue(self, j: int, frame: _Frame, now: int) -> None:
@@ -516,7 +498,7 @@ class Scheduler:
         link.sending, link.corrupted = chosen, bool(self._numbers[message.corrupted].next())
         length = leg.part.corrupted_length if link.corrupted else leg.part.length
         self._due[self._line + k] = now + length
-        self._note(now, FRAME_STARTED, leg.message, leg.frames[0].number, leg.place)
+        self._note(now, note.FRAME_STARTED, leg.message, leg.frames[0].number, leg.place)
 
     def _end_frame(self, link: _LinkState, now: int) -> None:
         """The last bit of a frame is transmitted."""
@@ -524,10 +506,10 @@ class Scheduler:
         leg = self._legs[j]
         message = self._parts.messages[leg.message]
         if link.corrupted:
-            self._note(now, FRAME_CORRUPTED, leg.message, leg.frames[0].number, leg.place)
+            self._note(now, note.FRAME_CORRUPTED, leg.message, leg.frames[0].number, leg.place)
             return
         frame = leg.frames.popleft()
-        self._note(now, FRAME_TRANSMITTED, leg.message, frame.number, leg.place)
+        self._note(now, note.FRAME_TRANSMITTED, leg.message, frame.number, leg.place)
         if not leg.is_last:
             self._legs[j + 1].coming.append((now + message.pause, frame))
             self._due[self._hop + j + 1] = self._legs[j + 1].coming[0][0]

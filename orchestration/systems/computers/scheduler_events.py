@@ -6,31 +6,16 @@ import numpy as np
 
 from orchestration.foundation.basics.simulator import Integers
 from orchestration.foundation.recording.recording import KINDS
-from orchestration.systems.computers.parts import (
-    ABORTED,
-    FINISHED,
-    FRAME_CORRUPTED,
-    FRAME_TRANSMITTED,
-    LATER,
-    NONE,
-    PREEMPTED,
-    QUEUED,
-    RELEASED,
-    RESUMED,
-    SKIPPED,
-    STARTED,
-    Parts,
-)
-from orchestration.systems.computers.parts import KINDS as KINDS_OF_NOTES
+from orchestration.systems.computers import note
+from orchestration.systems.computers.parts import LATER, NONE, Parts
 
 _EVENTS = {
-    RELEASED: "released", STARTED: "started", PREEMPTED: "preempted", RESUMED: "resumed", FINISHED: "finished",
-    ABORTED: "aborted", SKIPPED: "skipped", QUEUED: "queued", FRAME_TRANSMITTED: "transmitted",
-    FRAME_CORRUPTED: "retransmitted",
-}  # fmt: skip
+    getattr(note, word.upper()): word
+    for word in ("released", "started", "preempted", "resumed", "finished", "aborted", "skipped", "queued")
+} | {note.FRAME_TRANSMITTED: "transmitted", note.FRAME_CORRUPTED: "retransmitted"}
 NEEDED = frozenset(_EVENTS)
 """The kinds of notes that events are made of"""
-_KIND = np.full(KINDS_OF_NOTES, NONE)
+_KIND = np.full(note.KINDS, NONE)
 _KIND[[*_EVENTS]] = [KINDS.index(word) for word in _EVENTS.values()]
 _MISSED = KINDS.index("missed")
 
@@ -52,10 +37,10 @@ class EventBuilder:
         A missed deadline comes after all else at that instant.
         """
         what, part = notes[:, 1], notes[:, 2]
-        of_messages = what >= QUEUED
+        of_messages = what >= note.QUEUED
         kind, owner = _KIND[what], part + self._tasks * of_messages
         reported = (kind != NONE) & self._is_reported[owner]
-        passed = np.flatnonzero(what == FRAME_TRANSMITTED)
+        passed = np.flatnonzero(what == note.FRAME_TRANSMITTED)
         reported[passed] &= notes[passed, 4] == self._last_leg[part[passed]]
         rows, jobs = np.flatnonzero(reported), np.flatnonzero(reported & ~of_messages)
         found = _table(notes[rows, 0], kind[rows], owner[rows], notes[rows, 3])
@@ -82,7 +67,7 @@ class _Deadlines:
         A job that is released behind its deadline, by its jitter, is late when it is released.
         """
         what, task = notes[:, 1], notes[:, 2]
-        new = np.flatnonzero((what == RELEASED) | (what == SKIPPED))
+        new = np.flatnonzero((what == note.RELEASED) | (what == note.SKIPPED))
         counts = self._counts + np.bincount(task[new], minlength=len(self._counts))
         start = np.cumsum(counts) - counts
         places = (start - self._first)[task] + notes[:, 3]
@@ -92,7 +77,7 @@ class _Deadlines:
         due[before], ended[before], reported_at[before] = self._due, self._ended, self._reported_at
         due[places[new]] = notes[new, 4] + self._of_tasks[task[new]]
         reported_at[places[new]] = np.maximum(due[places[new]], notes[new, 0])
-        done = np.flatnonzero((what == FINISHED) & (places >= start[task]))  # late ones are reported already
+        done = np.flatnonzero((what == note.FINISHED) & (places >= start[task]))  # late ones are reported already
         ended[places[done]] = notes[done, 0]
         past = reported_at < time
         late = np.flatnonzero(past & (ended > due))

@@ -8,32 +8,15 @@ import numpy as np
 
 from orchestration.foundation.basics.simulator import Booleans, Integers
 from orchestration.foundation.recording.recording import Events
-from orchestration.systems.computers.parts import (
-    ABORTED,
-    FINISHED,
-    FRAME_CORRUPTED,
-    FRAME_STARTED,
-    FRAME_TRANSMITTED,
-    INTERRUPTED,
-    KINDS,
-    LATER,
-    NONE,
-    PREEMPTED,
-    QUEUED,
-    RELEASED,
-    RESUMED,
-    SKIPPED,
-    STARTED,
-    SWITCHING,
-    WRITTEN,
-    Parts,
-)
-from orchestration.systems.computers.results import ABORTED as WAS_ABORTED
+from orchestration.systems.computers import note
+from orchestration.systems.computers.parts import LATER, NONE, Parts
 from orchestration.systems.computers.results import (
+    ABORTED,
     CORRUPTED,
     DONE,
     NEVER,
     RUN,
+    SKIPPED,
     SWITCH,
     UNFINISHED,
     Frames,
@@ -41,12 +24,11 @@ from orchestration.systems.computers.results import (
     Slices,
     Timeline,
 )
-from orchestration.systems.computers.results import SKIPPED as WAS_SKIPPED
 from orchestration.systems.computers.scheduler_events import EventBuilder
 
-_OF_TASKS = (RELEASED, STARTED, PREEMPTED, RESUMED, FINISHED, ABORTED, SKIPPED, SWITCHING, INTERRUPTED, WRITTEN)
-_OF_MESSAGES = (QUEUED, FRAME_STARTED, FRAME_CORRUPTED, FRAME_TRANSMITTED)
-_ON_A_PROCESSOR = (SWITCHING, STARTED, RESUMED, PREEMPTED, FINISHED, INTERRUPTED)
+_OF_TASKS = tuple(kind for kind in range(note.QUEUED) if kind != note.SAMPLED)
+_OF_MESSAGES = (note.QUEUED, note.FRAME_STARTED, note.FRAME_CORRUPTED, note.FRAME_TRANSMITTED)
+_ON_A_PROCESSOR = (note.SWITCHING, note.STARTED, note.RESUMED, note.PREEMPTED, note.FINISHED, note.INTERRUPTED)
 NEEDED = frozenset((*_OF_TASKS, *_OF_MESSAGES))
 """The kinds of notes that a timeline is made of"""
 
@@ -99,7 +81,7 @@ def timeline(
 
 def _are(what: Integers, kinds: Sequence[int]) -> Booleans:
     """Which notes are of one of these kinds."""
-    is_one = np.zeros(KINDS, dtype=np.bool_)
+    is_one = np.zeros(note.KINDS, dtype=np.bool_)
     is_one[[*kinds]] = True
     found: Booleans = is_one[what]
     return found
@@ -107,7 +89,7 @@ def _are(what: Integers, kinds: Sequence[int]) -> Booleans:
 
 def _jobs(notes: Integers, deadline: int, stop: int) -> Jobs:
     what = notes[:, 1]
-    first = notes[(what == RELEASED) | (what == SKIPPED)]
+    first = notes[(what == note.RELEASED) | (what == note.SKIPPED)]
     count = len(first)
 
     def times(kind: int) -> Integers:
@@ -116,18 +98,18 @@ def _jobs(notes: Integers, deadline: int, stop: int) -> Jobs:
         found[some[:, 3]] = some[:, 0]
         return found
 
-    ended = times(FINISHED)
+    ended = times(note.FINISHED)
     outcome = np.where(ended == NEVER, UNFINISHED, DONE)
-    outcome[notes[what == ABORTED, 3]] = WAS_ABORTED
-    outcome[notes[what == SKIPPED, 3]] = WAS_SKIPPED
+    outcome[notes[what == note.ABORTED, 3]] = ABORTED
+    outcome[notes[what == note.SKIPPED, 3]] = SKIPPED
     return Jobs(
         nominal=first[:, 4],
         released=first[:, 0],
-        started=times(STARTED),
+        started=times(note.STARTED),
         ended=ended,
-        written=times(WRITTEN),
+        written=times(note.WRITTEN),
         deadline=first[:, 4] + deadline,
-        preemptions=np.bincount(notes[what == PREEMPTED, 3], minlength=count),
+        preemptions=np.bincount(notes[what == note.PREEMPTED, 3], minlength=count),
         outcome=outcome,
         stop=stop,
     )
@@ -135,10 +117,10 @@ def _jobs(notes: Integers, deadline: int, stop: int) -> Jobs:
 
 def _frames(notes: Integers, deadline: int, legs: int, stop: int) -> Frames:
     what = notes[:, 1]
-    first = notes[what == QUEUED]
+    first = notes[what == note.QUEUED]
     started, ended = np.full((2, len(first)), NEVER, dtype=np.int64)
-    first_bits = notes[(what == FRAME_STARTED) & (notes[:, 4] == 0)]
-    last = notes[(what == FRAME_TRANSMITTED) & (notes[:, 4] == legs - 1)]
+    first_bits = notes[(what == note.FRAME_STARTED) & (notes[:, 4] == 0)]
+    last = notes[(what == note.FRAME_TRANSMITTED) & (notes[:, 4] == legs - 1)]
     started[first_bits[::-1, 3]] = first_bits[::-1, 0]  # of several attempts the first
     ended[last[:, 3]] = last[:, 0]
     return Frames(
@@ -147,7 +129,7 @@ def _frames(notes: Integers, deadline: int, legs: int, stop: int) -> Frames:
         started=started,
         ended=ended,
         deadline=np.minimum(first[:, 4], LATER - deadline) + deadline,
-        attempts=np.bincount(notes[what == FRAME_STARTED, 3], minlength=len(first)),
+        attempts=np.bincount(notes[what == note.FRAME_STARTED, 3], minlength=len(first)),
         stop=stop,
     )
 
@@ -156,8 +138,8 @@ def _slices_of_processor(notes: Integers, parts: Parts, processor: int, names: S
     """The slices of a processor: each note about its use ends the slice before it."""
     owners = [i for i, task in enumerate(parts.tasks) if task.processor == processor]
     kept = notes[_are(notes[:, 1], _ON_A_PROCESSOR) & np.isin(notes[:, 2], owners)]
-    kinds = np.where(kept[:, 1] == SWITCHING, SWITCH, RUN)
-    return _slices(kept, kinds, (SWITCHING, STARTED, RESUMED), owners, names, stop)
+    kinds = np.where(kept[:, 1] == note.SWITCHING, SWITCH, RUN)
+    return _slices(kept, kinds, (note.SWITCHING, note.STARTED, note.RESUMED), owners, names, stop)
 
 
 def _slices_of_link(notes: Integers, parts: Parts, link: int, names: Sequence[str], stop: int) -> Slices:
@@ -166,11 +148,11 @@ def _slices_of_link(notes: Integers, parts: Parts, link: int, names: Sequence[st
     for m, message in enumerate(parts.messages):
         for place, leg in enumerate(message.legs):
             where[m, place] = leg.link
-    notes = notes[notes[:, 1] != QUEUED]
+    notes = notes[notes[:, 1] != note.QUEUED]
     kept = notes[where[notes[:, 2], notes[:, 4]] == link]
-    is_corrupted = np.append(kept[1:, 1] == FRAME_CORRUPTED, [False])[: len(kept)]
+    is_corrupted = np.append(kept[1:, 1] == note.FRAME_CORRUPTED, [False])[: len(kept)]
     owners = np.flatnonzero((where == link).any(axis=1)).tolist()
-    return _slices(kept, np.where(is_corrupted, CORRUPTED, RUN), (FRAME_STARTED,), owners, names, stop)
+    return _slices(kept, np.where(is_corrupted, CORRUPTED, RUN), (note.FRAME_STARTED,), owners, names, stop)
 
 
 def _slices(

@@ -5,8 +5,9 @@ from collections.abc import Collection
 import numpy as np
 
 from orchestration.foundation.basics.simulator import Integers
+from orchestration.systems.computers import note
 from orchestration.systems.computers.compiled import scheduler
-from orchestration.systems.computers.parts import ARRIVES, KINDS, LATER, SAMPLED, SENT
+from orchestration.systems.computers.parts import LATER
 from orchestration.systems.schedule.random_timing import NEVER
 from orchestration.systems.schedule.resources import Resources
 from orchestration.systems.schedule.streams import Streams
@@ -92,7 +93,7 @@ class Lookahead:
     """The scheduler of a system, run ahead of the timetable."""
 
     def __init__(self, system: System, resources: Resources, streams: Streams) -> None:
-        self._scheduler = scheduler(resources.of_run(streams), (SAMPLED, SENT, ARRIVES))
+        self._scheduler = scheduler(resources.of_run(streams), (note.SAMPLED, note.SENT, note.ARRIVES))
         self._tasks, self._stop = resources.tasks, resources.parts.stop
         self._reached = 0
         self.messages = {name: ForeseenMessages() for name in resources.carriers}
@@ -120,15 +121,15 @@ class Lookahead:
         notes = self._scheduler.take_notes()
         if not len(notes):
             return
-        which = KINDS * notes[:, 2] + notes[:, 1]
+        which = note.KINDS * notes[:, 2] + notes[:, 1]
 
         def of(kind: int, owner: int) -> Integers:
-            return notes.take(np.flatnonzero(which == KINDS * owner + kind), axis=0)
+            return notes.take(np.flatnonzero(which == note.KINDS * owner + kind), axis=0)
 
         for name, task in self._tasks.items():
-            self.samples[name].add(of(SAMPLED, task)[:, 4])
+            self.samples[name].add(of(note.SAMPLED, task)[:, 4])
         for i, messages in enumerate(self.messages.values()):
-            messages.add(of(SENT, i), of(ARRIVES, i))
+            messages.add(of(note.SENT, i), of(note.ARRIVES, i))
 
     def advance(self) -> None:
         """Advance further, because something before the requested time is not known yet."""

@@ -8,8 +8,9 @@ import numpy as np
 
 from orchestration.foundation.basics.simulator import Integers
 from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.systems.computers import note
 from orchestration.systems.computers.compiled import scheduler
-from orchestration.systems.computers.parts import ARRIVES, LATER, NONE, QUEUED, RELEASED, SAMPLED, SENT
+from orchestration.systems.computers.parts import LATER, NONE
 from orchestration.systems.schedule.resources import Resources
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.system.model import System
@@ -54,7 +55,7 @@ class ScheduleTrace:
     @property
     def jobs(self) -> int:
         """The number of jobs and messages."""
-        return int(np.isin(self.notes[:, 1], (RELEASED, QUEUED)).sum())
+        return int(np.isin(self.notes[:, 1], (note.RELEASED, note.QUEUED)).sum())
 
     def notes_of(self, kind: int, owner: int) -> Integers:
         """Notes of one kind of a task, message or carrier."""
@@ -69,11 +70,12 @@ class ScheduleTrace:
         parts, until = self.resources.parts, end == self.stop
         samples, sent, transit_times = dict[str, tuple[Fraction, ...]](), dict[str, tuple[Fraction, ...]](), {}
         for name, task in self.resources.tasks.items():
-            samples[name] = _offsets_between(self.notes_of(SAMPLED, task)[:, 4], begin, end, period)[0]
+            samples[name] = _offsets_between(self.notes_of(note.SAMPLED, task)[:, 4], begin, end, period)[0]
         released = frozenset(name for name, c in self.resources.carriers.items() if parts.carriers[c].releases)
         for name, c in self.resources.carriers.items():
-            sender, notes, arriving = parts.carriers[c].sender, self.notes_of(SENT, c), self.notes_of(ARRIVES, c)
-            times = notes[:, 0] if sender == NONE else self.notes_of(SAMPLED, sender)[:, 4]
+            sender = parts.carriers[c].sender
+            notes, arriving = self.notes_of(note.SENT, c), self.notes_of(note.ARRIVES, c)
+            times = notes[:, 0] if sender == NONE else self.notes_of(note.SAMPLED, sender)[:, 4]
             outcome, arrives = np.full((2, len(times)), NONE)
             outcome[notes[:, 3]], arrives[arriving[:, 3]] = notes[:, 4], arriving[:, 4]
             offsets, which = _offsets_between(times, begin, end, period)

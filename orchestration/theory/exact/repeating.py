@@ -16,7 +16,7 @@ import numpy as np
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Integers
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds, nanoseconds
-from orchestration.systems.computers import parts
+from orchestration.systems.computers import note, parts
 from orchestration.systems.system.component import Sampling, has_scheduled_instants
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System
@@ -29,9 +29,9 @@ MAX_SIMULATED_JOBS = 200_000
 """Most jobs of all tasks and messages that are simulated"""
 WINDOWS, MOST_WINDOWS = 12, 96
 """Windows that are compared at first, and at most"""
-_WITH_TIMES = (parts.RELEASED, parts.SKIPPED, parts.QUEUED, parts.SAMPLED, parts.ARRIVES)
+_WITH_TIMES = (note.RELEASED, note.SKIPPED, note.QUEUED, note.SAMPLED, note.ARRIVES)
 """Kinds of notes whose last number is a time"""
-_WORK = (parts.SWITCHING, parts.STARTED, parts.RESUMED)
+_WORK = (note.SWITCHING, note.STARTED, note.RESUMED)
 
 
 def periodic_schedule(
@@ -110,7 +110,7 @@ class _Windows:
         content, are_times = notes[:, [0, 1, 2, 4]], np.isin(notes[:, 1], _WITH_TIMES)
         content[:, 0] -= window * length
         content[are_times, 3] -= (window * length)[are_times]
-        content[notes[:, 1] == parts.WRITTEN, 3] = 0
+        content[notes[:, 1] == note.WRITTEN, 3] = 0
         ends = np.searchsorted(window, np.arange(count + 1))
         self._parts = [notes[begin:end] for begin, end in itertools.pairwise(ends.tolist())]
         self._contents = [content[begin:end].tobytes() for begin, end in itertools.pairwise(ends.tolist())]
@@ -133,7 +133,7 @@ class _Windows:
     @property
     def _longest(self) -> int:
         """The longest time without a note [ns] of a job, a frame, or a message that will release a task."""
-        arrivals = self._trace.notes[self._trace.notes[:, 1] == parts.ARRIVES]
+        arrivals = self._trace.notes[self._trace.notes[:, 1] == note.ARRIVES]
         placed = placed_tasks(self._trace.system.computers)
         jobs = [nanoseconds(highest(each.task.execution) + each.computer.switch) for each in placed]
         frames = [leg.length + of.pause for of in self._trace.resources.parts.messages for leg in of.legs]
@@ -147,34 +147,35 @@ class _Windows:
         """
         of_all, count = self._trace.resources.parts, _counter(notes)
         for i, task in enumerate(of_all.tasks):
-            over, works = count(parts.FINISHED, i) + count(parts.ABORTED, i), any(count(kind, i) for kind in _WORK)
-            more, processor = count(parts.RELEASED, i) - over, of_all.processors[task.processor]
+            over = count(note.FINISHED, i) + count(note.ABORTED, i)
+            works = any(count(kind, i) for kind in _WORK)
+            more, processor = count(note.RELEASED, i) - over, of_all.processors[task.processor]
             others = [one for j, one in enumerate(of_all.tasks) if one.processor == task.processor and j != i]
             first = processor.policy == parts.FIXED_PRIORITY and all(one.priority != task.priority for one in others)
             if more < 0 or (more > 0 and not first) or (works and not over):
                 return False
         for c, carrier in enumerate(of_all.carriers):
-            if carrier.sender != parts.NONE and count(parts.SAMPLED, carrier.sender) != count(parts.SENT, c):
+            if carrier.sender != parts.NONE and count(note.SAMPLED, carrier.sender) != count(note.SENT, c):
                 return False
-        return all(count(parts.QUEUED, m) == self._received(notes, m) for m in range(len(of_all.messages)))
+        return all(count(note.QUEUED, m) == self._received(notes, m) for m in range(len(of_all.messages)))
 
     def _received(self, notes: Integers, message: int) -> int:
         """How many frames of a message were received."""
         last = len(self._trace.resources.parts.messages[message].legs) - 1
-        return int(((notes[:, 1] == parts.FRAME_TRANSMITTED) & (notes[:, 2] == message) & (notes[:, 4] == last)).sum())
+        return int(((notes[:, 1] == note.FRAME_TRANSMITTED) & (notes[:, 2] == message) & (notes[:, 4] == last)).sum())
 
     def failure_text(self) -> str:
         """Why no schedule repeats, in one line."""
         half = np.concatenate(self._parts[-(self._count // 2) :])
         count, seconds = _counter(half), self._count // 2 * self._length / NANOSECONDS
         for i, place in enumerate(self._trace.places):
-            more = count(parts.RELEASED, i) - count(parts.FINISHED, i) - count(parts.ABORTED, i)
+            more = count(note.RELEASED, i) - count(note.FINISHED, i) - count(note.ABORTED, i)
             if more > self._count // 4:
                 return (
                     f"{place}: falls behind by {more} jobs in {seconds:g} s, and makes others late; expected less load"
                 )
         for m, place in enumerate(self._trace.messages):
-            more = count(parts.QUEUED, m) - self._received(half, m)
+            more = count(note.QUEUED, m) - self._received(half, m)
             if more > self._count // 4:
                 return f"{place}: falls behind by {more} messages in {seconds:g} s; expected less load"
         return (
