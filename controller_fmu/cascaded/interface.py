@@ -1,5 +1,7 @@
 """The variables of the cascade's FMU: those of every controller, and those of its loops, with PX4's names."""
 
+from typing import Any
+
 from controller_fmu.cascaded.airframe import Airframe
 from controller_fmu.cascaded.attitude_loop import AttitudeLoop
 from controller_fmu.cascaded.position_loop import PositionLoop
@@ -18,7 +20,7 @@ STEEPEST = 89.0 / 90.0 * 1.5707963267948966
 _POSITION, _VELOCITY, _ATTITUDE, _RATE, _FRAME = PositionLoop(), VelocityLoop(), AttitudeLoop(), RateLoop(), Airframe()
 
 
-def _parameter(name: str, description: str, unit: str, start: float, **bounds: float) -> Parameter:
+def _parameter(name: str, description: str, unit: str, start: float | Vec3, **bounds: Any) -> Parameter:
     """A parameter; without other bounds one that is not negative."""
     return Parameter(description, unit, start, name=name, **bounds or {"minimum": 0.0})
 
