@@ -23,7 +23,7 @@ from orchestration.components.building.builder import (
     translating_errors,
 )
 from orchestration.components.building.models import MODELS
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, prefixed
 
 _NOTES = logging.getLogger("quadcosim")
 
@@ -93,11 +93,9 @@ def of_components(fmus: Mapping[str, str], announce: Callable[[str], None] | Non
     """The .fmu file of each component, as by `locate`; raises `UsageError` that names the component."""
     paths = {}
     for name, fmu in fmus.items():
-        try:
+        with prefixed(f"components.{name}."):
             paths[name] = locate(fmu, announce)
             _NOTES.debug("component %s: %s is %s", name, fmu, paths[name])
-        except UsageError as error:
-            raise UsageError(f"components.{name}.{error}") from error
     return paths
 
 

@@ -11,7 +11,7 @@ from orchestration.experiments.studies.axes import Value
 from orchestration.experiments.studies.linked_settings import Key
 from orchestration.experiments.studies.study_file import AxisTable, axis_of, control_loop_of, load
 from orchestration.foundation.basics.documents import read_toml
-from orchestration.foundation.basics.errors import UsageError, no_such_key
+from orchestration.foundation.basics.errors import UsageError, no_such_key, prefixed
 from orchestration.foundation.basics.records import record
 from orchestration.foundation.basics.typed_tables import table_of
 from orchestration.systems.expressions.at_instant import compiled
@@ -151,7 +151,7 @@ def _function_of_axis(text: Value, axis: str, place: str) -> Callable[[Value], f
             raise UsageError(f"{place} = {text}: is {result} at {axis} = {value}; expected a number")
         return result
 
-    try:
+    with prefixed(f"{place} = {text}: "):
         node = parse(text)
         for name in names(node):
             if name != axis:
@@ -159,8 +159,6 @@ def _function_of_axis(text: Value, axis: str, place: str) -> Callable[[Value], f
         if is_truth(node):
             raise UsageError(f"it is true or false; expected a number over {axis}")
         at = compiled(node, {axis: 0})
-    except UsageError as error:
-        raise UsageError(f"{place} = {text}: {error}") from None
     return parameter
 
 

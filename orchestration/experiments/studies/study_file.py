@@ -8,7 +8,7 @@ from typing import Any, Protocol, TypeVar
 from orchestration.experiments.studies.axes import Axis, Scale, Value, span
 from orchestration.experiments.studies.study import Study, names_fmu
 from orchestration.foundation.basics.documents import read_toml
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, prefixed
 from orchestration.foundation.basics.records import record
 from orchestration.foundation.basics.typed_tables import parsed, table_of
 from orchestration.simulation.requests.request import load_request, request_from_tables
@@ -92,10 +92,8 @@ Result = TypeVar("Result")
 def load(path: Path, kind: str, shape: type[File], make: Callable[[File, Path], Result]) -> Result:
     """Read a file of a shape and convert it by `make`; raises `UsageError` that names the file."""
     tables = read_toml(path, kind)
-    try:
+    with prefixed(f"{path}: "):
         return make(parsed(tables, shape), path)
-    except UsageError as error:
-        raise UsageError(f"{path}: {error}") from error
 
 
 def base_of(file: HasBase, folder: Path) -> Request:

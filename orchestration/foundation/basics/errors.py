@@ -121,12 +121,12 @@ _wording: Wording = str
 
 
 @contextmanager
-def at_place(place: str) -> Iterator[None]:
-    """Prefix the `UsageError`s of a block with `place`."""
+def prefixed(prefix: str) -> Iterator[None]:
+    """Prefix the `UsageError`s of a block, as with `PLACE.` or `FILE: `."""
     try:
         yield
     except UsageError as error:
-        raise UsageError(f"{place}.{error}") from error
+        raise UsageError(f"{prefix}{error}") from error
 
 
 @contextmanager

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from orchestration.foundation.basics.documents import read_toml
-from orchestration.foundation.basics.errors import UsageError, no_such_key, shown
+from orchestration.foundation.basics.errors import UsageError, no_such_key, prefixed, shown
 from orchestration.foundation.basics.typed_tables import parsed, table_of
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
 from orchestration.quadrotor.scenarios.presets import preset_timing
@@ -38,10 +38,8 @@ def load_scenario(path: str | Path) -> Scenario:
     """
     path = Path(path)
     tables = read_toml(path, "scenario file")
-    try:
+    with prefixed(f"{path}: "):
         return scenario_from_tables(tables, path.parent)
-    except UsageError as error:
-        raise UsageError(f"{path}: {error}") from error
 
 
 def scenario_from_tables(tables: dict[str, Any], folder: Path) -> Scenario:

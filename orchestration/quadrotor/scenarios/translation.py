@@ -6,7 +6,7 @@ from dataclasses import field, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, prefixed
 from orchestration.foundation.basics.records import record
 from orchestration.quadrotor.scenarios.timing import TIMING_KEYS
 from orchestration.quadrotor.scenarios.wiring import EXTERNAL_FORCE, POSITION_REFERENCE
@@ -146,10 +146,8 @@ def disturbed(system: System, choice: DisturbanceChoice) -> System:
             keys |= {"columns": WIND, "scale": drag}
         elif choice.drag is not None:
             raise UsageError(f"disturbance.drag: expected columns {', '.join(WIND)} in {choice.file}")
-    try:
+    with prefixed("sources.disturbance."):
         source = Source(**keys)
-    except UsageError as error:
-        raise UsageError(f"sources.disturbance.{error}") from error
     return replace(system, sources={**system.sources, "disturbance": source})
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.foundation.basics.documents import read_toml
-from orchestration.foundation.basics.errors import UsageError, did_you_mean, expected_name
+from orchestration.foundation.basics.errors import UsageError, did_you_mean, expected_name, prefixed
 from orchestration.systems.system.component import Parameter, parameters_in
 from orchestration.systems.system.vehicle import Vehicle
 
@@ -31,13 +31,11 @@ def load_vehicle(name: str, folder: Path) -> Vehicle:
     if not name.endswith(ENDING) and name not in names():
         raise UsageError(f"vehicle {name}: {expected_name(name, names())}, or a path that ends in {ENDING}")
     tables = read_toml(path, "vehicle file")
-    try:
+    with prefixed(f"{path}: "):
         vehicle = _vehicle(path.stem, tables)
         for fmu, parameters in vehicle.controllers.items():
             _expect_parameters(fmu, parameters, path.parent)
         return vehicle
-    except UsageError as error:
-        raise UsageError(f"{path}: {error}") from error
 
 
 def _vehicle(name: str, tables: dict[str, Any]) -> Vehicle:

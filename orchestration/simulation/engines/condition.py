@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from orchestration.foundation.basics.c_structures import constants
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import prefixed
 from orchestration.simulation.engines.sources import SourceValues
 from orchestration.simulation.engines.wiring_by_index import Board
 from orchestration.systems.expressions.at_instant import Current, compiled, scalars
@@ -53,10 +53,8 @@ class Condition:
         constants = [name for name in self.numbers if name in named]
         order = ["", "time", *columns, *(signal for name in used for signal in self.signals_of[name]), *constants]
         places = {name: i for i, name in enumerate(order)}
-        try:
+        with prefixed("criterion.diverged: "):
             clauses = [_Clause(clause, places) for clause in _alternatives(node)]
-        except UsageError as error:
-            raise UsageError(f"criterion.diverged: {error}") from None
         get = operator.itemgetter(
             0, 0, *(board.place[column] for column in columns)
         )  # two more than needed, so that it is a tuple

@@ -10,7 +10,7 @@ from orchestration.components.building import fmus
 from orchestration.components.fmi.instance import number_of
 from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD, TRAJECTORY
 from orchestration.components.fmi.read_description import NUMERIC, Model, read_model
-from orchestration.foundation.basics.errors import UsageError, at_place
+from orchestration.foundation.basics.errors import UsageError, prefixed
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import Grid, exact_nanoseconds
 from orchestration.simulation.engines import sources
@@ -142,7 +142,7 @@ def _parameters(system: System, models: Mapping[str, Model]) -> dict[str, float]
     parameters = {}
     for name, model in models.items():
         values = system.components[name].parameters
-        with at_place(f"components.{name}.parameters"):
+        with prefixed(f"components.{name}.parameters."):
             for variable in model.variables.values():
                 value = values.get(variable.name, variable.start)
                 is_one = variable.causality == "parameter" or variable.is_constant

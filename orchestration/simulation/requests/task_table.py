@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.foundation.basics.documents import readable
-from orchestration.foundation.basics.errors import UsageError, expected_name
+from orchestration.foundation.basics.errors import UsageError, expected_name, prefixed
 from orchestration.systems.system.computers import Task
 
 UNITS = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9}
@@ -66,10 +66,8 @@ def _add(computers: dict[str, Any], path: Path, place: str, columns: list[tuple[
     )["tasks"]
     if name in tasks:
         raise UsageError(f"{place}: name = {name}: expected another one than those before it")
-    try:
+    with prefixed(f"{place}: {name}: "):
         task = Task(**keys)
-    except UsageError as error:
-        raise UsageError(f"{place}: {name}: {error}") from error
     defaults = {field.name: field.default for field in dataclasses.fields(task)}
     tasks[name] = {key: value for key, value in keys.items() if value != defaults[key]}
 

@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import TypeAlias
 
 from orchestration.components.fmi.read_description import Model
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import prefixed
 from orchestration.foundation.basics.unit_algebra import METRE, NUMBER, SECOND, Operand, Unit, agreed
 from orchestration.systems.expressions import syntax
 from orchestration.systems.expressions.operators import OPERATORS
@@ -53,10 +53,8 @@ def _units(
 
 
 def _unit(place: str, expression: str, known: Mapping[str, Unit | None]) -> Unit | None:
-    try:
+    with prefixed(f"{place}: "):
         return unit_of(syntax.parse(expression), known)
-    except UsageError as error:
-        raise UsageError(f"{place}: {error}") from error
 
 
 def _of_signals(expressions: Sequence[str], sources: Sources, models: Mapping[str, Model]) -> dict[str, Unit | None]:

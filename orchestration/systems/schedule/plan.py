@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, prefixed
 from orchestration.foundation.basics.times import seconds
 from orchestration.systems.system.component import Sampling
 from orchestration.systems.system.computers import require_less
@@ -197,7 +197,5 @@ def _times_of_resources(system: System) -> dict[str, float]:
 
 
 def _expect_jitter_within_period(name: str, sampling: Sampling) -> None:
-    try:
+    with prefixed(f"components.{name}.sampling."):
         sampling.expect_jitter_within_period()
-    except UsageError as error:
-        raise UsageError(f"components.{name}.sampling.{error}") from error

@@ -4,7 +4,7 @@ Times are in seconds.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -99,46 +99,36 @@ def responses_of(system: System, timeline: Timeline) -> SystemResponses:
             place = f"{name}.{message_name}"
             frames = timeline.frames[place]
             demand = seconds(frame_nanoseconds(network, message)) * _rate(message, 1.0, frames)
-            messages[place] = _of_frames(frames, demand, bounds[place])
+            messages[place] = _of_records(frames, demand, bounds[place])
     shared = {**timeline.processors, **timeline.links}
     busy = {name: float((each.end - each.begin).sum()) / timeline.stop for name, each in shared.items()}
     return SystemResponses(tasks=tasks, messages=messages, busy=busy)
 
 
 def _of_jobs(jobs: Jobs, utilisation: float, bound: int | None, read_at_release: bool) -> Responses:
-    done, skipped, aborted = jobs.done, int((jobs.outcome == SKIPPED).sum()), int((jobs.outcome == ABORTED).sum())
     read = jobs.released if read_at_release else jobs.started
-    is_written = jobs.written != NEVER
-    return Responses(
-        jobs=len(jobs) - skipped,
-        utilisation=utilisation,
-        response=Spread.of(jobs.responses),
-        bound=None if bound is None else seconds(bound),
-        start_jitter=_range((jobs.started - jobs.nominal)[jobs.started != NEVER]),
-        end_jitter=_range(jobs.responses),
-        latency=Spread.of((jobs.written - read)[is_written]),
-        deadline=_deadline(jobs),
-        missed=_missed(jobs),
-        skipped=skipped,
-        aborted=aborted,
-        unfinished=len(jobs) - int(done.sum()) - skipped - aborted,
+    return replace(
+        _of_records(jobs, utilisation, bound, *(int((jobs.outcome == kind).sum()) for kind in (SKIPPED, ABORTED))),
+        latency=Spread.of((jobs.written - read)[jobs.written != NEVER]),
     )
 
 
-def _of_frames(frames: Frames, utilisation: float, bound: int | None) -> Responses:
+def _of_records(
+    of: Jobs | Frames, utilisation: float, bound: int | None, skipped: int = 0, aborted: int = 0
+) -> Responses:
     return Responses(
-        jobs=len(frames),
+        jobs=len(of) - skipped,
         utilisation=utilisation,
-        response=Spread.of(frames.responses),
+        response=Spread.of(of.responses),
         bound=None if bound is None else seconds(bound),
-        start_jitter=_range((frames.started - frames.nominal)[frames.started != NEVER]),
-        end_jitter=_range(frames.responses),
+        start_jitter=_range((of.started - of.nominal)[of.started != NEVER]),
+        end_jitter=_range(of.responses),
         latency=None,
-        deadline=_deadline(frames),
-        missed=_missed(frames),
-        skipped=0,
-        aborted=0,
-        unfinished=len(frames) - int(frames.done.sum()),
+        deadline=_deadline(of),
+        missed=_missed(of),
+        skipped=skipped,
+        aborted=aborted,
+        unfinished=len(of) - int(of.done.sum()) - skipped - aborted,
     )
 
 

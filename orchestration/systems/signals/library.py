@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from orchestration.foundation.basics.errors import UsageError, expected_name, shown
+from orchestration.foundation.basics.errors import UsageError, expected_name, prefixed, shown
 from orchestration.systems.signals.dryden import Dryden
 from orchestration.systems.signals.limits import SignalLimits
 from orchestration.systems.signals.motions import MOTIONS
@@ -38,7 +38,5 @@ def _with_parameters(name: str, kind: type, parameters: Mapping[str, Any]) -> An
             raise UsageError(f"parameters.{key}: {name} has no such parameter; {expected_name(key, known)}")
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
             raise UsageError(f"parameters.{key} = {shown(value)}: expected a finite number")
-    try:
+    with prefixed("parameters."):
         return kind(**{key: float(value) for key, value in parameters.items()})
-    except UsageError as error:
-        raise UsageError(f"parameters.{error}") from error

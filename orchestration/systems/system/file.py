@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from orchestration.foundation.basics.documents import read_toml
-from orchestration.foundation.basics.errors import UsageError, at_place
+from orchestration.foundation.basics.errors import UsageError, prefixed
 from orchestration.foundation.basics.typed_tables import fields_of, parsed, table_of
 from orchestration.systems.system.choices import Order
 from orchestration.systems.system.component import Component, Sampling, SamplingOnArrival, flattened, parameters_in
@@ -77,10 +77,8 @@ def load_system(path: str | Path) -> System:
     """
     path = Path(path)
     tables = read_toml(path, "system file")
-    try:
+    with prefixed(f"{path}: "):
         return system_from_tables(tables, path.parent)
-    except UsageError as error:
-        raise UsageError(f"{path}: {error}") from error
 
 
 def is_system(tables: Mapping[str, Any]) -> bool:
@@ -109,10 +107,8 @@ def system_from_tables(tables: Mapping[str, Any], folder: Path) -> System:
     for name in system.optional:
         known = ", ".join(system.objectives) or "no objectives"
         require(name in system.objectives, "optional", name, f"one of {known}")
-    try:
+    with prefixed("operating_point: "):
         changed(system, system.operating_point)
-    except UsageError as error:
-        raise UsageError(f"operating_point: {error}") from error
     return system
 
 
@@ -170,7 +166,7 @@ def _source(name: str, table: Any, folder: Path) -> Source:
 
 
 def _part(place: str, kind: type[Part], keys: Mapping[str, Any]) -> Part:
-    with at_place(place):
+    with prefixed(f"{place}."):
         return kind(**keys)
 
 
@@ -186,12 +182,12 @@ def with_distributions(place: str, table: Any, folder: Path) -> dict[str, Any]:
 
 def parsed_distribution(place: str, table: Mapping[str, Any]) -> Distribution:
     """The distribution of a table, with the path of its trace from the current folder; raises `UsageError`."""
-    with at_place(place):
+    with prefixed(f"{place}."):
         found = parsed(table, DistributionTable)
     return _distribution(place, found, Path())
 
 
 def _distribution(place: str, table: Any, folder: Path) -> Distribution:
     keys = table.model_dump() | {"file": None if table.file is None else folder / table.file}
-    with at_place(place):
+    with prefixed(f"{place}."):
         return Distribution(**keys)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field, replace
 from typing import Any, ClassVar
 
-from orchestration.foundation.basics.errors import UsageError, listed
+from orchestration.foundation.basics.errors import UsageError, listed, prefixed
 from orchestration.foundation.basics.records import record
 from orchestration.foundation.basics.times import is_at_least
 from orchestration.systems.expressions.syntax import is_number, parse
@@ -258,10 +258,8 @@ def expressions(system: System) -> list[tuple[str, str]]:
 def _require_expressions(texts: tuple[tuple[str, str], ...]) -> None:
     """Raise `UsageError` for one that is not valid, or for a criterion that is no condition; cached for studies."""
     for place, text in texts:
-        try:
+        with prefixed(f"{place}: "):
             node = parse(text)
-        except UsageError as error:
-            raise UsageError(f"{place}: {error}") from error
         if place.startswith("criterion."):
             condition = parse(dict(texts).get(f"objectives.{text.strip()}", text))
             require(not is_number(condition) and not is_number(node), place, text, "a condition, as in peak < 2.5")

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from orchestration.foundation.basics.errors import UsageError, did_you_mean
+from orchestration.foundation.basics.errors import UsageError, did_you_mean, prefixed
 from orchestration.foundation.basics.records import replaced
 from orchestration.systems.system.component import Component, Sampling, SamplingOnArrival, TaskSampling
 from orchestration.systems.system.computers import Arrivals, Computer, Network
@@ -269,7 +269,5 @@ def for_each(start: Iterable[str], value: Any) -> Any:
 def _replaced(place: str, of: Any, keys: Mapping[str, Any]) -> Any:
     if any(isinstance(value, (str, Mapping)) for value in keys.values()):
         keys = parsed_fields(of, f"{place}.", keys)
-    try:
+    with prefixed(f"{place}." if place else ""):
         return dataclasses.replace(of, **dict(keys))
-    except UsageError as error:
-        raise UsageError(f"{place}.{error}" if place else str(error)) from error
