@@ -1,7 +1,8 @@
 """Registries of what higher packages know about a kind of request, loaded on first use."""
 
-from collections.abc import Callable, Iterator
-from typing import Generic, TypeVar
+from collections.abc import Iterator
+from pkgutil import resolve_name
+from typing import Any, Generic, TypeVar
 
 Entry = TypeVar("Entry")
 
@@ -10,22 +11,21 @@ class Registry(Generic[Entry]):
     """Entries by kind of request."""
 
     def __init__(self) -> None:
-        self._loaders: dict[str, Callable[[], Entry]] = {}
+        self._places: dict[str, str] = {}
 
-    def register(self, kind: str, load: Callable[[], Entry]) -> None:
-        """Make the result of `load` the entry of a kind."""
-        self._loaders[kind] = load
+    def register(self, kind: str, place: str) -> None:
+        """Make what is at `place`, as `package.module:name`, the entry of a kind."""
+        self._places[kind] = place
 
     def __contains__(self, kind: str) -> bool:
         """Whether a kind has an entry, without loading it."""
-        return kind in self._loaders
+        return kind in self._places
 
     def of(self, kind: str) -> Entry | None:
         """The entry of a kind; None if it has none."""
-        load = self._loaders.get(kind)
-        return None if load is None else load()
+        found: Any = resolve_name(self._places[kind]) if kind in self._places else None
+        return found  # type: ignore[no-any-return]
 
     def all(self) -> Iterator[Entry]:
         """All entries, in the order of registration."""
-        for load in self._loaders.values():
-            yield load()
+        return map(resolve_name, self._places.values())

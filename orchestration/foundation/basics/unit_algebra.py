@@ -172,38 +172,10 @@ def first(word: str, operands: Sequence[Operand]) -> Unit | None:
     return operands[0].unit
 
 
-def none(word: str, operands: Sequence[Operand]) -> Unit | None:
-    """The unit of a truth value, with any operands."""
-    return ONE
-
-
-def second(word: str, operands: Sequence[Operand]) -> Unit | None:
-    """The unit of a time."""
-    return SECOND
-
-
-def settled(word: str, operands: Sequence[Operand]) -> Unit | None:
-    """The unit of a time, with operands of one unit."""
-    agreed(word, operands)
-    return SECOND
-
-
 def over_time(word: str, operands: Sequence[Operand]) -> Unit | None:
     """The unit of an integral over time."""
     unit = operands[0].unit
     return None if unit is None else unit.times(SECOND)
-
-
-def compared(word: str, operands: Sequence[Operand]) -> Unit | None:
-    """The unit of a truth value, with operands of one unit."""
-    agreed(word, operands)
-    return ONE
-
-
-def direction(word: str, operands: Sequence[Operand]) -> Unit | None:
-    """The unit of an angle, with operands of one unit."""
-    agreed(word, operands)
-    return RADIAN
 
 
 def product(word: str, operands: Sequence[Operand]) -> Unit | None:
@@ -244,7 +216,19 @@ def ratio(word: str, operands: Sequence[Operand]) -> Unit | None:
     return ONE
 
 
-def angle(word: str, operands: Sequence[Operand]) -> Unit | None:
-    """The unit of an angle, with an operand in 1 or rad."""
-    ratio(word, operands)
-    return RADIAN
+def _always(unit: Unit, expected: Rule = lambda word, operands: None) -> Rule:
+    """The rule of one unit, with operands that `expected` allows."""
+
+    def rule(word: str, operands: Sequence[Operand]) -> Unit | None:
+        expected(word, operands)
+        return unit
+
+    return rule
+
+
+none, second = _always(ONE), _always(SECOND)
+"""The units of a truth value and of a time, with any operands"""
+compared, settled, direction = (_always(unit, agreed) for unit in (ONE, SECOND, RADIAN))
+"""The units of a truth value, a time and an angle, with operands of one unit"""
+angle = _always(RADIAN, ratio)
+"""The unit of an angle, with an operand in 1 or rad"""

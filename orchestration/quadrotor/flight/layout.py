@@ -108,3 +108,6 @@ def _vector(
 ) -> Iterator[Line]:
     for column, label in zip(columns, labels, strict=True):
         yield Line(column=column, label=label, held=held, reference=reference)
+
+
+LAYOUT = FlightLayout()

@@ -11,9 +11,10 @@ from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
 from orchestration.quadrotor.scenarios.presets import preset_timing
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.quadrotor.scenarios.timing import Timing
-from orchestration.quadrotor.scenarios.translation import DisturbanceChoice, ReferenceChoice
+from orchestration.quadrotor.scenarios.translation import SYSTEM, DisturbanceChoice, ReferenceChoice
 from orchestration.quadrotor.scenarios.vehicle import load_vehicle
 from orchestration.quadrotor.scenarios.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT
+from orchestration.simulation.requests.kinds import RequestKind
 from orchestration.systems.system.component import parameters_in
 from orchestration.systems.system.file import DistributionTable, with_distributions
 
@@ -101,3 +102,7 @@ def _signal(place: str, table: dict[str, Any], kind: type[Signal], folder: Path)
     if "file" in fields:
         fields["file"] = folder / fields["file"]
     return kind(**fields, parameters=parameters)
+
+
+SCENARIOS = RequestKind(default=Scenario, from_tables=scenario_from_tables, files=(SYSTEM,))
+"""Scenarios as a kind of request"""

@@ -18,7 +18,7 @@ ROOTS = (
     "orchestration.simulation.workers.task",
     "orchestration.components.fmi.isolated_process",
     "orchestration.simulation.runs.apart_process",
-    "orchestration.quadrotor.scenarios.kind",
+    "orchestration.quadrotor.scenarios.file",
 )
 """Entry modules of the simulation code; two are started by name as separate processes, one is registered"""
 _EXCLUDED = (

@@ -5,7 +5,7 @@ Integrals are exact for signals that are held.
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -102,10 +102,7 @@ class _Extreme(Fold):
 class _Integral(Fold):
     """integral, and mean, rms and share by it; of a sampled signal the mean of its values."""
 
-    def __init__(self, function: str) -> None:
-        super().__init__(function)
-        self._sum, self._span, self._first, self._count = 0.0, 0.0, math.nan, 0
-        self._sampled = False
+    _sum, _span, _first, _count, _sampled = 0.0, 0.0, math.nan, 0, False
 
     def add(self, x: Course, *numbers: float | None) -> None:
         if self.function == "rms":
@@ -131,9 +128,7 @@ class _Integral(Fold):
 class _Edge(Fold):
     """first and last."""
 
-    def __init__(self, function: str) -> None:
-        super().__init__(function)
-        self._values: list[float] = []
+    _values: Sequence[float] = ()
 
     def add(self, x: Course, *numbers: float | None) -> None:
         new = x.values[x.first :]
@@ -147,9 +142,8 @@ class _Edge(Fold):
 class _PeakTime(Fold):
     """peak_time: when the largest value occurs first."""
 
-    def __init__(self, function: str) -> None:
-        super().__init__(function)
-        self._best, self._time = -math.inf, None
+    _best = -math.inf
+    _time: float | None = None
 
     def add(self, x: Course, *numbers: float | None) -> None:
         if len(x.values) and x.values.max() > self._best:
@@ -159,15 +153,11 @@ class _PeakTime(Fold):
     def value(self) -> float | None:
         return self._time
 
-    _time: float | None
-
 
 class _SettlingTime(Fold):
     """settling_time: the time from which |x| stays within the band."""
 
-    def __init__(self, function: str) -> None:
-        super().__init__(function)
-        self._inside_from: float | None = None
+    _inside_from: float | None = None
 
     def add(self, x: Course, *numbers: float | None) -> None:
         time, values = x.time[x.first :], x.values[x.first :]
@@ -185,9 +175,7 @@ class _SettlingTime(Fold):
 class _TotalVariation(Fold):
     """total_variation: the sum of all changes of x, including jumps."""
 
-    def __init__(self, function: str) -> None:
-        super().__init__(function)
-        self._sum = 0.0
+    _sum = 0.0
 
     def add(self, x: Course, *numbers: float | None) -> None:
         self._sum += float(np.abs(x.ends - x.values[:-1]).sum() + np.abs(x.values[1:] - x.ends).sum())
@@ -199,10 +187,8 @@ class _TotalVariation(Fold):
 class _GrowthShare(Fold):
     """growth_share: of the steps from one value to the next, the share that grows and ends above the floor."""
 
-    def __init__(self, function: str) -> None:
-        super().__init__(function)
-        self._last: float | None = None
-        self._grown = self._steps = 0
+    _last: float | None = None
+    _grown = _steps = 0
 
     def add(self, x: Course, *numbers: float | None) -> None:
         values = x.values[x.first :]
