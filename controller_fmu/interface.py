@@ -1,5 +1,7 @@
 """The variables that every controller FMU has; each law adds its own."""
 
+from typing import Any
+
 from controller_fmu.gain_scaling import GainScaling
 from fmu_kit import frames
 from fmu_kit.algebra import ZERO, Quaternion
@@ -12,7 +14,15 @@ from fmu_kit.trajectory import Trajectory
 _BODY, _TRAJECTORY = Body(), Trajectory()
 _HOVER = _BODY.mass * _BODY.gravity
 _UPRIGHT, _NONE = Quaternion(ZERO, 1.0), Quaternion(ZERO, 0.0)
-_USED = "used when use_reference_inputs is true"
+
+
+def _reference(name: str, description: str, unit: str, start: Any = ZERO, frame: Any = frames.inertial) -> Input:
+    what = f"{description}, used when use_reference_inputs is true"
+    return Input(what, unit, start, name=f"reference.{name}", frame=frame, terminal="reference")
+
+
+def _trajectory(name: str, description: str, unit: str, **others: Any) -> FixedParameter:
+    return FixedParameter(description, unit, getattr(_TRAJECTORY, name), name=f"trajectory.{name}", **others)
 
 
 class ControllerInterface(Framed):
@@ -31,41 +41,15 @@ class ControllerInterface(Framed):
         "measured angular velocity, body frame", "rad/s", ZERO, frame=frames.body, terminal="motion"
     )
 
-    reference_position = Input(
-        f"desired position, {_USED}", "m", ZERO, name="reference.position", frame=frames.inertial, terminal="reference"
+    reference_position = _reference("position", "desired position", "m")
+    reference_velocity = _reference("velocity", "desired velocity", "m/s")
+    reference_acceleration = _reference("acceleration", "desired acceleration", "m/s2")
+    reference_jerk = _reference("jerk", "desired jerk", "m/s3")
+    reference_snap = _reference("snap", "desired snap", "m/s4")
+    reference_yaw = _reference(
+        "yaw", "desired direction of the nose, from x of the inertial frame towards y", "rad", 0.0, frames.yaw
     )
-    reference_velocity = Input(
-        f"desired velocity, {_USED}",
-        "m/s",
-        ZERO,
-        name="reference.velocity",
-        frame=frames.inertial,
-        terminal="reference",
-    )
-    reference_acceleration = Input(
-        f"desired acceleration, {_USED}",
-        "m/s2",
-        ZERO,
-        name="reference.acceleration",
-        frame=frames.inertial,
-        terminal="reference",
-    )
-    reference_jerk = Input(
-        f"desired jerk, {_USED}", "m/s3", ZERO, name="reference.jerk", frame=frames.inertial, terminal="reference"
-    )
-    reference_snap = Input(
-        f"desired snap, {_USED}", "m/s4", ZERO, name="reference.snap", frame=frames.inertial, terminal="reference"
-    )
-    reference_yaw = Input(
-        f"desired direction of the nose, from x of the inertial frame towards y, {_USED}",
-        "rad",
-        name="reference.yaw",
-        frame=frames.yaw,
-        terminal="reference",
-    )
-    reference_yaw_rate = Input(
-        f"its rate, {_USED}", "rad/s", name="reference.yaw_rate", frame=frames.about_z, terminal="reference"
-    )
+    reference_yaw_rate = _reference("yaw_rate", "its rate", "rad/s", 0.0, frames.about_z)
 
     thrust = Output("total thrust, upward in the body, held between samples", "N", nominal=_HOVER, terminal="command")
     torque = Output("body torque, body frame, held between samples", "N.m", ZERO, frame=frames.body, terminal="command")
@@ -77,41 +61,15 @@ class ControllerInterface(Framed):
         nominal=0.25 * _HOVER,
     )
 
-    trajectory_amplitude_x = FixedParameter(
-        "a_x of [a_x sin wt cos wt, a_y sin wt, z0 + vz t]",
-        "m",
-        _TRAJECTORY.amplitude_x,
-        name="trajectory.amplitude_x",
+    trajectory_amplitude_x = _trajectory("amplitude_x", "a_x of [a_x sin wt cos wt, a_y sin wt, z0 + vz t]", "m")
+    trajectory_amplitude_y = _trajectory("amplitude_y", "a_y of the built-in trajectory", "m")
+    trajectory_frequency = _trajectory(
+        "frequency", "w of the built-in trajectory", "rad/s", nominal=_TRAJECTORY.frequency, quantity="AngularFrequency"
     )
-    trajectory_amplitude_y = FixedParameter(
-        "a_y of the built-in trajectory", "m", _TRAJECTORY.amplitude_y, name="trajectory.amplitude_y"
-    )
-    trajectory_frequency = FixedParameter(
-        "w of the built-in trajectory",
-        "rad/s",
-        _TRAJECTORY.frequency,
-        name="trajectory.frequency",
-        nominal=_TRAJECTORY.frequency,
-        quantity="AngularFrequency",
-    )
-    trajectory_start_z = FixedParameter(
-        "z0 of the built-in trajectory, along z of the inertial frame",
-        "m",
-        _TRAJECTORY.start_z,
-        name="trajectory.start_z",
-    )
-    trajectory_rate_z = FixedParameter(
-        "vz of the built-in trajectory, along z of the inertial frame",
-        "m/s",
-        _TRAJECTORY.rate_z,
-        name="trajectory.rate_z",
-    )
-    trajectory_yaw = FixedParameter(
-        "yaw of the nose at time 0, along the built-in trajectory", "rad", _TRAJECTORY.yaw, name="trajectory.yaw"
-    )
-    trajectory_yaw_rate = FixedParameter(
-        "rate of the yaw along the built-in trajectory", "rad/s", _TRAJECTORY.yaw_rate, name="trajectory.yaw_rate"
-    )
+    trajectory_start_z = _trajectory("start_z", "z0 of the built-in trajectory, along z of the inertial frame", "m")
+    trajectory_rate_z = _trajectory("rate_z", "vz of the built-in trajectory, along z of the inertial frame", "m/s")
+    trajectory_yaw = _trajectory("yaw", "yaw of the nose at time 0, along the built-in trajectory", "rad")
+    trajectory_yaw_rate = _trajectory("yaw_rate", "rate of the yaw along the built-in trajectory", "rad/s")
     mass = FixedParameter("nominal mass m", "kg", _BODY.mass, above=0.0)
     gravity = FixedParameter("nominal gravity g", "m/s2", _BODY.gravity, minimum=0.0)
     inertia = FixedParameter(
