@@ -1,6 +1,7 @@
 """The variables of the plant FMU."""
 
 import math
+from typing import Any
 
 from fmu_kit import frames
 from fmu_kit.algebra import ZERO, Quaternion
@@ -20,6 +21,15 @@ _BODY, _WIND, _BOX, _MOTORS = Body(), Wind(), Box(), Motors()
 _HOVER = _BODY.mass * _BODY.gravity
 
 
+def _motion(description: str, unit: str, start: Any, frame: Any) -> Output:
+    return Output(description, unit, start, variability="continuous", frame=frame, terminal="motion")
+
+
+def _motor(name: str, description: str, unit: str, start: float, **bounds: Any) -> FixedParameter:
+    """A parameter of the motors; without other bounds one that is not negative."""
+    return FixedParameter(description, unit, start, name=f"motor.{name}", **bounds or {"minimum": 0.0})
+
+
 class PlantInterface(Framed):
     """Inputs, outputs and parameters of the vehicle."""
 
@@ -29,23 +39,10 @@ class PlantInterface(Framed):
     torque = Input("body torque, body frame, before limits and lag", "N.m", ZERO, frame=frames.body, terminal="command")
     external_force = Input("force in the inertial frame, added to the wind", "N", ZERO, frame=frames.inertial)
 
-    position = Output(
-        "position P, inertial frame", "m", ZERO, variability="continuous", frame=frames.inertial, terminal="motion"
-    )
-    velocity = Output(
-        "velocity V, inertial frame", "m/s", ZERO, variability="continuous", frame=frames.inertial, terminal="motion"
-    )
-    quaternion = Output(
-        "attitude Q, inertial to body, scalar last",
-        "1",
-        Quaternion(ZERO, 0.0),
-        variability="continuous",
-        frame=frames.attitude,
-        terminal="motion",
-    )
-    angular_velocity = Output(
-        "angular velocity, body frame", "rad/s", ZERO, variability="continuous", frame=frames.body, terminal="motion"
-    )
+    position = _motion("position P, inertial frame", "m", ZERO, frames.inertial)
+    velocity = _motion("velocity V, inertial frame", "m/s", ZERO, frames.inertial)
+    quaternion = _motion("attitude Q, inertial to body, scalar last", "1", Quaternion(ZERO, 0.0), frames.attitude)
+    angular_velocity = _motion("angular velocity, body frame", "rad/s", ZERO, frames.body)
 
     mass = FixedParameter("mass m", "kg", _BODY.mass, above=0.0)
     gravity = FixedParameter("gravity g, downward", "m/s2", _BODY.gravity, minimum=0.0)
@@ -91,36 +88,24 @@ class PlantInterface(Framed):
         "largest internal integration step", "s", LARGEST_INTERNAL_STEP, above=0.0, nominal=LARGEST_INTERNAL_STEP
     )
 
-    motor_thrust_max = FixedParameter(
-        "largest thrust of each of four motors on an X frame; 0: no motors",
-        "N",
-        _MOTORS.thrust_max,
-        name="motor.thrust_max",
-        minimum=0.0,
+    motor_thrust_max = _motor(
+        "thrust_max", "largest thrust of each of four motors on an X frame; 0: no motors", "N", _MOTORS.thrust_max
     )
     motor_thrust_min = FixedParameter("least thrust of each motor", "N", _MOTORS.thrust_min, name="motor.thrust_min")
-    motor_arm_x = FixedParameter(
-        "distance from the centre to each motor along x of the body", "m", _MOTORS.arm_x, name="motor.arm.x", above=0.0
+    motor_arm_x = _motor(
+        "arm.x", "distance from the centre to each motor along x of the body", "m", _MOTORS.arm_x, above=0.0
     )
-    motor_arm_y = FixedParameter(
-        "distance from the centre to each motor along y of the body", "m", _MOTORS.arm_y, name="motor.arm.y", above=0.0
+    motor_arm_y = _motor(
+        "arm.y", "distance from the centre to each motor along y of the body", "m", _MOTORS.arm_y, above=0.0
     )
-    motor_drag_to_thrust = FixedParameter(
-        "torque about z by thrust of a propeller", "m", _MOTORS.drag_to_thrust, name="motor.drag_to_thrust", above=0.0
+    motor_drag_to_thrust = _motor(
+        "drag_to_thrust", "torque about z by thrust of a propeller", "m", _MOTORS.drag_to_thrust, above=0.0
     )
-    motor_up = FixedParameter(
-        "lag of a motor's thrust that grows; 0: actuator_time_constant",
-        "s",
-        _MOTORS.up,
-        name="motor.time_constant.up",
-        minimum=0.0,
+    motor_up = _motor(
+        "time_constant.up", "lag of a motor's thrust that grows; 0: actuator_time_constant", "s", _MOTORS.up
     )
-    motor_down = FixedParameter(
-        "lag of a motor's thrust that falls; 0: actuator_time_constant",
-        "s",
-        _MOTORS.down,
-        name="motor.time_constant.down",
-        minimum=0.0,
+    motor_down = _motor(
+        "time_constant.down", "lag of a motor's thrust that falls; 0: actuator_time_constant", "s", _MOTORS.down
     )
     payload_mass = Parameter(
         "payload at the centre of gravity, added to the mass", "kg", 0.0, name="payload.mass", minimum=0.0
