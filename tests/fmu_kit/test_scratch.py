@@ -80,3 +80,23 @@ def test_no_space_to_unpack_is_reported_with_the_folder(
     expected = f"cannot be unpacked in {temporary}, which TMPDIR names: No space left on device"
     assert str(raised.value) == f"{built['QuadrotorPlant']}: {expected}"
     assert not list(temporary.iterdir())
+
+
+def test_a_folder_without_an_owner_is_removed_and_one_taken_for_such_is_made_again(
+    temporary: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A process may be killed, or overtaken by one that clears, between making its folder and locking it."""
+    left = temporary / "quadcosim-left.scratch"
+    left.mkdir()
+    lock, first = scratch._locked, iter([True])
+
+    def overtaken(folder: Path, *, wait: bool) -> int | None:
+        if wait and next(first, False):
+            folder.rmdir()
+        return lock(folder, wait=wait)
+
+    monkeypatch.setattr(scratch, "_locked", overtaken)
+    with scratch.temporary_folder() as folder:
+        assert [*temporary.iterdir()] == [folder]
+        (folder / "file").write_text("text")
+    assert not any(temporary.iterdir())

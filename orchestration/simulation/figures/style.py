@@ -13,7 +13,7 @@ from matplotlib.backend_bases import get_registered_canvas_class
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from fmu_kit.new_files import new_files
+from fmu_kit.new_files import new_file, new_files
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import Share
 from orchestration.simulation.figures.names import COLUMNS, FORMATS, WRITTEN
@@ -159,11 +159,12 @@ def save(
         for name, figure in figures.items():
             with laid_out_once(figure):
                 for ending in style.formats:
-                    path = new / f"{name}.{ending}"
-                    write(figure, path, ending)
-                    if ending == "png" and style.colors is not None:
-                        _reduce(path, style.colors)
-                    written.append(folder / path.name)
+                    file = f"{name}.{ending}"
+                    with new_file(new / file) as path:
+                        write(figure, path, ending)
+                        if ending == "png" and style.colors is not None:
+                            _reduce(path, style.colors)
+                    written.append(folder / file)
                     progress(len(written) / (len(figures) * len(style.formats)))
     return written
 
