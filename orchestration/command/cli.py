@@ -12,13 +12,11 @@ import typer.core
 from orchestration.command import (
     controllers,
     exact,
-    exports,
     fmus,
-    interop,
     limit,
-    linearise,
     margin,
     new,
+    other_tools,
     plotting,
     registry,
     report,
@@ -115,10 +113,10 @@ COMMANDS = {
         controllers.tune,
         exact.expect,
         margin.margin,
-        linearise.linearise,
+        margin.linearise,
     ),
     "FMUs": (fmus.build, fmus.validate, fmus.doctor),
-    "Other tools": (exports.export_c, exports.ssp, interop.interop),
+    "Other tools": (other_tools.export_c, other_tools.ssp, other_tools.interop),
 }
 """Commands by their groups, in the order of the help"""
 

@@ -2,7 +2,7 @@
 
 import dataclasses
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,6 +11,12 @@ from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, build_option, option_group, result_of_files
 from orchestration.command.study_flags import Out, StudyEngineFlag, TimeLimit, Workers
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.terminal import inform
+
+if TYPE_CHECKING:
+    from orchestration.experiments.comparison.cells import CellSummary
+    from orchestration.experiments.comparison.design import Comparison
+    from orchestration.experiments.comparison.run import Compared
 
 
 @build_option
@@ -31,7 +37,7 @@ def compare(
     look: FigureFlags,
 ) -> CommandResult:
     """Compare controllers from the same initial conditions: survival, settling, limits, error and effort."""
-    from orchestration.command import comparison as command
+    from orchestration.experiments.comparison import run
     from orchestration.experiments.comparison.file import load_comparison
     from orchestration.simulation.workers.choice import engine_choice
 
@@ -40,14 +46,54 @@ def compare(
     if time_limit is not None and (cell is not None or start is not None):
         raise UsageError("--time-limit: expected no --cell; the limit is for whole comparisons")
     if start is not None:
-        return command.flight(loaded, cell, start, out, engine=how, figures=figures)
+        if cell is None or out is None:
+            raise UsageError("--start: expected --cell K, the cell of the run, and --out DIR for its files")
+        run.flight(loaded, cell, start, out, engine=how, figures=figures)
+        inform(f"results in {out}")
+        return CommandResult(document={"directory": out}, lines=[])
     if cell is not None:
-        return command.cell(loaded, cell, out, workers=workers, engine=how)
+        (rerun,) = run.rerun_cells(loaded, [cell], workers=workers, engine=how)
+        return _cell(loaded, rerun, run.stored_cell(loaded, cell, out))
+    style = look.figure_style if figures else None
+    compared = run.compare(
+        loaded, folder=out, workers=workers, engine=how, time_limit=time_limit, figures=figures, style=style
+    )
     flags = (" --native" if native else "") + (f" --engine {engine}" if engine != "auto" else "")
-    return command.all_cells(
-        loaded, out, workers=workers, engine=how, time_limit=time_limit, figures=figures, look=look,
-        again=f"quadcosim compare {comparison}{flags} --cell",
-    )  # fmt: skip
+    return _all_cells(loaded, compared, again=f"quadcosim compare {comparison}{flags} --cell K")
+
+
+def _all_cells(comparison: "Comparison", compared: "Compared", again: str) -> CommandResult:
+    """The results of all cells; `again` is the command for one of them."""
+    from orchestration.command import comparison_text
+    from orchestration.experiments.comparison.outcome import as_json
+
+    summary = compared.summary
+    inform(f"{summary.path}: {summary.total} runs, {summary.flown} of them new; tables and pictures beside it")
+    for each in summary.follows:
+        inform(f"follows {each}")
+    if summary.agreement is not None:
+        inform(f"engine {summary.engine}: {summary.agreement}")
+    inform(f"to run one cell again, by its number in cells.csv: {again}")
+    if summary.failed:
+        inform(f"{summary.failed} runs failed: runs.csv shows why")
+    content = as_json(comparison, compared.outcome, compared.bandwidths)
+    return CommandResult(
+        document={**content, "follows": summary.follows, "files": compared.written},
+        lines=list(comparison_text.lines(comparison, compared.outcome)),
+        good=not summary.failed,
+    )
+
+
+def _cell(comparison: "Comparison", rerun: "CellSummary", stored: "CellSummary | None") -> CommandResult:
+    """The results of a cell that was run again, and whether the store has the same."""
+    from orchestration.command import comparison_text
+    from orchestration.experiments.comparison.run import agree
+
+    same = None if stored is None else agree(stored, rerun)
+    lines = list(comparison_text.cell_lines(comparison, rerun))
+    if same is not None:
+        lines.append(f"{'in the store':<22}  {'the same' if same else 'a different result'}")
+    return CommandResult(document={**rerun.row("value"), "same_as_stored": same}, lines=lines)
 
 
 @build_option
