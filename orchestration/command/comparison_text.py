@@ -1,12 +1,13 @@
 """A comparison as tables of text."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import groupby
 
 from orchestration.experiments.comparison.cells import PEAK, VARIATION, CellSummary, Median, Share
 from orchestration.experiments.comparison.design import Comparison
 from orchestration.experiments.comparison.limits import GridLimit
 from orchestration.experiments.comparison.outcome import Outcome
+from orchestration.foundation.basics.terminal import in_columns
 
 
 def lines(comparison: Comparison, outcome: Outcome) -> Iterator[str]:
@@ -24,12 +25,12 @@ def lines(comparison: Comparison, outcome: Outcome) -> Iterator[str]:
         for value in comparison.values:
             here = {cell.controller: cell for cell in cells if cell.value == value}
             rows.append([f"{value:g}", *(_counts(here[name]) if name in here else "-" for name in names)])
-        yield from _table(rows)
+        yield from in_columns(rows)
         yield ""
     if outcome.limits:
         yield f"{axis} up to which half and nine in ten of the runs survive, and settle, with 95 % intervals"
         heads = ["controller", "vehicle", "condition", "runs", "half", "nine in ten", "rad/s"]
-        yield from _table([heads, *_limits(outcome)])
+        yield from in_columns([heads, *_limits(outcome)])
 
 
 def cell_lines(comparison: Comparison, cell: CellSummary) -> Iterator[str]:
@@ -72,9 +73,3 @@ def _median(median: Median) -> str:
         return "-"
     low, high = ("?" if end is None else f"{end:.4g}" for end in (median.low, median.high))
     return f"{median.value:.4g} [{low}, {high}]"
-
-
-def _table(rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    for row in rows:
-        yield "  ".join(text.ljust(width) for text, width in zip(row, widths)).rstrip()

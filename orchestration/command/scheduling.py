@@ -1,6 +1,6 @@
 """The command `schedule`: timeline and response times of computers and networks, with bounds of theory."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,7 +11,7 @@ from orchestration.command.flags import assigned
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.terminal import inform
+from orchestration.foundation.basics.terminal import in_columns, inform
 from orchestration.simulation.figures.names import expect_figure
 
 if TYPE_CHECKING:
@@ -80,7 +80,8 @@ def _lines(found: "Scheduled") -> Iterator[str]:
     """A table for the tasks and one for the messages."""
     for kind, each in (("task", found.tasks), ("message", found.messages)):
         if each:
-            yield from _table(kind, each)
+            rows = [(kind, *HEAD[1:]), *((name, *_row(one)) for name, one in each.items())]
+            yield from in_columns(rows, right=True)
             yield ""
     for name, share in found.busy.items():
         yield f"{name}: busy {100.0 * share:.4g} % of {found.until:g} s"
@@ -88,17 +89,6 @@ def _lines(found: "Scheduled") -> Iterator[str]:
         for name, task in found.tasks.items():
             if task.skipped or task.aborted:
                 yield f"{name}: {task.skipped} releases skipped, {task.aborted} jobs aborted"
-
-
-def _table(kind: str, responses: "Mapping[str, Responses]") -> Iterator[str]:
-    rows = [(kind, *HEAD[1:]), *((name, *_row(one)) for name, one in responses.items())]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        first, *rest = (
-            cell.ljust(width) if i == 0 else cell.rjust(width)
-            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
-        )
-        yield "  ".join([first, *rest]).rstrip()
 
 
 def _row(of: "Responses") -> Sequence[str]:

@@ -8,7 +8,7 @@ import os
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TextIO
@@ -81,6 +81,14 @@ def note(text: str) -> None:
     for handler in _MESSAGES.handlers:
         if handler is not _SCREEN:
             handler.handle(_MESSAGES.makeRecord(_MESSAGES.name, logging.DEBUG, "", 0, text, (), None))
+
+
+def in_columns(rows: Sequence[Sequence[str]], *, right: bool = False) -> Iterator[str]:
+    """Lines of cells in columns: left-aligned, or with `right` only the first."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        aligned = (cell.rjust(w) if right and i else cell.ljust(w) for i, (cell, w) in enumerate(zip(row, widths)))
+        yield "  ".join(aligned).rstrip()
 
 
 def _painted(record: logging.LogRecord) -> str:

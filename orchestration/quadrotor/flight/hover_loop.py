@@ -10,7 +10,6 @@ import itertools
 import numpy as np
 
 from orchestration.components.building import fmus
-from orchestration.components.fmi.instance import Instance
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
@@ -72,7 +71,9 @@ def controller_at_hover(hover: Scenario, fleet: Instances) -> tuple[Floats, Floa
         controller = flight.instances["controller"]
         at_rest = measurement_at({})
         controller.initialise(wiring.MEASUREMENT, at_rest)
-        step = min(STEP, 1e-3 * _value(controller, wiring.BOUNDARY_LAYER, absent=1.0))
+        has_layer = wiring.BOUNDARY_LAYER in controller.variables
+        layer = float(controller.get(wiring.BOUNDARY_LAYER)) if has_layer else 1.0
+        step = min(STEP, 1e-3 * layer)
 
         instants = itertools.count()
 
@@ -106,12 +107,3 @@ def _expect_one_feedback(scenario: Scenario) -> None:
         value = scenario.controller.parameters.get(name, plain[0])
         if value not in plain:
             raise UsageError(f"the loop about hover is for controllers with {name} = {plain[0]} only")
-
-
-def _value(fmu: Instance, name: str, *, absent: float) -> float:
-    """The value of a Real variable of an FMU; `absent` if it has none of that name."""
-    if name not in fmu.variables:
-        return absent
-    value: Floats = np.zeros(1)
-    fmu.reader((name,), value)()
-    return float(value[0])

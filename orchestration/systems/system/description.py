@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from orchestration.foundation.basics.errors import listed
+from orchestration.foundation.basics.terminal import in_columns
 from orchestration.foundation.basics.unit_algebra import in_brackets
 from orchestration.systems.system.component import Component, Sampling, SamplingOnArrival, TaskSampling
 from orchestration.systems.system.computers import Message, Task
@@ -46,8 +47,11 @@ def as_text(system: System, units: Mapping[str, str] = {}, follows: str = "") ->
         ),
         ("criterion", [(name, " ".join(text.split())) for name, text in criteria if text is not None]),
     ]
-    head = f"{len(system.components)} components, {len(system.connections)} connections, {system.stop_time:g} s"
-    return "\n".join([head, *(line for title, rows in sections if rows for line in ("", title, *_table(rows)))])
+    lines = [f"{len(system.components)} components, {len(system.connections)} connections, {system.stop_time:g} s"]
+    for title, rows in sections:
+        if rows:
+            lines += ["", title, *(f"  {row}" for row in in_columns(rows))]
+    return "\n".join(lines)
 
 
 def describe_rate(component: Component) -> str:
@@ -191,9 +195,3 @@ def _shortened(names: Sequence[str]) -> str:
         for stem, parts in groups.items()
     ]
     return listed(named, MAX_NAMES_IN_CELL)
-
-
-def _table(rows: Sequence[Sequence[str]]) -> list[str]:
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = ("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in rows)
-    return [f"  {line}".rstrip() for line in lines]
