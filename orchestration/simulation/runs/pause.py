@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fmu_kit.new_files import new_file, write_atomically
+from orchestration.components.fmi.opening import content_hash
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import nanoseconds
 from orchestration.foundation.processes.resource_limits import Limits
@@ -160,8 +161,8 @@ def _hashes(simulation: PreparedRun) -> dict[str, str]:
     """The hashes of all that a resumed run depends on beside its state."""
     return {
         SCENARIO: hashlib.sha256(simulation.request.to_toml().encode()).hexdigest(),
-        **{f"the file of {name}": _hash(path) for name, path in input_files(simulation.system).items()},
-        **{f"the FMU of {name}": _hash(instance.path) for name, instance in simulation.instances.items()},
+        **{f"the file of {name}": content_hash(path) for name, path in input_files(simulation.system).items()},
+        **{f"the FMU of {name}": content_hash(instance.path) for name, instance in simulation.instances.items()},
     }
 
 
@@ -170,10 +171,6 @@ def _expect_states(simulation: PreparedRun) -> None:
     without = [name for name, instance in simulation.instances.items() if not instance.model.saves_state]
     if without:
         raise UsageError(f"pause: the FMU of {', '.join(without)} cannot save its state; expected FMUs that can")
-
-
-def _hash(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def _expect_same(paused: dict[str, str], simulation: PreparedRun, folder: Path) -> None:

@@ -1,6 +1,5 @@
 """The files of an SSP: a folder with its SystemStructure.ssd; an archive is unpacked once into the user's cache."""
 
-import hashlib
 import zipfile
 import zlib
 from dataclasses import dataclass
@@ -8,6 +7,7 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 from fmu_kit.new_files import new_files
+from orchestration.components.fmi.opening import content_hash
 from orchestration.foundation.basics.documents import readable
 from orchestration.foundation.basics.errors import UsageError
 
@@ -38,18 +38,13 @@ def open_package(path: Path) -> Package:
     """The SSP of an .ssp or .ssd file; raises `UsageError` for anything else."""
     if path.suffix.lower() == ".ssd":
         return Package(structure=path)
-    with readable(path, "SSP archive"), path.open("rb") as file:
-        key = hashlib.file_digest(file, "sha256").hexdigest()[:20] if hasattr(hashlib, "file_digest") else _digest(path)
-    folder = _cache() / key
+    with readable(path, "SSP archive"):
+        folder = _cache() / content_hash(path)[:20]
     if not folder.is_dir():
         _unpack(path, folder)
     if not (folder / STRUCTURE).is_file():
         raise UsageError(f"{path}: expected an SSP archive: it has no {STRUCTURE}")
     return Package(structure=folder / STRUCTURE)
-
-
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()[:20]
 
 
 def _cache() -> Path:
