@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from orchestration.foundation.basics.simulator import Floats, Transfer
 from orchestration.foundation.recording.recording import InMemory
 from orchestration.simulation.engines.master import Master
+from orchestration.simulation.engines.running_system import RunningSystem
 from orchestration.simulation.figures.palette import GREY
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
@@ -92,14 +93,14 @@ def costs(systems: Sequence[System]) -> list[float]:
 def seconds(system: System) -> float:
     """CPU time of one run [s]."""
     streams = Streams(system.seed)
-    master = Master(
+    running = RunningSystem(
         system,
         {name: Nothing() for name in system.components},
         timetable=Timetable(system, streams),
         streams=streams,
         recorded=dict.fromkeys(system.components, ()),
-        recorder=InMemory(),
     )
+    master = Master(running, InMemory())
     master.initialise()
     start = time.process_time()
     master.run()

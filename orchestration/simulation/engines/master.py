@@ -11,22 +11,17 @@ from typing import Any, Literal, Protocol, cast, get_args
 import numpy as np
 
 from orchestration.foundation.basics import errors
-from orchestration.foundation.basics.simulator import Booleans, Floats, Simulator
+from orchestration.foundation.basics.simulator import Booleans, Floats
 from orchestration.foundation.basics.times import nanoseconds, seconds
 from orchestration.foundation.recording.recording import Chunk, Recorder
 from orchestration.simulation.engines import initial
 from orchestration.simulation.engines.backlog import Backlog
 from orchestration.simulation.engines.compiled import CompiledLoop, reason_unavailable
-from orchestration.simulation.engines.condition import NEVER, Condition
 from orchestration.simulation.engines.connection_hold import Channel
-from orchestration.simulation.engines.feeds import Feed
 from orchestration.simulation.engines.instants import PythonLoop
 from orchestration.simulation.engines.memory import Allocator
-from orchestration.simulation.engines.running_system import Diverged, RunningSystem, Sources, Terminated
+from orchestration.simulation.engines.running_system import Diverged, RunningSystem, Terminated
 from orchestration.simulation.engines.wiring_by_index import clock_of
-from orchestration.systems.schedule.streams import Streams
-from orchestration.systems.schedule.timetable import Timetable
-from orchestration.systems.system.model import System
 
 ROWS_PENDING = "rows"
 """Key in `Master.saved` beside the names of the components"""
@@ -55,17 +50,9 @@ class Master:
 
     def __init__(
         self,
-        system: System,
-        simulators: Mapping[str, Simulator],
-        *,
-        timetable: Timetable,
-        streams: Streams,
-        recorded: Mapping[str, Sequence[str]],
+        running: RunningSystem,
         recorder: Recorder,
-        sources: Sources = (),
-        feeds: Sequence[Feed] = (),
-        interrupted: Callable[[], bool] = lambda: False,
-        condition: Condition = NEVER,
+        *,
         first_exchange: Sequence[Sequence[int]] | None = None,
         waiting: Collection[str] = (),
         loop: Callable[[RunningSystem, Recorder], Loop] = PythonLoop,
@@ -74,10 +61,7 @@ class Master:
 
         Other sampled components, unless they have their own clock, begin at their first sample.
         """
-        self._running = running = RunningSystem(
-            system, simulators, timetable=timetable, streams=streams, recorded=recorded, sources=sources, feeds=feeds,
-            interrupted=interrupted, condition=condition,
-        )  # fmt: skip
+        self._running = running
         self.board, self.columns, self.recorder = running.board, running.columns, recorder
         self.divergence: str | None = None
         self.divergence_time: int | None = None
@@ -86,7 +70,7 @@ class Master:
         self._first_exchange = (
             [(i,) for i in range(len(running.channels))] if first_exchange is None else first_exchange
         )
-        self._first_samples, self._waiting = timetable.first_samples, waiting
+        self._waiting = waiting
         self._loop = loop(running, recorder)
         self.backlog = self._loop.backlog
         self.engine = self._loop.engine
@@ -207,7 +191,7 @@ class Master:
     def _exchange_first(self) -> None:
         running, stop = self._running, seconds(self._running.stop)
         for name in running.wires.names:
-            ratio, first = clock_of(running.system, name, self._first_samples)
+            ratio, first = clock_of(running.system, name, running.first_samples)
             running.simulators[name].enter_initialization(0.0 if name in self._waiting else ratio * first, ratio * stop)
         for feed in running.feeds:
             feed.write(0.0)
@@ -221,7 +205,7 @@ class Master:
         for index in range(len(running.wires.names)):
             running.component(index).expect_finite(0.0)
         for name in self._waiting:
-            ratio, first = clock_of(running.system, name, self._first_samples)
+            ratio, first = clock_of(running.system, name, running.first_samples)
             if first > 0.0:
                 running.simulators[name].step(0.0, ratio * first)
         running.check_divergence(0.0)
@@ -255,23 +239,18 @@ def engine_named(name: str | None, *others: str) -> Engine | None:
 
 
 def create_master(
-    engine: Engine | None,
-    system: System,
-    simulators: Mapping[str, Simulator],
-    *,
-    allocate: Allocator,
-    **others: Any,
+    engine: Engine | None, running: RunningSystem, recorder: Recorder, *, allocate: Allocator, **others: Any
 ) -> Master:
     """The master of a run, with an engine; default: the compiled loop where available.
 
     The compiled loop keeps what it has not handed over in memory of `allocate`; `others` are arguments of `Master`.
     Raises `QuadcosimError` with the reason if the compiled loop was requested and is not available.
     """
-    reason = None if engine == "python" else reason_unavailable(simulators, nanoseconds(system.stop_time))
+    reason = None if engine == "python" else reason_unavailable(running.simulators, running.stop)
     if reason:
         _NOTES.debug("no compiled loop: %s", reason)
     if engine == "python" or (engine is None and reason):
-        return Master(system, simulators, **others)
+        return Master(running, recorder, **others)
     if reason:
         raise errors.QuadcosimError(f"--engine compiled is not available: {reason}")
-    return Master(system, simulators, loop=partial(CompiledLoop, allocate=allocate), **others)
+    return Master(running, recorder, loop=partial(CompiledLoop, allocate=allocate), **others)

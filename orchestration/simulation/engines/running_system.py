@@ -12,7 +12,7 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import SimulatorError, StoppedStepError
 from orchestration.foundation.basics.simulator import Floats, Simulator, Transfer
-from orchestration.simulation.engines.condition import Condition
+from orchestration.simulation.engines.condition import NEVER, Condition
 from orchestration.simulation.engines.connection_hold import Channel
 from orchestration.simulation.engines.feeds import Feed
 from orchestration.simulation.engines.sources import SourceValues
@@ -89,10 +89,10 @@ class RunningSystem:
         timetable: Timetable,
         streams: Streams,
         recorded: Mapping[str, Sequence[str]],
-        sources: Sources,
-        feeds: Sequence[Feed],
-        interrupted: Callable[[], bool],
-        condition: Condition,
+        sources: Sources = (),
+        feeds: Sequence[Feed] = (),
+        interrupted: Callable[[], bool] = lambda: False,
+        condition: Condition = NEVER,
     ) -> None:
         self.system, self.simulators, self.stop = system, simulators, timetable.stop
         self.wires = wires = Wires(system, recorded)
@@ -100,7 +100,7 @@ class RunningSystem:
         self.sources, self.feeds = list(sources), list(feeds)
         self.columns = (*board.columns, *(signal for signals, _ in sources for signal in signals))
         """Columns of every row: those of the board, then the signals of the sources"""
-        self.cursor = Cursor(timetable)
+        self.cursor, self.first_samples = Cursor(timetable), timetable.first_samples
         self.interrupted = interrupted
         self.interrupted_at: int | None = None
         self.termination: str | None = None

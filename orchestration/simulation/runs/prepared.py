@@ -27,6 +27,7 @@ from orchestration.simulation.engines.feeds import Feed
 from orchestration.simulation.engines.master import Engine, Master, create_master
 from orchestration.simulation.engines.memory import Allocator, process_memory
 from orchestration.simulation.engines.resolved import Announce, ResolvedRequest, fixed_steps, resolve
+from orchestration.simulation.engines.running_system import RunningSystem
 from orchestration.simulation.engines.sources import SourceValues
 from orchestration.simulation.runs.outcome import Course, Progress, RunOutcome, result_of
 from orchestration.simulation.runs.result import Provenance, Result
@@ -148,20 +149,23 @@ def prepared(
             recorder.describe({name: one.as_metadata() for name, one in resolved.described.items()})
             sources = resolved.sources(streams)
             signals = {name: system.sources[name].signals(name) for name in sources}
-            master = create_master(
-                engine,
+            running = RunningSystem(
                 system,
                 instances,
                 timetable=schedule,
                 streams=streams,
                 recorded=recorded_variables(system, models),
-                recorder=recorder,
                 sources=[(signals[name], values) for name, values in sources.items()],
                 feeds=_feeds(system, sources, instances),
                 interrupted=lambda: interrupt.requested,
                 condition=Condition(
                     text=system.criterion.diverged, sources=sources, signals_of=signals, numbers=parameters
                 ),
+            )
+            master = create_master(
+                engine,
+                running,
+                recorder,
                 allocate=allocate,
                 first_exchange=initial.groups(system.connections, lambda name, output: models[name].depends_on(output)),
                 waiting=[name for name in system.components if models[name].waits],

@@ -19,6 +19,7 @@ from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
 from orchestration.foundation.recording.recording import Chunk, InMemory
 from orchestration.simulation.engines.master import Master
 from orchestration.simulation.engines.resolved import fixed_steps
+from orchestration.simulation.engines.running_system import RunningSystem
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.component import Component
@@ -85,14 +86,9 @@ def _master(loop: AtRest, simulators: Mapping[str, LinearSimulator]) -> Master:
         criterion=Criterion(),
     )
     streams, models = Streams(system.seed, system.streams), {n: i.model for n, i in simulation.instances.items()}
-    return Master(
-        system,
-        simulators,
-        timetable=Timetable(system, streams, fixed_steps(system, models)),
-        streams=streams,
-        recorded=dict.fromkeys(simulators, ()),
-        recorder=NullRecorder(),
-    )
+    timetable, recorded = Timetable(system, streams, fixed_steps(system, models)), dict.fromkeys(simulators, ())
+    running = RunningSystem(system, simulators, timetable=timetable, streams=streams, recorded=recorded)
+    return Master(running, NullRecorder())
 
 
 def _with_even_steps(component: Component, period: Fraction) -> Component:

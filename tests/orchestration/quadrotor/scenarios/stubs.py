@@ -16,6 +16,7 @@ from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.quadrotor.scenarios.wiring import COMMAND, MEASUREMENT, POSITION_REFERENCE
 from orchestration.simulation.engines.condition import Condition
 from orchestration.simulation.engines.master import Master
+from orchestration.simulation.engines.running_system import RunningSystem
 from orchestration.simulation.engines.sources import ConstantValues, SourceValues
 from orchestration.systems.schedule.instant_arrays import Cursor
 from orchestration.systems.schedule.streams import Streams
@@ -227,15 +228,15 @@ class StubRun:
         system = Scenario(timing=timing, stop_time=stop_time).as_system()
         streams = Streams(seed, system.streams)
         named, signals = {"reference": reference}, {"reference": POSITION_REFERENCE}
-        self.master = Master(
+        running = RunningSystem(
             system,
             {"plant": self.plant, "controller": self.controller},
             timetable=Timetable(system, streams),
             streams=streams,
             recorded={"plant": (), "controller": ()},
-            recorder=self.recorder,
             condition=Condition(text=system.criterion.diverged, sources=named, signals_of=signals),
         )
+        self.master = Master(running, self.recorder)
         self.over: bool | None = None
         if start:
             self.master.initialise()

@@ -7,6 +7,7 @@ import pytest
 from orchestration.foundation.basics.errors import SimulatorError
 from orchestration.foundation.recording.recording import InMemory
 from orchestration.simulation.engines.master import Master
+from orchestration.simulation.engines.running_system import RunningSystem
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from tests.orchestration.simulation.engines.stubs import (
@@ -25,9 +26,8 @@ from tests.orchestration.simulation.engines.stubs import (
 def run(what, stubs, **keys):
     streams = Streams(what.seed, what.streams)
     recorded = {name: ["y"] if "y" in stub.values else [] for name, stub in stubs.items()}
-    master = Master(
-        what, stubs, timetable=Timetable(what, streams), streams=streams, recorded=recorded, recorder=InMemory(), **keys
-    )  # fmt: skip
+    running = RunningSystem(what, stubs, timetable=Timetable(what, streams), streams=streams, recorded=recorded)
+    master = Master(running, InMemory(), **keys)
     master.initialise()
     master.run()
     return master

@@ -21,6 +21,7 @@ from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.quadrotor.scenarios.translation import quadrotor
 from orchestration.quadrotor.scenarios.wiring import MEASUREMENT
 from orchestration.simulation.engines.master import Master
+from orchestration.simulation.engines.running_system import RunningSystem
 from orchestration.systems.schedule import instant_arrays as position
 from orchestration.systems.schedule.fixed_step import FixedStep
 from orchestration.systems.schedule.streams import Streams
@@ -72,10 +73,8 @@ def both(what: System, fixed: Iterable[str] = ()) -> tuple[second_clock.Seen, se
     streams, zero = Streams(what.seed, what.streams), exact_nanoseconds(0.0)
     grids = {name: Grid(zero, exact_nanoseconds(what.components[name].step or 0.0)) for name in fixed}
     steps = {name: FixedStep(name=name, grid=grid, moves=True) for name, grid in grids.items()}
-    master = Master(
-        what, stubs, timetable=Timetable(what, streams, steps), streams=streams, recorded=dict.fromkeys(stubs, ()),
-        recorder=InMemory(),
-    )  # fmt: skip
+    clock, recorded = Timetable(what, streams, steps), dict.fromkeys(stubs, ())
+    master = Master(RunningSystem(what, stubs, timetable=clock, streams=streams, recorded=recorded), InMemory())
     master.initialise()
     master.run()
     assert master.divergence is None

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 
 from orchestration.foundation.recording.recording import InMemory
 from orchestration.simulation.engines.master import Master
+from orchestration.simulation.engines.running_system import RunningSystem
 from orchestration.systems.schedule.instant_arrays import Cursor
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
@@ -63,8 +64,8 @@ def noisy(what):
               for name in what.components}  # fmt: skip
     stubs = {name: Stub(y=1.0, z=2.0, **dict.fromkeys(names, 0.0)) for name, names in inputs.items()}
     streams = Streams(what.seed)
-    master = Master(what, stubs, timetable=Timetable(what, streams), streams=streams, recorded=dict.fromkeys(stubs, ()),
-                    recorder=InMemory())  # fmt: skip
+    clock, recorded = Timetable(what, streams), dict.fromkeys(stubs, ())
+    master = Master(RunningSystem(what, stubs, timetable=clock, streams=streams, recorded=recorded), InMemory())
     master.initialise()
     master.run()
     chunks = master.recorder.finish().chunks()
