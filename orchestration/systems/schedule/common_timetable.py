@@ -2,13 +2,14 @@
 
 from collections import OrderedDict
 from collections.abc import Hashable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from orchestration.foundation.basics.c_structures import address
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Booleans, Integers
 from orchestration.foundation.basics.times import Grid, exact_nanoseconds, nanoseconds
@@ -35,6 +36,11 @@ class Instants:
 
     def __len__(self) -> int:
         return len(self.times)
+
+    @cached_property
+    def addresses(self) -> tuple[int, int]:
+        """The addresses of both."""
+        return address(self.times), address(self.stepped)
 
     def merged_with(self, others: "Instants") -> "Instants":
         """The union of these and others."""
@@ -100,7 +106,7 @@ class InstantCollector:
         return Instants(times=instants, stepped=table)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(kw_only=True, eq=False)
 class Span:
     """Everything from one time to another, in order; the tables are those of a `Schedule`."""
 
@@ -118,11 +124,17 @@ class Span:
     sampled: Integers
     """Times of the samples [ns]"""
     exchanged: Integers
+    addresses: Mapping[str, int] = field(default_factory=dict)
+    """The addresses of tables that are known"""
 
     @property
     def begin(self) -> int:
         """[ns], the first instant."""
         return min(int(each.times[0]) for each in (self.regular, self.own) if len(each))
+
+    def address_of(self, table: str) -> int:
+        """The address of a table."""
+        return self.addresses.get(table) or address(getattr(self, table))
 
     def count_of(self, connection: int, table: str) -> int:
         """The number of messages of a connection in `table`."""

@@ -122,38 +122,42 @@ class CompiledTimetable(Timetable):
 
     def _set_out(self, streams: Streams) -> Mapping[str, int]:
         self._library, self._outline = library(), _outline_of(self._common, streams)
+        self._counts = _structures().Counts()
         seed, names = np.array(_words(streams.seed), dtype=np.uint32), self._plan.sampled
         first = np.empty(len(names), dtype=np.int64)
         self._handle = self._library.timetable_new(self._outline.address, address(seed), len(seed), address(first))
         self._expect(bool(self._handle))
-        weakref.finalize(self, self._library.timetable_free, self._handle)
         return dict(zip(names, first.tolist(), strict=True))
 
+    def __del__(self) -> None:
+        if getattr(self, "_handle", None):
+            self._library.timetable_free(self._handle)
+
     def _drawn(self, begin: int, end: int) -> Span:
-        counts, continuous = _structures().Counts(), len(self._common.continuous)
+        counts, continuous = self._counts, len(self._common.continuous)
         self._expect(self._library.timetable_draw(self._handle, end, ctypes.byref(counts)))
-        shapes = {name: (getattr(counts, name), columns) for name, columns in _COLUMNS.items()}
-        tables, place = {}, 0
-        memory = np.empty(sum(rows * columns for rows, columns in shapes.values()) + counts.samples, dtype=np.int64)
-        for name, (rows, columns) in shapes.items():
-            tables[name] = memory[place : place + rows * columns].reshape(rows, columns)
-            place += rows * columns
-        sampled, stepped = memory[place:], np.empty((counts.own, continuous), dtype=np.bool_)
-        into = _structures().Tables(
-            sampled=address(sampled), stepped=address(stepped),
-            **{name: address(table) for name, table in tables.items()},
-        )  # fmt: skip
-        rows = self._library.timetable_lay_out(self._handle, ctypes.byref(into), ctypes.byref(counts))
+        sizes = [getattr(counts, name) * columns for name, columns in _COLUMNS.items()]
+        steps = counts.own * continuous
+        memory = np.empty(sum(sizes) + -(-steps // 8), dtype=np.int64)
+        where = address(memory)
+        rows = self._library.timetable_lay_out(self._handle, where, ctypes.byref(counts))
         self._expect(rows >= 0)
-        own = Instants(times=tables.pop("own")[:rows, 0], stepped=stepped[:rows])
-        return Span(end=end, regular=self._common.regular(begin, end), own=own, sampled=sampled, **tables)
+        tables, addresses, place = {}, {}, 0
+        for (name, columns), size in zip(_COLUMNS.items(), sizes):
+            table = memory[place : place + size]
+            tables[name] = table if columns == 1 else table.reshape(-1, columns)
+            addresses[name] = where + place * memory.itemsize
+            place += size
+        stepped = memory[place:].view(np.bool_)[: rows * continuous].reshape(rows, continuous)
+        own = Instants(times=tables.pop("own")[:rows], stepped=stepped)
+        return Span(end=end, regular=self._common.regular(begin, end), own=own, addresses=addresses, **tables)
 
     def _expect(self, has_memory: bool) -> None:
         if not has_memory:
             raise MemoryError("no memory for the samples and messages of a timetable")
 
 
-_COLUMNS = {"own": 1, "samples": 5, "exchanged": 4, "posted": 4, "measured": 4, "arrivals": 4}
+_COLUMNS = {"own": 1, "sampled": 1, "samples": 5, "exchanged": 4, "posted": 4, "measured": 4, "arrivals": 4}
 """The tables of a span, of 64-bit integers"""
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from orchestration.systems.schedule.common_timetable import CommonTimetable, Span
+from orchestration.systems.schedule.compiled_timetable import timetable
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system import placement
@@ -70,7 +71,7 @@ class ScheduleCache:
             self._kept.move_to_end(key)
             first_samples, spans = self._kept[key]
             return RunSchedule(first_samples=first_samples, spans=iter(spans))
-        table = Timetable(system, Streams(system.seed, system.streams), common=self._common(outline, timing, system))
+        table = timetable(system, Streams(system.seed, system.streams), common=self._common(outline, timing, system))
         return RunSchedule(first_samples=table.first_samples, spans=self._spans(key, table))
 
     def _common(self, outline: Hashable, timing: ScheduleKey, system: System) -> CommonTimetable:

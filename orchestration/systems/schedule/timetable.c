@@ -8,7 +8,7 @@
 
 EXPORT const Size sizes[] = {
     SIZE_OF(Grid), SIZE_OF(Varying), SIZE_OF(Route), SIZE_OF(Clock), SIZE_OF(Post), SIZE_OF(Outline), SIZE_OF(Counts),
-    SIZE_OF(Tables), SIZE_OF(Size), {0}};
+    SIZE_OF(Size), {0}};
 
 static void *resized(void *memory, size_t size) { return realloc(memory, size); }
 
@@ -45,6 +45,6 @@ EXPORT Timetable *timetable_new(const Outline *of, const uint32_t *seed, int64_t
 
 EXPORT int timetable_draw(Timetable *t, int64_t end, Counts *counts) { return draw_window(t, end, counts); }
 
-EXPORT int64_t timetable_lay_out(Timetable *t, const Tables *into, const Counts *counts) {
-    return lay_out(t, into, counts);
+EXPORT int64_t timetable_lay_out(Timetable *t, int64_t *memory, const Counts *counts) {
+    return lay_out(t, memory, counts);
 }

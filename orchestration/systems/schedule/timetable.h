@@ -230,6 +230,11 @@ typedef struct {
     int64_t first; /* index of the first message in this window */
 } Poster;
 
+typedef struct { /* those of a window, as in common_timetable.py */
+    int64_t *own, *sampled, *samples, *exchanged, *posted, *measured, *arrivals;
+    uint8_t *stepped;
+} Tables;
+
 /* Rows in the order of their times, one column of a table. */
 typedef struct {
     const int64_t *times, *then; /* `then`: NULL, or the column that orders rows of the same time */
@@ -279,26 +284,72 @@ static int begin_timetable(Timetable *t, const uint32_t *seed, int64_t seed_size
 
 /* -- messages ------------------------------------------------------------------------------------------------------ */
 
-static inline int64_t in_order(Link *link, int64_t own) { return link->last = own > link->last ? own : link->last; }
+/* Add `sign` times the next numbers of a stream. */
+static void spread(Stream *s, int64_t *times, int64_t count, int64_t sign) {
+    const Varying *of = s->of;
+    if (of->kind == CONSTANT) {
+        for (int64_t i = 0; of->least && i < count; i++) times[i] += sign * of->least;
+    } else if (of->kind == UNIFORM) { /* the usual one, with its generator in registers */
+        Generator generator = s->generator;
+        double width = (double)(of->most - of->least);
+        for (int64_t i = 0; i < count; i++) times[i] += sign * (of->least + (int64_t)(uniform(&generator) * width));
+        s->generator = generator;
+    } else
+        for (int64_t i = 0; i < count; i++) times[i] += sign * next_of(s);
+}
 
-/* The arrival of the next message; -1 for a lost one. */
-static inline int64_t arrival_of(Link *link, int64_t sent) {
-    int64_t own = sent + next_of(&link->delay) + next_of(&link->late);
-    return next_of(&link->loss) ? -1 : in_order(link, own);
+static void lose(Stream *s, int64_t *arrivals, int64_t count) {
+    for (int64_t i = 0; s->of->kind != CONSTANT && i < count; i++)
+        if (next_of(s)) arrivals[i] = -1;
+}
+
+/* No message overtakes another, and a lost one hinders none. */
+static void put_in_order(Link *link, int64_t *times, int64_t count) {
+    int64_t last = link->last;
+    for (int64_t i = 0; i < count; i++) {
+        last = times[i] > last ? times[i] : last;
+        times[i] = times[i] < 0 ? -1 : last;
+    }
+    link->last = last;
+}
+
+static void draw_arrivals(Link *link, const int64_t *sent, int64_t *arrivals, int64_t count) {
+    memcpy(arrivals, sent, (size_t)count * sizeof *sent);
+    spread(&link->delay, arrivals, count, 1);
+    spread(&link->late, arrivals, count, 1);
+    lose(&link->loss, arrivals, count);
+    put_in_order(link, arrivals, count);
+}
+
+/* When messages are measured for samples at these times. */
+static void draw_measurements(Link *link, const int64_t *times, int64_t *measured, int64_t *arrivals, int64_t count) {
+    memcpy(measured, times, (size_t)count * sizeof *times);
+    memcpy(arrivals, times, (size_t)count * sizeof *times);
+    spread(&link->delay, measured, count, -1);
+    spread(&link->late, measured, count, -1);
+    for (int64_t i = 0; i < count; i++) measured[i] = measured[i] < 0 ? 0 : measured[i];
+    put_in_order(link, measured, count);
+    lose(&link->loss, arrivals, count);
 }
 
 static int draw_messages(Link *link, const int64_t *times, int64_t count, bool are_measured) {
     int64_t *sent = room(&link->sent, count), *arrivals = room(&link->arrivals, count);
     if (!sent || !arrivals) return 0;
     link->sent.count += count, link->arrivals.count += count;
-    for (int64_t i = 0; i < count; i++) {
-        if (are_measured) { /* for a sample at this time */
-            sent[i] = in_order(link, times[i] - next_of(&link->delay) - next_of(&link->late));
-            arrivals[i] = next_of(&link->loss) ? -1 : times[i];
-        } else { /* sent now, or at the next sample */
-            sent[i] = times[i + (link->of->jacobi != 0)];
-            arrivals[i] = arrival_of(link, sent[i]);
-        }
+    if (are_measured)
+        draw_measurements(link, times, sent, arrivals, count);
+    else {
+        memcpy(sent, times + (link->of->jacobi != 0), (size_t)count * sizeof *sent);
+        draw_arrivals(link, sent, arrivals, count);
+    }
+    return 1;
+}
+
+/* Add the points before `end`, and `least` of them at the least. */
+static int add_points(Points *points, Numbers *times, int64_t end, int64_t least) {
+    for (int64_t count = 0; count < least || point(points) < end; count++) {
+        if (!room(times, 1)) return 0;
+        times->items[times->count++] = next_point(points);
     }
     return 1;
 }
@@ -308,9 +359,9 @@ static int draw_samples(Timetable *t, Task *task) {
     const Clock *of = task->of;
     int64_t drawn = task->times.count - 1;
     while (task->times.items[task->times.count - 1] - of->ahead < t->end) {
-        int64_t *next = room(&task->times, 1);
-        if (!next) return 0;
-        *next = next_point(&task->points) + next_of(&task->late), task->times.count++;
+        int64_t first = task->times.count;
+        if (!add_points(&task->points, &task->times, t->end + of->ahead, 1)) return 0;
+        spread(&task->late, task->times.items + first, task->times.count - first, 1);
     }
     const int64_t *times = task->times.items + drawn;
     int64_t count = task->times.count - 1 - drawn;
@@ -323,13 +374,12 @@ static int draw_samples(Timetable *t, Task *task) {
 
 static int draw_points(Timetable *t, Poster *poster) {
     Link *link = &t->links[poster->of->connection];
-    poster->first = poster->points.k, link->sent.count = link->arrivals.count = 0;
-    while (point(&poster->points) < t->end) {
-        int64_t *sent = room(&link->sent, 1), *arrival = room(&link->arrivals, 1);
-        if (!sent || !arrival) return 0;
-        *sent = next_point(&poster->points), *arrival = arrival_of(link, *sent);
-        link->sent.count++, link->arrivals.count++;
-    }
+    poster->first = poster->points.k, link->sent.count = 0;
+    if (!add_points(&poster->points, &link->sent, t->end, 0)) return 0;
+    link->arrivals.count = 0;
+    if (!room(&link->arrivals, link->sent.count)) return 0;
+    link->arrivals.count = link->sent.count;
+    draw_arrivals(link, link->sent.items, link->arrivals.items, link->sent.count);
     return 1;
 }
 
@@ -378,7 +428,7 @@ static int draw_window(Timetable *t, int64_t end, Counts *counts) {
         }
         for (int64_t j = 0; j < clock->outgoing_count; j++)
             if (!set_out(&t->links[clock->outgoing[j]], times, task->first, task->now)) return 0;
-        counts->samples += task->now, counts->own += task->to_end;
+        counts->sampled += task->now, counts->samples += task->now, counts->own += task->to_end;
         counts->exchanged += task->now * (clock->incoming_count + clock->outgoing_count);
     }
     for (int64_t i = 0; i < of->route_count; i++) {
@@ -402,6 +452,7 @@ static void add_run(Timetable *t, Run run) {
 static inline Run *earliest(Timetable *t) {
     Run *found = NULL;
     int64_t time = 0, then = 0;
+    if (t->run_count == 1) return t->runs->at < t->runs->end ? t->runs : NULL;
     for (Run *run = t->runs; run < t->runs + t->run_count; run++) {
         if (run->at == run->end) continue;
         int64_t own = run->times[run->stride * run->at], own_then = run->then ? run->then[run->stride * run->at] : 0;
@@ -443,24 +494,33 @@ static void put_measured(Timetable *t, int64_t *into) {
     put_messages(t, into);
 }
 
+/* Lay out the messages of one task from row `at` to before `end` of its samples, in the order of exchange. */
+static void put_exchanged(const Timetable *t, const Task *task, int64_t at, int64_t end, int64_t *into) {
+    int64_t incoming = task->of->incoming_count, count = incoming + task->of->outgoing_count;
+    for (int64_t i = 0; i < count; i++) {
+        const Link *link = &t->links[i < incoming ? task->of->incoming[i] : task->of->outgoing[i - incoming]];
+        const int64_t *sent = link->sent.items, *arrivals = link->arrivals.items;
+        int64_t *row = into + 4 * i;
+        for (int64_t j = at; j < end; j++, row += 4 * count)
+            put_message(row, link, task->first + j, sent[j], arrivals[j]);
+    }
+}
+
 static void put_samples(Timetable *t, const Tables *into) {
-    int64_t *sampled = into->sampled, *samples = into->samples, *exchanged = into->exchanged;
+    int64_t *sampled = into->sampled, *samples = into->samples, exchanged = 0;
     t->run_count = 0;
     for (const Task *task = t->tasks; task < t->tasks + t->of->clock_count; task++)
         add_run(t, (Run){task->times.items, .stride = 1, .end = task->now, .task = task});
-    for (Run *run; (run = earliest(t)); run->at++) {
-        const Task *task = run->task;
-        const Clock *of = task->of;
-        int64_t before = (exchanged - into->exchanged) / 4, sent = before + of->incoming_count;
-        *sampled++ = run->times[run->at];
-        *samples++ = of->component, *samples++ = run->times[run->at + 1];
-        *samples++ = before, *samples++ = sent, *samples++ = sent + of->outgoing_count;
-        for (int64_t i = 0; i < of->incoming_count + of->outgoing_count; i++) {
-            int64_t j = i < of->incoming_count ? of->incoming[i] : of->outgoing[i - of->incoming_count];
-            const Link *link = &t->links[j];
-            exchanged = put_message(
-                exchanged, link, task->first + run->at, link->sent.items[run->at], link->arrivals.items[run->at]);
-        }
+    bool is_alone = t->run_count == 1;
+    if (is_alone) put_exchanged(t, t->runs->task, 0, t->runs->end, into->exchanged);
+    for (Run *run; (run = earliest(t)); run->at++, sampled++, samples += 5) {
+        const Clock *of = run->task->of;
+        int64_t at = run->at, received = exchanged, sent = received + of->incoming_count;
+        if (!is_alone) put_exchanged(t, run->task, at, at + 1, into->exchanged + 4 * exchanged);
+        exchanged = sent + of->outgoing_count;
+        *sampled = run->times[at];
+        samples[0] = of->component, samples[1] = run->times[at + 1];
+        samples[2] = received, samples[3] = sent, samples[4] = exchanged;
     }
 }
 
@@ -480,62 +540,71 @@ static void put_arrivals(Timetable *t, int64_t *into) {
 
 static uint64_t bit(int64_t place) { return place < 0 ? 0 : (uint64_t)1 << place; }
 
-/* An instant that begins or continues a run, whose memory is there. */
-static void put_own(Timetable *t, int64_t time, uint64_t stepped) {
-    t->times.items[t->times.count++] = time, t->masks.items[t->masks.count++] = (int64_t)stepped;
+/* Add the instants behind those that are noted: one more run. */
+static void end_run(Timetable *t, const int64_t *end) {
+    int64_t first = t->times.count;
+    t->times.count = end - t->times.items;
+    add_run(t, (Run){t->times.items, .stride = 1, .at = first, .end = t->times.count});
 }
 
-static void end_run(Timetable *t, int64_t first) {
-    add_run(t, (Run){t->times.items, .stride = 1, .at = first, .end = t->times.count});
+/* Note the instants of a task's samples, and of messages that are measured for later ones. */
+static void note_task(Timetable *t, const Task *task) {
+    const Clock *of = task->of;
+    int64_t *time = t->times.items + t->times.count, *stepped = t->masks.items + t->times.count;
+    uint64_t read = 0;
+    for (int64_t i = 0; i < of->incoming_count; i++) {
+        const Route *route = &t->of->routes[of->incoming[i]];
+        if (!route->read_ahead) read |= bit(route->sender);
+    }
+    for (int64_t i = 0; i < task->to_end; i++) time[i] = task->times.items[i], stepped[i] = i < task->now ? (int64_t)read : 0;
+    for (int64_t j = 0; j < of->outgoing_count; j++) {
+        const Link *link = &t->links[of->outgoing[j]];
+        int64_t receiver = (int64_t)bit(link->of->receiver);
+        for (int64_t i = 0; i < task->now; i++) stepped[i] |= link->arrivals.items[i] == time[i] ? receiver : 0;
+    }
+    end_run(t, time + task->to_end);
+    for (int64_t i = 0; i < of->incoming_count; i++) {
+        const Link *link = &t->links[of->incoming[i]];
+        if (!link->of->read_ahead) continue;
+        time = t->times.items + t->times.count, stepped = t->masks.items + t->times.count;
+        for (int64_t j = link->past; j < link->past + link->now; j++)
+            *time++ = link->sent.items[j], *stepped++ = (int64_t)bit(link->of->sender);
+        end_run(t, time);
+    }
+}
+
+/* Note the instants at which messages arrive: those of a post at once, then all others. */
+static void note_arrivals(Timetable *t, const int64_t *arrivals, int64_t count) {
+    for (const Poster *poster = t->posters; poster < t->posters + t->of->post_count; poster++) {
+        const Link *link = &t->links[poster->of->connection];
+        int64_t *time = t->times.items + t->times.count, *stepped = t->masks.items + t->times.count;
+        for (int64_t i = 0; i < link->sent.count; i++)
+            if (link->arrivals.items[i] == link->sent.items[i])
+                *time++ = link->sent.items[i], *stepped++ = (int64_t)bit(link->of->receiver);
+        end_run(t, time);
+    }
+    int64_t *time = t->times.items + t->times.count, *stepped = t->masks.items + t->times.count;
+    for (int64_t i = 0; i < count; i++)
+        *time++ = arrivals[4 * i + 3], *stepped++ = (int64_t)bit(t->of->routes[arrivals[4 * i]].receiver);
+    end_run(t, time);
 }
 
 /* Own instants, each once; the result is their number. */
 static int64_t put_own_instants(Timetable *t, const Tables *into, const Counts *counts) {
-    int64_t count = t->of->continuous_count, rows = 0;
-    t->run_count = t->times.count = t->masks.count = 0;
-    for (const Task *task = t->tasks; task < t->tasks + t->of->clock_count; task++) {
-        const Clock *of = task->of;
-        uint64_t read = 0;
-        for (int64_t i = 0; i < of->incoming_count; i++) {
-            const Route *route = &t->of->routes[of->incoming[i]];
-            if (!route->read_ahead) read |= bit(route->sender);
-        }
-        int64_t first = t->times.count;
-        for (int64_t i = 0; i < task->to_end; i++) {
-            int64_t time = task->times.items[i];
-            uint64_t stepped = i < task->now ? read : 0;
-            for (int64_t j = 0; i < task->now && j < of->outgoing_count; j++) {
-                const Link *link = &t->links[of->outgoing[j]];
-                if (link->arrivals.items[i] == time) stepped |= bit(link->of->receiver);
-            }
-            put_own(t, time, stepped);
-        }
-        end_run(t, first);
-        for (int64_t i = 0; i < of->incoming_count; i++) {
-            const Link *link = &t->links[of->incoming[i]];
-            first = t->times.count;
-            for (int64_t j = link->past; link->of->read_ahead && j < link->past + link->now; j++)
-                put_own(t, link->sent.items[j], bit(link->of->sender));
-            end_run(t, first);
-        }
-    }
-    for (const Poster *poster = t->posters; poster < t->posters + t->of->post_count; poster++) {
-        const Link *link = &t->links[poster->of->connection];
-        int64_t first = t->times.count;
-        for (int64_t i = 0; i < link->sent.count; i++)
-            if (link->arrivals.items[i] == link->sent.items[i]) put_own(t, link->sent.items[i], bit(link->of->receiver));
-        end_run(t, first);
-    }
-    int64_t first = t->times.count;
-    for (int64_t i = 0; i < counts->arrivals; i++)
-        put_own(t, into->arrivals[4 * i + 3], bit(t->of->routes[into->arrivals[4 * i]].receiver));
-    end_run(t, first);
+    int64_t count = t->of->continuous_count, rows = 0, last = -1;
+    const int64_t *masks = t->masks.items;
+    uint8_t *row = into->stepped;
+    t->run_count = t->times.count = 0;
+    for (const Task *task = t->tasks; task < t->tasks + t->of->clock_count; task++) note_task(t, task);
+    note_arrivals(t, into->arrivals, counts->arrivals);
     for (Run *run; (run = earliest(t)); run->at++) {
-        uint64_t stepped = (uint64_t)t->masks.items[run->at];
-        bool is_new = !rows || into->own[rows - 1] != run->times[run->at];
-        if (is_new) into->own[rows++] = run->times[run->at];
-        uint8_t *row = into->stepped + (rows - 1) * count;
-        for (int64_t i = 0; i < count; i++) row[i] = (is_new ? 0 : row[i]) | (stepped >> i & 1);
+        uint64_t stepped = (uint64_t)masks[run->at];
+        int64_t time = run->times[run->at];
+        if (time != last) {
+            row = into->stepped + rows * count, into->own[rows++] = last = time;
+            for (int64_t i = 0; i < count; i++) row[i] = stepped >> i & 1;
+        } else
+            for (int64_t i = 0; i < count; i++) row[i] |= stepped >> i & 1;
     }
     return rows;
 }
@@ -554,9 +623,24 @@ static void drop_past(Timetable *t) {
     for (int64_t i = 0; i < t->of->route_count; i++) drop(&t->links[i].flight, FLIGHT * t->links[i].landing);
 }
 
+/* The tables one after another in the order of their counts, then a byte for each own instant and component. */
+static Tables tables_in(int64_t *memory, const Counts *counts) {
+    Tables in;
+    in.own = memory;
+    in.sampled = in.own + counts->own;
+    in.samples = in.sampled + counts->sampled;
+    in.exchanged = in.samples + 5 * counts->samples;
+    in.posted = in.exchanged + 4 * counts->exchanged;
+    in.measured = in.posted + 4 * counts->posted;
+    in.arrivals = in.measured + 4 * counts->measured;
+    in.stepped = (uint8_t *)(in.arrivals + 4 * counts->arrivals);
+    return in;
+}
+
 /* Lay out the tables of the window that was drawn; the result is the number of own instants, -1 without memory. */
-static int64_t lay_out(Timetable *t, const Tables *into, const Counts *counts) {
-    t->times.count = t->masks.count = 0;
+static int64_t lay_out(Timetable *t, int64_t *memory, const Counts *counts) {
+    Tables tables = tables_in(memory, counts), *into = &tables;
+    t->times.count = 0;
     if (!room(&t->times, counts->own) || !room(&t->masks, counts->own)) return -1;
     put_posted(t, into->posted);
     put_measured(t, into->measured);

@@ -6,7 +6,6 @@ instants.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -94,10 +93,12 @@ class Timetable:
             span = self._span(most)
             if len(span.regular) or len(span.own):
                 if before is not None:
-                    yield replace(before, end=span.begin)
+                    before.end = span.begin
+                    yield before
                 before = span
         if before is not None:
-            yield replace(before, end=self._end)
+            before.end = self._end
+            yield before
 
     def _window(self, most: int) -> Schedule | None:
         """The schedule of the next window with instants."""

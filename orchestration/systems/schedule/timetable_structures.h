@@ -49,13 +49,8 @@ typedef struct { /* all that the timetables of some runs have in common, in the 
 } Outline;
 
 typedef struct { /* the numbers of rows of the tables of a window */
-    int64_t own, samples, exchanged, posted, measured, arrivals;
+    int64_t own, sampled, samples, exchanged, posted, measured, arrivals;
 } Counts;
-
-typedef struct { /* memory for the tables of a window, as in common_timetable.py */
-    int64_t *own, *sampled, *samples, *exchanged, *posted, *measured, *arrivals;
-    uint8_t *stepped;
-} Tables;
 
 typedef struct {
     const char *name;

@@ -89,6 +89,10 @@ class Track:
     span: Span | None = None
 
 
+_SourceTables = tuple[tuple[Floats, Floats], tuple[int, int]]
+"""Values of sources for expressions and for inputs at some instants, and their addresses"""
+
+
 class Batch:
     """Memory for the runs of a shape, used for one group of runs after another."""
 
@@ -101,7 +105,7 @@ class Batch:
         self._loop, self._address = self._structures.loop, ctypes.addressof(self._structures.loop)
         self._initialisation = Initialisation(shape, self.arrays, self._structures, self.numbers)
         self._read = [wanted.copy() for wanted in self.arrays.wanted]
-        self._source_values: OrderedDict[Hashable, tuple[Floats, Floats]] = OrderedDict()
+        self._source_values: OrderedDict[Hashable, _SourceTables] = OrderedDict()
         self._rows: Floats | None = None
 
     def __del__(self) -> None:
@@ -232,33 +236,32 @@ class Batch:
             return
         c_span = self._c.Span(end=span.end)
         for name in ("regular", "own"):
-            instants = getattr(span, name)
-            places = self._c.Instants(
-                times=address(instants.times), stepped=address(instants.stepped), count=len(instants)
-            )
-            setattr(c_span, name, places)
+            instants: Instants = getattr(span, name)
+            times, stepped = instants.addresses
+            setattr(c_span, name, self._c.Instants(times=times, stepped=stepped, count=len(instants)))
         for name in ("posted", "measured", "arrivals", "samples"):
-            setattr(c_span, name, address(getattr(span, name)))
+            setattr(c_span, name, span.address_of(name))
             setattr(c_span, f"{name}_count", len(getattr(span, name)))
-        c_span.exchanged, c_span.sampled = address(span.exchanged), address(span.sampled)
+        c_span.exchanged, c_span.sampled = span.address_of("exchanged"), span.address_of("sampled")
         into.span = c_span
         for lane in track.lanes[:1] if track.same_sources else track.lanes:
             run = runs[lane]
             regular, own = (self._values_at(run, instants) for instants in (span.regular, span.own))
-            run.arrays = [*regular, *own]
-            into.seen[lane], into.given[lane], into.seen_own[lane], into.given_own[lane] = map(address, run.arrays)
+            run.arrays = [regular, own]
+            (into.seen[lane], into.given[lane]), (into.seen_own[lane], into.given_own[lane]) = regular[1], own[1]
         for lane in track.lanes:
             self._draw_noise(lane, runs[lane], span)
 
-    def _values_at(self, run: LaneRun, instants: Instants) -> tuple[Floats, Floats]:
+    def _values_at(self, run: LaneRun, instants: Instants) -> _SourceTables:
         """The values of sources at some instants; those that runs have in common are computed once."""
         key = instants, run.source_key
         if key not in self._source_values:
             t = seconds(instants.times)
-            self._source_values[key] = (
+            tables = (
                 np.ascontiguousarray(np.column_stack([values.over(t) for values in run.seen] or [t[:, None]])),
                 np.ascontiguousarray(np.column_stack([values.at_each(t) for values in run.given] or [t[:, None]])),
             )
+            self._source_values[key] = tables, (address(tables[0]), address(tables[1]))
             while len(self._source_values) > _CACHED_SOURCE_VALUES:
                 self._source_values.popitem(last=False)
         self._source_values.move_to_end(key)

@@ -98,7 +98,7 @@ def test_the_farthest_tail_of_a_normal_distribution_is_the_same() -> None:
     [
         ("0x4385df649fccf645u", "0x4385df649fccf647u"),
         ("if (arrival <= times[i]) continue;", "if (arrival < times[i]) continue;"),
-        ("own > link->last ? own", "own < link->last ? own"),
+        ("times[i] > last ? times", "times[i] < last ? times"),
     ],
 )
 def test_a_slip_in_the_text_of_c_is_seen(right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:

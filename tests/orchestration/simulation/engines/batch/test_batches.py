@@ -167,7 +167,7 @@ def test_a_run_with_a_component_that_fails_or_becomes_infinite_is_left_to_be_run
 def test_a_run_in_lanes_draws_its_samples_once_and_what_is_regular_is_found_once_for_all(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    made = dict.fromkeys(("Timetable", "CommonTimetable"), 0)
+    made = dict.fromkeys(("timetable", "CommonTimetable"), 0)
 
     def counted(name: str) -> None:
         there = getattr(schedule_cache, name)
@@ -183,7 +183,7 @@ def test_a_run_in_lanes_draws_its_samples_once_and_what_is_regular_is_found_once
     late = Scenario(timing=Timing(jitter=0.002), stop_time=0.05).as_system()
     found = Batches().run([with_files(replace(late, seed=seed)) for seed in range(2)])
     assert None not in found
-    assert made == {"Timetable": 2, "CommonTimetable": 1}
+    assert made == {"timetable": 2, "CommonTimetable": 1}
 
 
 @pytest.mark.parametrize("lanes", [2, 4])
