@@ -102,7 +102,7 @@ def compiled_step(system: System) -> float:
         flight.master.initialise()
         begin = time.process_time()
         flight.master.run()
-        return (time.process_time() - begin) / flight.master.steps
+        return (time.process_time() - begin) / flight.master.running.steps
 
 
 def end_to_end(period: float, runs: int) -> float:

@@ -86,7 +86,7 @@ def loop(scenario: Scenario) -> float:
             flight.master.initialise()
             start = time.process_time()
             flight.master.run()
-            assert flight.master.steps == STEPS
+            assert flight.master.running.steps == STEPS
             return time.process_time() - start
 
     work()

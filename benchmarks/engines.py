@@ -38,7 +38,7 @@ def step(flight: Scenario, engine: Engine) -> float:
         run.master.initialise()
         start = time.process_time()
         run.master.run()
-        return (time.process_time() - start) / run.master.steps * 1e6
+        return (time.process_time() - start) / run.master.running.steps * 1e6
 
 
 def main() -> None:

@@ -17,7 +17,6 @@ from orchestration.foundation.recording.recording import Chunk, Recorder
 from orchestration.simulation.engines import initial
 from orchestration.simulation.engines.backlog import Backlog
 from orchestration.simulation.engines.compiled import CompiledLoop, reason_unavailable
-from orchestration.simulation.engines.connection_hold import Channel
 from orchestration.simulation.engines.instants import PythonLoop
 from orchestration.simulation.engines.memory import Allocator
 from orchestration.simulation.engines.running_system import Diverged, RunningSystem, Terminated
@@ -61,7 +60,7 @@ class Master:
 
         Other sampled components, unless they have their own clock, begin at their first sample.
         """
-        self._running = running
+        self.running = running
         self.board, self.columns, self.recorder = running.board, running.columns, recorder
         self.divergence: str | None = None
         self.divergence_time: int | None = None
@@ -75,33 +74,6 @@ class Master:
         self.backlog = self._loop.backlog
         self.engine = self._loop.engine
         """the name of the loop"""
-
-    # -- state ---------------------------------------------------------------------------------------------------
-
-    @property
-    def now(self) -> int:
-        """The current instant [ns]."""
-        return self._running.now
-
-    @property
-    def steps(self) -> int:
-        """Of all components in continuous time."""
-        return self._running.steps
-
-    @property
-    def termination(self) -> str | None:
-        """How an FMU has ended the run; None if none has."""
-        return self._running.termination
-
-    @property
-    def interrupted_at(self) -> int | None:
-        """When Ctrl-C or an error of an FMU has ended the run [ns]; None if neither has."""
-        return self._running.interrupted_at
-
-    @property
-    def channels(self) -> Sequence[Channel]:
-        """The connections, in the order of the system."""
-        return self._running.channels
 
     # -- a run ---------------------------------------------------------------------------------------------------
 
@@ -129,9 +101,9 @@ class Master:
                 return False
         except (Diverged, Terminated, errors.SimulatorError) as error:
             if isinstance(error, errors.SimulatorError) and not isinstance(error, errors.StoppedStepError):
-                error.timed(seconds(self.now))
+                error.timed(seconds(self.running.now))
             self._ended(error)
-        if self.interrupted_at is not None:
+        if self.running.interrupted_at is not None:
             self.backlog.drop_later_events()
         elif progress is not None:
             progress(1.0)
@@ -144,52 +116,52 @@ class Master:
     def state(self) -> dict[str, Any]:
         """The state of the run, of its messages, and of events that are not handed over, without `saved`."""
         return {
-            "instants": self._running.cursor.past,
+            "instants": self.running.cursor.past,
             "row": self.board.row.tolist(),
             "handed_over": self.backlog.handed_over,
-            "channels": [channel.state() for channel in self.channels],
+            "channels": [channel.state() for channel in self.running.channels],
             "events": self.backlog.tables.events().ravel().tolist(),
         }
 
     def saved(self) -> dict[str, bytes]:
         """The states of the components, and the rows that are not handed over, as bytes."""
         return {
-            **{name: simulator.save() for name, simulator in self._running.simulators.items()},
+            **{name: simulator.save() for name, simulator in self.running.simulators.items()},
             ROWS_PENDING: self.backlog.tables.rows().tobytes(),
         }
 
     def restore(self, state: Mapping[str, Any], saved: Mapping[str, bytes]) -> None:
         """Continue where `state` and `saved` were taken, instead of `initialise`."""
-        for name, simulator in self._running.simulators.items():
+        for name, simulator in self.running.simulators.items():
             simulator.restore(saved[name])
-        for schedule in self._running.cursor.move_to(state["instants"]):
-            self._running.skip(schedule)
+        for schedule in self.running.cursor.move_to(state["instants"]):
+            self.running.skip(schedule)
         self.board.row[:] = state["row"]
         events = np.array(state["events"], dtype=np.int64).reshape(-1, 4)
         self.backlog.restore(saved[ROWS_PENDING], events, handed_over=state["handed_over"])
-        for channel, content in zip(self.channels, state["channels"], strict=True):
+        for channel, content in zip(self.running.channels, state["channels"], strict=True):
             channel.restore(content)
 
     def _ended(self, error: Exception) -> None:
         """End the run by divergence or by an FMU that ends it; any other failure of an FMU is raised."""
         if isinstance(error, Terminated):
-            self._running.termination = str(error)
+            self.running.termination = str(error)
         elif isinstance(error, errors.SimulatorError) and not error.divergence:
             if self.backlog.has_row():
                 self.failure = error
-                self._running.now = self._running.interrupted_at = nanoseconds(self.board.row[0])
+                self.running.now = self.running.interrupted_at = nanoseconds(self.board.row[0])
                 self.backlog.drop_later_events()
                 self.backlog.hand_over_rest()
             raise error
         else:
-            self.divergence, self.divergence_time, self._running.termination = str(error), self.now, None
+            self.divergence, self.divergence_time, self.running.termination = str(error), self.running.now, None
         self.backlog.drop_later_events()
         self.backlog.ensure_row()
 
     # -- initialisation ------------------------------------------------------------------------------------------
 
     def _exchange_first(self) -> None:
-        running, stop = self._running, seconds(self._running.stop)
+        running, stop = self.running, seconds(self.running.stop)
         for name in running.wires.names:
             ratio, first = clock_of(running.system, name, running.first_samples)
             running.simulators[name].enter_initialization(0.0 if name in self._waiting else ratio * first, ratio * stop)
@@ -211,7 +183,7 @@ class Master:
         running.check_divergence(0.0)
 
     def _exchange(self, group: Sequence[int]) -> None:
-        running, connections = self._running, self._running.system.connections
+        running, connections = self.running, self.running.system.connections
 
         def pass_on(index: int, open_: Booleans) -> tuple[Floats, Floats]:
             running.readers[connections[index].sender]()

@@ -89,15 +89,15 @@ class PreparedRun:
 
     def outcome(self) -> RunOutcome:
         """The outcome of the run so far."""
-        master = self.master
+        master, running = self.master, self.master.running
         return RunOutcome(
             end=float(master.board.row[0]),
-            steps=master.steps,
+            steps=running.steps,
             divergence=master.divergence,
             divergence_time=_seconds(master.divergence_time),
-            termination=master.termination,
+            termination=running.termination,
             failure=master.failure,
-            interrupted_at=_seconds(master.interrupted_at),
+            interrupted_at=_seconds(running.interrupted_at),
             provenance={**provenance(self.instances), "engine": master.engine},
             warnings=tuple(warning for instance in self.instances.values() for warning in instance.warnings),
         )

@@ -100,7 +100,7 @@ class Simulation:
     @property
     def time(self) -> float:
         """The time [s] of the last measurement."""
-        return seconds(self._under_way.master.now)
+        return seconds(self._under_way.master.running.now)
 
     @property
     def values(self) -> dict[str, float]:
@@ -173,7 +173,7 @@ class Simulation:
 
     def _measure_end(self, run: PreparedRun) -> None:
         """Deliver the measurement at the end of the run, where the component is not stepped."""
-        for x, channel in zip(self._resolved.system.connections, run.master.channels):
+        for x, channel in zip(self._resolved.system.connections, run.master.running.channels):
             if x.receiver == self.component:
                 channel.pass_on()
 

@@ -49,11 +49,11 @@ def initial_state_of(
             raise UsageError(f"it diverges at its initialisation: {run.master.divergence}")
         saved = {name: instance.save() for name, instance in run.instances.items()}
         outputs = {name: _outputs(run.instances[name], part.outputs) for name, part in parts.items()}
-        received = [channel.received.copy() for channel in run.master.channels]
+        received = [channel.received.copy() for channel in run.master.running.channels]
     for name, state in loop.saved_states.items():
         loop.simulation.instances[name].restore(state)
     rest = {name: _outputs(loop.simulation.instances[name], part.outputs) for name, part in parts.items()}
-    received_at_rest = [channel.received for channel in loop.simulation.master.channels]
+    received_at_rest = [channel.received for channel in loop.simulation.master.running.channels]
     return InitialState(
         states={name: tangents[name].coordinates_of(saved[name]) for name in parts},
         outputs={name: outputs[name] - rest[name] for name in parts},

@@ -150,9 +150,8 @@ def _settle(simulation: PreparedRun, begin: Fraction, period: Fraction) -> None:
     rows = []
     for k in range(SETTLED):
         if master.run(pause_at=math.floor(begin + k * period)):
-            raise UsageError(
-                f"the run leaves the operating point: {master.divergence or master.termination or 'it was interrupted'}"
-            )
+            why = master.divergence or master.running.termination or "it was interrupted"
+            raise UsageError(f"the run leaves the operating point: {why}")
         rows.append([master.board.row[master.board.place[signal]] for signal in exchanged_signals(system)])
     expect_rest(system, np.array(rows))
 

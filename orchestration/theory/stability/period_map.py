@@ -102,7 +102,7 @@ def _with_even_steps(component: Component, period: Fraction) -> Component:
 def _state_parts(master: Master, simulators: Mapping[str, LinearSimulator]) -> list[Floats]:
     """The state at an instant, in place: the row without its time, connections, and components."""
     parts = [master.board.row[1:]]
-    for channel in master.channels:
+    for channel in master.running.channels:
         parts += channel.held()
     return [*parts, *(part for one in simulators.values() for part in (one.state, one.input))]
 

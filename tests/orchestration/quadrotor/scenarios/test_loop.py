@@ -211,7 +211,7 @@ def test_the_plant_is_stepped_from_row_to_row_over_exactly_the_horizon(timing: T
     assert run.plant.steps() == [(a / 1e9, (b - a) / 1e9) for a, b in itertools.pairwise(times)]
     assert sum(round(h * 1e9) for _, h in run.plant.steps()) == times[-1] - times[0]
     assert (times[0], times[-1]) == (0, nanoseconds(periods * timing.period))
-    assert run.master.steps == len(times) - 1
+    assert run.master.running.steps == len(times) - 1
 
 
 @given(timings(clock_ratio=1.0), st.integers(1, 20))
@@ -425,7 +425,7 @@ def test_a_run_restored_at_any_pause_goes_on_to_the_same_bits(hold: str, order: 
         resumed.master.restore(*paused.state())
         assert resumed.master.run()
         assert resumed.bits() == whole.bits()
-        assert resumed.master.steps == whole.master.steps
+        assert resumed.master.running.steps == whole.master.running.steps
 
 
 def test_a_run_paused_again_and_again_is_the_same_run() -> None:
@@ -433,7 +433,7 @@ def test_a_run_paused_again_and_again_is_the_same_run() -> None:
     for run in (whole, hopping):
         run.master.initialise()
     whole.master.run()
-    while not hopping.master.run(pause_at=hopping.master.now + 2 * MS):
+    while not hopping.master.run(pause_at=hopping.master.running.now + 2 * MS):
         state = hopping.state()
         hopping = everything()
         hopping.master.restore(*state)
@@ -454,7 +454,7 @@ def test_a_pause_is_at_the_first_instant_from_the_time_given() -> None:
     run = everything(jitter=0.0, delay_jitter=0.0)
     run.master.initialise()
     assert not run.master.run(pause_at=10_500_000)
-    assert run.master.now == 11 * MS
+    assert run.master.running.now == 11 * MS
     assert run.nanoseconds()[-1] == 11 * MS
 
 
