@@ -118,8 +118,7 @@ class NewFiles:
         self.path.rename(whole)
         try:
             for name in names:
-                if len(names) > 1 or (self.folder / name).is_dir():
-                    _keep(self.folder / name, old / name)
+                _keep(self.folder / name, old / name)
                 os.replace(whole / name, self.folder / name)
             _synchronise(self.folder)
         except BaseException:

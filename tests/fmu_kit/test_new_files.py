@@ -50,8 +50,8 @@ def nth_fails(monkeypatch: pytest.MonkeyPatch, name: str, n: int) -> None:
     monkeypatch.setattr(os, name, fail)
 
 
-def calls_of(name: str, tmp_path: Path) -> int:
-    """The number of calls of a function of the operating system by which two files are written."""
+def calls_of(name: str, files: dict[str, str], tmp_path: Path) -> int:
+    """The number of calls of a function of the operating system by which files are written."""
     with pytest.MonkeyPatch.context() as patch:
         counted: list[object] = []
         (tmp_path / "counted").mkdir()
@@ -62,29 +62,30 @@ def calls_of(name: str, tmp_path: Path) -> int:
             genuine(*arguments, **named)
 
         patch.setattr(os, name, count)
-        write(tmp_path / "counted", NEW)
+        write(tmp_path / "counted", files)
     return len(counted)
 
 
+@pytest.mark.parametrize("new", [NEW, {"model.c": "new c"}], ids=["a set", "one file"])
 @pytest.mark.parametrize("name", ["replace", "fsync", "rename"])
 def test_whichever_call_fails_the_set_is_as_it_was_and_nothing_is_left(
-    name: str, before: dict[str, str], tmp_path: Path
+    name: str, new: dict[str, str], before: dict[str, str], tmp_path: Path
 ) -> None:
     folder = tmp_path / "out"
     folder.mkdir()
     for each, text in before.items():
         (folder / each).write_text(text)
-    count = calls_of(name, tmp_path)
+    count = calls_of(name, new, tmp_path)
     assert count > 0
     for n in range(1, count + 1):
         with pytest.MonkeyPatch.context() as patch:
             nth_fails(patch, name, n)
             with pytest.raises(WriteError, match=r"out.*: could not be written: No space left on device$"):
-                write(folder, NEW)
+                write(folder, new)
         assert contents(folder) == before
         assert {path.name for path in folder.iterdir()} == set(before)
-    write(folder, NEW)
-    assert contents(folder) == NEW
+    write(folder, new)
+    assert contents(folder) == {**before, **new}
 
 
 def test_where_no_folder_can_be_made_nothing_is_left(tmp_path: Path) -> None:
