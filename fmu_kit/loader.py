@@ -5,6 +5,7 @@ libpython before it. `loader.c` does that. It is packed under the name of the mo
 """
 
 import functools
+import os
 import platform
 import shutil
 import subprocess
@@ -68,7 +69,8 @@ def _compiled_by(cc: str) -> bytes:
             str(library),
             *_OPTIONS,
         ]  # from stdin: the path of a file would be in the library
-        done = subprocess.run(command, input=SOURCE.read_bytes(), capture_output=True, check=False)
+        environment = {**os.environ, "TMPDIR": str(folder)}
+        done = subprocess.run(command, input=SOURCE.read_bytes(), env=environment, capture_output=True, check=False)
         if done.returncode != 0:
             lines = done.stderr.decode(errors="replace").strip().splitlines() or ["no output"]
             raise LoaderError(f"{cc}: {lines[0]}")

@@ -10,6 +10,7 @@ import fmpy
 import pytest
 
 from fmu_kit import scratch
+from fmu_kit.compiler.pack import c_compiler
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.foundation.basics.errors import QuadcosimError
 
@@ -99,4 +100,10 @@ def test_a_folder_without_an_owner_is_removed_and_one_taken_for_such_is_made_aga
     with scratch.temporary_folder() as folder:
         assert [*temporary.iterdir()] == [folder]
         (folder / "file").write_text("text")
+    assert not any(temporary.iterdir())
+
+
+def test_what_a_compiler_keeps_for_itself_is_in_such_a_folder(temporary: Path) -> None:
+    command = ["sh", "-c", 'printf %s "$TMPDIR" > library']
+    assert Path(c_compiler._compiled(command, {}, "main.c").decode()).parent == temporary
     assert not any(temporary.iterdir())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 import platform
 import shutil
 import struct
@@ -116,7 +117,12 @@ def _compiled(command: list[str], sources: dict[str, bytes], main: str, after: S
         for name, content in sources.items():
             (folder / name).write_bytes(content)
         done = subprocess.run(
-            [*command, main, "-o", "library", *after], cwd=folder, capture_output=True, text=True, check=False
+            [*command, main, "-o", "library", *after],
+            cwd=folder,
+            env={**os.environ, "TMPDIR": str(folder)},  # a compiler that is killed leaves its own files, too
+            capture_output=True,
+            text=True,
+            check=False,
         )
         if done.returncode != 0:
             lines = done.stderr.strip().splitlines() or ["no output"]

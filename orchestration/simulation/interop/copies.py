@@ -4,6 +4,7 @@ A copy has a library in front of the FMU's own, which forwards every call: `reco
 """
 
 import functools
+import os
 import re
 import subprocess
 import uuid
@@ -80,8 +81,10 @@ def _recorder() -> bytes:
     """The compiled library."""
     with temporary_folder() as folder:
         library = folder / "recorder.so"
-        command = [str(compiler()), "-std=gnu11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", str(SOURCE)]
-        done = subprocess.run([*command, "-o", str(library), "-ldl"], capture_output=True, text=True, check=False)
+        options = ("-std=gnu11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", str(SOURCE))
+        command = [str(compiler()), *options, "-o", str(library), "-ldl"]
+        environment = {**os.environ, "TMPDIR": str(folder)}
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
         if done.returncode != 0:
             lines = done.stderr.strip().splitlines() or ["no output"]
             raise QuadcosimError(f"{SOURCE.name}: {lines[0]}")
