@@ -20,6 +20,7 @@ from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.basics.times import Grid, nanoseconds
 from orchestration.systems.schedule.common_timetable import CommonTimetable, Instants, Span
 from orchestration.systems.schedule.fixed_step import FixedStep
+from orchestration.systems.schedule.instant_arrays import Schedule
 from orchestration.systems.schedule.lateness_and_loss import whole
 from orchestration.systems.schedule.random_timing import clock_grid
 from orchestration.systems.schedule.streams import DELAY, DELAY_JITTER, HIGHEST, JITTER, LOSS, LOWEST, NORMAL, Streams
@@ -63,6 +64,7 @@ def loaded(sources: dict[str, bytes]) -> Any:
     made.timetable_new.restype, made.timetable_new.argtypes = pointer, (pointer, pointer, number, pointer)
     made.timetable_draw.argtypes = (pointer, number, pointer)
     made.timetable_lay_out.restype, made.timetable_lay_out.argtypes = number, (pointer, pointer, pointer)
+    made.timetable_schedule.restype, made.timetable_schedule.argtypes = number, (pointer,)
     made.timetable_free.restype, made.timetable_free.argtypes = None, (pointer,)
     return made
 
@@ -151,6 +153,32 @@ class CompiledTimetable(Timetable):
         stepped = memory[place:].view(np.bool_)[: rows * continuous].reshape(rows, continuous)
         own = Instants(times=tables.pop("own")[:rows], stepped=stepped)
         return Span(end=end, regular=self._common.regular(begin, end), own=own, addresses=addresses, **tables)
+
+    def _scheduled(self, span: Span) -> Schedule:
+        continuous, most = self._common.continuous, len(span.regular) + len(span.own) + 1
+        table, stepped = np.empty((6, most), dtype=np.int64), np.empty(most * len(continuous), dtype=np.int64)
+        columns = ("times", "stepped_at", "posted_at", "measured_at", "arrivals_at", "samples_at")
+        window = _structures().Window(
+            continuous=address(continuous), continuous_count=len(continuous), stepped=address(stepped),
+            **{name: address(table) + i * table.strides[0] for i, name in enumerate(columns)},
+        )  # fmt: skip
+        for name in ("regular", "own"):
+            instants: Instants = getattr(span, name)
+            times, steps = instants.addresses
+            setattr(window, name, times)
+            setattr(window, f"{name}_stepped", steps)
+            setattr(window, f"{name}_count", len(instants))
+        for name in ("posted", "measured", "arrivals", "samples"):
+            setattr(window, f"{name}_count", len(getattr(span, name)))
+        for name in ("posted", "measured", "arrivals", "sampled"):
+            setattr(window, name, span.address_of(name))
+        count = self._library.timetable_schedule(ctypes.byref(window))
+        table[0, count] = span.end
+        return Schedule(
+            **{name: table[i, : count + 1] for i, name in enumerate(columns)},
+            stepped=stepped[: table[1, count]], posted=span.posted, measured=span.measured, arrivals=span.arrivals,
+            samples=span.samples, exchanged=span.exchanged,
+        )  # fmt: skip
 
     def _expect(self, has_memory: bool) -> None:
         if not has_memory:

@@ -8,7 +8,7 @@
 
 EXPORT const Size sizes[] = {
     SIZE_OF(Grid), SIZE_OF(Varying), SIZE_OF(Route), SIZE_OF(Clock), SIZE_OF(Post), SIZE_OF(Outline), SIZE_OF(Counts),
-    SIZE_OF(Size), {0}};
+    SIZE_OF(Window), SIZE_OF(Size), {0}};
 
 static void *resized(void *memory, size_t size) { return realloc(memory, size); }
 
@@ -48,3 +48,5 @@ EXPORT int timetable_draw(Timetable *t, int64_t end, Counts *counts) { return dr
 EXPORT int64_t timetable_lay_out(Timetable *t, int64_t *memory, const Counts *counts) {
     return lay_out(t, memory, counts);
 }
+
+EXPORT int64_t timetable_schedule(const Window *window) { return lay_out_schedule(window); }

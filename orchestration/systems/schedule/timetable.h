@@ -524,14 +524,17 @@ static void put_samples(Timetable *t, const Tables *into) {
     }
 }
 
+static void add_landing(Timetable *t, int64_t connection) {
+    const Link *link = &t->links[connection];
+    add_run(t, (Run){link->flight.items + 2, link->flight.items + 3, FLIGHT, .end = link->landing, .link = link});
+}
+
 /* Those at the same time in the order in which they were decided, and of links: posts, then tasks. */
 static void put_arrivals(Timetable *t, int64_t *into) {
     t->run_count = 0;
-#define LANDING(j) \
-    (Run){t->links[j].flight.items + 2, t->links[j].flight.items + 3, FLIGHT, .end = t->links[j].landing, .link = &t->links[j]}
-    for (int64_t i = 0; i < t->of->post_count; i++) add_run(t, LANDING(t->of->posts[i].connection));
+    for (int64_t i = 0; i < t->of->post_count; i++) add_landing(t, t->of->posts[i].connection);
     for (int64_t i = 0; i < t->of->clock_count; i++)
-        for (int64_t j = 0; j < t->of->clocks[i].outgoing_count; j++) add_run(t, LANDING(t->of->clocks[i].outgoing[j]));
+        for (int64_t j = 0; j < t->of->clocks[i].outgoing_count; j++) add_landing(t, t->of->clocks[i].outgoing[j]);
     for (Run *run; (run = earliest(t)); run->at++) {
         const int64_t *message = run->link->flight.items + FLIGHT * run->at;
         into = put_message(into, run->link, message[0], message[1], message[2]);
@@ -556,7 +559,10 @@ static void note_task(Timetable *t, const Task *task) {
         const Route *route = &t->of->routes[of->incoming[i]];
         if (!route->read_ahead) read |= bit(route->sender);
     }
-    for (int64_t i = 0; i < task->to_end; i++) time[i] = task->times.items[i], stepped[i] = i < task->now ? (int64_t)read : 0;
+    for (int64_t i = 0; i < task->to_end; i++) {
+        time[i] = task->times.items[i];
+        stepped[i] = i < task->now ? (int64_t)read : 0;
+    }
     for (int64_t j = 0; j < of->outgoing_count; j++) {
         const Link *link = &t->links[of->outgoing[j]];
         int64_t receiver = (int64_t)bit(link->of->receiver);
@@ -649,4 +655,28 @@ static int64_t lay_out(Timetable *t, int64_t *memory, const Counts *counts) {
     int64_t rows = put_own_instants(t, into, counts);
     drop_past(t);
     return rows;
+}
+
+/* -- schedules, as in instant_arrays.py ---------------------------------------------------------------------------- */
+
+/* Lay out the instants of a window and the rows that each has in its tables; the result is their number. */
+static int64_t lay_out_schedule(const Window *w) {
+    int64_t count = w->continuous_count, n = 0, i = 0, j = 0;
+    int64_t moved = 0, posted = 0, measured = 0, arrived = 0, sampled = 0; /* rows so far */
+    for (;; n++) {
+        w->stepped_at[n] = moved, w->posted_at[n] = posted, w->measured_at[n] = measured;
+        w->arrivals_at[n] = arrived, w->samples_at[n] = sampled;
+        if (i == w->regular_count && j == w->own_count) return n;
+        int64_t regular = i < w->regular_count ? w->regular[i] : INT64_MAX;
+        int64_t own = j < w->own_count ? w->own[j] : INT64_MAX, time = regular < own ? regular : own;
+        const uint8_t *one = w->regular_stepped + i * count, *other = w->own_stepped + j * count;
+        w->times[n] = time;
+        for (int64_t k = 0; k < count; k++)
+            if ((regular == time && one[k]) || (own == time && other[k])) w->stepped[moved++] = w->continuous[k];
+        i += regular == time, j += own == time;
+        while (posted < w->posted_count && w->posted[4 * posted + 2] == time) posted++;
+        while (measured < w->measured_count && w->measured[4 * measured + 2] == time) measured++;
+        while (arrived < w->arrivals_count && w->arrivals[4 * arrived + 3] == time) arrived++;
+        while (sampled < w->samples_count && w->sampled[sampled] == time) sampled++;
+    }
 }

@@ -103,13 +103,17 @@ class Timetable:
     def _window(self, most: int) -> Schedule | None:
         """The schedule of the next window with instants."""
         while self._begin < self._end:
-            schedule = self._span(most).schedule(self._common.continuous)
+            schedule = self._scheduled(self._span(most))
             if self._misaligned:
                 self._end = min(self._end, min(self._misaligned).time)
                 schedule = schedule.part(0, int(np.searchsorted(schedule.times[:-1], self._end)))
             if len(schedule):
                 return schedule
         return None
+
+    def _scheduled(self, span: Span) -> Schedule:
+        """The schedule of a window."""
+        return span.schedule(self._common.continuous)
 
     def _span(self, most: int) -> Span:
         """The next window, of about `most` instants, or none."""

@@ -52,6 +52,18 @@ typedef struct { /* the numbers of rows of the tables of a window */
     int64_t own, sampled, samples, exchanged, posted, measured, arrivals;
 } Counts;
 
+typedef struct { /* a window, and memory for its schedule */
+    const int64_t *regular, *own;
+    const uint8_t *regular_stepped, *own_stepped;
+    int64_t regular_count, own_count;
+    const int64_t *posted, *measured, *arrivals; /* messages */
+    const int64_t *sampled;
+    int64_t posted_count, measured_count, arrivals_count, samples_count;
+    const int64_t *continuous; /* components in continuous time, by their places */
+    int64_t continuous_count;
+    int64_t *times, *stepped_at, *posted_at, *measured_at, *arrivals_at, *samples_at, *stepped;
+} Window;
+
 typedef struct {
     const char *name;
     int64_t size;

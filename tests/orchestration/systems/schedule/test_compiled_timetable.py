@@ -1,6 +1,6 @@
 """The timetable in C: the same windows as in Python, to the bit."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -13,6 +13,7 @@ from orchestration.systems.schedule import compiled_timetable
 from orchestration.systems.schedule.common_timetable import CommonTimetable, Span
 from orchestration.systems.schedule.compiled_timetable import FILES, CompiledTimetable, reason_unavailable, timetable
 from orchestration.systems.schedule.fixed_step import FixedStep
+from orchestration.systems.schedule.instant_arrays import Schedule
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.component import Component, Sampling
@@ -56,9 +57,22 @@ def same(what: System, size: int = 2**15) -> list[Span]:
     return theirs
 
 
+def same_schedules(what: System, size: int) -> None:
+    """The schedules of windows of about so many instants are the same in Python and in C."""
+    common, streams = CommonTimetable(what, {}), Streams(what.seed, what.streams)
+    in_c, in_python = (kind(what, streams, common=common) for kind in (CompiledTimetable, Timetable))
+    while (other := in_python.next_schedule(size)) is not None:
+        one = in_c.next_schedule(size)
+        assert one is not None
+        for field in fields(Schedule):
+            assert np.array_equal(getattr(one, field.name), getattr(other, field.name)), field.name
+    assert in_c.next_schedule(size) is None
+
+
 @given(systems(), st.integers(0, 2**40) | st.just(2**63 - 1), SIZES)
-def test_windows_are_the_same_over_random_systems(what: System, seed: int, size: int) -> None:
+def test_windows_and_their_schedules_are_the_same_over_random_systems(what: System, seed: int, size: int) -> None:
     same(replace(what, seed=seed), size)
+    same_schedules(replace(what, seed=seed), size)
 
 
 @given(cases(), SIZES)
