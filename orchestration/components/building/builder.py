@@ -21,7 +21,9 @@ from fmu_kit.compiler.pack import freshness
 from fmu_kit.discovery import slave_beside, slaves_in
 from fmu_kit.new_files import write_atomically
 from fmu_kit.variants import Variant
+from orchestration.components.building import consent
 from orchestration.components.building.models import MODELS
+from orchestration.components.fmi import trust
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.foundation.basics.records import Scalar
 from orchestration.foundation.processes import subprocesses
@@ -61,11 +63,11 @@ PACKINGS = (NATIVE_FMI_3, NATIVE, IN_PYTHON)
 
 
 def out_of_date(names: Iterable[str], folder: Path, packing: Packing = IN_PYTHON) -> list[str]:
-    """Those of this project's FMUs that are missing in `folder` or carry another hash than their sources."""
+    """Those of this project's FMUs in `folder` that are missing, were not built here, or of other sources."""
     return [
         name
-        for name in names
-        if read_source_hash(folder / f"{name}.fmu") != _source_hash(packing, Target.parse(MODELS[name]))
+        for name, path, slave in ((name, folder / f"{name}.fmu", Target.parse(MODELS[name])) for name in names)
+        if read_source_hash(path) != _source_hash(packing, slave) or is_of_elsewhere(path, slave)
     ]
 
 
@@ -190,7 +192,24 @@ def build_slaves(
     last line of the build's output if it fails.
     """
     options = [] if systems is None else ["--target", systems]
-    return _run_packer([*packing.command, *options], targets, folder, announce, progress)
+    paths = _run_packer([*packing.command, *options], targets, folder, announce, progress)
+    for target, path in zip(targets, paths, strict=True):
+        if _is_own(target):
+            trust.record(path)
+    return paths
+
+
+def _is_own(slave: Target) -> bool:
+    """Whether a slave is one of this project's, or of the examples of its checkout."""
+    if slave.root is None:
+        return f"{slave.module}:{slave.model}" in MODELS.values()
+    return consent.is_of_this_project(Path(slave.root))
+
+
+def is_of_elsewhere(path: Path, slave: Target) -> bool:
+    """Whether an FMU of a slave of this project was not built here, so that it would run as a foreign one."""
+    is_of_kit = _is_own(slave) and read_source_hash(path) is not None
+    return is_of_kit and trust.is_recordable() and not trust.is_own(path)
 
 
 def export_c(targets: Sequence[Target], folder: Path, *, single: bool = False) -> list[Path]:

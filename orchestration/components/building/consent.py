@@ -57,7 +57,7 @@ def agree(folder: Path) -> None:
 
 def expect(fmu: Path, folder: Path) -> None:
     """Raise `UsageError` if an FMU may not be built of the modules in `folder`; consent is recorded."""
-    if _policy is None or _is_of_this_project(folder) or _place(folder).is_file():
+    if _policy is None or is_of_this_project(folder) or _place(folder).is_file():
         return
     what = f"building it runs the modules in {folder.resolve()}, which are not of this project"
     if not (_policy.allowed or _policy.ask(f"{fmu} is missing or out of date; {what}. Build it?")):
@@ -65,7 +65,7 @@ def expect(fmu: Path, folder: Path) -> None:
     agree(folder)
 
 
-def _is_of_this_project(folder: Path) -> bool:
+def is_of_this_project(folder: Path) -> bool:
     """Whether it is in the examples of the checkout that this package runs from."""
     root = Path(ROOT)
     return (root / "pyproject.toml").is_file() and folder.resolve().is_relative_to(root / "examples")

@@ -18,6 +18,7 @@ from orchestration.components.building.builder import (
     Packing,
     build,
     build_slaves,
+    is_of_elsewhere,
     is_out_of_date,
     out_of_date,
     translating_errors,
@@ -70,7 +71,7 @@ def locate(fmu: str, announce: Callable[[str], None] | None = None) -> Path:
         packing, target = _slave_of(path)
         if target is None:
             packing, target = _variant_at(path, announce)
-        if target is not None and is_out_of_date(path, target, packing):
+        if target is not None and (is_out_of_date(path, target, packing) or is_of_elsewhere(path, target)):
             if target.root is not None:
                 consent.expect(path, path.parents[len(Path(packing.folder).parts)])
             _announce_build(path, announce)

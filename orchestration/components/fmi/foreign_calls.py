@@ -19,11 +19,12 @@ class LostError(SimulatorError):
 
 
 def isolated_call(fmus: Iterable[Path], function: Callable[..., T], *arguments: object) -> T:
-    """Call a function that loads these FMUs, in a separate process unless all of them are of this project's kit.
+    """Call a function that loads these FMUs, in a separate process unless all of them were built here from this
+    project's sources.
 
     Returns or raises what the function does. Raises `LostError` if the process ends before.
     """
-    if all(read_model(path).is_of_this_kit for path in fmus):
+    if all(read_model(path).is_own for path in fmus):
         return function(*arguments)
     try:
         with Child(

@@ -67,7 +67,7 @@ class NativeInstance(Instance):
         self._layout = TransferLayout(instance_name, self.model, self.stored)
         self._tolerance = self.model.tolerance
         self._expect_supported()
-        self.guard = None if self.model.is_of_this_kit else Surroundings()
+        self.guard = None if self.model.is_own else Surroundings()
         try:
             with zipfile.ZipFile(path) as archive:
                 slaves.folder_here(self.model.version, slaves.binary_folders(archive.namelist()))
@@ -248,7 +248,7 @@ class NativeInstance(Instance):
     # -- global state of this process ------------------------------------------------------------------------------
 
     guard: Surroundings | None
-    """restores global state after its calls; None for an FMU of this project's kit, which does not change any"""
+    """restores global state after its calls; None for an FMU of this project, which does not change any"""
 
     def restore_globals(self) -> None:
         """Restore what the FMU has changed of the whole process, with a warning."""
@@ -296,7 +296,7 @@ class NativeInstance(Instance):
     def _unpacked(self) -> Path:
         """A folder with what the FMU needs to run, until it is closed."""
         self._folder = scratch.temporary()
-        fmpy.extract(str(self.path), str(self._folder.path), include=_is_used if self.model.is_of_this_kit else None)
+        fmpy.extract(str(self.path), str(self._folder.path), include=_is_used if self.model.follows_kit else None)
         slaves.expect_readable_place(self._folder.path)
         return self._folder.path
 

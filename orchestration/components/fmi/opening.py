@@ -6,7 +6,6 @@ kept in the user's cache directory.
 """
 
 import contextlib
-import functools
 import hashlib
 import json
 import platform
@@ -21,6 +20,7 @@ from orchestration.components.fmi.fmi3 import Fmi3Instance
 from orchestration.components.fmi.instance import Instance
 from orchestration.components.fmi.native import NativeInstance
 from orchestration.components.fmi.read_description import read_model
+from orchestration.components.fmi.trust import content_hash
 from orchestration.foundation.processes import subprocesses
 from orchestration.foundation.processes.resource_limits import Limits
 
@@ -44,17 +44,6 @@ class Repeatability:
 def repeatability_of(path: Path) -> Repeatability:
     """The repeatability of the FMU at `path`, tested now if it has not been; raises `UsageError` if it is no FMU."""
     return _of(content_hash(path), path)
-
-
-def content_hash(path: Path) -> str:
-    """SHA-256 of a file, read again only if it has changed."""
-    status = path.stat()
-    return _hash(path.absolute(), status.st_mtime_ns, status.st_size)
-
-
-@functools.lru_cache(maxsize=256)
-def _hash(path: Path, changed: int, size: int) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 _known: dict[str, Repeatability] = {}

@@ -18,6 +18,7 @@ from fmpy.model_description import ModelDescription, ModelVariable
 
 from fmu_kit.archive import read_source_hash
 from fmu_kit.units import BASE
+from orchestration.components.fmi import trust
 from orchestration.components.fmi.archive import (
     TOKENS,
     OtherVersionError,
@@ -94,15 +95,20 @@ class Model:
         counts = Counter(v.causality for v in self.variables.values())
         return f"<Model {self.name}, FMI {self.version}: {', '.join(f'{n} {what}' for what, n in counts.items())}>"
 
+    @property
+    def is_own(self) -> bool:
+        """Whether it was built here from this project's sources, and may run in this process."""
+        return trust.is_own(self.path)
+
     @cached_property
-    def is_of_this_kit(self) -> bool:
-        """Whether it is built on `fmu_kit`, and follows the conventions of its slaves."""
+    def follows_kit(self) -> bool:
+        """Whether it says that it is built on `fmu_kit`, whose conventions it follows then."""
         return read_source_hash(self.path) is not None
 
     @property
     def waits(self) -> bool:
         """Whether the time of its first sample is set by a parameter, and it does not sample in steps before."""
-        return self.is_of_this_kit and self.has_clock and SAMPLE_OFFSET in self.variables
+        return self.follows_kit and self.has_clock and SAMPLE_OFFSET in self.variables
 
     @property
     def has_clock(self) -> bool:

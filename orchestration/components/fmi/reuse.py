@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from orchestration.components.fmi import opening
+from orchestration.components.fmi import opening, trust
 from orchestration.components.fmi.instance import Instance
 from orchestration.components.fmi.opening import open_instance
 from orchestration.foundation.basics.errors import SimulatorError
@@ -18,7 +18,9 @@ class Instances:
     one that has failed, or ended its run, is replaced.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, foreign_apart: bool = False) -> None:
+        """`foreign_apart`: an FMU that was not built here from this project's sources has a process of its own."""
+        self._foreign_apart = foreign_apart
         self._kept: dict[tuple[Path, str], Instance] = {}
         self.close = weakref.finalize(self, _free, self._kept)
         """Free all instances; called automatically when this object is garbage or the process ends."""
@@ -29,7 +31,7 @@ class Instances:
         key = (path, instance_name)
         instance = self._kept.pop(key, None)
         if instance is None or not _is_reset(instance):
-            instance = open_instance(path, instance_name)
+            instance = self._open(path, instance_name)
         try:
             yield instance
         finally:
@@ -37,6 +39,13 @@ class Instances:
                 instance.close()
             else:
                 self._kept[key] = instance
+
+    def _open(self, path: Path, instance_name: str) -> Instance:
+        if self._foreign_apart and not trust.is_own(path):
+            from orchestration.components.fmi.isolated_instance import IsolatedInstance  # loads what starts processes
+
+            return IsolatedInstance(path, instance_name)
+        return open_instance(path, instance_name)
 
 
 def _is_reset(instance: Instance) -> bool:

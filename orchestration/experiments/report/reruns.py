@@ -46,7 +46,8 @@ def fastest(study: Study) -> tuple[Study, Files, bool]:
 
     how = choose_execution("auto", study.native, first)
     variant = replace(study, native=how.native)
-    return variant, variant.files(), how.in_lanes
+    files = variant.files()
+    return variant, files, how.in_lanes and all(model.is_own for model in files.models.values())
 
 
 def rerun(

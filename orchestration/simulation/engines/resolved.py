@@ -64,8 +64,8 @@ class ResolvedRequest(CheckedSystem):
 
     @property
     def foreign(self) -> list[str]:
-        """Components whose FMUs are not built on this project's kit."""
-        return [name for name, model in self.models.items() if not model.is_of_this_kit]
+        """Components whose FMUs were not built here from this project's sources."""
+        return [name for name, model in self.models.items() if not model.is_own]
 
     @property
     def described(self) -> dict[str, ColumnInfo]:

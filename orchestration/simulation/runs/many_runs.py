@@ -61,7 +61,12 @@ class Flights(Mapping[str, Floats]):
 
 
 def run_many(
-    request: RequestLike, values: Mapping[str, Any], *, outputs: Sequence[str] | None = None, record: Sequence[str] = ()
+    request: RequestLike,
+    values: Mapping[str, Any],
+    *,
+    outputs: Sequence[str] | None = None,
+    record: Sequence[str] = (),
+    in_process: bool = False,
 ) -> Flights:
     """Run a system, or a scenario, many times, from arrays into arrays, without a store or a result for each run.
 
@@ -71,8 +76,11 @@ def run_many(
     their `time` [s]. All arrays are of float64; truth values are 0.0 and 1.0.
 
     Native FMUs run in lanes of vector registers where this machine has a C compiler and the FMUs have code for lanes,
-    else each run is one of `run`. Raises `UsageError` for a path, an output or a column that does not exist, arrays of
-    different lengths and invalid values; and what `run` raises for a run that fails, naming it.
+    else each run is one of `run`. So it is with FMUs that were not built here from this project's sources, whose runs
+    have a process each; `in_process`: all may run in lanes, and in this process, which they can end.
+
+    Raises `UsageError` for a path, an output or a column that does not exist, arrays of different lengths and invalid
+    values; and what `run` raises for a run that fails, naming it.
     """
     loaded = request_of(request)
     with errors_in_own_terms(loaded):
@@ -83,9 +91,13 @@ def run_many(
         fits = check_against_fmus(_recording(system, models, record), models)
         names = _outputs(fits.system, outputs)
         runs = columns(loaded, fits.system, models, values)
-        reason = _reason_unavailable(fits.system, models)
+        reason = _reason_unavailable(fits.system, models, in_process)
         table = _Table(runs.count, names, record)
-        for row in _one_by_one(runs, range(runs.count), record) if reason else _in_lanes(runs, fits.parameters, record):
+        for row in (
+            _one_by_one(runs, range(runs.count), record, in_process)
+            if reason
+            else _in_lanes(runs, fits.parameters, record)
+        ):
             table.put(row)
     engine = table.engine if reason else BATCH
     _NOTES.debug("%d runs by the engine %s%s", runs.count, engine, f": {reason}" if reason else "")
@@ -139,7 +151,7 @@ def _in_lanes(runs: Columns, parameters: Mapping[str, float], record: Sequence[s
         if len(rows) == MAX_ROWS:
             raise UsageError(f"record: run {place} has more than {MAX_ROWS} rows; expected runs of fewer")
         if summary is None:
-            yield from _one_by_one(runs, [place], record)
+            yield from _one_by_one(runs, [place], record, True)
             continue
         signals = {"time": rows[:, 0], **{name: rows[:, i] for name, i in places.items()}} if record else {}
         if record and len(places) < len(record):
@@ -148,11 +160,11 @@ def _in_lanes(runs: Columns, parameters: Mapping[str, float], record: Sequence[s
         yield _RunRow(place=place, metrics=summary.metrics, rows=_rows(signals, record))
 
 
-def _one_by_one(runs: Columns, places: Iterable[int], record: Sequence[str]) -> Iterator[_RunRow]:
+def _one_by_one(runs: Columns, places: Iterable[int], record: Sequence[str], in_process: bool) -> Iterator[_RunRow]:
     """Runs one by one, by `run`."""
     for place in places:
         try:
-            result = run(runs.alone(place))
+            result = run(runs.alone(place), in_process=in_process)
         except QuadcosimError as error:
             raise type(error)(f"run {place}: {error}") from error
         rows = _rows(result.signals, record)
@@ -209,8 +221,12 @@ def _outputs(system: System, names: Sequence[str] | None) -> tuple[str, ...]:
     return tuple(dict.fromkeys(known if names is None else names))
 
 
-def _reason_unavailable(system: System, models: Mapping[str, Model]) -> str | None:
-    """Why a system that its FMUs fit cannot run in lanes here, in a line; None: it can."""
+def _reason_unavailable(system: System, models: Mapping[str, Model], in_process: bool) -> str | None:
+    """Why a system that its FMUs fit cannot run in lanes of this process, in a line; None: it can."""
+    foreign = [name for name, model in models.items() if not model.is_own]
+    if foreign and not in_process:
+        listed = ", ".join(f"components.{name}" for name in foreign)
+        return f"{listed}: not built here from quadcosim's own sources: expected in_process=True"
     try:
         expect_lanes(system, models)
     except QuadcosimError as error:

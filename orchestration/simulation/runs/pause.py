@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fmu_kit.new_files import new_file, write_atomically
-from orchestration.components.fmi.opening import content_hash
+from orchestration.components.fmi.trust import content_hash
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import nanoseconds
 from orchestration.foundation.processes.resource_limits import Limits

@@ -53,9 +53,9 @@ def run(
     A run that diverges has a result, and so has one that an FMU ends early.
 
     Rows are kept in memory unless a `recorder` takes them. `engine`: by default the compiled loop where available; the
-    results are the same. With FMUs that are not built on this project's kit the run has a separate process, unless
-    `in_process`: however that process ends, this one goes on. `memory_limit` [MB] applies to that process, and so does
-    `time_limit` [s] of processor time; with a time limit any run has a separate process.
+    results are the same. With FMUs that were not built here from this project's sources the run has a separate process,
+    unless `in_process`: however that process ends, this one goes on. `memory_limit` [MB] applies to that process, and
+    so does `time_limit` [s] of processor time; with a time limit any run has a separate process.
 
     Raises `UsageError` for an FMU, variable or value that does not exist, `SimulatorError` if an FMU
     refuses a call for another reason than divergence, `RunLost` if an FMU or a limit ends the process,

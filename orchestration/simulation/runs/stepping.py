@@ -55,7 +55,7 @@ class Simulation:
         """The names in a measurement, in order: its inputs that are connected or fed by a source."""
         self.commanded = replacement.commanded
         """The names in a command, in order: its outputs that are connected."""
-        self._instances = Instances()
+        self._instances = Instances(foreign_apart=True)
         self._thread: threading.Thread | None = None
         self._run: PreparedRun | None = None
         self._outcome: RunOutcome | None = None

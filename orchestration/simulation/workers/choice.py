@@ -2,14 +2,17 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal, cast, get_args
 
 from orchestration.components.building.fmus import native_twins
+from orchestration.components.fmi.foreign_calls import isolated_call
+from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError, expected_name
 from orchestration.simulation.engines.batch.shape import expect_lanes
 from orchestration.simulation.engines.master import Engine
 from orchestration.simulation.engines.resolved import check_against_fmus
-from orchestration.systems.system.files import Files, files_of
+from orchestration.systems.system.files import Files, files_of, with_files
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Twin, system_of
 
@@ -79,7 +82,11 @@ def choose_execution(
 
 
 def _expect_lanes(system: System, files: Files) -> None:
-    models = files.models_of(system)
+    isolated_call(files.fmus.values(), _compile_lanes, with_files(system, {**files.fmus, **files.tables}))
+
+
+def _compile_lanes(system: System) -> None:
+    models = {name: read_model(Path(component.fmu)) for name, component in system.components.items()}
     expect_lanes(check_against_fmus(system, models).system, models)
 
 

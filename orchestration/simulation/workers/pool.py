@@ -15,6 +15,7 @@ from typing import Any
 
 from fmu_kit import scratch
 from fmu_kit.new_files import write_atomically
+from orchestration.components.fmi.trust import is_own_content
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.processes import subprocesses
 from orchestration.foundation.processes.child import Child, Died
@@ -34,17 +35,20 @@ class Inputs:
 
     contents: Mapping[str, bytes]
     """files by their names in systems"""
+    own_fmus: frozenset[str]
+    """hashes of the FMUs that the coordinator has built, which may share a process with the worker"""
     versions: dict[str, str]
 
     @classmethod
     def of(cls, files: Files) -> "Inputs":
         """The content of `files`."""
-        return cls(contents=files.contents, versions=versions())
+        own = frozenset(files.hashes[name] for name in files.fmus if is_own_content(files.hashes[name]))
+        return cls(contents=files.contents, own_fmus=own, versions=versions())
 
     @cached_property
     def digest(self) -> str:
-        """A hash of contents and versions."""
-        return hashlib.sha256(pickle.dumps((dict(self.contents), self.versions))).hexdigest()
+        """A hash of all of them."""
+        return hashlib.sha256(pickle.dumps((dict(self.contents), sorted(self.own_fmus), self.versions))).hexdigest()
 
 
 class InterruptedWorker(QuadcosimError):
@@ -70,9 +74,9 @@ class WorkerProcess:
         self._child.allow(None)
         return answer
 
-    def wait_until_ready(self) -> tasks.Ready:
+    def wait_until_ready(self, own_fmus: frozenset[str]) -> tasks.Ready:
         """The report of the process once it has started; raises `Died`."""
-        self._child.send(sources())
+        self._child.send((sources(), own_fmus))
         answer = self._child.receive()
         assert isinstance(answer, tasks.Ready)
         return answer
@@ -166,7 +170,7 @@ class Supervisor:
                     return self._worker
                 self._worker = worker = WorkerProcess(self._root)
             try:
-                ready = worker.wait_until_ready()
+                ready = worker.wait_until_ready(self._inputs.own_fmus)
             except Died as death:
                 self._drop()
                 _expect_no_interrupt(death)

@@ -7,6 +7,7 @@ import tempfile
 from pathlib import Path
 
 from fmu_kit import scratch
+from orchestration.components.fmi import trust
 from orchestration.foundation.processes.channel import Parent
 from orchestration.simulation.workers import task as tasks
 from orchestration.simulation.workers.provenance import Sources, machine, software
@@ -22,7 +23,9 @@ def main(own_folder: str) -> None:
 
     # An FMU must not be blamed for an interrupt.
     parent = Parent(interrupt=signal.SIG_DFL, on_orphaned=orphaned)
-    coordinator_sources: Sources = parent.receive()
+    coordinator_sources: Sources
+    coordinator_sources, own_fmus = parent.receive()
+    trust.accept(own_fmus)
     parent.send(tasks.Ready(versions=software(coordinator_sources.current()), machine=machine()))
     runner = tasks.Runner(machine())
     for task in parent:

@@ -5,12 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.runs.replacement import component_named
-from orchestration.systems.system.request import errors_in_own_terms
+from orchestration.systems.system.files import files_of
+from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
 from orchestration.theory.stability.known_loops import rested
 from orchestration.theory.stability.linear_simulator import OpenPort
 from orchestration.theory.stability.loop_at_rest import AtRest, at_rest
@@ -43,7 +45,13 @@ def linearise(request: RequestLike, component: str | None = None) -> Linearised:
     Raises `UsageError` for a system that does not rest there, for FMUs that cannot save their state, and for a
     component that is not sampled, or is sampled more often than another one.
     """
-    request = request_of(request)
+    loaded = request_of(request)
+    with errors_in_own_terms(loaded):
+        files = files_of(system_of(loaded))
+    return isolated_call(files.fmus.values(), _linearised, loaded, component)
+
+
+def _linearised(request: Request, component: str | None) -> Linearised:
     with errors_in_own_terms(request), closing(Instances()) as instances:
         system = rested(request)
         name = component_named(system, component, "at which to cut the loop open")

@@ -7,7 +7,7 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 from fmu_kit.new_files import new_files
-from orchestration.components.fmi.opening import content_hash
+from orchestration.components.fmi.trust import content_hash
 from orchestration.foundation.basics.documents import readable
 from orchestration.foundation.basics.errors import UsageError
 
@@ -26,9 +26,10 @@ class Package:
     def file(self, source: str, base: Path | None = None) -> Path:
         """The file of a source in a document, relative to the .ssd or to `base`; raises `UsageError`."""
         parts = urlsplit(source)
-        if parts.scheme not in ("", "file") or parts.netloc:
-            raise UsageError(f"source {source}: expected a file of the SSP")
         path = ((base or self.structure).parent / unquote(parts.path)).resolve()
+        is_inside = path.is_relative_to(self.structure.parent.resolve())
+        if parts.scheme not in ("", "file") or parts.netloc or not is_inside:
+            raise UsageError(f"source {source}: expected a file of the SSP")
         if not path.is_file():
             raise UsageError(f"source {source}: there is no such file in the SSP")
         return path

@@ -13,6 +13,7 @@ from fmu_kit.archive import SOURCE_HASH_FILE, read_source_hash, write_archive
 from fmu_kit.bundle import Target, bundled_sources
 from orchestration.components.building import builder, fmus
 from orchestration.components.building.models import MODELS
+from orchestration.components.fmi import trust
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.processes import subprocesses
@@ -180,10 +181,8 @@ def test_a_build_that_fails_says_why_in_one_line(tmp_path: Path, monkeypatch: py
 def test_a_build_says_how_far_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     builds_by("print('a.fmu'); print('b.fmu')", monkeypatch)
     reported: list[float] = []
-    assert builder.build(["UnifiedController", "QuadrotorPlant"], tmp_path, progress=reported.append) == [
-        Path("a.fmu"),
-        Path("b.fmu"),
-    ]
+    slaves = [Target("lamps", "A"), Target("lamps", "B")]
+    assert builder.build_slaves(slaves, tmp_path, progress=reported.append) == [Path("a.fmu"), Path("b.fmu")]
     assert reported == [0.5, 1.0]
 
 
@@ -222,6 +221,7 @@ def test_a_missing_fmu_is_built_from_the_slave_beside_it_and_again_when_that_cha
     for _ in range(2):
         assert fmus.locate(str(path), reported.append) == path
     assert reported == [f"building {path}"]
+    assert not trust.is_own(path)
     (lamp / "voltage.py").write_text("VOLTS = 24.0\n", encoding="utf-8")
     fmus.locate(str(path), reported.append)
     assert reported == [f"building {path}"] * 2

@@ -12,6 +12,7 @@ import fmpy
 import platformdirs
 import pytest
 
+from fmu_kit.archive import SOURCE_HASH_FILE
 from orchestration.components.fmi import opening
 
 COMPILER = shutil.which("gcc") or shutil.which("cc")
@@ -75,10 +76,10 @@ CLOCK = '<Clock name="tick" valueReference="7" causality="input" intervalVariabi
 
 
 def nothing_known(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A user's cache, from now on, in which nothing is known of any FMU; what is compiled is shared with all tests."""
+    """A user's cache, from now on, in which nothing is known of any FMU; what is built is shared with all tests."""
     usual, own = (Path(each) / "quadcosim" for each in (platformdirs.user_cache_dir(), folder))
     own.mkdir(parents=True)
-    for name in ("batch", "lanes", "loader", "loop", "native"):
+    for name in ("batch", "built", "lanes", "loader", "loop", "native"):
         (usual / name).mkdir(parents=True, exist_ok=True)
         (own / name).symlink_to(usual / name)
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
@@ -95,9 +96,11 @@ def small(
     more: str = "",
     tolerance: float | None = None,
     mode_is_input: bool = False,
+    forged: bool = False,
 ) -> Path:
     """The FMU with these habits (macros of `small.c`) in `folder`, with these flags in its description.
 
+    `forged`: it says that it is built on this project's kit.
     `mode_is_input`: that of FMI 2.0 has `mode` as an Integer that others may feed, of any value.
     """
     folder.mkdir(parents=True, exist_ok=True)
@@ -123,6 +126,8 @@ def small(
         experiment = "" if tolerance is None else f'<DefaultExperiment tolerance="{tolerance}"/>'
         described = text.format(attributes=attributes, items=_ITEMS, more=more, experiment=experiment)
         archive.writestr("modelDescription.xml", described)
+        if forged:
+            archive.writestr(SOURCE_HASH_FILE, "0" * 64)
         archive.writestr(f"binaries/{place}/Small{fmpy.sharedLibraryExtension}", library)
     return path
 

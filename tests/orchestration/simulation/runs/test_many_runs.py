@@ -101,7 +101,8 @@ def test_foreign_fmus_are_flown_alone_and_named(tmp_path: Path) -> None:
     found = quadcosim.fly(system, {"stop_time": [0.1, 0.2]})
     assert found["horizon"].tolist() == [0.1, 0.2]
     assert found.engine == "compiled"
-    assert "components.one: small.fmu" in str(found.reason)
+    assert "components.one: not built here" in str(found.reason)
+    assert "components.one: small.fmu" in str(quadcosim.fly(system, {"stop_time": [0.1]}, in_process=True).reason)
 
 
 WRONG: list[tuple[dict[str, Any], dict[str, Any], str]] = [

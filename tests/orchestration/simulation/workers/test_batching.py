@@ -143,5 +143,7 @@ def test_runs_that_end_their_process_together_are_repeated_one_by_one(
     repeated: list[int] = []
     monkeypatch.setattr(Supervisor, "_ready_worker", lambda self: Dying())
     monkeypatch.setattr(Supervisor, "run", lambda self, task: repeated.append(task.index))
-    Supervisor(tmp_path, Inputs(contents={}, versions={})).run_chunk(TaskBatch(tasks=tuple(tasks(3))))
+    Supervisor(tmp_path, Inputs(contents={}, own_fmus=frozenset(), versions={})).run_chunk(
+        TaskBatch(tasks=tuple(tasks(3)))
+    )
     assert repeated == [0, 1, 2]

@@ -34,7 +34,9 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def inputs(**contents: bytes) -> Inputs:
-    return Inputs(contents={f"{name}.fmu": content for name, content in contents.items()}, versions={})
+    return Inputs(
+        contents={f"{name}.fmu": content for name, content in contents.items()}, own_fmus=frozenset(), versions={}
+    )
 
 
 def task() -> RunTask:
@@ -104,7 +106,7 @@ def test_a_worker_reads_the_sources_only_if_one_was_edited_since_the_coordinator
     monkeypatch.setattr(pool, "sources", lambda: Sources(hash="received", states=known))
     worker = pool.WorkerProcess(tmp_path)
     try:
-        assert worker.wait_until_ready().versions == {**versions(), "sources": expected}
+        assert worker.wait_until_ready(frozenset()).versions == {**versions(), "sources": expected}
     finally:
         worker.close()
 
