@@ -100,8 +100,7 @@ def _by_size(comparison: Comparison, rows: "pd.DataFrame", fate: str) -> Floats:
     bins = (BINS * sizes(comparison, rows).to_numpy(float)).astype(int).clip(max=BINS - 1)
     counted = rows.assign(bin=bins, has=FATES[fate](rows).astype(float))
     shares_known = counted.pivot_table(index="bin", columns=comparison.axis.name, values="has")
-    share: Floats = shares_known.reindex(index=range(BINS), columns=[*comparison.values]).to_numpy(float)
-    return share
+    return np.asarray(shares_known.reindex(index=range(BINS), columns=[*comparison.values]).to_numpy(float))
 
 
 def _is_known(point: Point) -> bool:

@@ -108,8 +108,7 @@ class Grid:
         quotients, rests = np.divmod(numerators, self._denominator)
         twice = 2 * rests
         up = (twice > self._denominator) | ((twice == self._denominator) & (quotients % 2 == 1))
-        result: npt.NDArray[np.int64] = quotients + up
-        return result
+        return np.asarray(quotients + up)
 
 
 def _round_ratio(numerator: int, denominator: int) -> int:

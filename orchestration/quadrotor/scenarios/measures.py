@@ -16,8 +16,7 @@ def desired(signals: Mapping[str, Floats]) -> Floats:
 def position_error(signals: Mapping[str, Floats]) -> Floats:
     """‖P - P_d‖ [m], shape (n,)."""
     actual = np.column_stack([signals[f"plant.{name}"] for name in POSITION])
-    error: Floats = np.linalg.norm(actual - desired(signals), axis=1)
-    return error
+    return np.asarray(np.linalg.norm(actual - desired(signals), axis=1))
 
 
 def saturated(signals: Mapping[str, Floats], parameters: Mapping[str, float]) -> dict[str, Booleans]:
@@ -42,5 +41,4 @@ def _motors_saturated(thrust: Floats, torques: Sequence[Floats], parameters: Map
     motors = [
         thrust + turn * z / drag + way * (x / arm_y - turn * y / arm_x) for turn in (1.0, -1.0) for way in (1.0, -1.0)
     ]
-    any_of_them: Booleans = np.any([(one > 4.0 * most) | (one < 4.0 * least) for one in motors], axis=0)
-    return any_of_them
+    return np.asarray(np.any([(one > 4.0 * most) | (one < 4.0 * least) for one in motors], axis=0))

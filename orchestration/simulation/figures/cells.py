@@ -88,5 +88,4 @@ def limit(panel: Axes, x: Floats, y: Floats, good: Floats, **how: Any) -> LineCo
 
 
 def _differ(one: Floats, other: Floats) -> npt.NDArray[np.bool_]:
-    differ: npt.NDArray[np.bool_] = (one != other) & ~np.isnan(one) & ~np.isnan(other)
-    return differ
+    return np.asarray((one != other) & ~np.isnan(one) & ~np.isnan(other))

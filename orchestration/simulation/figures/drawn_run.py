@@ -85,8 +85,7 @@ class DrawnRun:
 
     def instants(self, kind: str, what: str | None = None) -> Floats:
         """The times of the events of a kind, of one connection if `what` names it [s], shape (n,)."""
-        times: Floats = seconds(self.events.table[self.events.are(kind, what), 0])
-        return times
+        return np.asarray(seconds(self.events.table[self.events.are(kind, what), 0]))
 
     def __contains__(self, signal: str) -> bool:
         return signal in self.signals

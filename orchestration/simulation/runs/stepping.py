@@ -188,8 +188,7 @@ class Simulation:
             self._thread = None
         if error is not None:
             raise error
-        measurement: Floats = self._substitute.measurement.copy()
-        return measurement
+        return np.asarray(self._substitute.measurement.copy())
 
     def _abandon(self) -> None:
         """End the run that is under way, if there is one."""

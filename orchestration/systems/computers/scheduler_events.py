@@ -48,8 +48,7 @@ class EventBuilder:
         if not len(missed):
             return found
         found = np.concatenate([found, missed])
-        in_order: Integers = found[np.argsort(found[:, 0], kind="stable")]
-        return in_order
+        return np.asarray(found[np.argsort(found[:, 0], kind="stable")])
 
 
 class _Deadlines:

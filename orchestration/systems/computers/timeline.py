@@ -83,8 +83,7 @@ def _are(what: Integers, kinds: Sequence[int]) -> Booleans:
     """Which notes are of one of these kinds."""
     is_one = np.zeros(note.KINDS, dtype=np.bool_)
     is_one[[*kinds]] = True
-    found: Booleans = is_one[what]
-    return found
+    return np.asarray(is_one[what])
 
 
 def _jobs(notes: Integers, deadline: int, stop: int) -> Jobs:

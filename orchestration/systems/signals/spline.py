@@ -99,8 +99,7 @@ def _derivatives(spans: Floats, points: Floats) -> Floats:
 def _energy(span: float) -> Floats:
     """∫ (d⁵p/dt⁵)² dt over a piece, as the matrix of the quadratic form in its derivatives at both ends."""
     weights = np.tile(span ** np.arange(ORDERS), 2)
-    result: Floats = _exact_matrices()[1] * weights[:, None] * weights * span ** -float(DEGREE)
-    return result
+    return np.asarray(_exact_matrices()[1] * weights[:, None] * weights * span ** -float(DEGREE))
 
 
 @functools.cache

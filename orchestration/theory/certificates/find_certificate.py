@@ -136,5 +136,4 @@ def _norm_of(maps: Sequence[Floats]) -> Floats:
     mean = np.mean([np.kron(M.T, M.T) for M in scaled], axis=0)
     mean *= min(1.0, 0.98 / float(np.abs(np.linalg.eigvals(mean)).max()))
     P = np.linalg.solve(np.eye(size * size) - mean, np.eye(size).ravel()).reshape(size, size)
-    found: Floats = np.linalg.cholesky(0.5 * (P + P.T)).T @ unscaled
-    return found
+    return np.asarray(np.linalg.cholesky(0.5 * (P + P.T)).T @ unscaled)

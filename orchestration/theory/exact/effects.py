@@ -318,8 +318,7 @@ class ContinuousEffects(LoopEffects):
         return held, white
 
     def _continuous_output_row(self, name: str, j: int) -> Floats:
-        found: Floats = self._outputs[name][j]
-        return found
+        return np.asarray(self._outputs[name][j])
 
     def _add_more_places(self, places: Places) -> None:
         """There are none."""

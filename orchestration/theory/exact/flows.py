@@ -85,5 +85,4 @@ class Flows:
 
 
 def _traces(costs: Floats, covariance: Floats) -> Floats:
-    found: Floats = np.einsum("kij,ij->k", costs, covariance)
-    return found
+    return np.asarray(np.einsum("kij,ij->k", costs, covariance))

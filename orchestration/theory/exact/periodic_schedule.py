@@ -59,8 +59,7 @@ class ScheduleTrace:
 
     def notes_of(self, kind: int, owner: int) -> Integers:
         """Notes of one kind of a task, message or carrier."""
-        found: Integers = self.notes[(self.notes[:, 1] == kind) & (self.notes[:, 2] == owner)]
-        return found
+        return np.asarray(self.notes[(self.notes[:, 1] == kind) & (self.notes[:, 2] == owner)])
 
     def schedule_between(self, begin: int, end: int, period: Fraction) -> PeriodicSchedule | None:
         """The events between two times [ns], as those of a `period` [s]; None where an arrival is not known.

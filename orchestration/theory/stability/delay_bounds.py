@@ -98,8 +98,7 @@ def _gains(loop: SampledLoop, omega: Floats) -> Floats:
     power += beyond * (loop.F @ loop.B) @ (loop.F @ loop.B).T
     sensitivity = np.linalg.inv(identity - _sampled_response(loop, omega))
     whole = sensitivity @ power @ sensitivity.conj().swapaxes(-1, -2)
-    found: Floats = np.sqrt(np.linalg.norm(whole, 2, axis=(-2, -1)))
-    return found
+    return np.asarray(np.sqrt(np.linalg.norm(whole, 2, axis=(-2, -1))))
 
 
 def _response(loop: SampledLoop, omega: Floats) -> Complexes:

@@ -87,8 +87,7 @@ class Errors:
         """Those of the futures of a state produced by an input at a point of the ladder, in a row."""
         ladder = self.times[: len(self.times) // 2]
         at = np.searchsorted(self.times, (ladder[point] + ladder) * (1.0 - 1e-9))
-        found: Floats = np.maximum(self.values[i, at], self.values[i, np.maximum(at - 1, 0)]).ravel()
-        return found
+        return np.asarray(np.maximum(self.values[i, at], self.values[i, np.maximum(at - 1, 0)]).ravel())
 
 
 class Excitation:
@@ -154,8 +153,7 @@ class Excitation:
     def futures(self, pair: Pair, rungs: Sequence[Rung]) -> Floats:
         """What outputs do from a state, the inputs at rest: their differences at the end of each rung, in a row."""
         up, down = (self.outputs_after(state, rungs) for state in pair)
-        found: Floats = ((up - down) / self.weight).ravel() / (2.0 * self.pulse)
-        return found
+        return np.asarray(((up - down) / self.weight).ravel() / (2.0 * self.pulse))
 
     def after_pulse(self, i: int, rung: Rung) -> Pair:
         """The states after a pulse on an input over a rung."""
@@ -174,14 +172,12 @@ class Excitation:
             legs = [(later if k else pulsed, rung) for k, rung in enumerate(rungs)]
             courses.append(self._course(self.rest, legs, MAX_DEVIATION))
         up, down = (course[: min(map(len, courses))] for course in courses)
-        found: Floats = (up - down) / self.weight / (2.0 * factor * self.pulse)
-        return found
+        return np.asarray((up - down) / self.weight / (2.0 * factor * self.pulse))
 
     def response_to(self, moves: Floats, rung: Rung) -> Floats:
         """The response to deviations of the inputs, shape (n, inputs), each over a rung; shape (n, outputs)."""
         up, down = (self._course(self.rest, [(self.held + sign * x, rung) for x in moves]) for sign in (1.0, -1.0))
-        found: Floats = 0.5 * (up - down)
-        return found
+        return np.asarray(0.5 * (up - down))
 
     # -- how far it is linear -------------------------------------------------------------------------------------
 

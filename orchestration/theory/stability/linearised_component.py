@@ -168,15 +168,13 @@ class Tangent(LinearSimulator):
     def _deviation(self, state: SavedState) -> Floats:
         """The coordinates of a state before they are reduced."""
         here, rest = (self._excitation.outputs_after(s, self.ladder) for s in (state, self._excitation.rest))
-        found: Floats = ((here - rest) / self._excitation.weight).ravel()
-        return found
+        return np.asarray(((here - rest) / self._excitation.weight).ravel())
 
     def _difference(self, both: Sequence[tuple[Floats, SavedState]]) -> Floats:
         """Outputs and coordinates after a step, per unit of the pulse up and down."""
         (up, after_up), (down, after_down) = both
         future = self._axes.T @ self._excitation.futures((after_up, after_down), self.ladder)
-        found: Floats = np.concatenate([(up - down) / (2.0 * self.pulse), future])
-        return found
+        return np.asarray(np.concatenate([(up - down) / (2.0 * self.pulse), future]))
 
     def _rung(self, h: float) -> Rung:
         return Rung(1, h) if self.unit is None else Rung(round(h / self.unit), self.unit)
