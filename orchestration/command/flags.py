@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from orchestration.systems.system.request import Request
 
 TIMING, EFFECTS, MODEL = "Timing", "Disturbances of the loop", "Model"
+_of_model = partial(option, panel=MODEL)
 
 
 def _of_timing(key: str, *, panel: str = EFFECTS, **options: Any) -> Any:
@@ -87,68 +89,57 @@ class FlightFlags:
     ] = None
     controller: Annotated[
         str | None,
-        option(
+        _of_model(
             "--controller",
             "The controller: any FMU with its variables; default: UnifiedController.",
             "NAME|PATH",
-            panel=MODEL,
             autocompletion=completion.controllers,
         ),
     ] = None
     plant: Annotated[
         str | None,
-        option(
+        _of_model(
             "--plant",
             "The plant: any FMU with its variables; default: QuadrotorPlant.",
             "NAME|PATH",
-            panel=MODEL,
             autocompletion=completion.plants,
         ),
     ] = None
     vehicle: Annotated[
         str | None,
-        option(
+        _of_model(
             "--vehicle",
             "Parameters of plant and controller by a file: paper, crazyflie, hummingbird, agilicious, or a path.",
             "NAME|FILE",
-            panel=MODEL,
             autocompletion=completion.vehicles,
         ),
     ] = None
     reference: Annotated[
         str | None,
-        option(
+        _of_model(
             "--reference",
             "The reference: hover, step, circle, lemniscate, helix, paper, or way-points; parameters by --set.",
             "NAME|FILE.csv",
-            panel=MODEL,
         ),
     ] = None
     disturbance: Annotated[
         str | None,
-        option(
+        _of_model(
             "--disturbance",
             "Disturbance of the vehicle: dryden (gusts), or force or wind over time; parameters by --set.",
             "NAME|FILE.csv",
-            panel=MODEL,
         ),
     ] = None
     native: Annotated[
         bool | None,
-        option(
-            "--native",
-            "Use native twins (no Python inside) of FMUs with sources here; built if need be.",
-            "",
-            panel=MODEL,
-        ),
+        _of_model("--native", "Use native twins (no Python inside) of FMUs with sources here; built if need be.", ""),
     ] = None
     set: Annotated[
         list[str] | None,
-        option(
+        _of_model(
             "--set",
             "A parameter, as controller.NAME=V, or of a system file a value by its path; may be repeated.",
             "SIDE.NAME=V",
-            panel=MODEL,
         ),
     ] = None
 
