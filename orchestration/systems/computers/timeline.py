@@ -8,22 +8,9 @@ import numpy as np
 
 from orchestration.foundation.basics.simulator import Booleans, Integers
 from orchestration.foundation.recording.recording import Events
-from orchestration.systems.computers import note
+from orchestration.systems.computers import note, results
 from orchestration.systems.computers.parts import LATER, NONE, Parts
-from orchestration.systems.computers.results import (
-    ABORTED,
-    CORRUPTED,
-    DONE,
-    NEVER,
-    RUN,
-    SKIPPED,
-    SWITCH,
-    UNFINISHED,
-    Frames,
-    Jobs,
-    Slices,
-    Timeline,
-)
+from orchestration.systems.computers.results import Frames, Jobs, Slices, Timeline
 from orchestration.systems.computers.scheduler_events import EventBuilder
 
 _OF_TASKS = tuple(kind for kind in range(note.QUEUED) if kind != note.SAMPLED)
@@ -92,15 +79,15 @@ def _jobs(notes: Integers, deadline: int, stop: int) -> Jobs:
     count = len(first)
 
     def times(kind: int) -> Integers:
-        found = np.full(count, NEVER, dtype=np.int64)
+        found = np.full(count, results.NEVER, dtype=np.int64)
         some = notes[what == kind]
         found[some[:, 3]] = some[:, 0]
         return found
 
     ended = times(note.FINISHED)
-    outcome = np.where(ended == NEVER, UNFINISHED, DONE)
-    outcome[notes[what == note.ABORTED, 3]] = ABORTED
-    outcome[notes[what == note.SKIPPED, 3]] = SKIPPED
+    outcome = np.where(ended == results.NEVER, results.UNFINISHED, results.DONE)
+    outcome[notes[what == note.ABORTED, 3]] = results.ABORTED
+    outcome[notes[what == note.SKIPPED, 3]] = results.SKIPPED
     return Jobs(
         nominal=first[:, 4],
         released=first[:, 0],
@@ -117,7 +104,7 @@ def _jobs(notes: Integers, deadline: int, stop: int) -> Jobs:
 def _frames(notes: Integers, deadline: int, legs: int, stop: int) -> Frames:
     what = notes[:, 1]
     first = notes[what == note.QUEUED]
-    started, ended = np.full((2, len(first)), NEVER, dtype=np.int64)
+    started, ended = np.full((2, len(first)), results.NEVER, dtype=np.int64)
     first_bits = notes[(what == note.FRAME_STARTED) & (notes[:, 4] == 0)]
     last = notes[(what == note.FRAME_TRANSMITTED) & (notes[:, 4] == legs - 1)]
     started[first_bits[::-1, 3]] = first_bits[::-1, 0]  # of several attempts the first
@@ -137,7 +124,7 @@ def _slices_of_processor(notes: Integers, parts: Parts, processor: int, names: S
     """The slices of a processor: each note about its use ends the slice before it."""
     owners = [i for i, task in enumerate(parts.tasks) if task.processor == processor]
     kept = notes[_are(notes[:, 1], _ON_A_PROCESSOR) & np.isin(notes[:, 2], owners)]
-    kinds = np.where(kept[:, 1] == note.SWITCHING, SWITCH, RUN)
+    kinds = np.where(kept[:, 1] == note.SWITCHING, results.SWITCH, results.RUN)
     return _slices(kept, kinds, (note.SWITCHING, note.STARTED, note.RESUMED), owners, names, stop)
 
 
@@ -151,7 +138,9 @@ def _slices_of_link(notes: Integers, parts: Parts, link: int, names: Sequence[st
     kept = notes[where[notes[:, 2], notes[:, 4]] == link]
     is_corrupted = np.append(kept[1:, 1] == note.FRAME_CORRUPTED, [False])[: len(kept)]
     owners = np.flatnonzero((where == link).any(axis=1)).tolist()
-    return _slices(kept, np.where(is_corrupted, CORRUPTED, RUN), (note.FRAME_STARTED,), owners, names, stop)
+    return _slices(
+        kept, np.where(is_corrupted, results.CORRUPTED, results.RUN), (note.FRAME_STARTED,), owners, names, stop
+    )
 
 
 def _slices(
