@@ -67,7 +67,10 @@ class PythonLoop:
         self._chunk, self._most_events = rows_of_a_chunk(running) * running.board.row.nbytes, events_of_a_chunk()
 
     def run(self, pause_at: int | None, progress: Callable[[float], None] | None) -> bool:
-        """Go on to the end, an interruption, or the first instant from `pause_at` [ns]; whether the run is over."""
+        """Go on to the end, an interruption, or the first instant from `pause_at` [ns]; whether the run is over.
+
+        Raises `Diverged`, `Terminated` or `SimulatorError` if the run ends before.
+        """
         running, stop = self._running, self._stop
         for count, (time, next_time, stepped, arrivals, posted, measured, samples) in enumerate(self._instants, 1):
             running.now = time

@@ -6,7 +6,7 @@ The loop is the compiled one where it is available, else that in Python; both gi
 import logging
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
-from typing import Any, Literal, Protocol, cast, get_args
+from typing import Any, Literal, TypeAlias, cast, get_args
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from orchestration.foundation.basics.simulator import Booleans, Floats
 from orchestration.foundation.basics.times import nanoseconds, seconds
 from orchestration.foundation.recording.recording import Chunk, Recorder
 from orchestration.simulation.engines import initial
-from orchestration.simulation.engines.backlog import Backlog
 from orchestration.simulation.engines.compiled import CompiledLoop, reason_unavailable
 from orchestration.simulation.engines.instants import PythonLoop
 from orchestration.simulation.engines.memory import Allocator
@@ -26,22 +25,8 @@ ROWS_PENDING = "rows"
 """Key in `Master.saved` beside the names of the components"""
 
 
-class Loop(Protocol):
-    """Processes the instants of a run."""
-
-    @property
-    def engine(self) -> str:
-        """Its name."""
-
-    @property
-    def backlog(self) -> Backlog:
-        """The recorded data that has not been handed over."""
-
-    def run(self, pause_at: int | None, progress: Callable[[float], None] | None) -> bool:
-        """Go on to the end, an interruption, or the first instant from `pause_at` [ns]; whether the run is over.
-
-        Raises `Diverged`, `Terminated` or `SimulatorError` if the run ends before.
-        """
+Loop: TypeAlias = PythonLoop | CompiledLoop
+"""Processes the instants of a run"""
 
 
 class Master:

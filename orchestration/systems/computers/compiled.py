@@ -5,7 +5,7 @@ import functools
 import weakref
 from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -70,21 +70,7 @@ class _Arguments(ctypes.Structure):
     )
 
 
-class Schedules(Protocol):
-    """A scheduler, in Python or C."""
-
-    @property
-    def next_instant(self) -> int:
-        """The next instant [ns]; LATER if there is none up to the end."""
-
-    def run(self, until: int) -> None:
-        """Go through all instants before `until` [ns], up to the end."""
-
-    def take_notes(self) -> Integers:
-        """The notes since the last call, one per row: time, kind, owner, index of its job or frame, one more value."""
-
-
-def scheduler(parts: Parts, kinds: Collection[int] = note.ALL_KINDS) -> Schedules:
+def scheduler(parts: Parts, kinds: Collection[int] = note.ALL_KINDS) -> "Scheduler | CompiledScheduler":
     """A scheduler of `parts` that keeps notes of these `kinds`; in C where there is a compiler."""
     try:
         _library()

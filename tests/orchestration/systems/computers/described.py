@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from orchestration.foundation.basics.times import Constant
-from orchestration.systems.computers.compiled import Schedules
+from orchestration.systems.computers.compiled import CompiledScheduler
 from orchestration.systems.computers.parts import (
     FIXED_PRIORITY,
     LATER,
@@ -112,7 +112,7 @@ class Described:
             links=numbered(self.links),
         )  # fmt: skip
 
-    def timeline(self, scheduler: Callable[[Parts], Schedules] = Scheduler) -> Timeline:
+    def timeline(self, scheduler: Callable[[Parts], Scheduler | CompiledScheduler] = Scheduler) -> Timeline:
         parts = self.parts()
         made = scheduler(parts)
         made.run(LATER)
