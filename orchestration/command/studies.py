@@ -10,7 +10,7 @@ from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, build_option, option_group, result_of_files
 from orchestration.command.study_flags import Out, StudyEngineFlag, TimeLimit, Workers
-from orchestration.foundation.basics.terminal import inform, progress_bar
+from orchestration.foundation.basics.terminal import inform, progress_bar, warn
 
 if TYPE_CHECKING:
     from orchestration.experiments.studies.study import Study
@@ -32,6 +32,7 @@ def sweep(
     time_limit: TimeLimit = None,
 ) -> CommandResult:
     """Run the missing runs of a study; it can be stopped and resumed at any time."""
+    from orchestration.experiments.studies.store import note_on_engines
     from orchestration.experiments.studies.study_file import load_study
     from orchestration.experiments.studies.sweep import sweep as run_missing
     from orchestration.simulation.workers.choice import engine_choice
@@ -46,9 +47,11 @@ def sweep(
     lines = [f"{summary.path}: {summary.total} runs, {summary.flown} of them new{failed}"]
     if summary.agreement is not None:
         lines.append(f"engine {summary.engine}: {summary.agreement}")
+    if note := note_on_engines(summary.engines):
+        warn(note)
     for each in summary.follows:
         inform(f"follows {each}")
-    keys = ("total", "flown", "failed", "path", "engine", "agreement", "follows")
+    keys = ("total", "flown", "failed", "path", "engine", "engines", "agreement", "follows")
     document = {name: getattr(summary, name) for name in keys}
     return CommandResult(document=document, lines=lines, good=not summary.failed)
 
@@ -67,7 +70,7 @@ def _warn_if_means_are_infinite(study: "Study") -> None:
 
 def status(study: StudyFile, out: Out = None) -> CommandResult:
     """Show the progress of a study, also while it runs in another process."""
-    from orchestration.experiments.studies.store import open_for_reading, store_path
+    from orchestration.experiments.studies.store import note_on_engines, open_for_reading, store_path
     from orchestration.experiments.studies.study_file import load_study
     from orchestration.experiments.studies.sweep import AGREEMENT, ENGINE, TOTAL, expect_current
     from orchestration.simulation.workers.batching import LaneAgreement
@@ -76,7 +79,7 @@ def status(study: StudyFile, out: Out = None) -> CommandResult:
     path = store_path(loaded.name, out)
     with open_for_reading(path) as opened:
         expect_current(opened, loaded)
-        about, counts = opened.about(), opened.counts()
+        about, counts, engines = opened.about(), opened.counts(), opened.engines()
         total = int(about.get(TOTAL, "0"))
     done, failed = counts.get("done", 0), counts.get("failed", 0)
     missing = total - done - failed
@@ -84,8 +87,10 @@ def status(study: StudyFile, out: Out = None) -> CommandResult:
     lines = [f"{path}: {done + failed} of {total} runs, {failed} failed, {missing} missing"]
     if agreement is not None:
         lines.append(f"engine {about[ENGINE]}: {agreement}")
+    if note := note_on_engines(engines):
+        lines.append(note)
     numbers = {"total": total, "done": done, "failed": failed, "missing": missing}
-    return CommandResult(document={"path": path, **numbers, "agreement": agreement}, lines=lines)
+    return CommandResult(document={"path": path, **numbers, "engines": engines, "agreement": agreement}, lines=lines)
 
 
 def export(

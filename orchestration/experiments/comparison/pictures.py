@@ -2,12 +2,13 @@
 
 import itertools
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from orchestration.experiments.comparison.cells import sizes
 from orchestration.experiments.comparison.design import CONDITION, CONTROLLER, VEHICLE, Comparison
@@ -18,6 +19,7 @@ from orchestration.experiments.comparison.outcome import Outcome
 from orchestration.experiments.comparison.survival import FATES
 from orchestration.experiments.studies.axis_labels import quantity_of
 from orchestration.experiments.studies.figures import save
+from orchestration.experiments.studies.table import note_in
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.figures.style import SCREEN, Style
 from orchestration.simulation.results import display_names as labels
@@ -39,15 +41,15 @@ def draw(
 ) -> list[Path]:
     """Draw all pictures into a folder; their paths. `units` are those of the store, by name of axis and metric."""
     axis = quantity_of(comparison.axis, units)
-    done = table[table["status"] == "done"]
+    done, keep = table[table["status"] == "done"], partial(save, style=style, note=note_in(table))
     written = [
         path
         for (vehicle, condition), rows in done.groupby([VEHICLE, CONDITION], sort=False)
-        for path in _of_one(comparison, units, outcome, rows, (vehicle, condition), folder, style)
+        for path in _of_one(comparison, units, outcome, rows, (vehicle, condition), folder, keep)
     ]
     if outcome.limits:
         reaches, in_seconds = reaches_of(comparison, outcome.limits), comparison.is_in_seconds
-        written += save(partial(limits_of, reaches, axis, in_seconds), folder / "limits", style)
+        written += keep(partial(limits_of, reaches, axis, in_seconds), folder / "limits")
     return written
 
 
@@ -58,7 +60,7 @@ def _of_one(
     rows: "pd.DataFrame",
     of: tuple[str, str],
     folder: Path,
-    style: Style,
+    keep: Callable[[Callable[[Style], Figure], Path], list[Path]],
 ) -> Iterator[Path]:
     """The pictures of one vehicle under one condition."""
     axis, colors = quantity_of(comparison.axis, units), colors_of([one.name for one in comparison.controllers])
@@ -71,14 +73,14 @@ def _of_one(
             for name in colors
             if len(group := rows[rows[CONTROLLER] == name])
         }
-        yield from save(partial(basins, by_size, axis, fate, title), folder / f"basin_{fate}_{end}", style)
-    yield from save(partial(shares, {title: summaries}, axis, colors), folder / f"shares_{end}", style)
+        yield from keep(partial(basins, by_size, axis, fate, title), folder / f"basin_{fate}_{end}")
+    yield from keep(partial(shares, {title: summaries}, axis, colors), folder / f"shares_{end}")
     if points:
         values = [*dict.fromkeys(point.value for point in points)]
         shown = [values[round(i)] for i in np.linspace(0, len(values) - 1, min(len(values), MAX_PANELS))]
         front = comparison.front
         names = tuple(labels.metric_with_unit(metric, units.get(metric)) for metric in (front.effort, front.error))
-        yield from save(partial(fronts_of, points, shown, axis, names, colors, title), folder / f"front_{end}", style)
+        yield from keep(partial(fronts_of, points, shown, axis, names, colors, title), folder / f"front_{end}")
 
 
 def reaches_of(comparison: Comparison, limits: Sequence[GridLimit]) -> list[Reach]:

@@ -15,10 +15,10 @@ from orchestration.experiments.studies.maps import heat_map
 from orchestration.experiments.studies.store import store_path
 from orchestration.experiments.studies.store_columns import TEXTS, metrics_with
 from orchestration.experiments.studies.study import Study
-from orchestration.experiments.studies.table import frame, units_in
+from orchestration.experiments.studies.table import frame, note_in, units_in
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.foundation.basics.terminal import Share
+from orchestration.foundation.basics.terminal import Share, warn
 from orchestration.simulation.figures.style import SCREEN, Style, save
 from orchestration.simulation.results.objectives import bound_of, judged_objective
 from orchestration.systems.system.requirements import is_number
@@ -65,10 +65,17 @@ def study_figures(
     if metric is None:
         metric = _default_metric_of(study, table)
     indices = indices_of(study, numbers(table, metric), metric) if _is_screened(study) else []
+    note = note_in(table)
+    if note is not None:
+        warn(note)
     with style.applied():
         if indices:
-            return {f"sensitivity_{metric}": figures.sensitivity_bars(indices, metric, style)}, indices
-        return _over_axes(study, table, metric, units, style), []
+            drawn = {f"sensitivity_{metric}": figures.sensitivity_bars(indices, metric, style)}
+        else:
+            drawn = _over_axes(study, table, metric, units, style)
+        for figure in drawn.values():
+            figures.add_note(figure, note)
+    return drawn, indices
 
 
 def _over_axes(

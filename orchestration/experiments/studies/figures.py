@@ -163,10 +163,17 @@ def good_runs(table: "pd.DataFrame") -> "pd.Series":
     return table["good"].eq(1).fillna(False).astype(bool)
 
 
-def save(make: Callable[[Style], Figure], path: Path, style: Style = SCREEN) -> list[Path]:
-    """Make a figure in a style and write it as `path` with the suffix of each format; the paths."""
+def add_note(figure: Figure, note: str | None) -> None:
+    """Write a note below a figure, if there is one."""
+    if note is not None:
+        figure.supxlabel(note, color=GREY, size="small")
+
+
+def save(make: Callable[[Style], Figure], path: Path, style: Style = SCREEN, *, note: str | None = None) -> list[Path]:
+    """Make a figure in a style, with a note, and write it as `path` with the suffix of each format; the paths."""
     with style.applied():
         figure = make(style)
+        add_note(figure, note)
     return write({path.name: figure}, path.parent, style)
 
 

@@ -17,6 +17,14 @@ from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.simulation.workers.row import Row
 
 
+def note_on_engines(engines: Mapping[str, int]) -> str | None:
+    """What to say of runs by several engines, with their numbers; None for one engine."""
+    if len(engines) < 2:
+        return None
+    numbers = ", ".join(f"{count} by {name}" for name, count in sorted(engines.items()))
+    return f"runs of several engines, which differ in last bits: {numbers}"
+
+
 def store_path(study: str, folder: str | Path | None = None) -> Path:
     """The path of a study's store; default: `results/NAME/study.sqlite`."""
     return Path(folder or Path("results") / study) / "study.sqlite"
@@ -76,6 +84,12 @@ class Store:
     def counts(self) -> dict[str, int]:
         """The number of points of the design by the status of their rows."""
         return self._pairs("SELECT status, count(*) FROM design JOIN runs USING (key) GROUP BY status")
+
+    def engines(self) -> dict[str, int]:
+        """The number of points of the design by the engine of their rows, failed ones aside."""
+        return self._pairs(
+            "SELECT engine, count(*) FROM design JOIN runs USING (key) WHERE engine IS NOT NULL GROUP BY engine"
+        )
 
     def _pairs(self, query: str, *values: bool) -> dict[Any, Any]:
         """The two columns of a query over a store that is whole, the second by the first."""
@@ -238,7 +252,7 @@ def _read_only(path: Path) -> sqlite3.Connection:
 def _values(row: Row, metrics: Iterable[str]) -> tuple[Any, ...]:
     measured = {name: (row.metrics or {}).get(name) for name in metrics}
     return (
-        row.key, row.status, row.message, row.seed, _real(row.duration), row.machine,
+        row.key, row.status, row.message, row.seed, _real(row.duration), row.machine, row.engine,
         *(_text(value) if name in columns.TEXTS else _real(value) for name, value in measured.items()),
     )  # fmt: skip
 

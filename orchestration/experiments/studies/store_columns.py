@@ -10,7 +10,7 @@ TEXTS = ("outcome",)
 MAX_OBJECTIVES = 1000
 """Largest number of columns, a limit of SQLite"""
 
-RUN = ("key", "status", "message", "seed", "duration", "machine")
+RUN = ("key", "status", "message", "seed", "duration", "machine", "engine")
 """Columns of a run besides its metrics"""
 SETTINGS = "settings"
 """Column with the value of each axis, as JSON"""
@@ -36,7 +36,7 @@ def tables_for(objectives: Iterable[str]) -> dict[str, str]:
         "design": "CREATE TABLE design (design_index INTEGER PRIMARY KEY, key TEXT NOT NULL, settings TEXT NOT NULL, "
         "checksum TEXT NOT NULL)",
         "runs": "CREATE TABLE runs (key TEXT PRIMARY KEY, status TEXT NOT NULL, message TEXT, seed INTEGER NOT NULL, "
-        f"duration REAL, machine TEXT, {typed}, checksum TEXT NOT NULL)",
+        f"duration REAL, machine TEXT, engine TEXT, {typed}, checksum TEXT NOT NULL)",
     }
 
 

@@ -17,12 +17,12 @@ from orchestration.experiments.studies.run_key import design_parts, difference, 
 from orchestration.experiments.studies.store_columns import UNITS
 from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.swept import Swept
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.interrupt import Interrupted
 from orchestration.foundation.basics.progress import CountProgress, runs_reporter
 from orchestration.foundation.basics.terminal import Count, inform
-from orchestration.simulation.engines.master import Engine
+from orchestration.simulation.engines.master import BATCH, Engine, engine_named
 from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.simulation.requests.ranges import paths_in, unit_at
 from orchestration.simulation.results.own_metrics import metrics_from_sources
@@ -70,13 +70,14 @@ def sweep(
     The store is in `folder`, default `results/NAME`; runs in it are not repeated, so that a sweep may be stopped and
     called again. Runs are executed by `workers` processes of this machine, which need no guard of the main module and
     work from a notebook, or by those of the `dask` scheduler at this address. The engine `batch` runs native FMUs in
-    SIMD lanes, and repeats some runs with the FMUs to compare; `auto` uses lanes if available, else native FMUs one at
-    a time, else the FMUs as they are. A run that takes more than `time_limit` [s] of processor time fails. `progress`
-    is called with the number of runs done and the total, `announce` with the engine and failed runs; None for silence.
+    SIMD lanes, and repeats some runs with the FMUs to compare; `auto` continues a store by the engine that it has, and
+    else uses lanes if available, else native FMUs one at a time, else the FMUs as they are. A run that takes more than
+    `time_limit` [s] of processor time fails. `progress` is called with the number of runs done and the total,
+    `announce` with the engine and failed runs; None for silence.
 
     Raises `UsageError`, before any run, for a design with an invalid run, or if the store holds another study, stating
-    the difference; `QuadcosimError` for failures not caused by a run, without a row; `KeyboardInterrupt`, stating how
-    far it came, after Ctrl-C.
+    the difference; `QuadcosimError` for failures not caused by a run, without a row, as if `auto` cannot have the
+    engine of a store; `KeyboardInterrupt`, stating how far it came, after Ctrl-C.
     """
     _expect_workers(workers, dask)
     if time_limit is not None and not time_limit > 0.0:
@@ -87,6 +88,8 @@ def sweep(
     path = store.store_path(study.name, folder)
     with runs_reporter(progress) as report, store.open_for_writing(path, study.metric_names) as opened:
         _describe(opened, study, files)
+        if engine == "auto":
+            execution = _as_before(execution, opened)
         missing = _missing(opened, study, retry_failed)
         sweep_progress = _Progress(len(study.points), opened, report, announce)
         agreement = None
@@ -105,17 +108,17 @@ def sweep(
                         for outcomes in results:
                             _keep(outcomes, opened)
                             sweep_progress.add(outcomes)
-                            lanes |= {each.row.key: each.row for each in outcomes if each.in_lanes}
+                            lanes |= {each.row.key: each.row for each in outcomes if each.row.engine == BATCH}
                     agreement = lane_agreement(lanes, all_files, partial(task_of, engine=None), run)
             except KeyboardInterrupt:
                 raise Interrupted(f"with {sweep_progress.done} of {sweep_progress.total} runs done") from None
         if agreement is not None:
             opened.describe({AGREEMENT: agreement.as_text()})
             agreement.expect()
-        failed = opened.counts().get("failed", 0)
+        failed, engines = opened.counts().get("failed", 0), opened.engines()
     return Swept(
         study=study, total=len(study.points), flown=len(missing), failed=failed, path=path, engine=execution.name,
-        agreement=agreement, follows=follows,
+        engines=engines, agreement=agreement, follows=follows,
     )  # fmt: skip
 
 
@@ -138,6 +141,19 @@ def prepare(study: Study, engine: EngineChoice) -> tuple[Study, Files, Execution
         first(execution.native)
     prepared, files, follows = candidates[execution.native]
     return prepared, files, execution, follows
+
+
+def _as_before(execution: Execution, opened: store.Store) -> Execution:
+    """What `auto` has chosen, but with the engine that was used last in a store; raises `QuadcosimError` without it."""
+    before = opened.about().get(ENGINE, execution.name)
+    if before == execution.name:
+        return execution
+    if before == BATCH:
+        raise QuadcosimError(
+            f"{opened.path}: expected engine {BATCH}, as of the runs there ({execution.reason}); another one needs "
+            "another --out"
+        )
+    return replace(execution, in_lanes=False, engine=engine_named(before), reason="as the runs in the store")
 
 
 def _expect_workers(workers: int, dask: str | None) -> None:

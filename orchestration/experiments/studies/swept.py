@@ -1,6 +1,7 @@
 """The result of a sweep."""
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -34,6 +35,8 @@ class Swept:
     """The store of the study."""
     engine: str
     """The engine, by its name in `--engine`."""
+    engines: Mapping[str, int]
+    """The number of runs in the store that have not failed by their engine."""
     agreement: LaneAgreement | None = None
     """Agreement of runs in SIMD lanes with the same runs by FMUs; None if there were none."""
     follows: tuple[str, ...] = ()

@@ -11,9 +11,10 @@ import pyarrow.parquet as pq
 from pyarrow import csv
 
 from fmu_kit.new_files import new_files
-from orchestration.experiments.studies.store import Store, open_for_reading
+from orchestration.experiments.studies.store import Store, note_on_engines, open_for_reading
 from orchestration.experiments.studies.store_columns import SETTINGS, TEXTS, UNITS
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.terminal import warn
 from orchestration.foundation.recording import mat_file
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 FORMATS = ("parquet", "csv", "mat")
 
-SHARED = (*TEXTS, "status", "machine")
+SHARED = (*TEXTS, "status", "machine", "engine")
 """Columns with few distinct texts"""
 
 
@@ -48,6 +49,11 @@ def frame(path: Path) -> "pd.DataFrame":
         for name, value in json.loads(about[kind]).items():
             table[f"{prefix}.{name}"] = value
     return table
+
+
+def note_in(table: "pd.DataFrame") -> str | None:
+    """What to say of the engines of a table's runs; None for one engine."""
+    return note_on_engines(table["engine"].value_counts().to_dict())
 
 
 def _columns(store: Store, axes: Sequence[str]) -> tuple[dict[str, list[Any]], dict[str, Any]]:
@@ -103,9 +109,12 @@ def export(path: Path, folder: Path, formats: Collection[str] = ("parquet", "csv
     """Write the rows by design index as `runs.parquet`, `runs.csv` or `runs.mat`; their paths.
 
     Parquet has units in the metadata of its fields, as `unit`; MAT has a structure `runs` with a field for each column,
-    and `units` with the same fields.
+    and `units` with the same fields. Warns of runs by several engines.
     """
-    table = _with_units(pa.Table.from_pandas(frame(path), preserve_index=False), units_in(path))
+    rows = frame(path)
+    if note := note_in(rows):
+        warn(note)
+    table = _with_units(pa.Table.from_pandas(rows, preserve_index=False), units_in(path))
     writers = {"parquet": pq.write_table, "csv": csv.write_csv, "mat": _write_mat}
     with new_files(folder) as new:
         for kind in formats:

@@ -186,6 +186,8 @@ class Master:
 _NOTES = logging.getLogger("quadcosim")
 
 Engine = Literal["python", "compiled"]
+BATCH = "batch"
+"""Name of the engine of many runs at once, whose metrics differ from those of the others in their last bits"""
 
 
 def engine_named(name: str | None, *others: str) -> Engine | None:

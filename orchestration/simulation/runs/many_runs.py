@@ -15,6 +15,7 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.engines.batch.batch import MAX_ROWS
 from orchestration.simulation.engines.batch.batches import Batches
 from orchestration.simulation.engines.batch.shape import expect_lanes
+from orchestration.simulation.engines.master import BATCH
 from orchestration.simulation.engines.resolved import check_against_fmus, columns_of, source_signals
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.results.objectives import FIXED, Metrics
@@ -25,7 +26,6 @@ from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import errors_in_own_terms
 
-BATCH = "batch"
 _NOTES = logging.getLogger("quadcosim")
 
 

@@ -10,7 +10,7 @@ from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError, expected_name
 from orchestration.simulation.engines.batch.shape import expect_lanes
-from orchestration.simulation.engines.master import Engine
+from orchestration.simulation.engines.master import BATCH, Engine
 from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.systems.system.files import Files, files_of, with_files
 from orchestration.systems.system.model import System
@@ -36,7 +36,7 @@ class Execution:
     @property
     def name(self) -> str:
         """The name as in `--engine`."""
-        return "batch" if self.in_lanes else self.engine or "compiled"
+        return BATCH if self.in_lanes else self.engine or "compiled"
 
     def __str__(self) -> str:
         if self.in_lanes:
@@ -63,7 +63,7 @@ def choose_execution(
     """
     if engine in ("python", "compiled"):
         return Execution(native=native, in_lanes=False, engine=engine)
-    if engine == "batch":
+    if engine == BATCH:
         if no_lanes is not None:
             raise UsageError(f"--engine {engine}: {no_lanes}")
         _expect_lanes(*first(True))

@@ -97,11 +97,13 @@ class Supervisor:
         self._worker: WorkerProcess | None = None
         self._machine: str | None = None
 
-    def run(self, task: tasks.RunTask) -> tasks.TaskOutcome:
-        """The outcome of a run; a run that ends its process `ATTEMPTS` times has failed.
+    def run(self, task: tasks.RunTask | tasks.TaskBatch) -> list[tasks.TaskOutcome]:
+        """The outcomes of a run, or of many in lanes; a run that ends its process `ATTEMPTS` times has failed.
 
-        Raises `QuadcosimError` for failures not caused by the run.
+        Runs that end their process or exceed their time limit together are repeated each by itself, in lanes too: the
+        bits of a row do not depend on deaths. Raises `QuadcosimError` for failures not caused by a run.
         """
+        several = task.tasks if isinstance(task, tasks.TaskBatch) else (task,)
         crashes = killed = 0
         while True:
             worker = self._ready_worker()
@@ -109,44 +111,36 @@ class Supervisor:
                 answer = worker.request(task)
             except Died as death:
                 self._drop()
-                if death.ending.reached is not None:
-                    message = f"it was ended: {death.ending.reached}"
-                    return tasks.TaskOutcome(row=tasks.row_of(task, None, message, 0.0, self._machine), ended=True)
                 _expect_no_interrupt(death)
-                if death.ending.code in _FROM_OUTSIDE:
+                from_outside = death.ending.reached is None and death.ending.code in _FROM_OUTSIDE
+                if len(several) > 1 and not from_outside:
+                    return [outcome for one in several for outcome in self.run(tasks.TaskBatch(tasks=(one,)))]
+                if death.ending.reached is not None:
+                    return [self._failed(several[0], f"it was ended: {death.ending.reached}", ended=True)]
+                if from_outside:
                     killed += 1
                 else:
                     crashes += 1
                 if crashes == ATTEMPTS:
-                    message = f"its worker process {death}, {ATTEMPTS} times, the last times in a new process"
-                    return tasks.TaskOutcome(row=tasks.row_of(task, None, message, 0.0, self._machine))
+                    return [
+                        self._failed(
+                            several[0],
+                            f"its worker process {death}, {ATTEMPTS} times, the last times in a new process",
+                        )
+                    ]
                 if killed == ATTEMPTS:
                     raise QuadcosimError(
-                        f"the worker process of run {task.index} {death} {ATTEMPTS} times: not caused by the run, or "
-                        "too little memory; start the sweep again, with fewer workers"
+                        f"the worker process of run {several[0].index} {death} {ATTEMPTS} times: not caused by the "
+                        "run, or too little memory; start the sweep again, with fewer workers"
                     ) from None
                 continue
             if isinstance(answer, tasks.EnvironmentFailure):
                 raise tasks.WorkerEnvironmentError(f"not a failure of a run: {answer.message}")
-            assert isinstance(answer, tasks.TaskOutcome)
+            assert isinstance(answer, list)
             return answer
 
-    def run_chunk(self, chunk: tasks.TaskBatch) -> list[tasks.TaskOutcome]:
-        """The outcomes of many runs; they are run one by one if together they end their process or exceed their
-        common time limit.
-
-        Raises `QuadcosimError` for failures not caused by a run.
-        """
-        try:
-            answer = self._ready_worker().request(chunk)
-        except Died as death:
-            self._drop()
-            _expect_no_interrupt(death)
-            return [self.run(task) for task in chunk.tasks]
-        if isinstance(answer, tasks.EnvironmentFailure):
-            raise tasks.WorkerEnvironmentError(f"not a failure of a run: {answer.message}")
-        assert isinstance(answer, list)
-        return answer
+    def _failed(self, task: tasks.RunTask, message: str, *, ended: bool = False) -> tasks.TaskOutcome:
+        return tasks.TaskOutcome(row=tasks.row_of(task, None, message, 0.0, self._machine), ended=ended)
 
     def close(self) -> None:
         """End the process; a waiting `run` raises `QuadcosimError`."""
@@ -225,8 +219,8 @@ class Pool:
             if isinstance(task, tasks.TaskBatch):
                 systems = all_with_files([each.system for each in task.tasks], self._paths)
                 each = tuple(replace(one, system=system) for one, system in zip(task.tasks, systems))
-                return supervisor.run_chunk(replace(task, tasks=each))
-            return [supervisor.run(replace(task, system=with_files(task.system, self._paths)))]
+                return supervisor.run(replace(task, tasks=each))
+            return supervisor.run(replace(task, system=with_files(task.system, self._paths)))
         finally:
             self._idle.put(supervisor)
 

@@ -24,6 +24,8 @@ class Row:
     """wall-clock time of the run [s]"""
     machine: str | None = None
     """the kind of machine that ran it"""
+    engine: str | None = None
+    """the engine that its metrics are of, by its name in `--engine`; None if it failed"""
 
     @property
     def status(self) -> str:

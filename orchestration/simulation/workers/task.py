@@ -12,7 +12,7 @@ from orchestration.components.fmi.instance import Instance
 from orchestration.components.fmi.read_description import read_model
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError
-from orchestration.simulation.engines.master import Engine
+from orchestration.simulation.engines.master import BATCH, Engine
 from orchestration.simulation.results.own_metrics import OwnMetric
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.simulation.runs.result import Result
@@ -60,8 +60,6 @@ class TaskOutcome:
 
     row: Row
     signals: bytes | None = None
-    in_lanes: bool = False
-    """whether it was run in SIMD lanes"""
     ended: bool = False
     """whether it was stopped at a limit"""
 
@@ -99,7 +97,7 @@ class Runner:
         Raises `WorkerEnvironmentError` for other failures.
         """
         started = time.perf_counter()
-        metrics, message, signals = None, None, None
+        metrics, message, signals, engine = None, None, None, None
         _expect_files(task.system)
         try:
             with prepared(task.system, load=self._load, engine=task.engine) as simulation:
@@ -108,6 +106,7 @@ class Runner:
                 result = simulation.result()
                 own = {metric.name: metric.of(result) for metric in task.metrics}
                 metrics, message = {**result.metrics, **own}, result.divergence or result.termination
+                engine = str(result.provenance["engine"])
                 signals = _parquet(result) if task.keep_signals else None
         except (SimulatorError, UsageError) as error:
             message = str(error)
@@ -116,7 +115,7 @@ class Runner:
         except Exception as error:
             message = f"{type(error).__name__}: {error}"
         return TaskOutcome(
-            row=row_of(task, metrics, message, time.perf_counter() - started, self._machine), signals=signals
+            row=row_of(task, metrics, message, time.perf_counter() - started, self._machine, engine), signals=signals
         )
 
     def run_chunk(self, chunk: TaskBatch) -> list[TaskOutcome]:
@@ -138,7 +137,7 @@ class Runner:
         return [
             self.run(task)
             if each is None
-            else TaskOutcome(row=row_of(task, each.metrics, each.message, duration, self._machine), in_lanes=True)
+            else TaskOutcome(row=row_of(task, each.metrics, each.message, duration, self._machine, BATCH))
             for task, each in zip(chunk.tasks, outcomes, strict=True)
         ]
 
@@ -171,12 +170,17 @@ def _expect_files(system: System) -> None:
 
 
 def row_of(
-    task: RunTask, metrics: dict[str, Any] | None, message: str | None, duration: float, machine: str | None
+    task: RunTask,
+    metrics: dict[str, Any] | None,
+    message: str | None,
+    duration: float,
+    machine: str | None,
+    engine: str | None = None,
 ) -> Row:
     """The row of a task; without metrics the run has failed."""
     return Row(
         index=task.index, key=task.key, settings=task.settings, seed=task.system.seed, metrics=metrics,
-        message=message, duration=duration, machine=machine,
+        message=message, duration=duration, machine=machine, engine=engine,
     )  # fmt: skip
 
 

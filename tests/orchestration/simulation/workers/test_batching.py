@@ -1,6 +1,7 @@
 """A sweep in SIMD lanes writes the rows that the FMUs of its runs would have written, and reports their agreement."""
 
 import dataclasses
+import random
 from pathlib import Path
 from typing import Any
 
@@ -12,15 +13,17 @@ from orchestration.experiments.studies.study_file import load_study
 from orchestration.experiments.studies.sweep import AGREEMENT
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.foundation.processes.child import Died, Ending
+from orchestration.simulation.engines.batch.batches import Batches
 from orchestration.simulation.workers.batching import SAMPLE, LaneAgreement, chunks, sample
 from orchestration.simulation.workers.pool import Inputs, Supervisor
 from orchestration.simulation.workers.task import RunTask, TaskBatch
+from orchestration.systems.system.files import with_files
 from tests.commands import Main
 from tests.orchestration.components.fmi.small import needs_compiler, small
 from tests.orchestration.experiments.studies.common import NOISY, RUNS, STORE, axis, bits, short, study, sweep, swept
 
 pytestmark = needs_compiler
-OWN = ("duration", "machine")
+OWN = ("duration", "machine", "engine")
 
 
 def noisy(folder: Path) -> Study:
@@ -29,7 +32,7 @@ def noisy(folder: Path) -> Study:
 
 
 def assert_alike(lanes: list[dict[str, Any]], alone: list[dict[str, Any]]) -> None:
-    """The same rows, numbers to 1e-12, without duration and machine."""
+    """The same rows, numbers to 1e-12, without what is of the machine."""
     assert len(lanes) == len(alone)
     for one, other in zip(lanes, alone):
         assert one.keys() == other.keys()
@@ -55,7 +58,7 @@ def test_rows_are_those_of_the_fmus_and_the_command_reports_their_agreement(
     assert "8 runs repeated with FMUs: largest relative difference" in done.stdout
     assert done.stdout.splitlines()[-1] in main("status", "study.toml").stdout
     lanes = bits(tmp_path / STORE)
-    assert len(lanes) == RUNS
+    assert [row["engine"] for row in lanes] == ["batch"] * RUNS
     assert_alike(lanes, alone)
     with open_for_reading(tmp_path / STORE) as opened:
         agreement = LaneAgreement.from_text(opened.about()[AGREEMENT])
@@ -133,17 +136,56 @@ def test_chunks_group_similar_runs_without_those_whose_signals_are_kept() -> Non
     assert [len({task.index % 2 for task in each}) for each in lanes].count(2) <= 1
 
 
-def test_runs_that_end_their_process_together_are_repeated_one_by_one(
+@pytest.mark.parametrize(
+    ("code", "repeated"), [(-9, [[0, 1, 2], [0, 1, 2]]), (-6, [[0, 1, 2], [0], [1], [2]])], ids=["killed", "crashed"]
+)
+def test_runs_whose_process_ends_are_repeated_in_lanes(
+    code: int, repeated: list[list[int]], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    asked: list[list[int]] = []
+
+    class DiesOnce:
+        def request(self, what: Any) -> Any:
+            asked.append([task.index for task in what.tasks])
+            if len(asked) == 1:
+                raise Died(Ending(code=code))
+            return asked[-1]
+
+    monkeypatch.setattr(Supervisor, "_ready_worker", lambda self: DiesOnce())
+    outcomes = Supervisor(tmp_path, Inputs(contents={}, own_fmus=frozenset(), versions={})).run(
+        TaskBatch(tasks=tuple(tasks(3)))
+    )
+    assert asked == repeated
+    assert outcomes == [0, 1, 2]
+
+
+def test_a_run_that_ends_its_process_in_lanes_fails_and_is_not_run_by_another_engine(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     class Dying:
         def request(self, what: Any) -> Any:
+            assert isinstance(what, TaskBatch)
             raise Died(Ending(code=-6))
 
-    repeated: list[int] = []
     monkeypatch.setattr(Supervisor, "_ready_worker", lambda self: Dying())
-    monkeypatch.setattr(Supervisor, "run", lambda self, task: repeated.append(task.index))
-    Supervisor(tmp_path, Inputs(contents={}, own_fmus=frozenset(), versions={})).run_chunk(
-        TaskBatch(tasks=tuple(tasks(3)))
+    found = Supervisor(tmp_path, Inputs(contents={}, own_fmus=frozenset(), versions={})).run(
+        TaskBatch(tasks=tuple(tasks(2)))
     )
-    assert repeated == [0, 1, 2]
+    assert [(one.row.index, one.row.status, one.row.engine) for one in found] == [
+        (0, "failed", None),
+        (1, "failed", None),
+    ]
+    assert str(found[0].row.message).startswith("its worker process ended by SIGABRT, 3 times")
+
+
+def test_the_bits_of_a_run_in_lanes_do_not_depend_on_the_runs_beside_it(tmp_path: Path) -> None:
+    chosen = dataclasses.replace(noisy(tmp_path), native=True)
+    files = chosen.files()
+    starts = files.start_values_of(chosen.origin)
+    systems = [with_files(chosen.system(i, starts), files.fmus) for i in range(RUNS)]
+    batches, order = Batches(), random.Random(1).sample(range(RUNS), RUNS)
+    together = batches.run(systems)
+    assert None not in together
+    for size in (1, 3, 5):
+        for group in (order[first : first + size] for first in range(0, RUNS, size)):
+            assert batches.run([systems[i] for i in group]) == [together[i] for i in group]

@@ -13,7 +13,7 @@ from orchestration.simulation.workers import pool
 from orchestration.simulation.workers.executors import _local_submit
 from orchestration.simulation.workers.pool import Inputs, Pool
 from orchestration.simulation.workers.provenance import Sources, sources, versions
-from orchestration.simulation.workers.task import RunTask, TaskOutcome
+from orchestration.simulation.workers.task import RunTask, TaskBatch, TaskOutcome
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.model import System
 from quadcosim import QuadcosimError, UsageError
@@ -117,7 +117,7 @@ def test_temporary_files_are_removed_after_the_last_thread_that_could_leave_more
     started, closed = threading.Event(), threading.Event()
 
     class Slow(pool.Supervisor):
-        def run(self, task: RunTask) -> TaskOutcome:
+        def run(self, task: RunTask | TaskBatch) -> list[TaskOutcome]:
             started.set()
             closed.wait()
             (self._root / "late").mkdir(parents=True)

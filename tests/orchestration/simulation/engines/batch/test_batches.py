@@ -107,8 +107,10 @@ def test_every_function_over_every_kind_of_signal(fmu: Path, kept: Kept, tmp_pat
         changed(first, {"components.controller.sampling.period": 0.03, "stop_time": 0.7}),
         changed(first, {"components.plant.parameters.place": 2.0, "sources.one.constant": 0.7}),
     ]
-    for what, found in zip(crowd, Batches().run(crowd)):
+    batches = Batches()
+    for what, found in zip(crowd, batches.run(crowd)):
         assert found is not None
+        assert batches.run([what]) == [found]
         alone = ran(what, "compiled", load=kept.load).metrics
         assert_the_same_numbers(found.metrics, alone)
 

@@ -1,0 +1,103 @@
+"""The rows of a store have the bits of one engine, or every answer from it says that there are several."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from orchestration.experiments.studies.drawing import study_figures
+from orchestration.experiments.studies.store import note_on_engines
+from orchestration.experiments.studies.study_file import load_study
+from orchestration.experiments.studies.table import frame
+from orchestration.foundation.basics.errors import QuadcosimError
+from orchestration.simulation.engines.batch import shape
+from tests.commands import Main
+from tests.orchestration.components.fmi.small import needs_compiler
+from tests.orchestration.experiments.studies.common import STORE, axis, bits, study, sweep
+
+pytestmark = needs_compiler
+
+BEGUN = """
+[base]
+stop_time = 0.1
+[base.controller]
+fmu = "native/UnifiedController"
+[base.plant]
+fmu = "native/QuadrotorPlant"
+[base.timing]
+plant_interval = 0.005
+[[axes]]
+name = "period"
+sets = ["timing.period"]
+values = [0.02, 0.01]
+"""
+CONTINUED = BEGUN.replace("0.01]", "0.01, 0.015]")
+NOTE = "runs of several engines, which differ in last bits: 2 by batch, 1 by compiled"
+
+
+def no_compiler() -> int:
+    raise QuadcosimError("no compiler")
+
+
+def test_a_store_of_two_engines_says_so_to_whoever_asks(
+    tmp_path: Path, main: Main, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = Path("study.toml")
+    path.write_text(BEGUN)
+    assert main("sweep", path, "--engine", "batch", "-q").stderr == ""
+    assert "several engines" not in main("status", path).stdout
+    path.write_text(CONTINUED)
+    warning = f"warning: {NOTE}\n"
+    assert main("sweep", path, "--engine", "compiled", "-q").stderr == warning
+    assert NOTE in main("status", path, "-q").stdout.splitlines()
+    assert '"engines": {\n    "batch": 2,\n    "compiled": 1\n  }' in main("status", path, "--json").stdout
+    assert main("export", path, "-q").stderr == warning
+    assert main("draw", path, "-q").stderr == warning
+    assert NOTE in main("report", path, "-q", "--out", "report.html").stdout + Path("report.html").read_text()
+    assert frame(STORE)["engine"].tolist() == ["batch", "batch", "compiled"]
+    drawn, _ = study_figures(load_study(path), STORE, None)
+    assert [figure.get_supxlabel() for figure in drawn.values()] == [NOTE]
+
+
+def test_of_one_engine_nothing_is_said() -> None:
+    assert note_on_engines({}) is None
+    assert note_on_engines({"batch": 3}) is None
+
+
+@pytest.mark.parametrize("quiet", [[], ["-q"]])
+def test_a_failed_compile_does_not_continue_runs_in_lanes_by_another_engine(
+    quiet: list[str], tmp_path: Path, main: Main, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = Path("study.toml")
+    path.write_text(BEGUN)
+    main("sweep", path)
+    before = bits(STORE)
+    path.write_text(CONTINUED)
+    with monkeypatch.context() as broken:
+        broken.setattr(shape, "preferred_lanes", no_compiler)
+        done = main("sweep", path, *quiet, code=1)
+    assert done.stderr.splitlines()[-1] == (
+        f"quadcosim: {STORE}: expected engine batch, as of the runs there (no compiler); another one needs another "
+        "--out"
+    )
+    assert bits(STORE) == before
+    main("sweep", path)
+    after = bits(STORE)
+    shutil.rmtree("results")
+    main("sweep", path)
+    assert bits(STORE) == after
+
+
+def test_runs_that_were_begun_without_lanes_are_continued_without(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as broken:
+        broken.setattr(shape, "preferred_lanes", no_compiler)
+        sweep(study(axis("timing.period", 0.01, 0.02)), folder=tmp_path, engine="auto")
+    told: list[str] = []
+    more = study(axis("timing.period", 0.01, 0.02, 0.03))
+    found = sweep(more, folder=tmp_path, engine="auto", announce=told.append)
+    assert told == ["engine compiled: native FMUs, one run at a time (as the runs in the store)"]
+    assert (found.engine, found.engines) == ("compiled", {"compiled": 3})
