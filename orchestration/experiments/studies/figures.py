@@ -164,9 +164,9 @@ def good_runs(table: "pd.DataFrame") -> "pd.Series":
 
 
 def add_note(figure: Figure, note: str | None) -> None:
-    """Write a note below a figure, if there is one."""
+    """Write a note above a figure, below its title, if there is one."""
     if note is not None:
-        figure.supxlabel(note, color=GREY, size="small")
+        figure.suptitle("\n".join(filter(None, (figure.get_suptitle(), note))), size="medium")
 
 
 def save(make: Callable[[Style], Figure], path: Path, style: Style = SCREEN, *, note: str | None = None) -> list[Path]:

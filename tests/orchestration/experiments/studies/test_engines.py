@@ -57,7 +57,7 @@ def test_a_store_of_two_engines_says_so_to_whoever_asks(
     assert NOTE in main("report", path, "-q", "--out", "report.html").stdout + Path("report.html").read_text()
     assert frame(STORE)["engine"].tolist() == ["batch", "batch", "compiled"]
     drawn, _ = study_figures(load_study(path), STORE, None)
-    assert [figure.get_supxlabel() for figure in drawn.values()] == [NOTE]
+    assert [figure.get_suptitle() for figure in drawn.values()] == [NOTE]
 
 
 def test_of_one_engine_nothing_is_said() -> None:

@@ -67,6 +67,7 @@ def test_a_frame_has_settings_metrics_seeds_guids_and_versions(grid: tuple[Study
         "message",
         "seed",
         "duration",
+        "engine",
         "machine",
     }
     models = files_in(Scenario()).models_of(Scenario().as_system())
