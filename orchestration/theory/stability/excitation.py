@@ -101,6 +101,7 @@ class Excitation:
         self._outputs_now: Floats = np.zeros(len(rest.outputs))
         self._read = rest.fmu.reader(rest.outputs, self._outputs_now)
         self._time = rest.time
+        self._followed: dict[tuple[SavedState, Rung], tuple[Floats, SavedState]] = {}
         self.rest = SavedState(rest.fmu.save(), rest.time)
         self._read()
         self.at_rest = self._outputs_now.copy()
@@ -122,33 +123,43 @@ class Excitation:
         held[i] += factor * self.pulses[i]
         return held
 
-    def outputs_after(self, start: SavedState, rungs: Sequence[Rung], held: Floats | None = None) -> Floats:
-        """The outputs at the end of each rung, shape (rungs, outputs); the inputs are `held`, by default at rest."""
-        inputs = self.held if held is None else held
-        return self._course(start, [(inputs, rung) for rung in rungs])
+    def outputs_after(self, start: SavedState, rungs: Sequence[Rung]) -> Floats:
+        """The outputs at the end of each rung, shape (rungs, outputs), the inputs at rest."""
+        if len(set(rungs)) > 1:
+            return self._course(start, [(self.held, rung) for rung in rungs])
+        found: Floats = np.zeros((len(rungs), len(self.outputs)))
+        for k, rung in enumerate(rungs):  # samples, most of which an earlier state has come by
+            found[k], start = self.followed(start, rung)
+        return found
 
     def _course(self, start: SavedState, legs: Sequence[tuple[Floats, Rung]], largest: float = np.inf) -> Floats:
         """The outputs at the end of each rung, with its inputs; ends with a deviation from rest above `largest`."""
         self._fmu.restore(start.saved)
         self._time, inputs = start.time, None
-        found = []
+        found, step = [], self._fmu.step
         for held, rung in legs:
             if held is not inputs:
                 self._inputs_now[:] = inputs = held
                 self._write()
             for _ in range(rung.steps):
-                self._fmu.step(self._time, rung.h)
+                step(self._time, rung.h)
                 self._time += rung.h
             self._read()
             found.append(self._outputs_now.copy())
-            if not np.abs((found[-1] - self.at_rest) / self.weight).max(initial=0.0) <= largest:
+            if largest < np.inf and not np.abs((found[-1] - self.at_rest) / self.weight).max(initial=0.0) <= largest:
                 break
         return np.array(found).reshape(len(found), len(self.outputs))
 
-    def stepped(self, start: SavedState, rung: Rung, held: Floats | None = None) -> tuple[Floats, SavedState]:
-        """The outputs and the state after a rung."""
-        outputs = self.outputs_after(start, [rung], held)[0]
+    def stepped(self, start: SavedState, rung: Rung, held: Floats) -> tuple[Floats, SavedState]:
+        """The outputs and the state after a rung; the inputs are `held`."""
+        outputs = self._course(start, [(held, rung)])[0]
         return outputs, SavedState(self._fmu.save(), self._time)
+
+    def followed(self, start: SavedState, rung: Rung) -> tuple[Floats, SavedState]:
+        """The outputs and the state after a rung, the inputs at rest; the FMU goes there once."""
+        if (start, rung) not in self._followed:
+            self._followed[start, rung] = self.stepped(start, rung, self.held)
+        return self._followed[start, rung]
 
     def futures(self, pair: Pair, rungs: Sequence[Rung]) -> Floats:
         """What outputs do from a state, the inputs at rest: their differences at the end of each rung, in a row."""

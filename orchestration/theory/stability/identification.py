@@ -93,7 +93,7 @@ def _expect_one_rate(excitation: Excitation, sample: Rung) -> None:
     pulsed = excitation.held + excitation.pulses
     for _ in range(SAMPLES):
         perturbed, _ = excitation.stepped(rest, sample, pulsed)
-        unperturbed, rest = excitation.stepped(rest, sample)
+        unperturbed, rest = excitation.followed(rest, sample)
         response = (perturbed - unperturbed) / excitation.pulse
         first = response if first is None else first
         if np.abs(response - first).max(initial=0.0) > TURN * max(1.0, np.abs(first).max(initial=0.0)):

@@ -63,7 +63,7 @@ class Tangent(LinearSimulator):
         key = round(h * NANOSECONDS)
         if key not in self._known:
             excitation, rung = self._excitation, self._rung(h)
-            by_pair = [self._difference([excitation.stepped(s, rung) for s in pair]) for pair in self._pairs]
+            by_pair = [self._difference([excitation.followed(s, rung) for s in pair]) for pair in self._pairs]
             sizes = excitation.pulses / excitation.pulse
             by_input = [
                 self._difference([excitation.stepped(excitation.rest, rung, excitation.pulsed(i, x)) for x in (1, -1)])
@@ -82,8 +82,8 @@ class Tangent(LinearSimulator):
         """
         state, rung = SavedState(saved, 0.0), self.ladder[0]
         found: Floats = self._axes.T @ self._deviation(state)
-        outputs, later = self._excitation.stepped(state, rung)
-        at_rest, _ = self._excitation.stepped(self._excitation.rest, rung)
+        outputs, later = self._excitation.followed(state, rung)
+        at_rest, _ = self._excitation.followed(self._excitation.rest, rung)
         seen = [self._deviation(state), outputs - at_rest, self._axes.T @ self._deviation(later)]
         after = self.derivatives(rung.duration)[0] @ found
         predicted = np.concatenate([self._back @ found, after])
@@ -136,7 +136,7 @@ class Tangent(LinearSimulator):
             ranks.append(0 if found is None else len(found[1]))
             if len(ranks) >= fewest and len(set(ranks[-3:])) == 1:
                 break
-            pairs = [(excitation.stepped(up, rung)[1], excitation.stepped(down, rung)[1]) for up, down in pairs]
+            pairs = [(excitation.followed(up, rung)[1], excitation.followed(down, rung)[1]) for up, down in pairs]
         if found is None or not len(found[1]):
             self._axes = self._back = np.zeros((len(ladder) * len(self.outputs), 0))
             self._pairs, self._inverse = [], np.zeros((0, 0))
