@@ -10,6 +10,7 @@ from orchestration.foundation.basics.errors import SimulatorError
 from orchestration.foundation.processes import subprocesses
 from orchestration.foundation.processes.child import Child, Died
 from orchestration.foundation.processes.resource_limits import UNLIMITED, Limits
+from orchestration.foundation.processes.typed_frames import result_kind
 
 T = TypeVar("T")
 
@@ -32,7 +33,7 @@ def isolated_call(fmus: Iterable[Path], function: Callable[..., T], *arguments: 
             limits=replace(UNLIMITED, memory=Limits.memory),
         ) as child:
             child.send((function, arguments))
-            result, error = child.receive()
+            result, error = child.receive(tuple[result_kind(function) | None, Exception | None])  # type: ignore[misc]
     except Died as death:
         raise LostError(f"the process of the FMUs {death}") from None
     if error is not None:

@@ -20,6 +20,8 @@ from orchestration.foundation.processes.child import Child, Died
 Command = tuple[Any, ...]
 """`("write", index, bytes)`, `("reader" or "writer", names)`, `("read",)` or the name of a method and its arguments"""
 
+_Answer = tuple[Value | bytes | None, Exception | None, bool, list[str]]
+"""Result and error of the last command, whether the instance has failed, and its warnings"""
 _PATIENCE = 5.0
 """Time in which a process must end after its last command [s]"""
 
@@ -118,7 +120,11 @@ class IsolatedInstance(Instance):
         return write
 
     def _refresh(self) -> None:
-        values = np.frombuffer(self._exchange([("read",)]))
+        content = self._exchange([("read",)])
+        if not isinstance(content, bytes) or len(content) != 8 * sum(map(len, self._values)):
+            self.failed = True
+            raise SimulatorError(f"{self.name} ({self.model.name}): its process sends other values than were asked for")
+        values = np.frombuffer(content)
         start = 0
         for each in self._values:
             each[:] = values[start : start + len(each)]
@@ -136,7 +142,7 @@ class IsolatedInstance(Instance):
         commands, self._waiting = [*self._waiting, *commands], []
         try:
             self._child.send(commands)
-            result, error, self.failed, self.warnings = self._child.receive()
+            result, error, self.failed, self.warnings = self._child.receive(_Answer)
         except Died as death:
             self.failed = True
             raise SimulatorError(f"{self.name} ({self.model.name}): its process {death}") from None

@@ -11,7 +11,7 @@ from orchestration.components.fmi.isolated_instance import Command
 from orchestration.components.fmi.native import NativeInstance
 from orchestration.components.fmi.opening import open_here
 from orchestration.foundation.basics.simulator import Floats, Transfer
-from orchestration.foundation.processes.channel import Parent, picklable
+from orchestration.foundation.processes.channel import Parent
 
 
 class _Server:
@@ -62,7 +62,7 @@ def main(path: str, name: str) -> None:
         try:
             result = server.execute(commands)
         except Exception as raised:
-            error = picklable(raised)
+            error = raised
         instance = server.instance
         parent.send((result, error, instance is None or instance.failed, [] if instance is None else instance.warnings))
     if server.instance is not None:

@@ -84,7 +84,7 @@ def _tested(content: str, path: Path) -> Repeatability:
                 "orchestration.components.fmi.repeatability_process", path.absolute(), manner
             )
             with Child(module, environment=subprocesses.environment(TMPDIR=str(folder)), limits=Limits()) as child:
-                ending = child.receive_all(shown.update)
+                ending = child.receive_all(shown.update, dict[str, bool])
         if ending.reached is not None:
             return Repeatability()
         if shown.pop("fresh", False):

@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
+from orchestration.foundation.processes.passable import passable
+
 MAX_MESSAGE_LENGTH = 4000
 """Largest number of characters in a message: names in it may come from a file and have any length"""
 
@@ -13,8 +15,12 @@ MAX_MESSAGE_LENGTH = 4000
 Value = TypeVar("Value")
 
 
+@passable
 class QuadcosimError(Exception):
     """A failure; the text states what went wrong and what was expected (exit code 1)."""
+
+    def __init_subclass__(cls) -> None:
+        passable(cls)
 
     def __init__(self, text: str) -> None:
         super().__init__(one_line(text))

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 from typing_extensions import dataclass_transform
 
 from orchestration.foundation.basics.errors import UsageError, no_such_key, shown
+from orchestration.foundation.processes.passable import passable
 
 if TYPE_CHECKING:
     import pydantic
@@ -78,7 +79,7 @@ def record(place: str = "") -> Callable[[Class], Class]:
                     raise UsageError(_first_problem(error, place, kwargs)) from None
 
         record_class.__init__ = checked
-        result: Class = record_class
+        result: Class = passable(record_class)
         return result
 
     return declared

@@ -1,16 +1,29 @@
-"""Messages between a process and its parent: pickled frames over the child's standard streams."""
+"""Messages between a process and its parent, over the child's standard streams.
 
-import math
+A process that was started trusts the one that started it, whose messages are pickled. What comes back is typed: foreign
+code in that process can write into its streams whatever it likes.
+"""
+
+import contextlib
 import os
 import pickle
+import select
 import signal
 import struct
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from typing import IO, Any
+from io import BufferedReader
+from typing import IO, Any, NoReturn, cast
+
+from orchestration.foundation.processes.typed_frames import FrameError, pack, unpack
 
 _HEADER = struct.Struct("<Q")
+_BLOCK = 2**20
+"""Most bytes that are read at once: memory grows with what has come, not with what is announced"""
+STALL = 60.0
+"""Time without a further byte after which a frame that has begun is given up [s]"""
 _POLL = 0.5
 """Time between two checks whether the parent lives [s]"""
 
@@ -19,23 +32,13 @@ parent_id = os.getppid()
 """The process that started this one, or the server that forked it: it may end before this one looks"""
 
 
-class LongError(EOFError):
+class LongError(FrameError):
     """A frame is longer than allowed."""
 
 
 def to_frame(content: object) -> bytes:
-    """`content` as a frame; raises what `pickle` raises."""
-    data = pickle.dumps(content, pickle.HIGHEST_PROTOCOL)
-    return _HEADER.pack(len(data)) + data
-
-
-def picklable(error: BaseException) -> BaseException:
-    """The error itself, or a `RuntimeError` with its name and text if it cannot be pickled and unpickled."""
-    try:
-        pickle.loads(pickle.dumps(error))
-    except Exception:
-        return RuntimeError(f"{type(error).__name__}: {error}")
-    return error
+    """`content` as a frame for a process that trusts this one; raises what `pickle` raises."""
+    return _framed(pickle.dumps(content, pickle.HIGHEST_PROTOCOL))
 
 
 def write_frame(stream: IO[bytes], frame: bytes) -> None:
@@ -44,20 +47,42 @@ def write_frame(stream: IO[bytes], frame: bytes) -> None:
     stream.flush()
 
 
-def read_frame(stream: IO[bytes], limit: float = math.inf) -> Any:
-    """The content of the next frame; raises `EOFError` if there is none or it is not a valid frame.
+def read_frame(stream: IO[bytes], limit: float) -> Any:
+    """The content of the next typed frame; raises `EOFError` if there is none, `FrameError` if it is not one.
 
     Raises `LongError`, before it is read, if it has more than `limit` bytes.
     """
-    try:
-        (length,) = _HEADER.unpack(stream.read(_HEADER.size))
-        if length > limit:
-            raise LongError
-        return pickle.loads(stream.read(length))
-    except EOFError:
-        raise
-    except Exception as error:  # truncated or foreign bytes may raise anything
-        raise EOFError from error
+    buffered = cast(BufferedReader, stream)
+    (length,) = _HEADER.unpack(_exactly(buffered, _HEADER.size, has_begun=False))
+    if length > limit:
+        raise LongError
+    return unpack(_exactly(buffered, length, has_begun=True))
+
+
+def _framed(data: bytes) -> bytes:
+    return _HEADER.pack(len(data)) + data
+
+
+def _exactly(stream: BufferedReader, count: int, *, has_begun: bool) -> bytes:
+    """So many bytes, of a frame that has begun or may begin at any time; none are read into a buffer before."""
+    content = bytearray()
+    while len(content) < count:
+        if (has_begun or content) and not _comes(stream):
+            raise FrameError("it ends in the middle")
+        block = stream.read1(min(count - len(content), _BLOCK))
+        if not block:
+            raise EOFError
+        content += block
+    return bytes(content)
+
+
+def _comes(stream: BufferedReader) -> bool:
+    """Whether something can be read, within `STALL`."""
+    if sys.platform == "win32":  # pipes cannot be polled there
+        return True
+    poll = select.poll()
+    poll.register(stream, select.POLLIN)
+    return bool(poll.poll(1000.0 * STALL))
 
 
 class Parent:
@@ -80,26 +105,27 @@ class Parent:
         threading.Thread(target=self._leave_with_parent, daemon=True).start()
 
     def send(self, content: object) -> None:
-        """Send one message; raises what `pickle` raises."""
-        frame = to_frame(content)
+        """Send one message; raises `TypeError` for what is no data."""
+        frame = _framed(pack(content))
         try:
             write_frame(self._answers, frame)
         except OSError:  # the parent has closed its end
             self.leave()
 
     def receive(self) -> Any:
-        """The next message; raises `EOFError` if there are no more."""
-        return read_frame(self._requests)
+        """The next message; this process ends if there is none: its parent has ended, or needs it no more."""
+        for message in self:
+            return message
+        self.leave()
 
     def __iter__(self) -> Iterator[Any]:
         """All messages, as they come."""
-        while True:
-            try:
-                yield self.receive()
-            except EOFError:
-                return
+        with contextlib.suppress(EOFError, struct.error, pickle.UnpicklingError):  # the last one may not be whole
+            while True:
+                (length,) = _HEADER.unpack(self._requests.read(_HEADER.size))
+                yield pickle.loads(self._requests.read(length))
 
-    def leave(self) -> None:
+    def leave(self) -> NoReturn:
         """End this process because its parent has ended."""
         self._leaving.acquire()
         self._on_orphaned()

@@ -11,7 +11,7 @@ import weakref
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, TypeVar
 
 from orchestration.foundation.processes.channel import LongError, read_frame, to_frame, write_frame
 from orchestration.foundation.processes.family import Family
@@ -21,11 +21,17 @@ from orchestration.foundation.processes.process import Process
 from orchestration.foundation.processes.resource_limits import UNLIMITED, Limits
 from orchestration.foundation.processes.subprocesses import Module
 from orchestration.foundation.processes.subprocesses import environment as usual_environment
+from orchestration.foundation.processes.typed_frames import FrameError, expect
+
+Result = TypeVar("Result")
 
 _KEPT = 16_384
 """Bytes kept of the end of the process's output"""
 _MAX_MESSAGE_MB = 64.0
 """Largest size of one message from a process whose output is limited [MB]"""
+_LARGEST_MESSAGE_MB = 2000.0
+"""The same of any other process"""
+_NO_MESSAGE = "it sends what is no message of quadcosim"
 _OUT_OF_PROCESSOR = "it uses more processor time than the system allows (ulimit -t)"
 _PATIENCE = 60.0
 """Time to wait for the exit of a process that has closed its channel [s]"""
@@ -91,7 +97,7 @@ class Child:
         self.pid = process.pid
         self._is_limited = math.isfinite(limits.time)
         self._output = None if process.stderr is None else _Output(process.stderr)
-        self._longest_message = math.inf if math.isinf(limits.output) else _MAX_MESSAGE_MB * 1e6
+        self._longest_message = _LARGEST_MESSAGE_MB if math.isinf(limits.output) else _MAX_MESSAGE_MB
         self._watch = Watch(process, family, limits, self._output)
         self._end = weakref.finalize(self, _terminate, process, family, self._watch)
 
@@ -118,26 +124,31 @@ class Child:
         except (OSError, ValueError):  # it has ended, or was closed by another thread
             raise Died(self._ending_now()) from None
 
-    def receive(self) -> Any:
-        """The next message; raises `Died`."""
+    def receive(self, kind: Any = Any) -> Any:
+        """The next message, which must fit `kind`, an annotation; raises `Died`, also if it does not."""
         assert self._process.stdout is not None
         try:
-            return read_frame(self._process.stdout, self._longest_message)
-        except LongError:
-            self.close()
-            self._watch.reached = self._watch.reached or f"it sends more than {_MAX_MESSAGE_MB:g} MB at once"
-            raise Died(self._ending_now()) from None
-        except EOFError:
+            return expect(read_frame(self._process.stdout, self._longest_message * 1e6), kind)
+        except FrameError as error:
+            raise self._ended_for(error) from None
+        except (EOFError, OSError, ValueError):  # it has ended, or was closed by another thread
             raise Died(self._ending_now()) from None
 
-    def receive_all(self, handle: Callable[[Any], None]) -> Ending:
-        """Pass all messages to `handle`; returns how the process ended."""
+    def receive_by(self, handle: Callable[[Any], Result], kind: Any = Any) -> Result:
+        """Pass the next message, as `receive`, to `handle`, which may raise `FrameError`: then this raises `Died`."""
+        message = self.receive(kind)
+        try:
+            return handle(message)
+        except FrameError as error:
+            raise self._ended_for(error) from None
+
+    def receive_all(self, handle: Callable[[Any], None], kind: Any = Any) -> Ending:
+        """Pass all messages to `handle`, as `receive_by`; returns how the process ended."""
         while True:
             try:
-                message = self.receive()
+                self.receive_by(handle, kind)
             except Died as death:
                 return death.ending
-            handle(message)
 
     def ending(self, patience: float | None = None) -> Ending:
         """Wait for its end, at most `patience` [s], and then end it; returns how it ended."""
@@ -171,6 +182,13 @@ class Child:
 
     def __exit__(self, *exception: object) -> None:
         self.close()
+
+    def _ended_for(self, error: FrameError) -> Died:
+        """Its death, of a message that is none: foreign code in it may write what it likes into its streams."""
+        self.close()
+        too_long = f"it sends more than {self._longest_message:g} MB at once"
+        self._watch.reached = self._watch.reached or (too_long if isinstance(error, LongError) else _NO_MESSAGE)
+        return Died(self._ending_now())
 
     def _ending_now(self) -> Ending:
         return self.ending(None if self._is_limited else _PATIENCE)

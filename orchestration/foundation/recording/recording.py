@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from orchestration.foundation.basics.simulator import Floats, Integers
 from orchestration.foundation.basics.times import instants_of
+from orchestration.foundation.processes.passable import passable
 
 ROWS, EVENTS = 2**15, 2**18
 """A chunk is complete with this many rows or events, so that what is computed by chunks does not depend on where they
@@ -39,6 +40,7 @@ KINDS = (
 SAMPLED, SENT, ARRIVED, LOST = range(4)
 
 
+@passable
 @dataclass(frozen=True, eq=False)
 class Events(Sequence[Event]):
     """Events in order, as columns: one object for all of them, as there may be millions."""
@@ -81,6 +83,7 @@ class Events(Sequence[Event]):
         return event
 
 
+@passable
 @dataclass(frozen=True, kw_only=True)
 class Chunk:
     """Consecutive rows, and the events after the row before them up to their last row."""

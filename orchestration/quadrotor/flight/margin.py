@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.processes.passable import passable
 from orchestration.quadrotor.flight.hover_limit import local_limit
 from orchestration.quadrotor.flight.hover_loop import HoverLoop
 from orchestration.quadrotor.scenarios.scenario import Scenario
@@ -10,6 +11,7 @@ from orchestration.systems.system.distribution import lowest
 from orchestration.theory.stability.delay_bounds import SampledLoop, breaking_jitter, certain_jitter
 
 
+@passable
 @dataclass(frozen=True, kw_only=True)
 class Margin:
     """Delay margins of the linear loop about hover, all in seconds."""

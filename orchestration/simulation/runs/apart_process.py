@@ -10,7 +10,7 @@ from typing import Any
 
 from orchestration.components.fmi.instance import Instance
 from orchestration.components.fmi.opening import open_instance
-from orchestration.foundation.processes.channel import Parent, picklable
+from orchestration.foundation.processes.channel import Parent
 from orchestration.foundation.recording.recording import About, Chunk, InMemory, Recording
 from orchestration.simulation.engines.memory import FolderMemory
 from orchestration.simulation.runs.prepared import prepared
@@ -71,7 +71,7 @@ def main(folder: str) -> None:
         _simulate(order, reporter, Path(folder))
     except BaseException as error:
         if not reporter.is_over:
-            reporter.report("error", picklable(error))
+            reporter.report("error", error)
     reporter.report("end")
 
 

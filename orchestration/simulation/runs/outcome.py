@@ -7,6 +7,7 @@ from typing import Any
 
 from orchestration.foundation.basics.errors import Named, SimulatorError
 from orchestration.foundation.basics.interrupt import Interrupted
+from orchestration.foundation.processes.passable import passable
 from orchestration.foundation.recording.recording import Recorder
 from orchestration.simulation.engines.resolved import ResolvedRequest, uneven_steps
 from orchestration.simulation.results import objectives
@@ -34,6 +35,7 @@ class RunLost(SimulatorError):
     """The process of a run ended before the run did; the text states how and when."""
 
 
+@passable
 @dataclass(frozen=True, kw_only=True)
 class RunOutcome:
     """How a run ended, beside what was recorded."""

@@ -12,6 +12,7 @@ from orchestration.foundation.basics.times import nanoseconds
 from orchestration.foundation.processes import subprocesses
 from orchestration.foundation.processes.child import Child, Died
 from orchestration.foundation.processes.resource_limits import UNLIMITED
+from orchestration.foundation.processes.typed_frames import call
 from orchestration.foundation.recording.recording import Chunk, Recorder
 from orchestration.simulation.engines.backlog import RunEvents
 from orchestration.simulation.engines.master import Engine
@@ -25,6 +26,8 @@ from orchestration.systems.system.request import Request
 _MESSAGES = logging.getLogger("quadcosim")
 _PATIENCE = 5.0
 """Time in which the process must end after its last message [s]"""
+_REPORTS = ("describe", "begin", "take", "share", "message", "stage", "outcome", "error", "end")
+"""Methods of `_Receiver` that a message may name"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,11 +102,9 @@ class _Receiver:
         try:
             child.send(order)
             while True:
-                name, *content = child.receive()
-                if name == "end":
+                if child.receive_by(lambda message: call(self, message, _REPORTS)) == "end":
                     child.close(_PATIENCE)
                     return None
-                getattr(self, name)(*content)
         except Died as death:
             reached = death.ending.reached
             return str(death) if reached is None else f"was ended: {reached}"
@@ -137,6 +138,9 @@ class _Receiver:
 
     def error(self, error: BaseException) -> None:
         raise error
+
+    def end(self) -> None:
+        """The last message."""
 
 
 def _lost(resolved: ResolvedRequest, receiver: _Receiver, folder: Path, ending: str) -> RunOutcome:

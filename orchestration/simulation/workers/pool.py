@@ -70,15 +70,15 @@ class WorkerProcess:
         """Send a task and return the answer; raises `Died`, also at its time limit."""
         self._child.allow(task.time_limit)
         self._child.send(task)
-        answer = self._child.receive()
+        kind: Any = list[tasks.TaskOutcome] | tasks.EnvironmentFailure
+        answer = self._child.receive_by(lambda answer: tasks.of_task(task, answer), kind)
         self._child.allow(None)
         return answer
 
     def wait_until_ready(self, own_fmus: frozenset[str]) -> tasks.Ready:
         """The report of the process once it has started; raises `Died`."""
         self._child.send((sources(), own_fmus))
-        answer = self._child.receive()
-        assert isinstance(answer, tasks.Ready)
+        answer: tasks.Ready = self._child.receive(tasks.Ready)
         return answer
 
     def close(self) -> None:
@@ -136,8 +136,8 @@ class Supervisor:
                 continue
             if isinstance(answer, tasks.EnvironmentFailure):
                 raise tasks.WorkerEnvironmentError(f"not a failure of a run: {answer.message}")
-            assert isinstance(answer, list)
-            return answer
+            outcomes: list[tasks.TaskOutcome] = answer
+            return outcomes
 
     def _failed(self, task: tasks.RunTask, message: str, *, ended: bool = False) -> tasks.TaskOutcome:
         return tasks.TaskOutcome(row=tasks.row_of(task, None, message, 0.0, self._machine), ended=ended)

@@ -4,7 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from orchestration.foundation.processes.passable import passable
 
+
+@passable
 @dataclass(frozen=True, kw_only=True)
 class Row:
     """One run: its settings and its results."""

@@ -4,7 +4,7 @@ import io
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,8 @@ from orchestration.components.fmi.instance import Instance
 from orchestration.components.fmi.read_description import read_model
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError
+from orchestration.foundation.processes.passable import passable
+from orchestration.foundation.processes.typed_frames import FrameError
 from orchestration.simulation.engines.master import BATCH, Engine
 from orchestration.simulation.results.own_metrics import OwnMetric
 from orchestration.simulation.runs.prepared import prepared
@@ -54,6 +56,7 @@ class TaskBatch:
         return sum(limits) if len(limits) == len(self.tasks) else None
 
 
+@passable
 @dataclass(frozen=True, kw_only=True)
 class TaskOutcome:
     """The row of a run, and its signals as the bytes of a Parquet file if they are kept."""
@@ -64,6 +67,7 @@ class TaskOutcome:
     """whether it was stopped at a limit"""
 
 
+@passable
 @dataclass(frozen=True, kw_only=True)
 class Ready:
     """The report of a started worker process: its software and the kind of its machine."""
@@ -72,11 +76,33 @@ class Ready:
     machine: str
 
 
+@passable
 @dataclass(frozen=True, kw_only=True)
 class EnvironmentFailure:
     """This worker cannot simulate, for a reason that is not a failure of a run."""
 
     message: str
+
+
+def of_task(
+    task: RunTask | TaskBatch, answer: list[TaskOutcome] | EnvironmentFailure
+) -> list[TaskOutcome] | EnvironmentFailure:
+    """An answer with the rows of its task, whatever its worker, which runs foreign code, says that they are of.
+
+    Raises `FrameError` if it has not one for each run.
+    """
+    several = task.tasks if isinstance(task, TaskBatch) else (task,)
+    if isinstance(answer, EnvironmentFailure):
+        return answer
+    if len(answer) != len(several):
+        raise FrameError("expected one outcome of each run")
+    return [
+        replace(
+            outcome,
+            row=replace(outcome.row, index=one.index, key=one.key, settings=one.settings, seed=one.system.seed),
+        )
+        for one, outcome in zip(several, answer)
+    ]
 
 
 class WorkerEnvironmentError(QuadcosimError):

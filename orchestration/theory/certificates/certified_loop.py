@@ -5,6 +5,7 @@ from fractions import Fraction
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.foundation.processes.passable import passable
 from orchestration.systems.system.connection import Connection, variable_of
 from orchestration.systems.system.model import System
 from orchestration.theory.stability.loop_at_rest import AtRest
@@ -18,6 +19,7 @@ from orchestration.theory.stability.matrices import (
 )
 
 
+@passable
 @dataclass(frozen=True, kw_only=True)
 class CertifiedLoop:
     """A system about its operating point, as matrices."""

@@ -13,6 +13,7 @@ from orchestration.components.fmi.read_description import Model
 from orchestration.foundation.basics.bisection import bisected
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.foundation.processes.passable import passable
 from orchestration.systems.system.computers import Task
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System
@@ -34,6 +35,7 @@ Word = tuple[int, ...]
 """Choices by turn, 0 or 1: nothing, or the value"""
 
 
+@passable
 @dataclass(frozen=True, kw_only=True)
 class RepeatedSearch:
     """A repeated sequence that makes a loop unstable, if one was found."""

@@ -7,6 +7,7 @@ from typing import Any
 
 from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.processes.passable import passable
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.systems.expressions.syntax import Call
 from orchestration.systems.system.files import files_of
@@ -17,6 +18,7 @@ from orchestration.theory.exact.objective_means import ObjectiveMeans
 from orchestration.theory.stability.known_loops import LOOPS, rested
 
 
+@passable
 @dataclass(frozen=True, kw_only=True)
 class Expected:
     """Expectations of a linear loop, stationary or from its initial conditions to a horizon."""

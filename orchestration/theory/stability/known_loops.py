@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from orchestration.foundation.basics.registry import Registry
+from orchestration.foundation.processes.passable import passable
 
 if TYPE_CHECKING:
     from orchestration.foundation.basics.bisection import Range
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from orchestration.systems.system.request import Request
 
 
+@passable
 @dataclass(frozen=True, kw_only=True)
 class LinearLimit:
     """A limit of small deviations, or of their mean squares; None: there is none, for a reason."""

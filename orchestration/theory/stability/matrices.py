@@ -10,6 +10,7 @@ import numpy as np
 
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS, nanoseconds
+from orchestration.foundation.processes.passable import passable
 from orchestration.theory.stability.linearised_component import Tangent
 
 NEAR, FAR = 0.1, 0.5
@@ -30,6 +31,7 @@ Derivatives = Callable[[float], tuple[Floats, Floats]]
 and by the inputs"""
 
 
+@passable
 @dataclass(frozen=True, kw_only=True)
 class Matrices:
     """A linear system, by the names of its inputs and outputs."""
@@ -42,6 +44,7 @@ class Matrices:
     D: Floats
 
 
+@passable
 @dataclass(frozen=True, kw_only=True)
 class Continuous(Matrices):
     """A component in continuous time: ẋ = A x + B u, y = C x + D u."""
@@ -52,6 +55,7 @@ class Continuous(Matrices):
     """why the matrices do not describe the component; None: they do"""
 
 
+@passable
 @dataclass(frozen=True, kw_only=True)
 class SampledSystem(Matrices):
     """A sampled component: at each sample y = C x + D u, and then x becomes A x + B u."""

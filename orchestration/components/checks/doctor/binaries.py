@@ -9,6 +9,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import BinaryIO
 
+from orchestration.foundation.processes.passable import passable
+
 LINUX, WINDOWS, MACOS = "Linux", "Windows", "macOS"
 
 _ELF_SYSTEMS = {"ELFOSABI_SYSV": LINUX, "ELFOSABI_LINUX": LINUX}
@@ -33,6 +35,7 @@ class UnreadableError(Exception):
     """A file is no shared library of a known format, or damaged."""
 
 
+@passable
 @dataclass(frozen=True, kw_only=True)
 class Dependency:
     """A library that must be found, and the versions of symbols that it must define."""
@@ -41,6 +44,7 @@ class Dependency:
     versions: tuple[str, ...] = ()
 
 
+@passable
 @dataclass(frozen=True, kw_only=True)
 class Binary:
     """A shared library or program."""

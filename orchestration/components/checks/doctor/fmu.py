@@ -29,6 +29,7 @@ from orchestration.components.fmi.archive import (
     version_of,
 )
 from orchestration.components.fmi.slaves import binary_folders
+from orchestration.foundation.processes.passable import passable
 
 CO_SIMULATION = "CoSimulation"
 KINDS = {CO_SIMULATION: "co-simulation", "ModelExchange": "model exchange", "ScheduledExecution": "scheduled execution"}
@@ -72,6 +73,7 @@ For processors other than x86, FMI 2.0 uses the names of FMI 3.0 (FMI 2.0.4, sec
 _SUFFIXES = {"linux": ".so", "win": ".dll", "darwin": ".dylib"}
 
 
+@passable
 @dataclass(frozen=True, kw_only=True)
 class PlatformBinary:
     """The FMU's library for one platform."""
@@ -87,6 +89,7 @@ class PlatformBinary:
     problem: str | None = None
 
 
+@passable
 @dataclass(frozen=True, kw_only=True)
 class InspectedFmu:
     """The requirements of an FMU."""

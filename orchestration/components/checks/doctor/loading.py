@@ -20,6 +20,9 @@ from orchestration.foundation.processes.channel import Parent
 from orchestration.foundation.processes.child import Child, Ending
 from orchestration.foundation.processes.resource_limits import Limits, restrict
 
+_Report = dict[str, InspectedFmu | UnreadableFmuError | str | bool]
+"""What the process sends, in parts"""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Trial:
@@ -58,15 +61,15 @@ def _try_loading(path: Path, limits: Limits, environment: Mapping[str, str]) -> 
         )
         received: dict[str, Any] = {}
         with Child(module, environment=environment, limits=limits) as child:
-            ending = child.receive_all(received.update)
+            ending = child.receive_all(received.update, _Report)
     if isinstance(received.get("error"), OtherVersionError):
         raise received["error"]
     if "error" in received:
         raise UsageError(f"{path}: {received['error']}")
-    if "fmu" not in received:
+    fmu = received.get("fmu")
+    if not isinstance(fmu, InspectedFmu):
         words = f": {ending.last_line}" if ending.last_line else ""
         raise UsageError(f"{path}: could not be read, the process {ending.description}{words}")
-    fmu: InspectedFmu = received["fmu"]
     if CO_SIMULATION not in fmu.kinds:
         return Trial(fmu=fmu, failure=f"not tried: it is for {' and '.join(KINDS[kind] for kind in fmu.kinds)} only")
     return Trial(fmu=fmu, failure=_failure(received, ending))

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 
 from fmu_kit.syntax_trees import parse_module
 from orchestration.components.fmi.slaves import ENTRY
+from orchestration.foundation.processes.passable import passable
 
 _MODULES = (".py", ".so", ".pyd")
 _IMPORT_ERRORS = {"ImportError", "ModuleNotFoundError"}
 
 
+@passable
 @dataclass(frozen=True, kw_only=True)
 class PythonSources:
     """The requirements of the sources in an FMU of pythonfmu."""

@@ -7,6 +7,7 @@ from typing import Any
 
 from orchestration.components.checks.validation.finding import Finding, Note, Rule, Subject, name_of
 from orchestration.foundation.basics.errors import SimulatorError
+from orchestration.foundation.processes.typed_frames import call
 
 MAX_FINDINGS = 100
 """Findings of one rule that are listed"""
@@ -14,8 +15,10 @@ MAX_FINDING_LENGTH = 1000
 """Characters of the text of a finding"""
 _BEAT = 0.02
 """Least time between two beats [s]"""
+_MESSAGES = ("begin", "beat", "finding", "failed", "end")
+"""Methods of `ReceivedReport` that a message may name"""
 Frame = tuple[Any, ...]
-"""The name of a method of `ReceivedReport` without its underscore, and its arguments"""
+"""One of these, and its arguments"""
 
 
 class Reporter:
@@ -87,21 +90,25 @@ class ReceivedReport:
         self._clock = clock
 
     def receive(self, frame: Frame) -> None:
-        """The next frame."""
-        name, *content = frame
-        getattr(self, f"_{name}")(*content)
+        """The next frame; raises `FrameError` if it is none."""
+        call(self, frame, _MESSAGES)
 
-    def _begin(self, rule: str) -> None:
+    def begin(self, rule: str) -> None:
+        """A rule begins."""
         self.rule = rule
 
-    def _beat(self) -> None:
+    def beat(self) -> None:
+        """A call begins or has returned."""
         self.last_beat = self._clock()
 
-    def _finding(self, text: str, note: bool) -> None:
+    def finding(self, text: str, note: bool) -> None:
+        """The rule has a finding."""
         self.findings.append(Finding(str(self.rule), text, note=note))
 
-    def _failed(self, error: str) -> None:
+    def failed(self, error: str) -> None:
+        """The validation itself fails."""
         self.error = error
 
-    def _end(self) -> None:
+    def end(self) -> None:
+        """All rules have been tried."""
         self.ended = True

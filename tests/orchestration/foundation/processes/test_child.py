@@ -218,8 +218,7 @@ def test_a_child_whose_input_is_closed_ends_itself_if_there_is_patience(
         ("import sys; sys.exit(3)", "ended with exit code 3"),
         ("import os; os.kill(os.getpid(), 11)", "ended by SIGSEGV"),
         pytest.param("import os; os.kill(os.getpid(), 40)", "ended by signal 40", marks=linux_only),
-        ("parent.send(Unknown())", "ended with exit code 0"),
-        ("import os; os.write(parent._answers.fileno(), b'not a frame, but as long')", "ended with exit code 0"),
+        ("parent.send(Unknown())", "ended with exit code 1"),
         ("parent._answers.write(bytes([200, 0, 0, 0, 0, 0, 0, 0, 1]))", "ended with exit code 0"),
         ("import os, time; os.close(parent._answers.fileno()); time.sleep(600)", "does not answer"),
     ],
@@ -234,6 +233,49 @@ def test_the_end_of_a_child_is_reported_to_a_waiting_receiver(
         one.receive()
     assert str(death.value) == expected
     assert gone(one.pid)
+
+
+PICKLE = """
+class Evil:
+    def __reduce__(self): return os.mkdir, (sys.argv[1],)
+frame = pickle.dumps(Evil())
+write(struct.pack("<Q", len(frame)) + frame)
+"""
+NO_MESSAGE = "it sends what is no message of quadcosim"
+
+
+@pytest.mark.parametrize(
+    ("program", "reached"),
+    [
+        (PICKLE, NO_MESSAGE),
+        ("write(b'no frame, but long enough for one')", "it sends more than 2000 MB at once"),
+        ("write(struct.pack('<Q', 2**62))", "it sends more than 2000 MB at once"),
+        ("write(struct.pack('<Q', 100) + bytes(7))", NO_MESSAGE),
+        ("write(bytes(5))", NO_MESSAGE),
+        ("write(struct.pack('<Q', 5) + b'\\xdd\\xff\\xff\\xff\\xff')", NO_MESSAGE),
+        ("parent.send('a text')", NO_MESSAGE),
+    ],
+)
+def test_a_child_that_writes_what_is_no_message_into_all_that_it_has_open_is_ended(
+    program: str, reached: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("orchestration.foundation.processes.channel.STALL", 0.1)
+    write = """
+import os, pickle, stat, struct, sys, time
+def write(content):
+    for descriptor in range(64):
+        try:
+            os.write(descriptor, content)
+        except OSError:
+            pass
+"""
+    command = [sys.executable, "-c", f"{TALKS}\n{write}\n{program}\ntime.sleep(600)", str(tmp_path / "made")]
+    with Child(command) as one:
+        with pytest.raises(Died) as death:
+            one.receive(dict[str, float])
+        assert death.value.ending.reached == reached
+        assert gone(one.pid)
+    assert not (tmp_path / "made").exists()
 
 
 def test_sending_to_a_child_closed_by_another_thread_reports_its_death(
