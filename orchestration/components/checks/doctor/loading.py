@@ -21,7 +21,7 @@ from orchestration.foundation.processes.child import Child, Ending
 from orchestration.foundation.processes.resource_limits import Limits, restrict
 
 _Report = dict[str, InspectedFmu | UnreadableFmuError | str | bool]
-"""What the process sends, in parts"""
+"""Parts of what the process sends"""
 
 
 @dataclass(frozen=True, kw_only=True)
