@@ -2,6 +2,7 @@
 # make check: lint and the most informative fast tests, under a minute, for while you work.
 # make coverage: all tests, and which lines they run. make site: the documentation as a site, in site/.
 # make bench: time the loop. make figures, make findings, make interop: figures, tables and icons of docs/ and examples/.
+# make faults: commands whose calls of the operating system fail, and the C under sanitizers; most of an hour.
 # make release: wheel, sources, native FMUs, SSP and their checksums, in dist/.
 # make newcomer: run every block of every page in a clone of the last commit; an hour or more.
 # Each makes its own environment first.
@@ -25,7 +26,7 @@ IN_MEMORY = $(shell awk '$$2 == "/dev/shm" && $$4 !~ /noexec/ {found = 1} END {e
 	&& test -w /dev/shm && test "$$(df -Pk /dev/shm | awk 'END {print $$4}')" -gt 4000000 && echo "-p /dev/shm")
 IN_FOLDER = folder=$$(mktemp -d $(IN_MEMORY)) && trap 'rm -rf "$$folder"' EXIT && trap 'exit 130' INT TERM && TMPDIR=$$folder
 
-.PHONY: demo newcomer check test tests coverage lint bench figures findings interop release site clean
+.PHONY: demo newcomer check test tests coverage lint bench faults figures findings interop release site clean
 
 demo: .venv/.base
 	$(BIN)/quadcosim build
@@ -109,6 +110,10 @@ findings: .venv/.test
 
 interop: .venv/.test .venv-cofmupy/.made
 	QUADCOSIM_COFMUPY=$(abspath $(COFMUPY)) $(BIN)/python -m docs.make_interop
+
+faults: .venv/.test
+	$(IN_FOLDER) $(BIN)/python -m tests.faults --page
+	$(IN_FOLDER) $(BIN)/python -m tests.faults.sanitised
 
 newcomer: .venv/.test
 	$(BIN)/python -m docs.newcomer

@@ -94,7 +94,7 @@ class NewFiles:
             if folder.exists() and not folder.is_dir():
                 raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
             folder.mkdir(parents=True, exist_ok=True)
-            _clear(folder)
+            clear(folder)
             self._scratch = Scratch(folder / f".quadcosim-{os.urandom(6).hex()}.new")
             self.path = self._scratch.path / _PARTIAL
             try:
@@ -179,7 +179,7 @@ def _keep(place: Path, old: Path) -> None:
             shutil.copy2(place, old, follow_symlinks=False)
 
 
-def _clear(folder: Path) -> None:
+def clear(folder: Path) -> None:
     """Finish what ended processes have begun: move sets that are complete to their place, remove the rest."""
     folder = folder.absolute()
     if folder in _cleared:

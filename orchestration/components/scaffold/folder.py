@@ -9,7 +9,7 @@ from pathlib import Path
 from string import Template
 from typing import Literal
 
-from fmu_kit.new_files import new_files, write_atomically
+from fmu_kit.new_files import clear, new_files, write_atomically
 from orchestration.components.building import consent
 from orchestration.components.building.models import MODELS
 from orchestration.foundation.basics.errors import UsageError
@@ -45,7 +45,8 @@ def write(kind: Kind, name: str, where: Path, *, author: str, license: str) -> l
 
 
 def expect_new(folder: Path) -> None:
-    """Raise `UsageError` for a folder that exists."""
+    """Raise `UsageError` for a folder that exists, also if it was about to when a process was killed."""
+    clear(folder.parent)
     if folder.exists():
         raise UsageError(f"{folder}: exists already; expected a folder that does not exist")
 
