@@ -69,6 +69,7 @@ bench: .venv/.test
 	$(BIN)/python -m benchmarks.native
 	$(BIN)/python -m benchmarks.engines
 	$(BIN)/python -m benchmarks.batch
+	$(BIN)/python -m benchmarks.floor
 	$(BIN)/python -m benchmarks.cold
 	$(BIN)/python -m benchmarks.stores
 	$(BIN)/python -m benchmarks.cluster

@@ -9,11 +9,13 @@ import os
 import resource
 import tempfile
 from collections import defaultdict
+from dataclasses import fields
 from pathlib import Path
 
 from benchmarks.mathematics import table
 from orchestration.components.building.fmus import native_twins
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.processes.subprocesses import Module
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.simulation.interop.catalogue import TOOLS, Tool
@@ -40,11 +42,19 @@ def scenario(stop: float) -> System:
     return native_twins(Scenario(timing=Timing(period=STEP, plant_interval=STEP), stop_time=stop).as_system())
 
 
+class NewProcess(Tool):
+    """A tool that starts a new Python: the time of a forked process would be that of the fork server."""
+
+    def command(self, job: Path, rows: Path) -> list[str]:
+        command = super().command(job, rows)
+        return command.command if isinstance(command, Module) else command
+
+
 def by_tool(tool: Tool, stop: float) -> float:
     """CPU time of a flight in a tool's process, including its start [s]."""
     with tempfile.TemporaryDirectory() as folder, ToolRuns(scenario(stop), Path(folder), None) as runs:
         before = _of_children()
-        runs.run(tool)
+        runs.run(NewProcess(**{each.name: getattr(tool, each.name) for each in fields(tool)}))
         return _of_children() - before
 
 
