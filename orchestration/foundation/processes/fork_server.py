@@ -32,6 +32,8 @@ _READ_AT_START = ("PYTHON", "LD_", "LC_", "LANG", "OPENBLAS_", "OMP_", "MKL_", "
 """Prefixes of the environment variables that are read only when a process starts or loads a library"""
 _PATIENCE = 10.0
 """Time within which an unused server must exit [s]"""
+_STARTS_WITHIN = 60.0
+"""Time within which a server must have forked [s], else it is replaced"""
 _Pipes = tuple[IO[bytes] | None, IO[bytes] | None, IO[bytes] | None]
 
 
@@ -107,7 +109,7 @@ class ForkServer:
     def fork(self, request: ForkRequest, piped: tuple[bool, bool, bool]) -> ForkedProcess:
         """A process; `piped` as in `forked`.
 
-        Raises `ConnectionError` or `EOFError` if the server has ended, `OSError` if it cannot fork.
+        Raises `ConnectionError` or `EOFError` if the server has ended or does not answer, `OSError` if it cannot fork.
         """
         with contextlib.ExitStack() as own, contextlib.ExitStack() as its:
             channel, answering = socket.socketpair()  # of this process alone: an interrupt here disturbs no other
@@ -122,9 +124,14 @@ class ForkServer:
             socket.send_fds(self._connection, [b"!"], descriptors)
             its.close()
             content = pickle.dumps(request)
-            with contextlib.suppress(ConnectionError):  # if it could not fork, it has answered why
-                channel.sendall(LENGTH.pack(len(content)) + content)
-            has_ended, number = _answer(channel)
+            channel.settimeout(_STARTS_WITHIN)
+            try:
+                with contextlib.suppress(ConnectionError):  # if it could not fork, it has answered why
+                    channel.sendall(LENGTH.pack(len(content)) + content)
+                has_ended, number = _answer(channel)
+            except TimeoutError:  # it is stopped
+                raise ConnectionError("the process to fork from does not answer") from None
+            channel.settimeout(None)
             if has_ended:
                 raise OSError(f"a process has ended before it could start, with exit code {number}")
             if number < 0:

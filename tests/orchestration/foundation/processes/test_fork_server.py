@@ -133,6 +133,20 @@ def test_a_stopped_server_does_not_keep_its_process_from_ending(monkeypatch: pyt
     assert gone(server.pid)
 
 
+def test_a_stopped_server_keeps_no_process_from_starting(monkeypatch: pytest.MonkeyPatch) -> None:
+    obeys = subprocesses.Module.of("orchestration.components.fmi.foreign_process")
+    Child(obeys).close()
+    stopped = servers(obeys.name)
+    monkeypatch.setattr(fork_server, "_PATIENCE", 0.1)
+    monkeypatch.setattr(fork_server, "_STARTS_WITHIN", 0.1)
+    for server in stopped:
+        os.kill(server, signal.SIGSTOP)
+    with Child(obeys) as child:
+        child.send((os.getpid, ()))
+        assert child.receive() == (child.pid, None)
+    assert all(map(gone, stopped))
+
+
 @pytest.mark.parametrize("environment", [{"QUADCOSIM_FAMILY": "its own"}, {}], ids=["no folder", "no family"])
 def test_what_cannot_start_is_no_process(environment: dict[str, str], tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError if environment else OSError):
