@@ -89,6 +89,11 @@ static void host_goes_back(void *c, const Host *host)
     }
     EXPECT(fmi2SerializeFMUstate(other, read, bytes, size - 1) == ERROR)
     EXPECT(fmi2SetFMUstate(other, NULL) == ERROR)
+    EXPECT(fmi2GetFMUstate(other, NULL) == ERROR && fmi2SerializedFMUstateSize(other, read, NULL) == ERROR)
+    EXPECT(fmi2SerializeFMUstate(other, NULL, bytes, size) == ERROR)
+    EXPECT(fmi2SerializeFMUstate(other, read, NULL, size) == ERROR)
+    EXPECT(fmi2DeSerializeFMUstate(other, NULL, size, &read) == ERROR)
+    EXPECT(fmi2DeSerializeFMUstate(other, bytes, size, NULL) == ERROR)
     EXPECT(fmi2FreeFMUstate(other, &read) == OK && read == NULL)
     EXPECT(fmi2FreeFMUstate(c, &state) == OK && fmi2FreeFMUstate(c, &state) == OK && fmi2FreeFMUstate(c, NULL) == OK)
     fmi2FreeInstance(other);

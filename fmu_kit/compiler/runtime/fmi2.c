@@ -161,8 +161,7 @@ CALL(SerializedFMUstateSize, void *state, size_t *size)
 {
     INSTANCE;
     (void)state;
-    *size = sizeof(Serialised);
-    return OK;
+    return size_of_bytes(m, size);
 }
 
 CALL(SerializeFMUstate, void *state, char *bytes, size_t size)

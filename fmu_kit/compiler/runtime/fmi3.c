@@ -232,8 +232,7 @@ CALL(FreeFMUState, void **state)
 CALL(SerializedFMUStateSize, void *state, size_t *size)
 {
     INSTANCE;
-    *size = sizeof(Serialised);
-    return OK;
+    return size_of_bytes(m, size);
 }
 
 CALL(SerializeFMUState, void *state, uint8_t *bytes, size_t size)

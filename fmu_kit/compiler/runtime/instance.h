@@ -375,6 +375,8 @@ static Status expect_own_state(Instance *m, const void *bytes, size_t size)
 
 static Status save(Instance *m, void **state)
 {
+    if (!state)
+        return refuse_with(m, "FMU state: expected a place for it", "", "");
     if (!*state && !(*state = malloc(sizeof(State))))
         return refuse_with(m, "FMU state: no memory for it", "", "");
     memcpy(*state, &m->state, sizeof(State));
@@ -408,10 +410,18 @@ static uint64_t checksum_of(const State *state)
     return found;
 }
 
+static Status size_of_bytes(Instance *m, size_t *size)
+{
+    if (!size)
+        return refuse_with(m, "FMU state (size of its bytes): expected a place for it", "", "");
+    *size = sizeof(Serialised);
+    return OK;
+}
+
 static Status to_bytes(Instance *m, const void *state, void *bytes, size_t size)
 {
     Serialised serialised;
-    if (!state || size < sizeof serialised)
+    if (!state || !bytes || size < sizeof serialised)
         return refuse_with(m, "FMU state: expected one, and room for its bytes", "", "");
     memcpy(&serialised.state, state, sizeof serialised.state);
     serialised.checksum = checksum_of(&serialised.state);
@@ -422,7 +432,9 @@ static Status to_bytes(Instance *m, const void *state, void *bytes, size_t size)
 static Status from_bytes(Instance *m, const void *bytes, size_t size, void **state)
 {
     Serialised found;
-    if (expect_own_state(m, bytes, size) != OK)
+    if (!state)
+        return refuse_with(m, "FMU state: expected a place for it", "", "");
+    if (expect_own_state(m, bytes, bytes ? size : 0) != OK)
         return ERROR;
     if (size != sizeof found)
         return refuse_with(m, "FMU state (its bytes): expected all of them", "", "");

@@ -9,10 +9,9 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
+from orchestration.foundation.processes import resource_limits
 
 DESCRIPTION = "modelDescription.xml"
-MAX_UNPACKED_MB, MAX_COMPRESSION = 1000.0, 20.0
-"""An FMU that unpacks to more MB than this, and to more than this many times its size, is not run"""
 
 
 class UnreadableFmuError(QuadcosimError):
@@ -89,12 +88,17 @@ def read_archive(path: Path, size_limit: float) -> Archive:
 def expect_honest_size(path: Path) -> None:
     """Raise `UsageError` for an archive that would fill the disk (a zip bomb), by the sizes that it declares."""
     with zipfile.ZipFile(path) as archive:
-        unpacked = sum(entry.file_size for entry in archive.infolist())  # zipfile unpacks no more than that
+        sizes = {entry.filename: entry.file_size for entry in archive.infolist()}  # zipfile unpacks no more than that
+        unpacked = sum(entry.file_size for entry in archive.infolist())
     times = unpacked / path.stat().st_size
-    if unpacked > MAX_UNPACKED_MB * 1e6 and times > MAX_COMPRESSION:
+    if unpacked > resource_limits.UNPACKED.bytes and times > resource_limits.COMPRESSION.value:
         raise UsageError(
             f"{path}: unpacks to {unpacked / 1e6:.0f} MB, {times:.0f} times its size: expected at most "
-            f"{MAX_UNPACKED_MB:g} MB, or {MAX_COMPRESSION:g} times its size"
+            f"{resource_limits.UNPACKED}, or {resource_limits.COMPRESSION} its size"
+        )
+    if (size := sizes.get(DESCRIPTION, 0)) > resource_limits.DESCRIPTION.bytes:
+        raise UsageError(
+            f"{path}: {DESCRIPTION} has {size / 1e6:.0f} MB: expected at most {resource_limits.DESCRIPTION}"
         )
 
 

@@ -22,7 +22,7 @@ from fmu_kit.scratch import Scratch
 from orchestration.components.fmi import slaves
 from orchestration.components.fmi.instance import Instance, Value, convert_value, same
 from orchestration.components.fmi.read_description import Variable, read_model
-from orchestration.components.fmi.surroundings import FOLDER, ROUNDING, Surroundings, sentence
+from orchestration.components.fmi.surroundings import FOLDER, LIMITS, ROUNDING, Surroundings, sentence
 from orchestration.components.fmi.transfers import Numbers, TransferCall, TransferLayout, TransferPart
 from orchestration.foundation.basics.errors import (
     QuadcosimError,
@@ -257,6 +257,8 @@ class NativeInstance(Instance):
                 self.warn_of_change(ROUNDING)
             if self.guard.restore_folder():
                 self.warn_of_change(FOLDER)
+            if self.guard.restore_limits():
+                self.warn_of_change(LIMITS)
 
     def warn_of_change(self, what: str) -> None:
         """Warn, once, that it has changed `what` of the whole process."""

@@ -31,6 +31,7 @@ from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.foundation.basics.documents import readable
 from orchestration.foundation.basics.errors import UsageError, did_you_mean, listed, no_utf8
 from orchestration.foundation.basics.unit_algebra import BaseUnits, Unit, named
+from orchestration.foundation.processes.resource_limits import ELEMENTS
 
 Kind = Literal["Real", "Integer", "Boolean", "Enumeration", "String", "Binary", "Clock"]
 """Types by their FMI 2.0 names; FMI 3.0's Float64 is a Real, its Int32 an Integer"""
@@ -242,6 +243,9 @@ def _read_model(path: Path, changed: int, size: int) -> Model:
         if not 0 <= declared.valueReference < 2**32:
             what = f"{declared.name}: valueReference = {declared.valueReference}"
             raise UsageError(f"{path}: {what}: expected a whole number of 32 bits without a sign")
+    elements = sum(math.prod(declared.shape) for declared in description.modelVariables if declared.shape)
+    if elements > ELEMENTS.value:
+        raise UsageError(f"{path}: its arrays have {elements} elements: expected at most {ELEMENTS}")
     scalars = [scalar for declared in description.modelVariables for scalar in scalars_of(declared)]
     variables = {v.name: v for v in scalars}
     if len(variables) < len(scalars):

@@ -1,11 +1,13 @@
-"""Global state of the process that an FMU may change: the rounding mode, and the current folder."""
+"""Global state of the process that an FMU may change: the rounding mode, the current folder, limits of resources."""
 
 import ctypes
 import os
 from collections.abc import Sequence
 from contextlib import suppress
 
-ROUNDING, FOLDER = "the floating-point mode", "the current folder"
+from orchestration.foundation.processes.resource_limits import own_limits, set_again
+
+ROUNDING, FOLDER, LIMITS = "the floating-point mode", "the current folder", "a limit of resources"
 _ONE, _LITTLE, _SMALLEST, _HALF, _TINY = 1.0, 2.0**-60, 2.0**-1022, 0.5, 2.0**-1074
 _ENVIRONMENT = 512
 """Upper bound on the size of the floating-point environment [byte]"""
@@ -15,7 +17,7 @@ class Surroundings:
     """The global state when this object is created; callers of FMUs restore it."""
 
     def __init__(self) -> None:
-        self._mode, self._folder = _mode(), current_folder()
+        self._mode, self._folder, self._limits = _mode(), current_folder(), own_limits()
         self._environment = ctypes.create_string_buffer(_ENVIRONMENT)
         self._library = _mathematics()
         if self._library is not None:
@@ -35,6 +37,10 @@ class Surroundings:
         with suppress(OSError):  # it no longer exists
             os.chdir(self._folder)
         return True
+
+    def restore_limits(self) -> bool:
+        """Restore the limits of resources; returns whether they had changed."""
+        return set_again(self._limits)
 
 
 def current_folder() -> str | None:

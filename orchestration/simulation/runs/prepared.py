@@ -15,7 +15,7 @@ from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.components.fmi.native import NativeInstance
 from orchestration.components.fmi.opening import open_instance
 from orchestration.components.fmi.read_description import Model
-from orchestration.components.fmi.surroundings import FOLDER, sentence
+from orchestration.components.fmi.surroundings import FOLDER, LIMITS, sentence
 from orchestration.foundation.basics.errors import SimulatorError
 from orchestration.foundation.basics.interrupt import Interrupt, deferred_interrupts
 from orchestration.foundation.basics.simulator import Floats
@@ -76,7 +76,7 @@ class PreparedRun:
         """Run along a `course`; whether the run is over. An error of an FMU after the first row is its outcome."""
 
         def report(share: float) -> None:
-            self.restore_folder()
+            self.restore_process()
             if progress is not None:
                 progress(share)
 
@@ -89,6 +89,7 @@ class PreparedRun:
 
     def outcome(self) -> RunOutcome:
         """The outcome of the run so far."""
+        self.restore_process()
         master, running = self.master, self.master.running
         return RunOutcome(
             end=float(master.board.row[0]),
@@ -108,12 +109,14 @@ class PreparedRun:
             self.resolved, self.outcome(), self.recorder, time.perf_counter() - self.started, self.interrupt.requested
         )
 
-    def restore_folder(self) -> None:
-        """Restore the current folder of before the run if an FMU has changed it while it was stepped."""
+    def restore_process(self) -> None:
+        """Restore the current folder and the limits of before the run if an FMU has changed them while stepped."""
         foreign = [one for one in self.instances.values() if isinstance(one, NativeInstance) and one.guard is not None]
-        if foreign and foreign[0].guard is not None and foreign[0].guard.restore_folder():
-            warning = sentence([f"{one.name} ({one.model.name})" for one in foreign], FOLDER)
-            if warning not in foreign[0].warnings:
+        if not foreign or (guard := foreign[0].guard) is None:
+            return
+        for what, restore in ((FOLDER, guard.restore_folder), (LIMITS, guard.restore_limits)):
+            warning = sentence([f"{one.name} ({one.model.name})" for one in foreign], what)
+            if restore() and warning not in foreign[0].warnings:
                 foreign[0].warnings.append(warning)
 
 
@@ -170,7 +173,7 @@ def prepared(
                 first_exchange=initial.groups(system.connections, lambda name, output: models[name].depends_on(output)),
                 waiting=[name for name in system.components if models[name].waits],
             )
-        yield PreparedRun(
+        run = PreparedRun(
             resolved=resolved,
             instances=instances,
             master=master,
@@ -178,6 +181,8 @@ def prepared(
             interrupt=interrupt,
             started=started,
         )
+        stack.callback(run.restore_process)  # also after a failure
+        yield run
 
 
 def _seconds(time: int | None) -> float | None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from fmu_kit import scratch
 from orchestration.components.fmi import trust
 from orchestration.foundation.processes.channel import Parent
+from orchestration.foundation.processes.resource_limits import own_limits
 from orchestration.simulation.workers import task as tasks
 from orchestration.simulation.workers.provenance import Sources, machine, software
 
@@ -28,8 +29,11 @@ def main(own_folder: str) -> None:
     trust.accept(own_fmus)
     parent.send(tasks.Ready(versions=software(coordinator_sources.current()), machine=machine()))
     runner = tasks.Runner(machine())
+    limits = own_limits()
     for task in parent:
         parent.send(_run(runner, task))
+        if own_limits() != limits:  # an FMU has lowered them for good; the next run gets another process
+            return
     parent.leave()
 
 

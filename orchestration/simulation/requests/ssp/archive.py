@@ -7,13 +7,12 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 from fmu_kit.new_files import new_files
+from orchestration.components.fmi.archive import expect_honest_size
 from orchestration.components.fmi.trust import content_hash
 from orchestration.foundation.basics.documents import readable
 from orchestration.foundation.basics.errors import UsageError
 
 STRUCTURE = "SystemStructure.ssd"
-MAX_UNPACKED_BYTES = 2**32
-"""Bytes of an archive's files together"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,10 +58,8 @@ def _unpack(path: Path, folder: Path) -> None:
     if not zipfile.is_zipfile(path):
         raise UsageError(f"{path}: expected an SSP archive, which is a zip file")
     try:
+        expect_honest_size(path)
         with new_files(folder.parent) as new, zipfile.ZipFile(path) as archive:
-            size = sum(info.file_size for info in archive.infolist())
-            if size > MAX_UNPACKED_BYTES:
-                raise UsageError(f"{path}: expected an SSP archive of at most {MAX_UNPACKED_BYTES} bytes, unpacked")
             archive.extractall(new / folder.name)
     except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError) as error:
         raise UsageError(f"{path}: expected an SSP archive: {error}") from error

@@ -9,6 +9,7 @@ from lxml import etree
 
 from orchestration.foundation.basics.documents import readable
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.processes.resource_limits import DOCUMENT
 
 NAMESPACES = {
     "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
@@ -25,8 +26,6 @@ SCHEMAS = {
     "ssm": "SystemStructureParameterMapping.xsd",
 }
 """The schemas in fmpy, by the prefix of the root"""
-MAX_DOCUMENT_BYTES = 2**24
-"""Bytes of a document"""
 
 Read = Any
 """An element of lxml, which has no types"""
@@ -58,9 +57,9 @@ def read(path: Path, kind: str) -> Read:
     """The root of a document that is valid by the schema of its `kind`, ssd, ssv or ssm; raises `UsageError`."""
     what = f"{kind.upper()} document of SSP 1.0"
     with readable(path, what), path.open("rb") as file:
-        text = file.read(MAX_DOCUMENT_BYTES + 1)
-    if len(text) > MAX_DOCUMENT_BYTES:
-        raise UsageError(f"{path}: expected a readable {what}: it has more than {MAX_DOCUMENT_BYTES} bytes")
+        text = file.read(DOCUMENT.bytes + 1)
+    if len(text) > DOCUMENT.bytes:
+        raise UsageError(f"{path}: expected a readable {what}: it has more than {DOCUMENT}")
     try:
         root = etree.fromstring(text, etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False))
     except etree.XMLSyntaxError as error:

@@ -13,8 +13,9 @@ from orchestration.components.building import builder
 from orchestration.components.fmi import trust
 from orchestration.components.fmi.foreign_calls import LostError, isolated_call
 from orchestration.components.fmi.read_description import read_model
-from orchestration.components.fmi.surroundings import ROUNDING
+from orchestration.components.fmi.surroundings import LIMITS, ROUNDING
 from orchestration.foundation.basics.errors import QuadcosimError
+from orchestration.foundation.processes.resource_limits import own_limits
 from orchestration.simulation.workers.choice import choose_execution
 from orchestration.simulation.workers.pool import Inputs
 from orchestration.systems.system.component import Component, Sampling
@@ -81,6 +82,13 @@ class TestForeign:
     def test_its_rounding_mode_is_restored_with_a_warning(self, forged: bool, tmp_path: Path) -> None:
         result = ran(alone(small(tmp_path, "ENDS=fesetround(FE_UPWARD)", forged=forged)))
         assert any(ROUNDING in warning for warning in result.warnings)
+
+    def test_a_limit_that_it_lowers_is_set_again_with_a_warning(self, forged: bool, tmp_path: Path) -> None:
+        before = own_limits()
+        lowers = "ENDS=struct rlimit r; getrlimit(RLIMIT_FSIZE, &r); r.rlim_cur = 0; setrlimit(RLIMIT_FSIZE, &r)"
+        result = ran(alone(small(tmp_path, lowers, forged=forged)))
+        assert any(LIMITS in warning for warning in result.warnings)
+        assert own_limits() == before
 
     def test_its_code_for_lanes_is_not_loaded_here(self, forged: bool, tmp_path: Path) -> None:
         path = small(tmp_path, forged=forged)
