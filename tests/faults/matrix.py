@@ -32,6 +32,8 @@ STILL = 90
 MOST = 200.0
 """[s] of processor time after which one is taken not to end"""
 HIDDEN = re.compile(r"(^|/)\.quadcosim-|\.new$|\.partial$")
+KEPT = re.compile(r"flight\.\d+(/|$)")
+"""A whole run that could not take its place"""
 JOURNALS = ("-wal", "-shm", ".lock")
 """Endings of files beside a store that are there or not"""
 
@@ -264,6 +266,8 @@ def _state(folder: Path) -> State:
     found = {}
     for path in folder.rglob("*"):
         name = path.relative_to(folder).as_posix()
+        if KEPT.match(name):
+            continue
         if path.is_file() and not name.endswith(JOURNALS):
             found[name] = hashlib.sha256(path.read_bytes()).hexdigest()
         elif path.is_dir() and not any(path.iterdir()):

@@ -47,7 +47,19 @@ def run(*words: str) -> int:
     """Run the tests over random systems; the exit code of pytest."""
     with tempfile.TemporaryDirectory() as folder:
         compiler_into(Path(folder))
-        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-k", "random", *TESTS, *words]
+        command = [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-q",
+            "-p",
+            "no:cacheprovider",
+            "--capture=sys",
+            "-k",
+            "random",
+            *TESTS,
+            *words,
+        ]
         return subprocess.run(command, env=environment(Path(folder)), check=False).returncode
 
 

@@ -28,6 +28,7 @@ static int64_t *room(Numbers *of, int64_t count) {
 
 static void drop(Numbers *of, int64_t count) {
     of->count -= count;
+    if (of->count == 0) return; /* there may be no items */
     memmove(of->items, of->items + count, (size_t)of->count * sizeof *of->items);
 }
 
