@@ -183,10 +183,10 @@ def _insert(connection: sqlite3.Connection, table: str, rows: Iterable[tuple[Any
 
 
 @contextmanager
-def open_for_writing(path: Path, objectives: Iterable[str]) -> Iterator[Store]:
-    """The store at `path`, locked for this process until the end of the block; created if missing.
+def locked_database(path: Path, what: str) -> Iterator[sqlite3.Connection]:
+    """The SQLite file at `path`, locked for this process until the end of the block; created if missing.
 
-    A new store has columns for these objectives; one that describes a study keeps its own.
+    `what` is the name of what writes into it.
     """
     import filelock
 
@@ -196,7 +196,7 @@ def open_for_writing(path: Path, objectives: Iterable[str]) -> Iterator[Store]:
         try:
             lock.acquire()
         except filelock.Timeout:
-            raise QuadcosimError(f"{path}: another sweep is writing into it; expected to be the only one") from None
+            raise QuadcosimError(f"{path}: another {what} is writing into it; expected to be the only one") from None
     try:
         with integrity.store_errors(path):
             connection = sqlite3.connect(path, timeout=10.0)
@@ -204,14 +204,25 @@ def open_for_writing(path: Path, objectives: Iterable[str]) -> Iterator[Store]:
             with integrity.store_errors(path):
                 connection.execute("PRAGMA journal_mode=WAL")
                 connection.execute("PRAGMA synchronous=NORMAL")
-                _create_tables(connection, list(objectives))
-                opened = Store(path, connection, integrity.expect_sound(path, connection))
-            opened.expect_whole()
-            yield opened
+            yield connection
             with integrity.store_errors(path):
                 connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     finally:
         lock.release()
+
+
+@contextmanager
+def open_for_writing(path: Path, objectives: Iterable[str]) -> Iterator[Store]:
+    """The store at `path`, locked for this process until the end of the block; created if missing.
+
+    A new store has columns for these objectives; one that describes a study keeps its own.
+    """
+    with locked_database(path, "sweep") as connection:
+        with integrity.store_errors(path):
+            _create_tables(connection, list(objectives))
+            opened = Store(path, connection, integrity.expect_sound(path, connection))
+        opened.expect_whole()
+        yield opened
 
 
 @contextmanager

@@ -40,11 +40,16 @@ def expect_sound(path: Path, connection: sqlite3.Connection) -> list[str]:
         raise QuadcosimError(
             f"{path}: no store of this version of quadcosim; expected one: take another --out, or remove it"
         )
+    expect_no_damage(path, connection)
+    expect_written(path, "about", connection.execute("SELECT * FROM about"))
+    return objectives
+
+
+def expect_no_damage(path: Path, connection: sqlite3.Connection) -> None:
+    """Raise `QuadcosimError` unless SQLite finds the file sound."""
     report = connection.execute("PRAGMA integrity_check(1)").fetchone()[0]
     if report != "ok":
         raise QuadcosimError(f"{path}: the store is damaged ({' '.join(report.split())}); {_REMEDY}")
-    expect_written(path, "about", connection.execute("SELECT * FROM about"))
-    return objectives
 
 
 def schema_of(connection: sqlite3.Connection) -> dict[str, str]:
@@ -75,4 +80,6 @@ def store_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except (sqlite3.Error, OSError, ValueError, OverflowError) as error:
-        raise QuadcosimError(f"{path}: the store cannot be used: {error_text(error)}") from error
+        is_damaged = isinstance(error, sqlite3.DatabaseError) and not isinstance(error, sqlite3.OperationalError)
+        remedy = f"; {_REMEDY}" if is_damaged else ""
+        raise QuadcosimError(f"{path}: the store cannot be used: {error_text(error)}{remedy}") from error

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from orchestration.components.fmi.foreign_calls import isolated_call
-from orchestration.experiments.tuning.tuning_problem import COST, SearchResult, TuningProblem, minimise
+from orchestration.experiments.tuning.tuning_problem import COST, Costs, SearchResult, TuningProblem, minimise
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.records import record
 from orchestration.foundation.basics.simulator import Floats
@@ -56,9 +56,13 @@ class ExactTuningResult(SearchResult):
 
 
 def search_exactly(
-    tuning: ExactTuning, period: float, seed: int, progress: Callable[[float], None]
+    tuning: ExactTuning,
+    period: float,
+    seed: int,
+    progress: Callable[[float], None],
+    keeping: Callable[[Costs], Costs] = lambda costs: costs,
 ) -> ExactTuningResult:
-    """The result of one search."""
+    """The result of one search; `keeping` wraps the costs of candidates to keep them."""
     files = tuning.files()
     loops = Loops(files.models)
 
@@ -70,7 +74,7 @@ def search_exactly(
     def costs(points: Sequence[Floats]) -> list[float]:
         return [_cost(each) for each in expected([point.tolist() for point in points])]
 
-    best = minimise(tuning, seed, costs, progress)
+    best = minimise(tuning, seed, keeping(costs), progress)
     (expectation,) = expected([best.shares.tolist()])
     cost = expectation.objectives[COST]
     return ExactTuningResult(

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, TypeVar
 
 from fmu_kit.new_files import new_files, write_atomically
 from orchestration.experiments.tuning.exact import ExactTuning, ExactTuningResult, search_exactly
+from orchestration.experiments.tuning.record import open_record
 from orchestration.experiments.tuning.tuning import Tuning, TuningResult, search
 from orchestration.experiments.tuning.tuning_file import gains_text
-from orchestration.experiments.tuning.tuning_problem import SearchResult, TuningProblem, best_by_period
+from orchestration.experiments.tuning.tuning_problem import Costs, SearchResult, TuningProblem, best_by_period
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing, needs
 from orchestration.foundation.basics.progress import ShareProgress, share_reporter
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Result = TypeVar("Result", bound=SearchResult)
+Find = Callable[[float, int, Callable[[float], None], Callable[[Costs], Costs]], Result]
+"""Makes the result of a search from period, seed, progress function, and what keeps the costs of points"""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -90,8 +93,9 @@ def tune(
     A `Tuning` runs an ensemble of initial conditions and is judged on others, by `workers` processes and an engine as
     in `sweep`. An `ExactTuning` needs no runs; it linearises native FMUs if available.
 
-    Writes a file of parameters into `out` for each period; it names `command` as its origin. The result of each search
-    is kept in `folder`, default `results/NAME`, so that no search is repeated. `progress` is called with the share
+    Writes a file of parameters into `out` for each period; it names `command` as its origin. Costs and results are
+    kept in `folder`, default `results/NAME`: called again after an interruption, it loses the generation of points that
+    it was evaluating, and ends with the same result. `progress` is called with the share
     done, `announce` with a line for each search; None for silence.
 
     Raises `UsageError` for an invalid tuning, `QuadcosimError` if a run fails, `KeyboardInterrupt` after Ctrl-C.
@@ -107,7 +111,7 @@ def tune(
         with share_reporter(progress, "searching") as report:
             find = functools.partial(search_exactly, exact)
             done = run_searches(
-                exact, exact.files(), folder, find, ExactTuningResult, progress=report, announce=announce
+                exact, exact.files(), folder, find, ExactTuningResult, engine="", progress=report, announce=announce
             )
     return Tuned(searches=tuple(done), written=tuple(write(tuning, done, Path(out), command)))
 
@@ -133,36 +137,42 @@ def _search_by_runs(
     with share_reporter(progress, "searching") as report, RunEvaluator(files, workers, execution.engine) as pool:
         run = functools.partial(pool.run_all, in_lanes=execution.in_lanes)
 
-        def find(period: float, seed: int, report: Callable[[float], None]) -> TuningResult:
-            return search(tuning, period, seed, run, pool.run_all, report)
+        def find(
+            period: float, seed: int, report: Callable[[float], None], keeping: Callable[[Costs], Costs]
+        ) -> TuningResult:
+            return search(tuning, period, seed, run, pool.run_all, report, keeping)
 
-        return run_searches(tuning, files, folder, find, TuningResult, progress=report, announce=announce)
+        return run_searches(
+            tuning, files, folder, find, TuningResult, engine=execution.name, progress=report, announce=announce
+        )
 
 
 def run_searches(
     tuning: TuningProblem,
     files: Files,
     folder: Path,
-    find: Callable[[float, int, Callable[[float], None]], Result],
+    find: Find[Result],
     kind: type[Result],
     *,
+    engine: str,
     progress: Callable[[float], None],
     announce: Callable[[str], None],
 ) -> list[Result]:
-    """The results of all searches; `find` makes one of class `kind` from period, seed and progress function.
+    """The results of all searches, of class `kind`, each made by `find`.
 
-    They are kept in `folder`: a finished search of the same tuning with the same software is not repeated.
+    They are kept in `folder`, with the costs of all points: of the same tuning with the same software and engine no
+    search is repeated, and none that is interrupted evaluates a point again.
     """
-    record = folder / f"{_key(tuning, files, kind)[:16]}.json"
-    done = [kind(**each) for each in json.loads(record.read_text())] if record.is_file() else []
     searches = [(period, seed) for period in tuning.periods for seed in tuning.seeds]
-    for i, (period, seed) in enumerate(searches):
-        if any((one.period, one.seed) == (period, seed) for one in done):
-            continue
-        one = find(period, seed, _part(progress, i, len(searches)))
-        done.append(one)
-        announce(f"period {period:g} s, seed {seed}: cost {one.cost:.5g}; {one.judgement}")
-        write_atomically(record, json.dumps([dataclasses.asdict(each) for each in done], indent=2))
+    with open_record(folder / f"{_key(tuning, files, kind, engine)[:16]}.sqlite") as record:
+        done = record.results(kind)
+        for i, (period, seed) in enumerate(searches):
+            if any((one.period, one.seed) == (period, seed) for one in done):
+                continue
+            one = find(period, seed, _part(progress, i, len(searches)), functools.partial(record.keeping, period))
+            record.add(one)
+            done.append(one)
+            announce(f"period {period:g} s, seed {seed}: cost {one.cost:.5g}; {one.judgement}")
     return done
 
 
@@ -183,7 +193,7 @@ def _part(progress: Callable[[float], None], index: int, count: int) -> Callable
     return lambda share: progress((index + share) / count)
 
 
-def _key(tuning: TuningProblem, files: Files, kind: type[SearchResult]) -> str:
+def _key(tuning: TuningProblem, files: Files, kind: type[SearchResult], engine: str) -> str:
     """A hash of everything that a search depends on."""
     content_of_tuning = json.dumps(dataclasses.asdict(tuning), default=str)
     fields = [each.name for each in dataclasses.fields(kind)]
@@ -193,5 +203,6 @@ def _key(tuning: TuningProblem, files: Files, kind: type[SearchResult]) -> str:
         sorted(files.hashes.items()),
         sorted(versions().items()),
         fields,
+        engine,
     ]
     return hashlib.sha256(json.dumps(content).encode()).hexdigest()

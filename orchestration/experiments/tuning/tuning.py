@@ -7,7 +7,7 @@ from typing import Any
 
 from orchestration.components.building.fmus import native_twins
 from orchestration.experiments.limits.evaluation import is_good
-from orchestration.experiments.tuning.tuning_problem import COST, SearchResult, TuningProblem, minimise
+from orchestration.experiments.tuning.tuning_problem import COST, Costs, SearchResult, TuningProblem, minimise
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.records import record
 from orchestration.foundation.basics.simulator import Floats
@@ -122,10 +122,19 @@ class TuningResult(SearchResult):
 
 
 def search(
-    tuning: Tuning, period: float, seed: int, run: RunSystems, judge: RunSystems, progress: Callable[[float], None]
+    tuning: Tuning,
+    period: float,
+    seed: int,
+    run: RunSystems,
+    judge: RunSystems,
+    progress: Callable[[float], None],
+    keeping: Callable[[Costs], Costs] = lambda costs: costs,
 ) -> TuningResult:
-    """The result of one search; `run` simulates the candidates, `judge` the runs that the best one is judged on."""
-    best = minimise(tuning, seed, lambda shares: _costs(tuning, period, shares, run), progress)
+    """The result of one search; `run` simulates the candidates, `judge` the runs that the best one is judged on.
+
+    `keeping` wraps the costs of candidates to keep them.
+    """
+    best = minimise(tuning, seed, keeping(lambda shares: _costs(tuning, period, shares, run)), progress)
     values = tuning.values(list(best.shares))
     judged = judge(tuning.systems(period, values, tuning.judging_ensemble()))
     return TuningResult(

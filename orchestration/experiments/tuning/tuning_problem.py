@@ -16,6 +16,8 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
 
+Costs = Callable[[Sequence[Floats]], Sequence[float]]
+"""The costs of points of the unit cube"""
 COST = "cost"
 """Name of the objective that a tuning adds"""
 _WIDTH = 0.25
@@ -133,7 +135,7 @@ class Minimum:
 def minimise(
     tuning: TuningProblem,
     seed: int,
-    costs: Callable[[Sequence[Floats]], Sequence[float]],
+    costs: Costs,
     progress: Callable[[float], None],
 ) -> Minimum:
     """The best point of one search by CMA-ES (Hansen, arXiv:1604.00772), which starts at a point drawn by the seed.

@@ -151,12 +151,13 @@ def test_an_interrupted_tuning_continues(tuning, tmp_path):
         return bowl(systems)
 
     def results_of(run):
-        def find(period, seed, report):
-            return search(tuning, period, seed, run, run, report)
+        def find(period, seed, report, keeping):
+            return search(tuning, period, seed, run, run, report, keeping)
 
         return run_searches(
-            tuning, files, tmp_path / "kept", find, TuningResult, progress=lambda share: None, announce=lines.append
-        )
+            tuning, files, tmp_path / "kept", find, TuningResult,
+            engine="", progress=lambda share: None, announce=lines.append,
+        )  # fmt: skip
 
     with pytest.raises(KeyboardInterrupt):
         results_of(run)
