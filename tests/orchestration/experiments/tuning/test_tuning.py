@@ -1,6 +1,8 @@
 import itertools
 import math
 import re
+import sqlite3
+from contextlib import closing
 from dataclasses import replace
 
 import pytest
@@ -10,7 +12,7 @@ from orchestration.experiments.tuning.tuning import Tuning, TuningResult, search
 from orchestration.experiments.tuning.tuning_file import load_tuning
 from orchestration.experiments.tuning.tuning_problem import best_by_period
 from orchestration.foundation.basics.documents import read_toml
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.systems.system.paths import value_at
 
 FILE = """
@@ -228,3 +230,56 @@ def test_initial_conditions_lie_around_the_trajectory_of_the_base(text, tmp_path
 
 def test_initial_conditions_that_are_judged_on_follow_the_others(tuning):
     assert tuning.judging_ensemble() == replace(tuning.starts, first=3, count=4)
+
+
+def searched(tuning, folder, run, judge=bowl):
+    return run_searches(
+        tuning, tuning.files(), folder,
+        lambda period, seed, report, keeping: search(tuning, period, seed, run, judge, report, keeping),
+        TuningResult, engine="", progress=lambda share: None, announce=lambda line: None,
+    )  # fmt: skip
+
+
+def test_a_search_stopped_at_any_generation_loses_it_alone_and_ends_with_the_same_bits(tuning, tmp_path):
+    tuning = replace(tuning, periods=(0.01,), seeds=(1,), evaluations=15)
+    generations: list[int] = []
+
+    def counted(systems):
+        generations.append(len(systems))
+        return bowl(systems)
+
+    whole = searched(tuning, tmp_path / "whole", counted)
+    assert len(generations) >= 4
+
+    def stopping(systems):
+        if not evaluated_before_stop:
+            raise KeyboardInterrupt
+        evaluated_before_stop.pop()
+        return bowl(systems)
+
+    for _ in generations:  # each start evaluates one generation more
+        evaluated_before_stop = [None]
+        with pytest.raises(KeyboardInterrupt):
+            searched(tuning, tmp_path / "stopped", stopping, judge=stopping)
+    assert searched(tuning, tmp_path / "stopped", stopping) == whole
+
+
+@pytest.mark.parametrize("damage", ["truncated", "other bytes", "a changed cost", "an older record", "a missing table"])
+def test_a_damaged_record_is_one_line_that_says_what_to_do(damage, tuning, tmp_path):
+    tuning = replace(tuning, periods=(0.01,), seeds=(1,), evaluations=15)
+    searched(tuning, tmp_path, bowl)
+    (record,) = tmp_path.glob("*.sqlite")
+    content = record.read_bytes()
+    if damage == "truncated":
+        record.write_bytes(content[: len(content) // 2])
+    elif damage == "other bytes":
+        record.write_bytes(content[:5000] + b"x" * 3000 + content[8000:])
+    elif damage == "an older record":
+        record.write_text("[]")
+    else:
+        with closing(sqlite3.connect(record)) as connection, connection:
+            connection.execute("UPDATE points SET cost = 0.0" if damage == "a changed cost" else "DROP TABLE points")
+    with pytest.raises(QuadcosimError, match=r"(put back a copy|take another folder), or remove it") as caught:
+        searched(tuning, tmp_path, bowl)
+    assert str(caught.value).startswith(f"{record}: ")
+    assert len(str(caught.value).splitlines()) == 1
