@@ -1,7 +1,10 @@
 """The rows of a store have the bits of one engine, or every answer from it says that there are several."""
 
+import os
 import shutil
+import signal
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -11,9 +14,11 @@ from orchestration.experiments.studies.study_file import load_study
 from orchestration.experiments.studies.table import frame
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.simulation.engines.batch import shape
+from orchestration.simulation.workers.pool import WorkerProcess
+from orchestration.simulation.workers.task import RunTask, TaskBatch
 from tests.commands import Main
 from tests.orchestration.components.fmi.small import needs_compiler
-from tests.orchestration.experiments.studies.common import STORE, axis, bits, study, sweep
+from tests.orchestration.experiments.studies.common import NOISY, RUNS, STORE, axis, bits, study, sweep
 
 pytestmark = needs_compiler
 
@@ -101,3 +106,27 @@ def test_runs_that_were_begun_without_lanes_are_continued_without(
     found = sweep(more, folder=tmp_path, engine="auto", announce=told.append)
     assert told == ["engine compiled: native FMUs, one run at a time (as the runs in the store)"]
     assert (found.engine, found.engines) == ("compiled", {"compiled": 3})
+
+
+@pytest.mark.parametrize("with_signal", [signal.SIGKILL, signal.SIGABRT])
+@pytest.mark.parametrize("at", [1, 2])
+def test_a_sweep_in_lanes_has_the_same_bits_whichever_chunk_its_worker_dies_in(
+    at: int, with_signal: signal.Signals, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "study.toml").write_text(NOISY)
+    chosen = load_study(tmp_path / "study.toml")
+    whole = bits(sweep(chosen, folder=tmp_path / "whole", engine="batch").path)
+    request, requests = WorkerProcess.request, 0
+
+    def killed(self: WorkerProcess, task: RunTask | TaskBatch) -> Any:
+        nonlocal requests
+        requests += 1
+        if requests == at:
+            os.kill(self._child.pid, with_signal)
+        return request(self, task)
+
+    monkeypatch.setattr(WorkerProcess, "request", killed)
+    found = sweep(chosen, folder=tmp_path / "killed", engine="batch")
+    assert requests > at
+    assert found.engines == {"batch": RUNS}
+    assert bits(found.path) == whole
