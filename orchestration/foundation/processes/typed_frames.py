@@ -214,7 +214,7 @@ def _argument_kinds(method: Any) -> tuple[Any, ...]:
 
 def _fits(value: Any, kind: Any) -> bool:
     """Whether a value fits an annotation, as far as this is one of data; others fit everything."""
-    if kind is Any or kind is object:
+    if kind is Any or kind is object or type(value) is kind:
         return True
     if kind is None:
         return value is None
