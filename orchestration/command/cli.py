@@ -175,6 +175,8 @@ def _report(error: Exception) -> int:
         text = str(error)
     elif misuse is not None:
         text = f"{misuse} (see --help)"
+    elif isinstance(error, MemoryError):
+        text = "there is not enough memory" + (f": {error}" if str(error) else "")
     elif isinstance(error, ModuleNotFoundError) and (lack := lack_of(error.name)) is not None:
         text = lack
     elif isinstance(error, ImportError) and (variables := misleading_variables()):

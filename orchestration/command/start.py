@@ -25,6 +25,8 @@ def main() -> None:
         return
     try:
         from orchestration.command import cli
+    except KeyboardInterrupt:
+        sys.exit(130)
     except Exception as error:
         misleading = misleading_variables()
         if not misleading or sys.flags.ignore_environment:

@@ -5,9 +5,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
+from orchestration.command import cli
+
 LARGE = {"dask", "distributed", "fmpy.ssp", "matplotlib", "pandas", "pyarrow", "scipy", "xarray"}
 RUN_AND_TELL = """
 import json, sys
+import pytest
+from orchestration.command import cli
 from orchestration.command.start import main
 try:
     main()
@@ -48,3 +54,27 @@ def test_processes_that_run_load_only_what_runs_need() -> None:
 
 def test_the_version_is_printed_without_loading_the_command_line() -> None:
     assert not (LARGE | {"numpy", "pydantic", "typer"}) & loaded("--version")
+
+
+INTERRUPTED = """
+import sys
+
+class Interrupts:
+    def find_spec(self, name, *_):
+        if name == "orchestration.command.cli":
+            raise KeyboardInterrupt
+
+sys.meta_path.insert(0, Interrupts())
+from orchestration.command.start import main
+main()
+"""
+
+
+def test_ctrl_c_while_the_command_line_is_loaded_prints_no_traceback() -> None:
+    done = subprocess.run([sys.executable, "-c", INTERRUPTED], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (130, "")
+
+
+def test_a_lack_of_memory_is_no_error_of_this_project(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli._report(MemoryError("Unable to allocate 3 GiB")) == 1
+    assert capsys.readouterr().err == "quadcosim: there is not enough memory: Unable to allocate 3 GiB\n"
