@@ -19,10 +19,14 @@ import socket
 import sys
 import tempfile
 import threading
+from pathlib import Path
 
 from orchestration.foundation.processes import channel as parent_channel
 from orchestration.foundation.processes.family import NamesInPlace
 from orchestration.foundation.processes.fork_server import ANSWER, LENGTH, ForkRequest, exactly
+
+_PR_SET_CHILD_SUBREAPER = 36
+"""Of linux/prctl.h"""
 
 
 def main(module: str, connection: socket.socket) -> ForkRequest | None:
@@ -35,6 +39,7 @@ def main(module: str, connection: socket.socket) -> ForkRequest | None:
     gc.enable()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGCHLD, lambda *_: None)
+    _adopt()
     woken, waking = os.pipe()
     os.set_blocking(waking, False)
     signal.set_wakeup_fd(waking)
@@ -76,13 +81,24 @@ def main(module: str, connection: socket.socket) -> ForkRequest | None:
 
 
 def _report(running: dict[int, socket.socket]) -> None:
-    """Answer the exit codes of processes that have ended."""
-    while running:
-        pid, status = os.waitpid(-1, os.WNOHANG)
-        if pid == 0:
-            return
-        with running.pop(pid) as channel, contextlib.suppress(OSError):  # the reader may have ended
-            channel.sendall(ANSWER.pack(True, os.waitstatus_to_exitcode(status)))
+    """Answer the exit codes of processes that have ended, and end what they have left, which this one has adopted."""
+    with contextlib.suppress(ChildProcessError):  # none is left
+        while (ended := os.waitpid(-1, os.WNOHANG))[0]:
+            if ended[0] in running:
+                with running.pop(ended[0]) as channel, contextlib.suppress(OSError):  # the reader may have ended
+                    channel.sendall(ANSWER.pack(True, os.waitstatus_to_exitcode(ended[1])))
+    with contextlib.suppress(OSError):  # the kernel may not say
+        for pid in map(int, Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()):
+            if pid not in running:
+                os.kill(pid, signal.SIGKILL)
+
+
+def _adopt() -> None:
+    """Become the parent of descendants whose own has ended, also of those in sessions of their own (Linux).
+
+    Each forked process adopts its descendants while it lives, and this server what it leaves.
+    """
+    ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
 
 def _report_failure(channel: socket.socket, error: Exception) -> None:
@@ -97,6 +113,7 @@ def _become(channel: socket.socket, streams: list[int], names: NamesInPlace) -> 
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     signal.signal(signal.SIGINT, signal.default_int_handler)
     os.setsid()
+    _adopt()
     for number, stream in enumerate(streams):
         os.dup2(stream, number)
         os.close(stream)

@@ -19,7 +19,7 @@ tempfile.gettempdir()  # which is remembered
 
 
 def main(what: str, *arguments: str) -> None:
-    """`look`, `fail`, `exit`, `kill`, `print`, `look late` or `end in parts`."""
+    """`look`, `fail`, `exit`, `kill`, `print`, `look late`, `leave` or `end in parts`."""
     if what == "look late":
         while os.getppid() == IMPORTED_BY:
             time.sleep(0.01)
@@ -44,6 +44,18 @@ def main(what: str, *arguments: str) -> None:
                 "open": sorted(os.listdir("/proc/self/fd")),
             }
         )
+    if what == "leave":  # a process in a session and an environment of its own, whose parent has ended
+        told, telling = os.pipe()
+        if os.fork() == 0:
+            os.setsid()
+            if os.fork() == 0:
+                os.write(telling, str(os.getpid()).encode())
+                os.execve("/bin/sleep", ["sleep", str(PATIENCE)], {})
+            os._exit(0)
+        parent = Parent()
+        parent.send(int(os.read(told, 20)))
+        for _ in parent:
+            pass
     if what == "fail":
         raise KeyError("what was wrong")
     if what == "exit":

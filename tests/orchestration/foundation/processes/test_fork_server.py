@@ -117,6 +117,15 @@ def test_what_a_killed_server_has_forked_ends_and_it_is_replaced() -> None:
         assert servers(waiting.name) != [server]
 
 
+def test_what_a_forked_process_leaves_in_a_session_of_its_own_ends_with_it() -> None:
+    with Child(module("leave")) as child, Child(module("leave")) as other:
+        left, left_by_other = child.receive(), other.receive()
+        child.close()
+        assert gone(left)
+        assert not gone_now(left_by_other)
+    assert gone(left_by_other)
+
+
 def test_a_forked_process_ends_with_its_server_though_that_ended_before_it_looked() -> None:
     child = Child(module("look late"))
     for server in servers(MODULE):
