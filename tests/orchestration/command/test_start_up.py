@@ -12,8 +12,6 @@ from orchestration.command import cli
 LARGE = {"dask", "distributed", "fmpy.ssp", "matplotlib", "pandas", "pyarrow", "scipy", "xarray"}
 RUN_AND_TELL = """
 import json, sys
-import pytest
-from orchestration.command import cli
 from orchestration.command.start import main
 try:
     main()
