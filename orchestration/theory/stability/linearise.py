@@ -9,6 +9,7 @@ from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.foundation.processes.passable import passable
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.runs.replacement import component_named
 from orchestration.systems.system.files import files_of
@@ -21,6 +22,7 @@ from orchestration.theory.stability.period_map import period_map
 from orchestration.theory.stability.state_space import StateSpace, reduced
 
 
+@passable
 @dataclass(frozen=True, kw_only=True)
 class Linearised:
     """A loop about its operating point, as two linear systems in feedback."""

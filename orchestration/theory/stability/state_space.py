@@ -7,6 +7,7 @@ import numpy as np
 
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.processes.passable import passable
 
 SAMPLES = (*range(32), 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024)
 """Samples of impulse responses, as long as they stay small"""
@@ -16,6 +17,7 @@ MINIMAL = 1e-9
 """Share of the largest singular value between inputs and outputs, each by its own unit: smaller ones count as 0"""
 
 
+@passable
 @dataclass(frozen=True, kw_only=True)
 class StateSpace:
     """Deviations from an operating point: x(k+1) = A x(k) + B u(k), y(k) = C x(k) + D u(k), every `dt` seconds."""
