@@ -116,6 +116,7 @@ FULL = """
 import resource, sys
 from pathlib import Path
 from fmu_kit.new_files import new_file, write_atomically
+sys.dont_write_bytecode = True  # else half of it would be kept
 resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
 try:
     write_atomically(Path(sys.argv[1]), "x" * 5000)
