@@ -26,7 +26,7 @@ from orchestration.foundation.processes.family import NamesInPlace
 from orchestration.foundation.processes.fork_server import ANSWER, LENGTH, ForkRequest, exactly
 
 _PR_SET_CHILD_SUBREAPER = 36
-"""Of linux/prctl.h"""
+"""The number of the option in linux/prctl.h"""
 
 
 def main(module: str, connection: socket.socket) -> ForkRequest | None:

@@ -27,7 +27,7 @@ class FileLimit:
     value: float
     unit: str
     of: str
-    """What is limited"""
+    """The name of what is limited"""
 
     def __str__(self) -> str:
         return f"{self.value:.0f} {self.unit}".rstrip()
