@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from docs.pages import fill
-from orchestration.foundation.processes.resource_limits import OF_FILES, Limits
+from orchestration.foundation.processes.resource_limits import OF_FILES, UNLIMITED, Limits
 
 PAGE = Path(__file__).with_name("systems.md")
 
@@ -16,6 +16,8 @@ def table() -> str:
         ("Memory of a process with foreign FMUs, with its children (Linux)", f"{confined.memory:.0f} MB"),
         ("A file that a process writes which checks an FMU", f"{confined.size:.0f} MB"),
         ("What such a process prints", f"{confined.output:.0f} MB"),
+        ("A message of such a process", f"{confined.message:.0f} MB"),
+        ("A message of any other process with FMUs", f"{UNLIMITED.message:.0f} MB"),
     ]
     return "\n".join(["| limit of | at most |", "|---|---|", *(f"| {of} | {limit} |" for of, limit in rows)])
 

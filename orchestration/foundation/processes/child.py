@@ -27,10 +27,6 @@ Result = TypeVar("Result")
 
 _KEPT = 16_384
 """Bytes kept of the end of the process's output"""
-_MAX_MESSAGE_MB = 64.0
-"""Largest size of one message from a process whose output is limited [MB]"""
-_LARGEST_MESSAGE_MB = 2000.0
-"""The same of any other process"""
 _NO_MESSAGE = "it sends what is no message of quadcosim"
 _OUT_OF_PROCESSOR = "it uses more processor time than the system allows (ulimit -t)"
 _PATIENCE = 60.0
@@ -97,7 +93,7 @@ class Child:
         self.pid = process.pid
         self._is_limited = math.isfinite(limits.time)
         self._output = None if process.stderr is None else _Output(process.stderr)
-        self._longest_message = _LARGEST_MESSAGE_MB if math.isinf(limits.output) else _MAX_MESSAGE_MB
+        self._longest_message = limits.message
         self._watch = Watch(process, family, limits, self._output)
         self._end = weakref.finalize(self, _terminate, process, family, self._watch)
 

@@ -18,6 +18,8 @@ class Limits:
     """Size that an archive unpacks to, and that any one file may grow to [MB]"""
     output: float = 10.0
     """Output written to standard output and standard error [MB]"""
+    message: float = 64.0
+    """Size of one message to the process that started it [MB]"""
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,8 @@ DESCRIPTION = FileLimit(100.0, "MB", "`modelDescription.xml`")
 DOCUMENT = FileLimit(16.0, "MB", "An XML document of an SSP")
 ELEMENTS = FileLimit(100_000.0, "", "Elements of all arrays of an FMU")
 OF_FILES = (UNPACKED, COMPRESSION, DESCRIPTION, DOCUMENT, ELEMENTS)
-UNLIMITED = Limits(time=math.inf, memory=math.inf, size=math.inf, output=math.inf)
+UNLIMITED = Limits(time=math.inf, memory=math.inf, size=math.inf, output=math.inf, message=2000.0)
+"""Without limits but that of a message, which may hold all signals of a run"""
 
 
 _KINDS = ("RLIMIT_AS", "RLIMIT_DATA", "RLIMIT_FSIZE", "RLIMIT_NOFILE", "RLIMIT_STACK")

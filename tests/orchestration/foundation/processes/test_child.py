@@ -295,18 +295,13 @@ def test_a_message_that_cannot_be_pickled_does_not_end_the_child(child: Callable
     assert one.receive() == 0
 
 
-def test_a_child_whose_output_is_limited_is_ended_before_too_long_a_message_is_read(
-    child: Callable[..., Child], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("orchestration.foundation.processes.child._MAX_MESSAGE_MB", 0.001)
-    for limits in ({}, {"output": 1.0}):
-        one = child("parent.send(bytes(2000)); parent.receive()", **limits)
-        if not limits:
-            assert one.receive() == bytes(2000)
-            continue
-        with pytest.raises(Died, match=r"^was stopped: it sends more than 0.001 MB at once$"):
-            one.receive()
-        assert gone(one.pid)
+def test_a_child_is_ended_before_a_message_longer_than_its_limit_is_read(child: Callable[..., Child]) -> None:
+    one = child("parent.send(bytes(2000)); parent.receive()", message=0.003)
+    assert one.receive() == bytes(2000)
+    one = child("parent.send(bytes(2000)); parent.receive()", message=0.001)
+    with pytest.raises(Died, match=r"^was stopped: it sends more than 0.001 MB at once$"):
+        one.receive()
+    assert gone(one.pid)
 
 
 def test_a_limited_child_that_is_garbage_collected_ends() -> None:
