@@ -251,8 +251,10 @@ def open_for_reading(path: Path) -> Iterator[Store]:
 
 
 def _read_only(path: Path) -> sqlite3.Connection:
-    connection = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True, timeout=10.0)
+    """A connection that changes nothing; it may write, so that the last one takes away the log beside the file."""
+    connection = sqlite3.connect(f"{path.resolve().as_uri()}?mode=rw", uri=True, timeout=10.0)
     try:
+        connection.execute("PRAGMA query_only=ON")
         integrity.schema_of(connection)
     except BaseException:
         connection.close()

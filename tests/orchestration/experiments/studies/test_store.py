@@ -237,6 +237,19 @@ def test_a_reader_does_not_keep_the_writer_from_finishing(path: Path) -> None:
     assert indices(path) == [0, 1, 2]
 
 
+def test_readers_leave_nothing_beside_a_store_and_do_not_change_it(path: Path) -> None:
+    written(path, row(0), row(1))
+    before = {file.name: file.read_bytes() for file in path.parent.iterdir()}
+    with open_for_reading(path) as one:
+        with open_for_reading(path) as other:
+            assert one.counts() == other.counts() == {"done": 2}
+        assert len(list(one.rows())) == 2
+        with pytest.raises(QuadcosimError, match="readonly"):
+            one.add([row(2)])
+    assert {file.name: file.read_bytes() for file in path.parent.iterdir()} == before
+    assert {*before} <= {path.name, f"{path.name}.lock"}
+
+
 # -- read-only places -------------------------------------------------------------------------------------
 
 
