@@ -79,7 +79,7 @@ def find(
     with share_reporter(progress, "longest search") as report, RunEvaluator(files, workers, execution.engine) as pool:
         announce = announce or (lambda line: None)
         if engine == "auto":
-            announce(str(execution))
+            execution.tell(announce)
         trials = Evaluator(
             varied=varied, span=span, seeds=seeds, confidence=confidence if random else None, units=units, pool=pool,
             announce=announce, progress=report,

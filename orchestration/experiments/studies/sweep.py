@@ -17,12 +17,12 @@ from orchestration.experiments.studies.run_key import design_parts, difference, 
 from orchestration.experiments.studies.store_columns import UNITS
 from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.swept import Swept
-from orchestration.foundation.basics.errors import QuadcosimError, UsageError
+from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.interrupt import Interrupted
 from orchestration.foundation.basics.progress import CountProgress, runs_reporter
 from orchestration.foundation.basics.terminal import Count, inform
-from orchestration.simulation.engines.master import BATCH, Engine, engine_named
+from orchestration.simulation.engines.master import BATCH, Engine
 from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.simulation.requests.ranges import paths_in, unit_at
 from orchestration.simulation.results.own_metrics import metrics_from_sources
@@ -89,14 +89,15 @@ def sweep(
     with runs_reporter(progress) as report, store.open_for_writing(path, study.metric_names) as opened:
         _describe(opened, study, files)
         if engine == "auto":
-            execution = _as_before(execution, opened)
+            before = opened.about().get(ENGINE, execution.name)
+            execution = execution.as_before(before, str(path), "another one needs another --out")
         missing = _missing(opened, study, retry_failed)
         sweep_progress = _Progress(len(study.points), opened, report, announce)
         agreement = None
         if missing:
             opened.describe({ENGINE: execution.name})
             if announce is not None and engine == "auto":
-                announce(str(execution))
+                execution.tell(announce)
             all_files = with_python_twins(files) if execution.in_lanes else files
             task_of = partial(_task, study, files.start_values_of(study.origin), time_limit)
             tasks = (task_of(index, key, execution.engine) for index, key in missing.items())
@@ -141,19 +142,6 @@ def prepare(study: Study, engine: EngineChoice) -> tuple[Study, Files, Execution
         first(execution.native)
     prepared, files, follows = candidates[execution.native]
     return prepared, files, execution, follows
-
-
-def _as_before(execution: Execution, opened: store.Store) -> Execution:
-    """What `auto` has chosen, but with the engine that was used last in a store; raises `QuadcosimError` without it."""
-    before = opened.about().get(ENGINE, execution.name)
-    if before == execution.name:
-        return execution
-    if before == BATCH:
-        raise QuadcosimError(
-            f"{opened.path}: expected engine {BATCH}, as of the runs there ({execution.reason}); another one needs "
-            "another --out"
-        )
-    return replace(execution, in_lanes=False, engine=engine_named(before), reason="as the runs in the store")
 
 
 def _expect_workers(workers: int, dask: str | None) -> None:

@@ -19,8 +19,9 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing, needs
 from orchestration.foundation.basics.progress import ShareProgress, share_reporter
 from orchestration.foundation.basics.terminal import inform
+from orchestration.simulation.engines.master import BATCH
 from orchestration.simulation.results import html
-from orchestration.simulation.workers.choice import EngineChoice, choose_execution, single_run_execution
+from orchestration.simulation.workers.choice import EngineChoice, Execution, choose_execution, single_run_execution
 from orchestration.simulation.workers.executors import RunEvaluator
 from orchestration.simulation.workers.provenance import versions
 from orchestration.systems.system.check import describe_references
@@ -131,7 +132,8 @@ def _search_by_runs(
     tuning = dataclasses.replace(tuning, native=execution.native)
     files = tuning.files()
     if engine == "auto":
-        announce(str(execution))
+        execution = _as_before(execution, lambda name: _place(tuning, files, folder, TuningResult, name))
+        execution.tell(announce)
     if follows := describe_references(tuning.origin, files.models_of(tuning.origin)):
         announce(f"follows {follows}")
     with share_reporter(progress, "searching") as report, RunEvaluator(files, workers, execution.engine) as pool:
@@ -164,7 +166,7 @@ def run_searches(
     search is repeated, and none that is interrupted evaluates a point again.
     """
     searches = [(period, seed) for period in tuning.periods for seed in tuning.seeds]
-    with open_record(folder / f"{_key(tuning, files, kind, engine)[:16]}.sqlite") as record:
+    with open_record(_place(tuning, files, folder, kind, engine)) as record:
         done = record.results(kind)
         for i, (period, seed) in enumerate(searches):
             if any((one.period, one.seed) == (period, seed) for one in done):
@@ -193,8 +195,19 @@ def _part(progress: Callable[[float], None], index: int, count: int) -> Callable
     return lambda share: progress((index + share) / count)
 
 
-def _key(tuning: TuningProblem, files: Files, kind: type[SearchResult], engine: str) -> str:
-    """A hash of everything that a search depends on."""
+def _as_before(execution: Execution, place: Callable[[str], Path]) -> Execution:
+    """What `auto` has chosen, but with the engine of the record that there is, if there is one, at its `place`.
+
+    Raises `QuadcosimError` if that engine is not available.
+    """
+    for engine in (execution.name, BATCH, "compiled"):
+        if place(engine).is_file():
+            return execution.as_before(engine, str(place(engine)), f"--engine {execution.name} begins another record")
+    return execution
+
+
+def _place(tuning: TuningProblem, files: Files, folder: Path, kind: type[SearchResult], engine: str) -> Path:
+    """The path of the record, by a hash of everything that a search depends on."""
     content_of_tuning = json.dumps(dataclasses.asdict(tuning), default=str)
     fields = [each.name for each in dataclasses.fields(kind)]
     content = [
@@ -205,4 +218,4 @@ def _key(tuning: TuningProblem, files: Files, kind: type[SearchResult], engine: 
         fields,
         engine,
     ]
-    return hashlib.sha256(json.dumps(content).encode()).hexdigest()
+    return folder / f"{hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]}.sqlite"

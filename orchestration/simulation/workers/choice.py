@@ -1,7 +1,7 @@
 """The choice of an engine for many runs: by default the fastest available, with the reason if it is not the fastest."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, cast, get_args
 
@@ -9,8 +9,9 @@ from orchestration.components.building.fmus import native_twins
 from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError, expected_name
+from orchestration.foundation.basics.terminal import warn
 from orchestration.simulation.engines.batch.shape import expect_lanes
-from orchestration.simulation.engines.master import BATCH, Engine
+from orchestration.simulation.engines.master import BATCH, Engine, engine_named
 from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.systems.system.files import Files, files_of, with_files
 from orchestration.systems.system.model import System
@@ -32,6 +33,8 @@ class Execution:
     """Engine for runs one at a time; None: the fastest that each can use"""
     reason: str | None = None
     """why `auto` did not choose the fastest"""
+    failed: bool = False
+    """whether that is a failure here, as of a compiler, and not what the runs are"""
 
     @property
     def name(self) -> str:
@@ -43,6 +46,19 @@ class Execution:
             return f"engine {self.name}: native FMUs, many runs at once"
         what = "native FMUs" if self.native else "the FMUs as they are"
         return f"engine {self.name}: {what}, one run at a time" + (f" ({self.reason})" if self.reason else "")
+
+    def tell(self, announce: Callable[[str], None]) -> None:
+        """Announce it, or warn where the fastest has failed: other engines have other last bits."""
+        (warn if self.failed else announce)(str(self))
+
+    def as_before(self, engine: str, where: str, remedy: str) -> "Execution":
+        """What `auto` has chosen, but with the engine of what was begun before; raises `QuadcosimError` without it."""
+        if engine == self.name:
+            return self
+        if engine == BATCH:
+            raise QuadcosimError(f"{where}: expected engine {BATCH}, as of the runs there ({self.reason}); {remedy}")
+        reason = "as the runs there"
+        return replace(self, in_lanes=False, engine=engine_named(engine), reason=reason, failed=False)
 
 
 def engine_choice(name: str) -> EngineChoice:
@@ -71,14 +87,21 @@ def choose_execution(
     try:
         system, files = first(True)
     except QuadcosimError as error:  # an invalid request is reported when it is run
-        return Execution(native=native, in_lanes=False, engine=None, reason=str(error))
+        return _slower(native, error)
     try:
         if no_lanes is not None:
             raise UsageError(no_lanes)
         _expect_lanes(system, files)
     except QuadcosimError as error:
-        return Execution(native=True, in_lanes=False, engine=None, reason=str(error))
+        return _slower(True, error)
     return Execution(native=True, in_lanes=True, engine=None)
+
+
+def _slower(native: bool, error: QuadcosimError) -> Execution:
+    """Runs one at a time, after an error of what is faster; a `UsageError` says that they cannot be otherwise."""
+    return Execution(
+        native=native, in_lanes=False, engine=None, reason=str(error), failed=not isinstance(error, UsageError)
+    )
 
 
 def _expect_lanes(system: System, files: Files) -> None:
@@ -98,5 +121,5 @@ def single_run_execution(request: Twin, engine: Engine | Literal["auto"]) -> tup
     try:
         files_of(system_of(native))
     except QuadcosimError as error:
-        return request, Execution(native=False, in_lanes=False, engine=None, reason=str(error))
+        return request, _slower(False, error)
     return native, Execution(native=True, in_lanes=False, engine=None)

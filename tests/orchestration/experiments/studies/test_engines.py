@@ -95,6 +95,19 @@ def test_a_failed_compile_does_not_continue_runs_in_lanes_by_another_engine(
     assert bits(STORE) == after
 
 
+def test_a_sweep_that_begins_with_a_failed_compile_says_so_also_where_it_is_quiet(
+    tmp_path: Path, main: Main, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(shape, "preferred_lanes", no_compiler)
+    path = Path("study.toml")
+    path.write_text(BEGUN)
+    said = "warning: engine compiled: native FMUs, one run at a time (no compiler)\n"
+    assert main("sweep", path, "-q").stderr == said
+    path.write_text(CONTINUED)
+    assert main("sweep", path, "-q").stderr == said
+
+
 def test_runs_that_were_begun_without_lanes_are_continued_without(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -104,7 +117,7 @@ def test_runs_that_were_begun_without_lanes_are_continued_without(
     told: list[str] = []
     more = study(axis("timing.period", 0.01, 0.02, 0.03))
     found = sweep(more, folder=tmp_path, engine="auto", announce=told.append)
-    assert told == ["engine compiled: native FMUs, one run at a time (as the runs in the store)"]
+    assert told == ["engine compiled: native FMUs, one run at a time (as the runs there)"]
     assert (found.engine, found.engines) == ("compiled", {"compiled": 3})
 
 

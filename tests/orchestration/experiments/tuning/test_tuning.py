@@ -7,13 +7,16 @@ from dataclasses import replace
 
 import pytest
 
+from orchestration.experiments.tuning import tune as tunes
 from orchestration.experiments.tuning.tune import run_searches, write
 from orchestration.experiments.tuning.tuning import Tuning, TuningResult, search
 from orchestration.experiments.tuning.tuning_file import load_tuning
 from orchestration.experiments.tuning.tuning_problem import best_by_period
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
+from orchestration.simulation.engines.batch import shape
 from orchestration.systems.system.paths import value_at
+from tests.orchestration.components.fmi.small import needs_compiler
 
 FILE = """
 [base]
@@ -283,3 +286,31 @@ def test_a_damaged_record_is_one_line_that_says_what_to_do(damage, tuning, tmp_p
         searched(tuning, tmp_path, bowl)
     assert str(caught.value).startswith(f"{record}: ")
     assert len(str(caught.value).splitlines()) == 1
+
+
+@needs_compiler
+def test_a_tuning_is_not_continued_by_another_engine_when_lanes_fail(tuning, tmp_path, monkeypatch):
+    tuning = replace(tuning, periods=(0.02,), seeds=(1,), evaluations=3)
+    told: list[str] = []
+    monkeypatch.setattr(tunes, "search", lambda t, p, s, run, judge, *rest: search(t, p, s, bowl, bowl, *rest))
+
+    def tuned(folder):
+        return tunes.tune(tuning, out=folder / "gains", folder=folder, progress=None, announce=told.append).searches
+
+    def no_compiler():
+        raise QuadcosimError("no compiler")
+
+    tuned(tmp_path / "lanes")
+    with monkeypatch.context() as broken:
+        broken.setattr(shape, "preferred_lanes", no_compiler)
+        with pytest.raises(
+            QuadcosimError,
+            match=r"lanes/\w{16}\.sqlite: expected engine batch, as of the runs there \(no compiler\); engine compiled "
+            r"begins another record$",
+        ):
+            tuned(tmp_path / "lanes")
+        tuned(tmp_path / "alone")
+    told.clear()
+    tuned(tmp_path / "alone")
+    assert told[0] == "engine compiled: native FMUs, one run at a time (as the runs there)"
+    assert not any(line.startswith("period") for line in told), "expected no search again"

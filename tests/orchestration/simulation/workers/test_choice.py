@@ -49,7 +49,7 @@ def test_an_engine_by_name_runs_the_requested_fmus(native: bool) -> None:
 def test_without_lanes_native_twins_are_chosen_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shape, "preferred_lanes", no_compiler)
     execution = choose_execution("auto", False, first)
-    assert execution == Execution(native=True, in_lanes=False, engine=None, reason="no compiler")
+    assert execution == Execution(native=True, in_lanes=False, engine=None, reason="no compiler", failed=True)
     assert str(execution) == "engine compiled: native FMUs, one run at a time (no compiler)"
     with pytest.raises(QuadcosimError, match="no compiler"):
         choose_execution("batch", False, first)
@@ -62,7 +62,7 @@ def test_with_a_reduction_that_has_no_form_in_lanes_runs_are_alone_with_the_reas
     system, files = first(True)
     objectives = {**system.objectives, "peak": "highest(plant.thrust)"}
     execution = choose_execution("auto", False, lambda _: (replace(system, objectives=objectives), files))
-    assert (execution.native, execution.in_lanes) == (True, False)
+    assert (execution.native, execution.in_lanes, execution.failed) == (True, False, False)
     assert str(execution.reason).startswith("highest(…) is not computed in SIMD lanes")
 
 
@@ -71,7 +71,7 @@ def test_without_native_twins_the_fmus_are_run_as_they_are_with_the_reason() -> 
         return (no_compiler(), None) if native else first(native)  # type: ignore[return-value]
 
     execution = choose_execution("auto", False, only_as_it_is)
-    assert execution == Execution(native=False, in_lanes=False, engine=None, reason="no compiler")
+    assert execution == Execution(native=False, in_lanes=False, engine=None, reason="no compiler", failed=True)
     assert str(execution) == "engine compiled: the FMUs as they are, one run at a time (no compiler)"
     with pytest.raises(QuadcosimError, match="no compiler"):
         choose_execution("batch", False, only_as_it_is)
