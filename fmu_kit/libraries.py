@@ -38,14 +38,18 @@ def _cache_path(folder: str, sources: Mapping[str, bytes], how: Any) -> Path:
     """The path of a library: a hash of all that its content depends on."""
     import platformdirs
 
-    cc = Path(shutil.which("cc") or "").resolve()
-    compiler = (str(cc), cc.stat().st_size, cc.stat().st_mtime_ns)
-    content = hashlib.sha256(repr((sorted(sources.items()), how, compiler, _processor())).encode())
+    content = hashlib.sha256(repr((sorted(sources.items()), how, compiler(), processor())).encode())
     return Path(platformdirs.user_cache_dir("quadcosim")) / folder / f"{content.hexdigest()}.so"
 
 
+def compiler() -> tuple[str, int, int]:
+    """The compiler of this machine: its path, size and time of last change [ns]."""
+    cc = Path(shutil.which("cc") or "").resolve()
+    return str(cc), cc.stat().st_size, cc.stat().st_mtime_ns
+
+
 @functools.cache
-def _processor() -> tuple[str, ...]:
+def processor() -> tuple[str, ...]:
     """The instruction sets of this machine: machines of a cluster share a cache, but may have different processors."""
     info = Path("/proc/cpuinfo")
     lines = info.read_text().splitlines() if info.is_file() else [platform.processor()]

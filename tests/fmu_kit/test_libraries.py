@@ -45,7 +45,7 @@ def test_another_source_option_compiler_or_processor_is_another_library(
     (tmp_path / "cc").touch()
     monkeypatch.setattr("shutil.which", lambda name: str(tmp_path / name))
     assert libraries.cached_content("made", SOURCES, "-O2", compiler) == b"library 4"
-    monkeypatch.setattr(libraries, "_processor", lambda: ("x86_64", "flags : fpu"))
+    monkeypatch.setattr(libraries, "processor", lambda: ("x86_64", "flags : fpu"))
     assert libraries.cached_content("made", SOURCES, "-O2", compiler) == b"library 5"
 
 

@@ -7,12 +7,13 @@ changed, since 0.0 may switch off an effect. A run whose metrics do not change i
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from orchestration.components.building.fmus import look_up, python_twin, python_twins
 from orchestration.components.fmi.read_description import Model, Variable
+from orchestration.experiments.studies import kept_agreement
 from orchestration.simulation.workers.batching import TOLERATED, LaneAgreement, Pair, sample
 from orchestration.simulation.workers.executors import TaskRunner
 from orchestration.simulation.workers.row import Row
@@ -35,16 +36,30 @@ def with_python_twins(files: Files) -> Files:
 
 
 def lane_agreement(
-    lanes: Mapping[str, Row], files: Files, task_of: Callable[[int, str], RunTask], run: TaskRunner
+    lanes: Mapping[str, Row], files: Files, task_of: Callable[[int, str], RunTask], run: TaskRunner, *, here: bool
 ) -> LaneAgreement | None:
     """The agreement of a sample of runs in lanes with the same runs by FMUs; None if there were no runs in lanes.
 
     `lanes` are their rows by key; `task_of` makes the task of a run from its index and key. `run` works with `files`,
-    as returned by `with_python_twins`.
+    as returned by `with_python_twins`. With all workers `here`, on this machine, one run is enough if a whole sample of
+    runs of the same code has agreed before.
     """
     chosen = [task_of(lanes[key].index, key) for key in sorted(sample(lanes))]
     if not chosen:
         return None
+    if not here:
+        return _agreement(chosen, lanes, files, run)
+    place = kept_agreement.place_of((task.system for task in chosen), files)
+    if kept_agreement.is_kept(place):
+        found = _agreement(chosen[:1], lanes, files, run)
+        if found.agrees and (found.python is not None or not _has_twins(chosen[0].system, files)):
+            return found
+    found = _agreement(chosen, lanes, files, run)
+    kept_agreement.keep(place, found)
+    return found
+
+
+def _agreement(chosen: Sequence[RunTask], lanes: Mapping[str, Row], files: Files, run: TaskRunner) -> LaneAgreement:
     beginnings = [_beginning(task) for task in chosen if _has_twins(task.system, files)]
     tasks: list[RunTask | TaskBatch] = [*chosen, *map(_in_python, beginnings)]
     if beginnings:

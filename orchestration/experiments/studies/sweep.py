@@ -110,7 +110,7 @@ def sweep(
                             _keep(outcomes, opened)
                             sweep_progress.add(outcomes)
                             lanes |= {each.row.key: each.row for each in outcomes if each.row.engine == BATCH}
-                    agreement = lane_agreement(lanes, all_files, partial(task_of, engine=None), run)
+                    agreement = lane_agreement(lanes, all_files, partial(task_of, engine=None), run, here=dask is None)
             except KeyboardInterrupt:
                 raise Interrupted(f"with {sweep_progress.done} of {sweep_progress.total} runs done") from None
         if agreement is not None:

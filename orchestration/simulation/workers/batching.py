@@ -61,10 +61,16 @@ class LaneAgreement:
     """the same for the beginning of non-chaotic runs with FMUs in Python; None: there are no such FMUs"""
 
     def __str__(self) -> str:
-        text = f"{self.runs} runs repeated with FMUs: largest relative difference {self._largest}"
+        runs = f"{self.runs} run" + "s" * (self.runs != 1)
+        text = f"{runs} repeated with FMUs: largest relative difference {self._largest}"
         if self.python is None:
             return text
         return f"{text}; the beginning of {self.python.runs} with FMUs in Python: {self.python._largest}"
+
+    @property
+    def agrees(self) -> bool:
+        """Whether no difference exceeds the tolerance."""
+        return self.difference <= TOLERATED and (self.python is None or self.python.agrees)
 
     @property
     def _largest(self) -> str:

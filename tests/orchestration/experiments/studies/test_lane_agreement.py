@@ -3,17 +3,21 @@
 import math
 from collections.abc import Callable, Generator, Iterable
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
+from orchestration.components.building.fmus import python_twin
+from orchestration.experiments.studies import kept_agreement
 from orchestration.experiments.studies.lane_agreement import lane_agreement, with_python_twins
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import QuadcosimError
-from orchestration.simulation.workers.batching import LaneAgreement
+from orchestration.simulation.workers.batching import SAMPLE, LaneAgreement
 from orchestration.simulation.workers.row import Row
 from orchestration.simulation.workers.task import RunTask, TaskBatch, TaskOutcome
 from orchestration.systems.system.model import System
-from tests.orchestration.components.fmi.small import needs_compiler
+from quadcosim import Scenario
+from tests.orchestration.components.fmi.small import needs_compiler, nothing_known
 from tests.orchestration.experiments.studies.common import axis, short, study
 
 pytestmark = needs_compiler
@@ -28,8 +32,8 @@ def chosen() -> Study:
     return replace(study(axis("timing.period", 0.01, 0.02), base=base), native=True)
 
 
-def agreement(chosen: Study, error: Error) -> LaneAgreement | None:
-    """The agreement of two runs if each kind of run has this error."""
+def agreement(chosen: Study, error: Error, count: int = 2, *, here: bool = False) -> LaneAgreement | None:
+    """The agreement of runs if each kind of run has this error."""
     files = with_python_twins(chosen.files())
 
     def row(task: RunTask, chunk: bool) -> Row:
@@ -45,7 +49,8 @@ def agreement(chosen: Study, error: Error) -> LaneAgreement | None:
                 assert files.fmus.keys() >= {*one.system.fmus.values()}
                 yield [TaskOutcome(row=row(one, isinstance(each, TaskBatch)))]
 
-    return lane_agreement({str(i): row(task(i, str(i)), True) for i in range(2)}, files, task, run)
+    lanes = {str(i): row(task(i, str(i)), True) for i in range(count)}
+    return lane_agreement(lanes, files, task, run, here=here)
 
 
 def in_python(task: RunTask) -> bool:
@@ -111,3 +116,85 @@ def test_a_nudged_run_has_each_real_parameter_changed_in_its_last_bit_except_zer
                 assert (float(after[v.name]) != float(value)) if moves else (after.get(v.name, value) == value), v.name
                 assert not moves or v.maximum is None or float(after[v.name]) <= v.maximum
     assert nudged.components["plant"].parameters["mass"] == math.nextafter(1.0, math.inf)
+
+
+@pytest.fixture
+def unknown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, chosen: Study) -> Path:
+    """The folder of agreements in a cache that has none."""
+    chosen.files()
+    return nothing_known(tmp_path / "cache", monkeypatch) / "quadcosim" / "agreement"
+
+
+@pytest.fixture
+def several(chosen: Study) -> Study:
+    return replace(chosen, axes=(axis("timing.period", *(0.01 + 0.001 * i for i in range(SAMPLE))),))
+
+
+def exact(task: RunTask, chunk: bool) -> float:
+    return 0.0
+
+
+def runs(found: LaneAgreement | None) -> tuple[int, int]:
+    assert found is not None
+    return found.runs, found.python.runs if found.python else 0
+
+
+def test_where_a_whole_sample_has_agreed_one_run_is_enough(unknown: Path, several: Study) -> None:
+    assert runs(agreement(several, exact, SAMPLE, here=True)) == (SAMPLE, SAMPLE)
+    found = agreement(several, exact, SAMPLE, here=True)
+    assert runs(found) == (1, 1)
+    assert "1 run repeated with FMUs" in str(found)
+    assert runs(agreement(several, exact, SAMPLE)) == (SAMPLE, SAMPLE)  # on other machines than this
+
+
+def test_fewer_runs_than_a_sample_vouch_for_nothing(unknown: Path, chosen: Study) -> None:
+    for _ in range(2):
+        assert runs(agreement(chosen, exact, here=True)) == (2, 2)
+
+
+@pytest.mark.parametrize("content", ["", "[]", "{}", '{"runs": 1, "difference": 0.0, "metric": null, "index": null}'])
+def test_an_agreement_that_cannot_be_read_or_is_not_of_a_whole_sample_does_not_count(
+    unknown: Path, several: Study, content: str
+) -> None:
+    agreement(several, exact, SAMPLE, here=True)
+    (kept,) = unknown.iterdir()
+    kept.write_text(content, encoding="utf-8")
+    assert runs(agreement(several, exact, SAMPLE, here=True)) == (SAMPLE, SAMPLE)
+
+
+def test_one_run_that_disagrees_has_the_whole_sample_repeated_and_ends_what_was_kept(
+    unknown: Path, several: Study
+) -> None:
+    agreement(several, exact, SAMPLE, here=True)
+    found = agreement(several, lambda task, chunk: 1e-6 * in_python(task), SAMPLE, here=True)
+    assert runs(found) == (SAMPLE, SAMPLE)
+    assert found is not None
+    with pytest.raises(QuadcosimError, match="FMUs in Python"):
+        found.expect()
+    assert runs(agreement(several, exact, SAMPLE, here=True)) == (SAMPLE, SAMPLE)
+
+
+def test_a_chaotic_run_does_not_stand_for_its_sample(unknown: Path, several: Study) -> None:
+    agreement(several, exact, SAMPLE, here=True)
+    first = "nudged begun 0"
+    found = agreement(several, lambda task, chunk: 1e-6 * (task.key == first), SAMPLE, here=True)
+    assert runs(found) == (SAMPLE, SAMPLE - 1)
+
+
+def test_other_code_is_compared_anew(unknown: Path, several: Study, monkeypatch: pytest.MonkeyPatch) -> None:
+    def place(study: Study) -> Path:
+        return kept_agreement.place_of([study.system(0, {})], files)
+
+    files = with_python_twins(several.files())
+    base = several.base
+    assert isinstance(base, Scenario)
+    before = place(several)
+    assert place(replace(several, base=base.with_changes(parameters={"plant.mass": 1.2}))) == before
+    assert place(replace(several, base=base.with_changes(parameters={"controller.coupling": False}))) != before
+    assert place(replace(several, base=replace(base, timing=replace(base.timing, delay=0.003)))) != before
+    for name in ("versions", "machine", "compiler", "processor"):
+        with monkeypatch.context() as changed:
+            changed.setattr(kept_agreement, name, lambda: ["other"])
+            assert place(several) != before, name
+    files.hashes[python_twin(several.system(0, {}).components["plant"].fmu)] = "other"
+    assert place(several) != before

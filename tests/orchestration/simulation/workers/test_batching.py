@@ -19,7 +19,7 @@ from orchestration.simulation.workers.pool import Inputs, Supervisor
 from orchestration.simulation.workers.task import RunTask, TaskBatch
 from orchestration.systems.system.files import with_files
 from tests.commands import Main
-from tests.orchestration.components.fmi.small import needs_compiler, small
+from tests.orchestration.components.fmi.small import needs_compiler, nothing_known, small
 from tests.orchestration.experiments.studies.common import NOISY, RUNS, STORE, axis, bits, short, study, sweep, swept
 
 pytestmark = needs_compiler
@@ -53,6 +53,7 @@ def test_rows_are_those_of_the_fmus_and_the_command_reports_their_agreement(
 ) -> None:
     chosen = noisy(tmp_path)
     alone = bits(swept(dataclasses.replace(chosen, native=True), tmp_path / "alone"))
+    nothing_known(tmp_path / "cache", monkeypatch)
     monkeypatch.chdir(tmp_path)
     done = main("sweep", "study.toml", "--engine", "batch")
     assert "8 runs repeated with FMUs: largest relative difference" in done.stdout
