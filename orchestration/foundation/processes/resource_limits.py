@@ -47,7 +47,7 @@ DOCUMENT = FileLimit(16.0, "MB", "An XML document of an SSP")
 ELEMENTS = FileLimit(100_000.0, "", "Elements of all arrays of an FMU")
 OF_FILES = (UNPACKED, COMPRESSION, DESCRIPTION, DOCUMENT, ELEMENTS)
 UNLIMITED = Limits(time=math.inf, memory=math.inf, size=math.inf, output=math.inf, message=2000.0)
-"""Without limits but that of a message, which may hold all signals of a run"""
+"""Limits of processes that have none but that of a message, which may hold all signals of a run"""
 
 
 _KINDS = ("RLIMIT_AS", "RLIMIT_DATA", "RLIMIT_FSIZE", "RLIMIT_NOFILE", "RLIMIT_STACK")
