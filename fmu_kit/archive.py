@@ -6,6 +6,7 @@ import re
 import uuid
 import zipfile
 from pathlib import Path
+from typing import Any
 
 from fmu_kit.loader import GUID_FILE
 from fmu_kit.new_files import new_file
@@ -21,6 +22,10 @@ NATIVE_TABLES = "sources/tables.h"
 SOURCE_HASH_FILE = "resources/source_hash.txt"
 VARIANT_FILE = "resources/variant.json"
 """File of the slave and its fixed values in the FMU of a variant"""
+WRAPPED_FILE = "resources/wrapped.json"
+"""File by which the FMU of a user's own C states its origin, and the period that the code believes"""
+LANES_FOLDER = "resources/lanes/"
+"""Folder of what the lanes of such an FMU are compiled from"""
 _STAMP = (1980, 1, 1, 0, 0, 0)
 
 
@@ -41,6 +46,16 @@ def read_variant(fmu: Path) -> tuple[str, Variant] | None:
             return str(slave), Variant.parse(text)
     except (OSError, KeyError, TypeError, ValueError, AttributeError, zipfile.BadZipFile):
         return None
+
+
+def read_wrapped(fmu: Path) -> dict[str, Any] | None:
+    """What the FMU of a user's own C states of its origin; None if it is none or not readable."""
+    try:
+        with zipfile.ZipFile(fmu) as archive:
+            found = json.loads(archive.read(WRAPPED_FILE))
+    except (OSError, KeyError, ValueError, zipfile.BadZipFile):
+        return None
+    return found if isinstance(found, dict) else None
 
 
 def content_guid(files: dict[str, bytes]) -> str:

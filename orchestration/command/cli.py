@@ -24,6 +24,7 @@ from orchestration.command import (
     scheduling,
     studies,
     systems,
+    wrap,
 )
 from orchestration.command.options import option
 from orchestration.command.registry import OutputOptions, ask, option_group
@@ -115,7 +116,7 @@ COMMANDS = {
         margin.margin,
         margin.linearise,
     ),
-    "FMUs": (fmus.build, fmus.validate, fmus.doctor),
+    "FMUs": (fmus.build, wrap.wrap, fmus.validate, fmus.doctor),
     "Other tools": (other_tools.export_c, other_tools.ssp, other_tools.interop),
 }
 """Commands by their groups, in the order of the help"""

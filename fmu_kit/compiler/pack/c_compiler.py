@@ -9,7 +9,8 @@ import shutil
 import struct
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Literal
 
 from fmu_kit.bundle import PackagingError
@@ -76,7 +77,7 @@ def compiler() -> str:
 
 
 def compiled_here(
-    sources: dict[str, bytes], main: str, *, mathematics: Mathematics = "own", options: Sequence[str] = ()
+    sources: Mapping[str, bytes], main: str, *, mathematics: Mathematics = "own", options: Sequence[str] = ()
 ) -> bytes:
     """The library for this machine, compiled from the file `main` among the sources by its compiler `cc`.
 
@@ -85,15 +86,17 @@ def compiled_here(
     return _compiled([compiler(), *OPTIONS, *_LINUX, *options], sources, main, _MATHEMATICS[mathematics])
 
 
-def compiled_for(target: str, sources: dict[str, bytes], main: str, version: int = 2) -> dict[str, bytes]:
+def compiled_for(
+    target: str, sources: Mapping[str, bytes], main: str, version: int = 2, after: Sequence[str] = ()
+) -> dict[str, bytes]:
     """The libraries for a system of `TARGETS`, compiled by zig, by the names of the system in a version of FMI.
 
-    For macOS in FMI 2.0 there is one for all processors. Raises `PackagingError`, naming what to install, without zig
-    or another compiler for the system.
+    `after`: further arguments of the compiler, behind the file. For macOS in FMI 2.0 there is one for all processors.
+    Raises `PackagingError`, naming what to install, without zig or another compiler for the system.
     """
     options = [*OPTIONS, *(_LINUX if target.startswith("linux") else ())]
     slices = {
-        name: _compiled([*_compiler_for(target, called), *options], sources, main)
+        name: _compiled([*_compiler_for(target, called), *options], sources, main, after)
         for name, called in TARGETS[target].items()
     }
     if version > 2 or target in _ONLY_IN_3:
@@ -112,22 +115,32 @@ def _compiler_for(target: str, called: str) -> list[str]:
     return [other]
 
 
-def _compiled(command: list[str], sources: dict[str, bytes], main: str, after: Sequence[str] = ()) -> bytes:
+def _compiled(command: list[str], sources: Mapping[str, bytes], main: str, after: Sequence[str] = ()) -> bytes:
     with temporary_folder() as folder:
         for name, content in sources.items():
             (folder / name).write_bytes(content)
+        output_of([*command, main, "-o", "library", *after], folder)
+        return (folder / "library").read_bytes()
+
+
+def output_of(command: Sequence[str], folder: Path) -> str:
+    """What a tool of the compiler prints in `folder`; raises `PackagingError` with the line of its error."""
+    try:
         done = subprocess.run(
-            [*command, main, "-o", "library", *after],
+            command,
             cwd=folder,
-            env={**os.environ, "TMPDIR": str(folder)},  # a compiler that is killed leaves its own files, too
+            env={**os.environ, "TMPDIR": str(folder), "LC_ALL": "C"},  # files that a killed compiler leaves; its words
             capture_output=True,
             text=True,
+            errors="replace",
             check=False,
         )
-        if done.returncode != 0:
-            lines = done.stderr.strip().splitlines() or ["no output"]
-            raise PackagingError(f"{command[0]}: {next((line for line in lines if 'error' in line), lines[-1])}")
-        return (folder / "library").read_bytes()
+    except FileNotFoundError:
+        raise PackagingError(f"no program {command[0]}: install it (Debian, Ubuntu: apt install binutils)") from None
+    if done.returncode != 0:
+        lines = done.stderr.strip().splitlines() or ["no output"]
+        raise PackagingError(f"{command[0]}: {next((line for line in lines if 'error' in line), lines[-1])}")
+    return done.stdout + done.stderr
 
 
 _FAT_MAGIC, _ALIGNMENT = 0xCAFEBABE, 14

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 
 from fmu_kit import compiler
 from fmu_kit.bundle import Target
+from fmu_kit.compiler.runtime import FOLDER
 from fmu_kit.documentation import TEMPLATE
 from fmu_kit.packaging import hash_of, licences_and_icon
 
@@ -19,3 +21,12 @@ def source_hash(target: Target, version: int = 2) -> str:
     """
     own = sorted(path for path in _COMPILER.rglob("*") if path.suffix in (".py", ".c", ".h", ".html"))
     return hash_of(target, [*own, TEMPLATE], {"version": str(version)}, licences_and_icon(target, version))
+
+
+def wrapping_hash() -> str:
+    """The hash of what is put around a user's own C."""
+    digest = hashlib.sha256()
+    packing = ("pack/user_objects.py", "pack/wrapping.py", "emit/user_code.py")
+    for path in (*sorted(FOLDER.glob("*.[ch]")), *(_COMPILER / name for name in packing)):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()

@@ -46,7 +46,9 @@ def compiled_lanes(
     if count not in (2**k for k in range(7)):
         raise PackagingError(f"lanes = {lanes}: expected 1 or a power of two up to {MAX_LANES}")
     options = (*FOR_THIS_PROCESSOR, f"-DQUADCOSIM_LANES={count}", "-Wno-psabi")
-    return compiled_here(dict(sources), MAIN, mathematics=mathematics, options=options)
+    compiled = [name for name in sources if name.endswith(".o")]  # a user's own code
+    options += (*compiled, "-lm") if compiled else ()
+    return compiled_here(sources, MAIN, mathematics=mathematics, options=options)
 
 
 class Lanes:

@@ -23,7 +23,7 @@ from orchestration.components.building.builder import (
     out_of_date,
     translating_errors,
 )
-from orchestration.components.building.models import MODELS
+from orchestration.components.building.models import MODELS, PATHS, WRAPPED
 from orchestration.foundation.basics.errors import UsageError, prefixed
 
 _NOTES = logging.getLogger("quadcosim")
@@ -55,8 +55,9 @@ def locate(fmu: str, announce: Callable[[str], None] | None = None) -> Path:
 
     The FMU of a path is built if a module beside it defines the slave of that name, or the one of which it is a
     variant, unless it carries the hash of these sources or was not built by this project; where consent is required,
-    `UsageError` states how to give it. Raises `UsageError` for a missing file, and for an unknown name. `announce`
-    receives a line for a build, and for a variant elsewhere that is older than the sources of this project.
+    `UsageError` states how to give it. So is that of a controller in C, whose path is that of its description. Raises
+    `UsageError` for a missing file, and for an unknown name. `announce` receives a line for a build, and for a variant
+    elsewhere that is older than the sources of this project.
     """
     for packing in PACKINGS:
         name = fmu.rpartition("/")[2]
@@ -67,6 +68,10 @@ def locate(fmu: str, announce: Callable[[str], None] | None = None) -> Path:
                 build([name], folder, announce, packing=packing)
             return folder / f"{name}.fmu"
     path = Path(fmu)
+    if path.suffix == WRAPPED:
+        from orchestration.components.building import wrap  # not before: loads what reads such files
+
+        return wrap.locate(path, announce)
     if path.suffix == ".fmu":
         packing, target = _slave_of(path)
         if target is None:
@@ -79,15 +84,18 @@ def locate(fmu: str, announce: Callable[[str], None] | None = None) -> Path:
         if path.is_file():
             return path
         raise UsageError(f"fmu = {fmu}: no such file, and no module beside it that defines the slave")
-    raise UsageError(f"fmu = {fmu}: expected {' or '.join(MODELS)}, or the path of an .fmu file")
+    raise UsageError(
+        f"fmu = {fmu}: expected {' or '.join(MODELS)}, or the path of an .fmu file, or of the {WRAPPED} file of a "
+        "controller in C"
+    )
 
 
 def look_up(fmu: str, announce: Callable[[str], None] | None = None) -> Path | None:
     """As `locate`, but without building where that needs consent; None if the file does not exist."""
     path = Path(fmu)
-    if path.suffix != ".fmu" or consent.is_allowed():
+    if path.suffix not in PATHS or consent.is_allowed():
         return locate(fmu, announce)
-    return path if path.is_file() else None
+    return path if path.is_file() and path.suffix != WRAPPED else None
 
 
 def of_components(fmus: Mapping[str, str], announce: Callable[[str], None] | None = None) -> dict[str, Path]:

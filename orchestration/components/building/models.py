@@ -7,5 +7,9 @@ MODELS = {
     "QuadrotorPlant": "plant_fmu.slave:QuadrotorPlant",
 }
 """FMUs of this project by name, and the slave that each is built from."""
+WRAPPED = ".toml"
+"""The ending of the file of a controller in C, of which an FMU is made"""
+PATHS = (".fmu", WRAPPED)
+"""Endings by which the name of an FMU is a path"""
 CONTROLLERS = tuple(name for name, slave in MODELS.items() if slave.startswith("controller_fmu."))
 """Those that control a vehicle"""

@@ -6,6 +6,7 @@ from dataclasses import field
 from pathlib import Path
 from typing import Any
 
+from orchestration.components.building.models import PATHS
 from orchestration.experiments.comparison.design import FMU, Comparison, Condition, Controller, Front, VehicleEntry
 from orchestration.experiments.studies.axes import Value
 from orchestration.experiments.studies.linked_settings import Key
@@ -122,7 +123,7 @@ def _controller(table: ControllerTable, axis: str, keys: list[tuple[str, Value]]
     place = f"controllers.{table.name}"
     sets: dict[str, Value] = {}
     if table.fmu is not None:
-        sets[FMU] = str(folder / table.fmu) if table.fmu.endswith(".fmu") else table.fmu
+        sets[FMU] = str(folder / table.fmu) if table.fmu.endswith(PATHS) else table.fmu
     own = _of_controller(parameters_in(table.parameters, f"{place}.parameters"))
     tuned: dict[Key, Mapping[str, Value]] = {}
     if table.file is not None and "{" in table.file:  # one file for each vehicle or value of the axis

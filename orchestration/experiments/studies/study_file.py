@@ -5,6 +5,7 @@ from dataclasses import field
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
+from orchestration.components.building.models import PATHS
 from orchestration.experiments.studies.axes import Axis, Scale, Value, span
 from orchestration.experiments.studies.study import Study, names_fmu
 from orchestration.foundation.basics.documents import read_toml
@@ -168,5 +169,5 @@ def _values(listed: list[Value | dict[str, Any]], targets: tuple[str, ...], fold
     are_paths = all(names_fmu(target) or is_source_file(target) or target.endswith(".fmu") for target in targets)
     plain = [as_text(value, folder) if isinstance(value, dict) else value for value in listed]
     return tuple(
-        str(folder / str(value)) if are_paths and str(value).endswith((".fmu", ".csv")) else value for value in plain
+        str(folder / str(value)) if are_paths and str(value).endswith((*PATHS, ".csv")) else value for value in plain
     )

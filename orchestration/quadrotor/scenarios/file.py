@@ -4,6 +4,7 @@ import dataclasses
 from pathlib import Path
 from typing import Any, TypeVar
 
+from orchestration.components.building.models import PATHS
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError, no_such_key, prefixed, shown
 from orchestration.foundation.basics.typed_tables import parsed, table_of
@@ -78,7 +79,7 @@ def _choice(side: str, table: dict[str, Any], default: str, folder: Path) -> Fmu
     fmu = parameters.pop("fmu", default)
     if not isinstance(fmu, str):
         raise UsageError(f"{side}.fmu = {shown(fmu)}: expected the name of an FMU or a path")
-    if fmu.endswith(".fmu"):
+    if fmu.endswith(PATHS):
         fmu = str(folder / fmu)
     return FmuChoice(fmu=fmu, parameters=parameters)
 

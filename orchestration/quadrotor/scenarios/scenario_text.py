@@ -4,6 +4,7 @@ import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from orchestration.components.building.models import PATHS
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
 from orchestration.quadrotor.scenarios.translation import DisturbanceChoice, ReferenceChoice
 from orchestration.systems.system.file_tables import in_toml
@@ -47,5 +48,5 @@ def _signal_table(choice: ReferenceChoice | DisturbanceChoice) -> dict[str, Any]
 
 def _fmu_table(choice: FmuChoice) -> dict[str, Any]:
     """A choice as a table that is valid in any folder."""
-    fmu = str(Path(choice.fmu).absolute()) if choice.fmu.endswith(".fmu") else choice.fmu
+    fmu = str(Path(choice.fmu).absolute()) if choice.fmu.endswith(PATHS) else choice.fmu
     return {"fmu": fmu, **choice.parameters}

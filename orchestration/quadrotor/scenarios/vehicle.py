@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from orchestration.components.building.models import PATHS
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError, did_you_mean, expected_name, prefixed
 from orchestration.systems.system.component import Parameter, parameters_in
@@ -62,6 +63,6 @@ def _expect_parameters(fmu: str, parameters: Mapping[str, Parameter], folder: Pa
     from orchestration.components.fmi.read_description import read_model
     from orchestration.systems.system.check import expect_parameter
 
-    model = read_model(locate(str(folder / fmu) if fmu.endswith(".fmu") else fmu))
+    model = read_model(locate(str(folder / fmu) if fmu.endswith(PATHS) else fmu))
     for name, value in parameters.items():
         expect_parameter(f"controllers.{fmu}.{name}", model, name, value)

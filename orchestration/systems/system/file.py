@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
+from orchestration.components.building.models import PATHS
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError, prefixed
 from orchestration.foundation.basics.typed_tables import fields_of, parsed, table_of
@@ -115,7 +116,7 @@ def system_from_tables(tables: Mapping[str, Any], folder: Path) -> System:
 def _component(name: str, table: Any, folder: Path) -> Component:
     place = f"components.{name}"
     keys = table.model_dump(exclude={"sampling"})
-    keys["fmu"] = str(folder / table.fmu) if table.fmu.endswith(".fmu") else table.fmu
+    keys["fmu"] = str(folder / table.fmu) if table.fmu.endswith(PATHS) else table.fmu
     keys["parameters"] = parameters_in(table.parameters, f"{place}.parameters")
     if table.sampling is not None:
         keys["sampling"] = _sampling(f"{place}.sampling", table.sampling, folder)

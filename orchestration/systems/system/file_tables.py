@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from orchestration.components.building.models import PATHS
+
 
 def tables_of(system: Any) -> dict[str, Any]:
     """The tables of the file that loads as `system`, in any folder, without defaults."""
@@ -17,7 +19,7 @@ def tables_of(system: Any) -> dict[str, Any]:
             del table["sampling"]  # which follows from the task
         if hasattr(component.sampling, "on"):
             del table["sampling"]["period"]
-        if table["fmu"].endswith(".fmu"):
+        if table["fmu"].endswith(PATHS):
             table["fmu"] = str(Path(table["fmu"]).absolute())
     tables["connections"] = [_connection_table(x) for x in system.connections]
     tables["sources"] = {name: _without_defaults(source) for name, source in system.sources.items()}

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from orchestration.components.building.models import PATHS
 from orchestration.components.fmi.read_description import Model
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.systems.system.connection import component_of
@@ -164,7 +165,7 @@ def _has_feedthrough(model: Model) -> bool:
 
 def _component(name: str, fmu: str, model: Model, folder: Path, sampled: str | None) -> list[str]:
     """The lines of a component; `sampled` is the reason for sampling it."""
-    place = _relative(Path(fmu), folder) if fmu.endswith(".fmu") else fmu
+    place = _relative(Path(fmu), folder) if fmu.endswith(PATHS) else fmu
     lines = [f"[components.{name}]", f"fmu = {_text(place)}"]
     step = _experiment(model, "stepSize")
     if sampled is not None:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import field
 from pathlib import PurePath
 
-from orchestration.components.building.models import CONTROLLERS
+from orchestration.components.building.models import CONTROLLERS, PATHS
 from orchestration.foundation.basics.errors import UsageError, expected_name
 from orchestration.foundation.basics.records import record
 from orchestration.systems.system.component import Parameter
@@ -28,7 +28,7 @@ class Vehicle:
 
     def __post_init__(self) -> None:
         for fmu in self.controllers:
-            if fmu not in CONTROLLERS and not fmu.endswith(".fmu"):
+            if fmu not in CONTROLLERS and not fmu.endswith(PATHS):
                 expected = f"{expected_name(fmu, CONTROLLERS)}, or the path of an .fmu file"
                 raise UsageError(f"controllers.{fmu}: no controller of this project; {expected}")
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fmu_kit import libraries
+from fmu_kit.archive import LANES_FOLDER
 from fmu_kit.bundle import PackagingError
 from fmu_kit.compiler.pack.c_compiler import FOR_THIS_PROCESSOR, OPTIONS, compiled_here
 from fmu_kit.compiler.pack.lanes import MAIN, Lanes, compiled_lanes
@@ -21,7 +22,7 @@ from orchestration.simulation.engines.structures import HEADER, shared
 
 FILES = (Path(__file__).with_name("batch.c"), INSTANTS, HEADER, FOLDER / "lanes.h", FOLDER / "mathematics.h")
 """The sources of a batch, besides those that are generated for a system"""
-_SOURCES = "sources/"
+_SOURCES = ("sources/", LANES_FOLDER)
 
 
 def preferred_lanes() -> int:
@@ -47,7 +48,7 @@ def component(name: str, model: Model, lanes: int) -> Lanes:
 def _sources_in(path: Path, changed: int) -> Mapping[str, bytes]:
     with zipfile.ZipFile(path) as archive:
         names = [name for name in archive.namelist() if name.startswith(_SOURCES) and not name.endswith("/")]
-        return {name.removeprefix(_SOURCES): archive.read(name) for name in names}
+        return {name.rpartition("/")[2]: archive.read(name) for name in names}
 
 
 @functools.lru_cache(maxsize=64)

@@ -1,0 +1,199 @@
+"""C that calls a user's own C: reads and sets its variables, which are named as lvalues, and runs its statements.
+
+The compiler knows the types of the lvalues, so no header is parsed. Its errors name the line of the user's file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from fmu_kit.compiler.emit.c_names import c_string
+from fmu_kit.variables import Causality, Variable
+
+CXX = (".cpp", ".cc", ".cxx")
+"""Endings of sources in C++"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Code:
+    """C that a user wrote, and its line in the user's file."""
+
+    text: str
+    line: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """A variable of an FMU: the lvalue that has it in the user's code."""
+
+    name: str
+    causality: Causality
+    lvalue: Code
+    unit: str | None = None
+    description: str = ""
+    minimum: float | None = None
+    maximum: float | None = None
+
+    def variable(self, start: float) -> Variable:
+        """The FMI variable."""
+        return Variable(
+            name=self.name,
+            description=self.description,
+            causality=self.causality,
+            variability="fixed" if self.causality == "parameter" else "discrete",
+            unit=self.unit,
+            start=start,
+            minimum=self.minimum,
+            maximum=self.maximum,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """Statements that run at each step, or at each `ratio`-th, beginning with the first."""
+
+    step: Code
+    ratio: int = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class UserCode:
+    """What a user's file says of the code to wrap."""
+
+    name: str
+    file: str
+    """the name of the user's file, for errors"""
+    hash: str
+    """of its content"""
+    folder: str
+    """its folder, to which paths are relative"""
+    period: float
+    """the sampling period that the code believes [s]"""
+    description: str
+    author: str
+    license: str
+    sources: tuple[str, ...]
+    include: tuple[str, ...]
+    defines: tuple[str, ...]
+    headers: tuple[Code, ...]
+    declare: Code | None
+    init: Code | None
+    after_parameters: Code | None
+    tasks: tuple[Task, ...]
+    places: tuple[Place, ...]
+    """inputs, outputs, parameters, in this order"""
+
+    @property
+    def is_cxx(self) -> bool:
+        """Whether the statements are C++: some source is."""
+        return any(source.endswith(CXX) for source in self.sources)
+
+    def having(self, causality: Causality) -> tuple[Place, ...]:
+        """The places of a causality."""
+        return tuple(place for place in self.places if place.causality == causality)
+
+
+_ROUNDING_C = """\
+/* Integers are rounded, also those in bit fields, of which only the compiler knows that they are some. */
+#define QUADCOSIM_SET(lvalue) \\
+    do { \\
+        if (_Generic((lvalue), float: 1, double: 1, long double: 1, default: 0)) \\
+            lvalue = x; \\
+        else \\
+            lvalue = (long long)(x < 0.0 ? x - 0.5 : x + 0.5); \\
+    } while (0)
+"""
+_ROUNDING_CXX = """\
+template <class T> struct quadcosim_kind {
+    static T of(double x) { return (T)(long long)(x < 0.0 ? x - 0.5 : x + 0.5); }
+};
+template <> struct quadcosim_kind<float> { static float of(double x) { return (float)x; } };
+template <> struct quadcosim_kind<double> { static double of(double x) { return x; } };
+template <class T> struct quadcosim_kind<T &> : quadcosim_kind<T> {};
+#define QUADCOSIM_SET(lvalue) (lvalue) = quadcosim_kind<decltype(lvalue)>::of(x)
+extern "C" void quadcosim_init(void);
+extern "C" void quadcosim_after_parameters(void);
+extern "C" void quadcosim_step(void);
+extern "C" void quadcosim_set(unsigned, double);
+extern "C" double quadcosim_get(unsigned);
+extern "C" void __cxa_pure_virtual(void) { __builtin_trap(); } /* the runtime library's would take more of it */
+"""
+
+
+def user_code(code: UserCode) -> str:
+    """The C or C++ beside the sources of a user."""
+    lines = [line for header in code.headers for line in _at(code, header, f'#include "{header.text}"')]
+    if code.declare is not None:
+        lines += _at(code, code.declare)
+    lines += [_ROUNDING_CXX if code.is_cxx else _ROUNDING_C, '#line 1 "user_code"']
+    lines += _function(code, "quadcosim_init", code.init)
+    lines += _function(code, "quadcosim_after_parameters", code.after_parameters)
+    lines += _step(code)
+    given = [(i, place) for i, place in enumerate(code.places) if place.causality != "output"]
+    lines += ["void quadcosim_set(unsigned variable, double x) {", "(void)x;", "switch (variable) {"]
+    lines += _cases(code, given, "QUADCOSIM_SET({});", "break;")
+    lines += ["}", "}", "double quadcosim_get(unsigned variable) {", "switch (variable) {"]
+    lines += _cases(code, [*enumerate(code.places)], "return (double)({});", "")
+    return "\n".join([*lines, "}", "return 0.0;", "}", ""])
+
+
+def places(code: UserCode, starts: Sequence[float], state_bytes: int) -> str:
+    """places.h: the memory of an instance, and the parameters' bounds."""
+    parameters = [place.variable(0.0) for place in code.having("parameter")]
+    parts = [
+        "/* The memory: the variables by value reference, then what is kept, at last the state of the code. */",
+        f"enum {{ FIRST_OUTPUT = {len(code.having('input'))}, "
+        f"FIRST_PARAMETER = {len(code.places) - len(parameters)}, VARIABLES = {len(code.places)} }};",
+        "enum { KEPT_START_TIME = VARIABLES, KEPT_STALE, KEPT_STATE };",
+        f"#define STATE_BYTES {state_bytes}",
+        "enum { PLACES = KEPT_STATE + (STATE_BYTES + 7) / 8 };",
+        f"static const double starts[PLACES] = {{{', '.join(map(repr, (*starts, 0.0, 1.0)))}}};",
+        _array("double lowest[]", (_number(v.minimum, "-") for v in parameters)),
+        _array("double highest[]", (_number(v.maximum, "") for v in parameters)),
+        "enum { OUT_OF_BOUNDS = 1, DIVERGENCE = 2 }; /* errors of instances and lanes */",
+    ]
+    return "\n".join(parts) + "\n"
+
+
+def texts(code: UserCode) -> str:
+    """The names of variables and the bounds of parameters, for messages."""
+    return "\n".join([
+        _array("char *const names[]", (c_string(place.name) for place in code.places)),
+        _array("char *const bounds[]", (c_string(p.variable(0.0).bounds) for p in code.having("parameter"))),
+    ]) + "\n"  # fmt: skip
+
+
+def _array(declaration: str, values: Iterator[str]) -> str:
+    """Values, of which there may be none."""
+    return f"static const {declaration} = {{{', '.join([*values, '0'])}}};"
+
+
+def _number(bound: float | None, sign: str) -> str:
+    return f"{sign}1e999" if bound is None else repr(bound)
+
+
+def _step(code: UserCode) -> list[str]:
+    if all(task.ratio == 1 for task in code.tasks):
+        body = [line for task in code.tasks for line in ("{", *_at(code, task.step), "}")]
+        return ["void quadcosim_step(void) {", *body, "}"]
+    lines = ["static unsigned long long quadcosim_ticks;", "void quadcosim_step(void) {"]
+    lines += ["const unsigned long long quadcosim_tick = quadcosim_ticks++;"]
+    for task in code.tasks:
+        lines += [f"if (quadcosim_tick % {task.ratio}u == 0) {{", *_at(code, task.step), "}"]
+    return [*lines, "}"]
+
+
+def _function(code: UserCode, name: str, body: Code | None) -> list[str]:
+    return [f"void {name}(void) {{", *([] if body is None else _at(code, body)), "}"]
+
+
+def _cases(code: UserCode, places: Sequence[tuple[int, Place]], form: str, after: str) -> Iterator[str]:
+    for number, place in places:
+        yield f"case {number}:"
+        yield from _at(code, place.lvalue, f"{form.format(place.lvalue.text)} {after}")
+
+
+def _at(code: UserCode, part: Code, text: str | None = None) -> list[str]:
+    """A part of the user's file, of which the compiler's errors name the line."""
+    return [f"#line {part.line} {c_string(code.file)}", part.text if text is None else text, '#line 1 "user_code"']
