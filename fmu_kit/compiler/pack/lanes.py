@@ -45,7 +45,7 @@ def compiled_lanes(
     count = preferred_lanes() if lanes is None else lanes
     if count not in (2**k for k in range(7)):
         raise PackagingError(f"lanes = {lanes}: expected 1 or a power of two up to {MAX_LANES}")
-    options = (*FOR_THIS_PROCESSOR, f"-DQUADCOSIM_LANES={count}", "-Wno-psabi")
+    options: tuple[str, ...] = (*FOR_THIS_PROCESSOR, f"-DQUADCOSIM_LANES={count}", "-Wno-psabi")
     compiled = [name for name in sources if name.endswith(".o")]  # a user's own code
     options += (*compiled, "-lm") if compiled else ()
     return compiled_here(sources, MAIN, mathematics=mathematics, options=options)

@@ -16,7 +16,7 @@ from typing import Literal
 import fmpy
 from fmpy.model_description import ModelDescription, ModelVariable
 
-from fmu_kit.archive import read_source_hash
+from fmu_kit.archive import read_source_hash, read_wrapped
 from fmu_kit.units import BASE
 from orchestration.components.fmi import trust
 from orchestration.components.fmi.archive import (
@@ -105,6 +105,13 @@ class Model:
     def follows_kit(self) -> bool:
         """Whether it says that it is built on `fmu_kit`, whose conventions it follows then."""
         return read_source_hash(self.path) is not None
+
+    @cached_property
+    def believed_period(self) -> float | None:
+        """The sampling period that a user's own code believes [s]; None for other FMUs."""
+        wrapped = read_wrapped(self.path)
+        period = None if wrapped is None else wrapped.get("period")
+        return period if isinstance(period, float) and period > 0.0 else None
 
     @property
     def waits(self) -> bool:

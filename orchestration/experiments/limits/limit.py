@@ -13,7 +13,7 @@ from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.progress import ShareProgress, share_reporter
 from orchestration.foundation.basics.terminal import inform
 from orchestration.simulation.engines.master import Engine
-from orchestration.simulation.engines.resolved import check_against_fmus
+from orchestration.simulation.engines.resolved import check_against_fmus, other_periods_in_words
 from orchestration.simulation.requests.ranges import Varied, default_quantity, search_range
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.results.objectives import bound_of, judged_objective
@@ -102,6 +102,7 @@ def find(
         ideal = _continuous_run(near, pool) if near is not None else None
         report(1.0)
     note = [*_note(span, bracket, trials, refuted, local), *_mean_square_note(mean_square, span)]
+    note += other_periods_in_words(varied.at(span.last), models)
     tried = tuple(trials.tried[value] for value in sorted(trials.tried))
     return Limit(
         of=of, unit=span.unit.strip() or None, judged=metric, judged_unit=units.get(metric or ""),

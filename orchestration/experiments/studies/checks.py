@@ -6,8 +6,9 @@ from typing import Any
 from orchestration.experiments.studies.store_columns import expect_columns
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.terminal import warn
 from orchestration.simulation.engines.batch.shape import outline
-from orchestration.simulation.engines.resolved import check_against_fmus, table_columns
+from orchestration.simulation.engines.resolved import check_against_fmus, other_periods_in_words, table_columns
 from orchestration.systems.signals.table_file import read_table
 from orchestration.systems.signals.waypoints import read_waypoints
 from orchestration.systems.system.check import check_parameter, connect_references
@@ -38,6 +39,8 @@ def check_design(study: Study, files: Files) -> tuple[str, ...]:
         raise UsageError(first + (f" ({invalid - 1} more runs are invalid)" if invalid > 1 else ""))
     with errors_in_own_terms(study.base):
         expect_tables(connect_references(longest, files.models_of(longest)))
+    for remark in checks.remarks:
+        warn(remark)
     return tuple(filter(None, checks.follows))
 
 
@@ -47,6 +50,9 @@ class _SystemChecks:
     def __init__(self, files: Files) -> None:
         self._files = files
         self._known: dict[Hashable, set[tuple[str, str, Any]]] = {}
+        self._periods: set[tuple[float | None, ...]] = set()
+        self.remarks: dict[str, None] = {}
+        """What the periods of some runs mean"""
         self.follows: dict[str, None] = {}
         """References and their followers, in order of occurrence"""
 
@@ -60,13 +66,22 @@ class _SystemChecks:
         if structure not in self._known:
             self.follows[check_against_fmus(system, self._files.models_of(system)).follows] = None
             self._known[structure] = set(parameters)
+            self._expect_believed(system)
             return
+        self._expect_believed(system)
         known, models = self._known[structure], None
         for name, key, value in parameters:
             if (name, key, value) not in known:
                 models = models or self._files.models_of(system)
                 check_parameter(system, models, name, key)
                 known.add((name, key, value))
+
+    def _expect_believed(self, system: System) -> None:
+        """Note components whose code believes another sampling period."""
+        periods = tuple(one.sampling and one.sampling.period for one in system.components.values())
+        if periods not in self._periods:
+            self._periods.add(periods)
+            self.remarks |= dict.fromkeys(other_periods_in_words(system, self._files.models_of(system)))
 
 
 def expect_tables(system: System) -> None:

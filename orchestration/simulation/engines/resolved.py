@@ -1,5 +1,6 @@
 """A request resolved against its FMUs, for any engine: its system checked, its sources, and its columns."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -21,7 +22,7 @@ from orchestration.systems.schedule.fixed_step import FixedStep
 from orchestration.systems.schedule.streams import VALUE, Streams
 from orchestration.systems.signals.library import make_signal
 from orchestration.systems.system.check import check, connect_references, describe_references, recorded_variables
-from orchestration.systems.system.component import Component, has_scheduled_instants
+from orchestration.systems.system.component import Component, SamplingOnArrival, has_scheduled_instants
 from orchestration.systems.system.connection import variable_of
 from orchestration.systems.system.model import System, expressions
 from orchestration.systems.system.request import Request, errors_in_own_terms
@@ -213,6 +214,43 @@ def fixed_steps(system: System, models: Mapping[str, Model]) -> dict[str, FixedS
             grid = Grid(Fraction(0), exact_nanoseconds(component.step))
             steps[name] = FixedStep(name=name, grid=grid, moves=component.align == "next")
     return steps
+
+
+def unbelieved_periods(system: System, models: Mapping[str, Model]) -> dict[str, float]:
+    """The components whose code believes another sampling period than theirs, and what it believes [s]."""
+    found = {}
+    for name, component in system.components.items():
+        sampling = component.sampling
+        if sampling is None or isinstance(sampling, SamplingOnArrival):
+            continue
+        believed = models[name].believed_period
+        if believed is not None and not math.isclose(believed, sampling.period, rel_tol=1e-6):
+            found[name] = believed
+    return found
+
+
+def periods_in_words(system: System, models: Mapping[str, Model]) -> list[str]:
+    """A warning for each such component of a run."""
+    return [
+        f"{name} ({models[name].name}): is sampled every {_period_of(system, name):g} s, but its code believes "
+        f"{believed:g} s: what it computes of time is wrong by that ratio"
+        for name, believed in unbelieved_periods(system, models).items()
+    ]
+
+
+def _period_of(system: System, name: str) -> float:
+    sampling = system.components[name].sampling
+    assert sampling is not None
+    return sampling.period
+
+
+def other_periods_in_words(system: System, models: Mapping[str, Model]) -> list[str]:
+    """What runs over periods mean for each such component of one of them."""
+    return [
+        f"{name} ({models[name].name}): its code believes {believed:g} s; at other periods this is the limit of that "
+        "code, whose constants of time stay, not of a design for each period"
+        for name, believed in unbelieved_periods(system, models).items()
+    ]
 
 
 def uneven_steps(system: System, models: Mapping[str, Model]) -> list[str]:
