@@ -18,15 +18,20 @@ def new(
     name: Annotated[str, typer.Argument(help="Name of the folder and its FMU, such as hover_pd.")],
     author: Annotated[str | None, option("--author", "Author; default: git's user.name.")] = None,
     license: Annotated[str, option("--license", "Licence of the slave.", "TEXT")] = "",
+    in_c: Annotated[bool, option("--c", "A controller in C, and the file by which it is wrapped.")] = False,
 ) -> CommandResult:
     """Write a folder NAME here: a law in a few lines, its test, a system that uses it, a page of commands."""
     kinds = {each: each for each in get_args(Kind)}
     if kind not in kinds:
         raise UsageError(f"new {kind}: expected {', '.join(kinds)}")
+    if in_c and kind != "controller":
+        raise UsageError(f"new {kind} --c: expected controller")
     author = git_author() if author is None else author
-    written = write(kinds[kind], name, Path(), author=author, license=license)
+    written = write(kinds[kind], name, Path(), author=author, license=license, in_c=in_c)
     if not author:
-        inform("no author is set: set it by --author NAME, or in the line author = of the class")
+        inform(
+            f"no author is set: set it by --author NAME, or in the line author = of the {'file' if in_c else 'class'}"
+        )
     inform(f"next: quadcosim run {name}/system.toml")
     return result_of_files(written)
 

@@ -11,15 +11,32 @@ from typing import Literal
 
 from fmu_kit.new_files import clear, new_files, write_atomically
 from orchestration.components.building import consent
-from orchestration.components.building.models import MODELS
+from orchestration.components.building.models import MODELS, WRAPPED
 from orchestration.foundation.basics.errors import UsageError
 
 Kind = Literal["controller", "plant", "filter"]
 _HERE = Path(__file__).parent
 
 
-def write(kind: Kind, name: str, where: Path, *, author: str, license: str) -> list[Path]:
-    """Write the folder `where`/`name`; the paths of its files.
+_IN_PYTHON = {
+    "{module}.py": "{kind}_law.py",
+    "test_{module}.py": "{kind}_test.py",
+    "system.toml": "{kind}_system.toml",
+    "README.md": "{kind}_README.md",
+}
+_IN_C = {
+    "{module}.c": "c_{kind}_law.c",
+    "{module}.h": "c_{kind}_law.h",
+    "{module}.toml": "c_{kind}_wrap.toml",
+    "test_{module}.py": "c_{kind}_test.py",
+    "system.toml": "{kind}_system.toml",
+    "README.md": "c_{kind}_README.md",
+}
+"""Templates by the file that is written"""
+
+
+def write(kind: Kind, name: str, where: Path, *, author: str, license: str, in_c: bool = False) -> list[Path]:
+    """Write the folder `where`/`name`; the paths of its files. A controller may be `in_c`.
 
     The class has the name in CamelCase, its module in snake_case. Raises `UsageError` for an invalid name, or if the
     folder exists.
@@ -30,15 +47,12 @@ def write(kind: Kind, name: str, where: Path, *, author: str, license: str) -> l
     folder = where / name
     expect_new(folder)
     names = {"Name": model, "module": module, "folder": name, "author": _quoted(author), "license": _quoted(license)}
-    files = {
-        f"{module}.py": "law.py",
-        f"test_{module}.py": "test.py",
-        "system.toml": "system.toml",
-        "README.md": "README.md",
-    }
+    names |= {"guard": module.upper(), "fmu": f"{module}{WRAPPED}" if in_c else f"{model}.fmu"}
+    templates = _IN_C if in_c else _IN_PYTHON
+    files = {key.format(module=module): value.format(kind=kind) for key, value in templates.items()}
     with new_files(where) as new:
         for file, template in files.items():
-            text = (_HERE / f"{kind}_{template}.tmpl").read_text(encoding="utf-8")
+            text = (_HERE / f"{template}.tmpl").read_text(encoding="utf-8")
             write_atomically(new / name / file, Template(text).substitute(names))
     consent.agree(folder)
     return [folder / file for file in files]
