@@ -94,14 +94,15 @@ class UserCode:
         return tuple(place for place in self.places if place.causality == causality)
 
 
+# Names of the user's own variables must not be hidden by those of the functions here.
 _ROUNDING_C = """\
 /* Integers are rounded, also those in bit fields, of which only the compiler knows that they are some. */
 #define QUADCOSIM_SET(lvalue) \\
     do { \\
         if (_Generic((lvalue), float: 1, double: 1, long double: 1, default: 0)) \\
-            lvalue = x; \\
+            lvalue = quadcosim_x; \\
         else \\
-            lvalue = (long long)(x < 0.0 ? x - 0.5 : x + 0.5); \\
+            lvalue = (long long)(quadcosim_x < 0.0 ? quadcosim_x - 0.5 : quadcosim_x + 0.5); \\
     } while (0)
 """
 _ROUNDING_CXX = """\
@@ -111,7 +112,7 @@ template <class T> struct quadcosim_kind {
 template <> struct quadcosim_kind<float> { static float of(double x) { return (float)x; } };
 template <> struct quadcosim_kind<double> { static double of(double x) { return x; } };
 template <class T> struct quadcosim_kind<T &> : quadcosim_kind<T> {};
-#define QUADCOSIM_SET(lvalue) (lvalue) = quadcosim_kind<decltype(lvalue)>::of(x)
+#define QUADCOSIM_SET(lvalue) (lvalue) = quadcosim_kind<decltype(lvalue)>::of(quadcosim_x)
 extern "C" void quadcosim_init(void);
 extern "C" void quadcosim_after_parameters(void);
 extern "C" void quadcosim_step(void);
@@ -131,9 +132,10 @@ def user_code(code: UserCode) -> str:
     lines += _function(code, "quadcosim_after_parameters", code.after_parameters)
     lines += _step(code)
     given = [(i, place) for i, place in enumerate(code.places) if place.causality != "output"]
-    lines += ["void quadcosim_set(unsigned variable, double x) {", "(void)x;", "switch (variable) {"]
+    lines += ["void quadcosim_set(unsigned quadcosim_variable, double quadcosim_x) {", "(void)quadcosim_x;"]
+    lines += ["switch (quadcosim_variable) {"]
     lines += _cases(code, given, "QUADCOSIM_SET({});", "break;")
-    lines += ["}", "}", "double quadcosim_get(unsigned variable) {", "switch (variable) {"]
+    lines += ["}", "}", "double quadcosim_get(unsigned quadcosim_variable) {", "switch (quadcosim_variable) {"]
     lines += _cases(code, [*enumerate(code.places)], "return (double)({});", "")
     return "\n".join([*lines, "}", "return 0.0;", "}", ""])
 

@@ -71,7 +71,8 @@ def locate(fmu: str, announce: Callable[[str], None] | None = None) -> Path:
     if path.suffix == WRAPPED:
         from orchestration.components.building import wrap  # not before: loads what reads such files
 
-        return wrap.locate(path, announce)
+        with prefixed("fmu = "):
+            return wrap.locate(path, announce)
     if path.suffix == ".fmu":
         packing, target = _slave_of(path)
         if target is None:
