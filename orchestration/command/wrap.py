@@ -7,8 +7,6 @@ import typer
 
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, result_of_files
-from orchestration.components.building import consent
-from orchestration.components.building import wrap as wrapping
 
 
 def wrap(
@@ -27,6 +25,9 @@ def wrap(
     ] = None,
 ) -> CommandResult:
     """Make an FMU of a controller that exists as C: its sources as they are, and a file that names its variables."""
+    from orchestration.components.building import consent
+    from orchestration.components.building import wrap as wrapping
+
     default = wrapping.fmu_of(controller, fmi)
     consent.agree(controller.parent)
     built = wrapping.build(controller, default if out is None else out / default.name, version=fmi, systems=target)

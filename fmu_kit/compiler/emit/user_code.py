@@ -63,11 +63,11 @@ class UserCode:
 
     name: str
     file: str
-    """the name of the user's file, for errors"""
+    """name of the user's file, for errors"""
     hash: str
-    """of its content"""
+    """hash of its content"""
     folder: str
-    """its folder, to which paths are relative"""
+    """folder of it, to which paths are relative"""
     period: float
     """the sampling period that the code believes [s]"""
     description: str

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fmu_kit.bundle import PackagingError
-from fmu_kit.compiler.emit.user_code import CXX, UserCode, user_code
+from fmu_kit.compiler.emit.user_code import CXX, UserCode
 from fmu_kit.compiler.pack.c_compiler import compiler, output_of
 
 SECTION = "quadcosim_state"
@@ -81,13 +81,11 @@ _ADVICE = {
 }  # fmt: skip
 
 
-def build_objects(code: UserCode, folder: Path) -> Objects:
-    """Compile the sources of a user, and what calls them, in `folder`.
+def build_objects(code: UserCode, user: Path, folder: Path) -> Objects:
+    """Compile the sources of a user and `user`, the file that calls them, in `folder`.
 
     Raises `RefusedCodeError` naming the user's file and line, and `PackagingError` without a compiler.
     """
-    user = folder / ("user_code.cpp" if code.is_cxx else "user_code.c")
-    user.write_text(user_code(code), encoding="utf-8")
     compiled, libraries, read = [], [], []
     for number, source in enumerate([*code.sources, str(user)]):
         path = Path(code.folder, source)

@@ -24,7 +24,7 @@ from fmu_kit.archive import WRAPPED_FILE, content_guid, write_archive
 from fmu_kit.bundle import PackagingError
 from fmu_kit.compiler.emit.standards import STANDARDS, Standard
 from fmu_kit.compiler.emit.tables import tables
-from fmu_kit.compiler.emit.user_code import Code, Place, Task, UserCode, places, texts
+from fmu_kit.compiler.emit.user_code import Code, Place, Task, UserCode, places, texts, user_code
 from fmu_kit.compiler.pack import c_compiler
 from fmu_kit.compiler.pack.freshness import wrapping_hash
 from fmu_kit.compiler.pack.lanes import MAIN
@@ -75,7 +75,11 @@ def build(code: UserCode, out: Path, version: int = 2, systems: Sequence[str] = 
     if here is None:
         raise PackagingError("wrap: expected Linux on x86-64 or ARM; it uses sections of ELF")
     with temporary_folder() as folder:
-        objects = build_objects(code, folder)
+        user = folder / f"user_code{'.cpp' if code.is_cxx else '.c'}"
+        user.write_text(user_code(code), encoding="utf-8")
+        objects = build_objects(code, user, folder)
+        for name, text in _probe(code, objects).items():
+            (folder / name).write_text(text, encoding="utf-8")
         starts = _starts(code, objects, folder)
         slave = _slave(code, starts)
         whole = objects.is_pure and not systems
@@ -109,12 +113,17 @@ def _library(code: UserCode, sources: Mapping[str, bytes], main: str) -> bytes:
     return c_compiler.compiled_here(sources, main, options=options)
 
 
+def _probe(code: UserCode, objects: Objects) -> dict[str, str]:
+    """The files of a program that prints the values of the variables after initialisation."""
+    return {
+        "places.h": places(code, [0.0] * len(code.places), objects.state_bytes),
+        "probe.c": _PROBE,
+        "wrapped.h": (FOLDER / "wrapped.h").read_text(encoding="utf-8"),
+    }
+
+
 def _starts(code: UserCode, objects: Objects, folder: Path) -> list[float]:
     """The values of the variables after the code's initialisation, which runs here."""
-    files = {"places.h": places(code, [0.0] * len(code.places), objects.state_bytes), "probe.c": _PROBE}
-    files["wrapped.h"] = (FOLDER / "wrapped.h").read_text(encoding="utf-8")
-    for name, text in files.items():
-        (folder / name).write_text(text, encoding="utf-8")
     c_compiler.output_of([c_compiler.compiler(), "-std=gnu11", "-w", "-c", "-fPIC", "probe.c", "-o", "probe.o"], folder)
     whole = [c_compiler.compiler(), "probe.o", str(objects.path), *libraries(code), "-o", "probe"]
     c_compiler.output_of(whole, folder)

@@ -49,7 +49,7 @@ class WrappedVariable:
     unit: str = "1"
     """Its unit in SI."""
     description: str = ""
-    """What it is."""
+    """Description of the variable."""
     min: float | int | None = None
     """Least value, of a parameter."""
     max: float | int | None = None
@@ -95,9 +95,9 @@ class WrapFile:
     headers: tuple[str, ...] = ()
     """Headers that the statements need."""
     description: str = ""
-    """What it is, in one line."""
+    """Description of the FMU, in one line."""
     author: str = ""
-    """Who wrote it."""
+    """Author of the code."""
     license: str = ""
     """Its licence; if given, the FMU contains the sources."""
     inputs: Mapping[str, str | WrappedVariable] = field(default_factory=dict)

@@ -52,7 +52,7 @@ class _SystemChecks:
         self._known: dict[Hashable, set[tuple[str, str, Any]]] = {}
         self._periods: set[tuple[float | None, ...]] = set()
         self.remarks: dict[str, None] = {}
-        """What the periods of some runs mean"""
+        """Words on what the periods of some runs mean"""
         self.follows: dict[str, None] = {}
         """References and their followers, in order of occurrence"""
 
