@@ -78,7 +78,7 @@ class _SystemChecks:
 
     def _expect_believed(self, system: System) -> None:
         """Note components whose code believes another sampling period."""
-        periods = tuple(one.sampling and one.sampling.period for one in system.components.values())
+        periods = tuple(one.sampling.period if one.sampling else None for one in system.components.values())
         if periods not in self._periods:
             self._periods.add(periods)
             self.remarks |= dict.fromkeys(other_periods_in_words(system, self._files.models_of(system)))
