@@ -64,10 +64,13 @@ def new_files(folder: Path, name: str = "") -> Iterator[Path]:
     """
     if any(_PRIVATE.fullmatch(part) for part in folder.parts):
         folder.mkdir(parents=True, exist_ok=True)
+        before = set(os.listdir(folder))
         try:
             yield folder
-        except OSError as error:
-            if error.filename is None and error.errno in _OF_THE_DISK:
+        except BaseException as error:
+            for each in {name} if name else set(os.listdir(folder)) - before:  # a run may be kept without them
+                _remove(folder / each)
+            if isinstance(error, OSError) and error.filename is None and error.errno in _OF_THE_DISK:
                 raise _write_error(error, folder / name) from error
             raise
         return
@@ -177,6 +180,13 @@ def _keep(place: Path, old: Path) -> None:
             os.link(place, old, follow_symlinks=False)
         except OSError:  # a file system without links
             shutil.copy2(place, old, follow_symlinks=False)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def clear(folder: Path) -> None:

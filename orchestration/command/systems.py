@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from fmu_kit.new_files import write_atomically
+from fmu_kit.new_files import clear, write_atomically
 from orchestration.command.flags import FlightFlags, ScenarioFile, Timing, flight_options, request_from
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, build_option
@@ -41,6 +41,8 @@ def connect(
     from orchestration.simulation.requests.resource_files import resources_of
     from orchestration.systems.system.proposal import propose
 
+    if out is not None:
+        clear(out.parent)  # it may be what a killed process was about to move there
     if out is not None and out.exists():
         raise UsageError(f"--out {out}: exists already; expected a file that does not exist")
     resources, others = resources_of(fmu)

@@ -1,6 +1,6 @@
-/* Calls of the operating system that fail, by LD_PRELOAD, on files of given folders: the n-th of one kind, or all from
- * it on; or the process is killed before it. Calls are counted in a file that child processes share. Calls that libc
- * makes inside of itself, as those of fwrite, are not seen. */
+/* Calls of the operating system that fail, by LD_PRELOAD, on files of a given folder, and calls for memory by libraries
+ * of two: the n-th of one kind, or all from it on; or the process is killed before it. Calls are counted in a file that
+ * child processes share. Calls that libc makes inside of itself, as those of fwrite, are not seen. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -8,6 +8,7 @@
 #include <limits.h>
 #include <signal.h>
 #include <stdarg.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,7 +17,7 @@
 #include <sys/uio.h>
 #include <unistd.h>
 
-enum { WRITE, OPEN, RENAME, FSYNC, MMAP, FTRUNCATE, OPERATIONS };
+enum { WRITE, OPEN, RENAME, FSYNC, MMAP, FTRUNCATE, MALLOC, OPERATIONS };
 enum { KILL = -1, SHORT = -2 };
 
 /* tests/faults/shim.py packs the same. */
@@ -25,7 +26,7 @@ struct plan {
     long struck;            /* how many failed */
     long operation, first, last;
     long how; /* the errno, or KILL, or SHORT: half of what was to be written is */
-    char folders[2][PATH_MAX];
+    char folder[PATH_MAX], libraries[PATH_MAX];
 };
 
 static struct plan *plan;
@@ -48,12 +49,12 @@ __attribute__((constructor)) static void load(void) {
     if (path != NULL) faults_load(path);
 }
 
+static int starts_with(const char *path, const char *folder) {
+    return *folder && strncmp(path, folder, strlen(folder)) == 0;
+}
+
 static int is_within(const char *path) {
-    for (int i = 0; i < 2; i++) {
-        size_t length = strlen(plan->folders[i]);
-        if (length > 0 && strncmp(path, plan->folders[i], length) == 0) return 1;
-    }
-    return 0;
+    return starts_with(path, plan->folder);
 }
 
 static int of_descriptor(int descriptor, char path[PATH_MAX]) {
@@ -185,3 +186,28 @@ MMAP_LIKE(mmap64, off64_t)
 
 FTRUNCATE_LIKE(ftruncate, off_t)
 FTRUNCATE_LIKE(ftruncate64, off64_t)
+
+/* Whether the code at an address is of a library in one of the folders. Most calls come from the same pages, of which
+ * the answers are kept. */
+static int is_of_library(void *address) {
+    static uintptr_t known[1024];
+    uintptr_t page = (uintptr_t)address >> 12, *kept = &known[page % 1024], seen = __atomic_load_n(kept, __ATOMIC_RELAXED);
+    if (seen >> 1 == page) return seen & 1;
+    Dl_info info;
+    int within = dladdr(address, &info) && info.dli_fname
+                 && (is_within(info.dli_fname) || starts_with(info.dli_fname, plan->libraries));
+    __atomic_store_n(kept, page << 1 | (uintptr_t)within, __ATOMIC_RELAXED);
+    return within;
+}
+
+#define MALLOC_LIKE(name, of_libc, parameters, arguments) \
+    extern void *of_libc parameters; \
+    void *name parameters { \
+        if (plan && is_of_library(__builtin_return_address(0)) && strikes(MALLOC)) return NULL; \
+        return of_libc arguments; \
+    }
+
+MALLOC_LIKE(malloc, __libc_malloc, (size_t n), (n))
+MALLOC_LIKE(calloc, __libc_calloc, (size_t count, size_t n), (count, n))
+MALLOC_LIKE(realloc, __libc_realloc, (void *memory, size_t n), (memory, n))
+MALLOC_LIKE(aligned_alloc, __libc_memalign, (size_t alignment, size_t n), (alignment, n))

@@ -1,44 +1,38 @@
 """Commands at each of whose calls of the operating system something fails: what becomes of their files.
 
-Each case is a process that is forked from this one, in a folder of its own, and then the command once more without a
-fault. This process has the shim, and never runs a command itself.
+Each case is a command in a folder of its own, and then the command once more without a fault, unless the folder is in a
+state from which it has been run before.
 """
 
-import atexit
-import gc
-import hashlib
-import importlib
-import os
 import re
-import select
 import shutil
-import signal
-import sys
-import tempfile
-import time
-import traceback
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from orchestration.command import cli
+from tests.faults import forked
 from tests.faults.commands import BEFORE, TEXTS, Command
-from tests.faults.shim import FAULTS, KILL, Fault, Plan
+from tests.faults.contents import (
+    HIDDEN,
+    STORE,
+    Contents,
+    as_bytes,
+    contents,
+    difference,
+    finished,
+    rows,
+    without_hidden,
+    without_varying,
+)
+from tests.faults.forked import End
+from tests.faults.shim import FAULTS, KILL, KILLED, Fault, Plan
 
 OLD = b"years of work"
-STILL = 90
-"""[s] in which a process that neither computes nor waits for the disk is taken to hang"""
-MOST = 200.0
-"""[s] of processor time after which one is taken not to end"""
-HIDDEN = re.compile(r"(^|/)\.quadcosim-|\.new$|\.partial$")
-KEPT = re.compile(r"flight\.\d+(/|$)")
-"""A whole run that could not take its place"""
-JOURNALS = ("-wal", "-shm", ".lock")
-"""Endings of files beside a store that are there or not"""
+EACH = 16
+"""Up to which each request of memory fails"""
 
-State = dict[str, str]
-"""The digests of the files below a folder, by path; of folders without files a word"""
+Finding = tuple[str, str]
+"""A kind of outcome that must not be, and what is wrong"""
 
 
 @dataclass(frozen=True)
@@ -54,12 +48,17 @@ class Row:
 
 
 @dataclass(frozen=True)
-class End:
-    """How a command ended."""
+class Clean:
+    """A command without a fault."""
 
-    code: int
-    errors: str
-    hangs: bool = False
+    after: Contents
+    varying: set[str]
+    """Files that differ from run to run"""
+    calls: dict[str, int]
+
+    def is_reached(self, found: Contents) -> bool:
+        """Whether all has been done."""
+        return without_varying(found, self.varying) == self.after
 
 
 class Matrix:
@@ -68,71 +67,84 @@ class Matrix:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.plan = Plan(folder / "plan")
-        self._known: dict[str, Path] = {}
+        self._before: dict[str, Path] = {}
+        self._again: dict[tuple[str, frozenset[tuple[str, str]]], list[Finding]] = {}
         self._count = 0
 
     def rows(self, command: Command, faults: Iterable[Fault] = FAULTS, most: int = 10**9) -> Iterator[Row]:
         """All cases of a command, with at most `most` numbers of a kind of call."""
-        clean, again = self._clean(command), self._clean(command)
-        varying = {name for name in clean.after if clean.after[name] != again.after.get(name)}
-        after = _without(clean.after, varying)
+        clean = self.clean(command)
         for fault in faults:
-            for n in list(_numbers(fault, clean.calls[fault.call]))[:most]:
-                row = self._case(command, fault, n, after, varying)
+            for n in list(numbers(fault, clean.calls[fault.call]))[:most]:
+                place = self._place(command)
+                row = self._case(command, fault, n, clean, place)
+                shutil.rmtree(place)
                 if row is not None:
                     yield row
 
-    def _clean(self, command: Command) -> "_Clean":
-        place = self._place(command)
-        end = self._run(command.words, place)
-        if end.code != 0 or end.hangs:
-            raise RuntimeError(f"{command.name} without a fault: code {end.code}: {end.errors}")
-        calls = self.plan.calls()
-        self._know_modules()
-        state = _state(place / "work")
-        shutil.rmtree(place)
-        return _Clean(state, calls)
+    def clean(self, command: Command) -> Clean:
+        """The command without a fault, twice."""
+        found = []
+        for _ in range(2):
+            place = self._place(command)
+            end = self._run(command.words, place)
+            if end.code != 0 or end.hangs:
+                raise RuntimeError(f"{command.name} without a fault: code {end.code}: {end.errors}")
+            calls = self.plan.calls()
+            forked.know_modules(self.plan)
+            found.append(contents(place / "work"))
+            shutil.rmtree(place)
+        one, other = found
+        varying = {name for name in one if one[name] != other.get(name)}
+        return Clean(without_varying(one, varying), varying, calls)
 
-    def _case(self, command: Command, fault: Fault, n: int, after: State, varying: set[str]) -> Row | None:
-        place = self._place(command)
-        before = _state(place / "work")
+    def _case(self, command: Command, fault: Fault, n: int, clean: Clean, place: Path) -> Row | None:
+        before = contents(place / "work")
         end = self._run(command.words, place, fault, n)
         if not self.plan.struck:
-            shutil.rmtree(place)
             return None
-        then = _without_hidden(_state(place / "work"))
-        faults = list(_faults_of(end, fault))
-        is_new = _without(then, varying) == after and set(then) >= set(after)
-        outcome = "new" if is_new else "old"
-        if end.code == 0 and not is_new and fault.how != KILL:
-            faults.append(("silent", f"code 0, but {_difference(_without(then, varying), after)}"))
-        elif not is_new and not command.resumes:
-            faults += _lost(then, before, after, varying, killed=fault.how == KILL)
-        if is_new and command.once:
-            for name in {name.split("/")[0] for name in set(after) - set(before)}:
-                shutil.rmtree(place / "work" / name)
-        rerun = self._run(command.words, place)
-        last = _state(place / "work")
-        there = command.once and _without(last, varying) == after
-        if (rerun.code != 0 and not there) or rerun.hangs:
-            faults.append(("stuck", f"then: code {rerun.code}: {_last_line(rerun.errors)}"))
-        elif _without(last, varying) != after:
-            faults.append(("stuck", f"then: {_difference(_without(last, varying), after)}"))
+        killed, then = fault.how == KILL, contents(place / "work")
+        then, beside = _parted(without_hidden(finished(then) if killed else then), command)
+        is_new = clean.is_reached(then)
+        found = [*_of_end(end, killed=killed), *_of_runs_beside(beside, end, clean, killed=killed)]
+        if end.code == 0 and not is_new and not killed:
+            found.append(("silent", f"code 0, but {difference(without_varying(then, clean.varying), clean.after)}"))
+        elif not is_new:
+            found += _lost(then, before, clean, some=killed or command.resumes)
+        found += self._next(command, place, clean, is_new=is_new)
+        outcome = found[0][0] if found else "new" if is_new else "old"
+        return Row(command.name, f"{fault.call}: {fault.text}", n, outcome, "; ".join(note for _, note in found))
+
+    def _next(self, command: Command, place: Path, clean: Clean, *, is_new: bool) -> list[Finding]:
+        """What is wrong with the command once more, without a fault, where a case has left off."""
+        state = as_bytes(place)
+        if is_new:
+            state = without_varying(state, {f"work/{name}" for name in clean.varying})
+        key = (command.name, frozenset(state.items()))
+        if key not in self._again:
+            self._again[key] = list(self._again_without_fault(command, place, clean))
+        return self._again[key]
+
+    def _again_without_fault(self, command: Command, place: Path, clean: Clean) -> Iterator[Finding]:
+        done = {path: set(rows(path, whole=True)) for path in (place / "work").rglob(f"*{STORE}")}
+        end = self._run(command.words, place)
+        last = contents(place / "work")
+        then, _ = _parted(without_hidden(last), command)
+        if end.hangs or (end.code != 0 and not (command.once and clean.is_reached(then))):
+            yield "stuck", f"then: code {end.code}: {_last_line(end.errors)}"
+        elif not clean.is_reached(then):
+            yield "stuck", f"then: {difference(without_varying(then, clean.varying), clean.after)}"
+        for path, before in done.items():
+            if command.resumes and (lost := before - set(rows(path, whole=True))):
+                yield "lost", f"then: {len(lost)} rows of {path.name} were made again"
         left = [str(path.relative_to(place)) for path in (place / "tmp").iterdir()]
-        left += [name for name in last if HIDDEN.search(name)]
-        if left:
-            faults.append(("left", ", ".join(sorted(left)[:3])))
-        shutil.rmtree(place)
-        if faults:
-            outcome = faults[0][0]
-        return Row(command.name, f"{fault.call}: {fault.text}", n, outcome, "; ".join(note for _, note in faults))
+        if left := left + [name for name in last if HIDDEN.search(name)]:
+            yield "left", ", ".join(sorted(left)[:3])
 
     def _place(self, command: Command) -> Path:
         self._count += 1
-        place = self.folder / f"case{self._count}"
+        place = _new_place(self.folder / f"case{self._count}")
         work = place / "work"
-        work.mkdir(parents=True)
-        (place / "tmp").mkdir()
         for name in command.needs:
             if name in TEXTS:
                 (work / name).write_text(TEXTS[name], encoding="utf-8")
@@ -144,177 +156,89 @@ class Matrix:
         return place
 
     def _made(self, name: str) -> Path:
-        if name not in self._known:
-            place = self.folder / f"before-{name}"
-            for each in ("tmp", "work"):
-                (place / each).mkdir(parents=True)
+        if name not in self._before:
+            place = _new_place(self.folder / f"before-{name}")
             for file, text in TEXTS.items():
                 (place / "work" / file).write_text(text, encoding="utf-8")
-            end = self._run(BEFORE[name], place)
-            if end.code != 0:
+            before = BEFORE[name]
+            end = self._run(before.words, place, KILLED if before.killed_at else None, before.killed_at)
+            if (end.code != 0) != bool(before.killed_at):
                 raise RuntimeError(f"{name}: {end.errors}")
-            self._known[name] = place / "work" / name
-        return self._known[name]
+            self._before[name] = place / "work" / name
+        return self._before[name]
 
     def _run(self, words: tuple[str, ...], place: Path, fault: Fault | None = None, n: int = 0) -> End:
         self.plan.write(place, fault, n)
-        printed = self.folder / "printed"
-        child = os.fork()
-        if child == 0:
-            _be_the_command(words, place, printed, self.plan, self.folder / "modules")
-        hangs = not _ends(child)
-        with suppress(ProcessLookupError):
-            os.killpg(child, signal.SIGKILL)
-        status = os.waitpid(child, 0)[1]
-        return End(os.waitstatus_to_exitcode(status), printed.read_text(errors="replace"), hangs)
-
-    def _know_modules(self) -> None:
-        """Import what the last command imported, so that the next ones need not."""
-        with suppress(FileNotFoundError):
-            for name in (self.folder / "modules").read_text().splitlines():
-                if name not in sys.modules:
-                    with suppress(Exception):
-                        importlib.import_module(name)
-        gc.freeze()
+        return forked.run(words, place, self.plan)
 
 
-@dataclass(frozen=True)
-class _Clean:
-    after: State
-    calls: dict[str, int]
-
-
-def _numbers(fault: Fault, count: int) -> Iterator[int]:
-    """Numbers of calls: every rename, else 1, 2, 4, … and the last."""
-    if fault.call == "rename":
-        yield from range(1, count + 1)
-        return
+def numbers(fault: Fault, count: int) -> Iterator[int]:
+    """Numbers of calls: every rename and the first requests of memory, else 1, 2, 4, … and the last."""
+    each = count if fault.call == "rename" else EACH if fault.call == "malloc" else 1
     n = 1
     while n < count:
         yield n
-        n *= 2
+        n = n + 1 if n < each else 2 * n
     if count:
         yield count
 
 
-def _be_the_command(words: tuple[str, ...], place: Path, printed: Path, plan: Plan, modules: Path) -> None:
-    """Run the command in this forked process, and end with it."""
-    code = 1
-    try:
-        os.setsid()
-        output = os.open(printed, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
-        os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
-        for stream in (1, 2):
-            os.dup2(output, stream)
-        os.chdir(place / "work")
-        os.environ["TMPDIR"] = str(place / "tmp")
-        tempfile.tempdir = str(place / "tmp")  # Python would try it out, and leave the attempt there if killed
-        plan.load()
-        try:
-            cli.main(list(words))
-            code = 0
-        except SystemExit as end:
-            code = end.code if isinstance(end.code, int) else int(end.code is not None)
-        atexit._run_exitfuncs()
-        sys.stdout.flush()
-        modules.write_text("\n".join(_importable()))
-    except BaseException:
-        traceback.print_exc()
-    finally:
-        with suppress(Exception):
-            sys.stderr.flush()
-        os._exit(code)
+def _new_place(place: Path) -> Path:
+    for each in ("tmp", "work"):
+        (place / each).mkdir(parents=True)
+    return place
 
 
-def _importable() -> list[str]:
-    return [name for name, module in list(sys.modules.items()) if getattr(module, "__spec__", None) is not None]
+def _parted(found: Contents, command: Command) -> tuple[Contents, dict[str, Contents]]:
+    """The files without runs that are beside their place, and those runs by name, as if they were at it."""
+    if command.beside is None:
+        return found, {}
+    others: Contents = {}
+    beside: dict[str, Contents] = {}
+    for name, digest in found.items():
+        folder = re.match(rf"({re.escape(command.beside)}\.\d+)(?=/|$)", name)
+        if folder is None:
+            others[name] = digest
+        else:
+            beside.setdefault(folder[0], {})[command.beside + name[folder.end() :]] = digest
+    return others, beside
 
 
-def _ends(child: int) -> bool:
-    """Wait for a process; whether it ends by itself."""
-    handle = os.pidfd_open(child)
-    try:
-        poll = select.poll()
-        poll.register(handle, select.POLLIN)
-        used, since = -1.0, time.monotonic()
-        while not poll.poll(1000):
-            now, waits = _use_of(child)
-            if now > MOST:
-                return False
-            if now != used or not waits:
-                used, since = now, time.monotonic()
-            elif time.monotonic() - since > STILL:
-                return False
-        return True
-    finally:
-        os.close(handle)
+def _of_runs_beside(beside: dict[str, Contents], end: End, clean: Clean, *, killed: bool) -> Iterator[Finding]:
+    """What is wrong with runs that could not take their place: each file is whole, and the line names the folder."""
+    for folder, found in beside.items():
+        wrong = [
+            name for name, digest in without_varying(found, clean.varying).items() if clean.after.get(name) != digest
+        ]
+        if wrong:
+            yield "lost", f"{folder}: {min(wrong)} is not whole"
+        elif folder not in end.errors and not killed:
+            yield "words", f"{folder} is not named: {_last_line(end.errors)}"
 
 
-def _use_of(session: int) -> tuple[float, bool]:
-    """The processor time of a session's processes [s], and whether all of them sleep."""
-    used, waits = 0.0, True
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        with suppress(OSError):
-            fields = path.read_text().rpartition(")")[2].split()
-            if int(fields[3]) == session:
-                used += (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-                waits &= fields[0] not in "RD"
-    return used, waits
-
-
-def _state(folder: Path) -> State:
-    found = {}
-    for path in folder.rglob("*"):
-        name = path.relative_to(folder).as_posix()
-        if KEPT.match(name):
-            continue
-        if path.is_file() and not name.endswith(JOURNALS):
-            found[name] = hashlib.sha256(path.read_bytes()).hexdigest()
-        elif path.is_dir() and not any(path.iterdir()):
-            found[name] = "empty folder"
-    return found
-
-
-def _without(state: State, varying: set[str]) -> State:
-    """The same, where of files that differ from run to run only the names count, and none is empty."""
-    nothing = hashlib.sha256(b"").hexdigest()
-    return {name: "any" if name in varying and digest != nothing else digest for name, digest in state.items()}
-
-
-def _without_hidden(state: State) -> State:
-    """The same without what the next process removes."""
-    return {name: digest for name, digest in state.items() if not HIDDEN.search(name)}
-
-
-def _faults_of(end: End, fault: Fault) -> Iterator[tuple[str, str]]:
+def _of_end(end: End, *, killed: bool) -> Iterator[Finding]:
     if end.hangs:
         yield "hang", "does not end"
     if "Traceback (most recent call last)" in end.errors:
         yield "traceback", _last_line(end.errors)
     elif "an error of quadcosim itself" in end.errors:
         yield "words", _last_line(end.errors)
-    elif end.code != 0 and fault.how != KILL:
+    elif end.code != 0 and not killed:
         lines = [line for line in end.errors.splitlines() if line.startswith("quadcosim: ")]
         if len(lines) != 1:
             yield "words", f"code {end.code}, {len(lines)} lines: {_last_line(end.errors)}"
 
 
-def _lost(then: State, before: State, after: State, varying: set[str], *, killed: bool) -> list[tuple[str, str]]:
-    """What is neither as before nor as it was to become; where a process was killed, some files may be new already."""
+def _lost(then: Contents, before: Contents, clean: Clean, *, some: bool) -> Iterator[Finding]:
+    """What is neither as before nor as it was to become; with `some`, some files may be new already."""
     if then == before:
-        return []
-    found = _without(then, varying)
-    wrong = [name for name in {**before, **found} if found.get(name) not in (before.get(name), after.get(name))]
+        return
+    found = without_varying(then, clean.varying)
+    wrong = [name for name in {**before, **found} if found.get(name) not in (before.get(name), clean.after.get(name))]
     if wrong:
-        return [("lost", f"{min(wrong)} is neither old nor new")]
-    if not killed:
-        return [("lost", f"some are old, some new: {_difference(found, after)}")]
-    return []
-
-
-def _difference(one: State, other: State) -> str:
-    names = sorted(name for name in {*one, *other} if one.get(name) != other.get(name))
-    return f"{len(names)} files differ, as {names[0]}" if names else "the same files"
+        yield "lost", f"{min(wrong)[:200]} is neither old nor new"
+    elif not some:
+        yield "lost", f"some are old, some new: {difference(found, clean.after)}"
 
 
 def _last_line(text: str) -> str:
@@ -327,9 +251,9 @@ def work_through(
 ) -> list[Row]:  # fmt: skip
     """The cases of some commands; `tell` is called after each."""
     matrix = Matrix(folder)
-    rows = []
+    found = []
     for command in commands:
         for row in matrix.rows(command, tuple(faults), most):
-            rows.append(row)
+            found.append(row)
             tell(row)
-    return rows
+    return found

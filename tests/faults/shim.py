@@ -1,4 +1,4 @@
-"""What `faults.c` is told: which call of the operating system fails, on files of which folders, and how."""
+"""What `faults.c` is told: which call fails, on files of which folder or by libraries of which, and how."""
 
 import ctypes
 import errno
@@ -10,13 +10,17 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import platformdirs
+
 SOURCE = Path(__file__).with_name("faults.c")
 VARIABLE = "QUADCOSIM_TESTS_FAULTS"
-CALLS = ("write", "open", "rename", "fsync", "mmap", "ftruncate")
+CALLS = ("write", "open", "rename", "fsync", "mmap", "ftruncate", "malloc")
 KILL, SHORT = -1, -2
 ENDLESS = 2**62
 _HEAD = struct.Struct(f"{len(CALLS)}q5q")
 _PATH_MAX = 4096
+LIBRARIES = platformdirs.user_cache_dir("quadcosim")
+"""Where what was compiled from the C of engines, timetable and scheduler is"""
 
 
 @dataclass(frozen=True)
@@ -43,7 +47,9 @@ FAULTS = (
     Fault("fsync", KILL, "killed"),
     Fault("mmap", errno.ENOMEM, "no memory"),
     Fault("ftruncate", errno.ENOSPC, "the disk is full"),
+    Fault("malloc", errno.ENOMEM, "no memory"),
 )
+KILLED = Fault("write", KILL, "killed")
 
 
 class Plan:
@@ -58,7 +64,8 @@ class Plan:
         if fault is not None:
             what = (CALLS.index(fault.call), n, ENDLESS if fault.stays else n, fault.how)
         head = _HEAD.pack(*[0] * len(CALLS), 0, *what)
-        self.path.write_bytes(head + (os.fsencode(folder) + b"/").ljust(2 * _PATH_MAX, b"\0"))
+        folders = ((os.fsencode(each) + b"/").ljust(_PATH_MAX, b"\0") for each in (folder, LIBRARIES))
+        self.path.write_bytes(head + b"".join(folders))
 
     def load(self) -> None:
         """Let it hold in this process, which has the shim, and in those that it starts."""

@@ -13,7 +13,7 @@ from tests.fmus.process import run
 @pytest.mark.skipif(shim.lack() is not None, reason=shim.lack() or "")
 def test_files_are_old_or_new_whichever_call_fails(tmp_path: Path) -> None:
     rows = tmp_path / "rows.json"
-    done = run(sys.executable, "-m", "tests.faults", "new", "show", "--most", "2", "--out", str(rows))
+    done = run(sys.executable, "-m", "tests.faults", "new", "ssp", "--most", "2", "--out", str(rows))
     assert (done.returncode, done.stderr) == (0, ""), done.stdout
     found = json.loads(rows.read_text())
     assert {row["operation"].partition(":")[0] for row in found} >= {"write", "open", "rename", "fsync"}

@@ -105,6 +105,18 @@ def test_what_the_block_raises_leaves_all_as_it_was(before: dict[str, str], tmp_
     assert {path.name for path in tmp_path.iterdir()} == set(before)
 
 
+def test_a_file_of_a_set_that_fails_is_not_left_half(before: dict[str, str], tmp_path: Path) -> None:
+    with new_files(tmp_path) as new:
+        (new / "model.c").write_text("new")
+        with suppress(ZeroDivisionError), new_file(new / "model.h") as header:
+            header.write_text("half")
+            raise ZeroDivisionError
+        with suppress(ZeroDivisionError), new_files(new) as folder:
+            (folder / "other.c").write_text("half")
+            raise ZeroDivisionError
+    assert contents(tmp_path) == {**before, "model.c": "new"}
+
+
 def test_an_error_of_something_else_is_not_blamed_on_the_file(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match=r"No such file or directory: '/missing'"), new_files(tmp_path):
         Path("/missing").read_text()

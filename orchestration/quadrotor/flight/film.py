@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 
-from fmu_kit.new_files import new_file
+from fmu_kit.new_files import new_file, write_atomically
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.terminal import Share
@@ -40,13 +41,23 @@ _ROTORS = [
 _ARMS = [np.array([[1.0, side, 0.0], [-1.0, -side, 0.0]]) for side in (1, -1)]
 
 
+class _GifWriter(PillowWriter):
+    """Writes the file by Python: Pillow itself takes what is written in part for written."""
+
+    def finish(self) -> None:
+        content: Any = BytesIO()
+        path, content.name, self.outfile = Path(self.outfile), self.outfile, content
+        super().finish()
+        write_atomically(path, content.getvalue())
+
+
 def writer(path: Path) -> AbstractMovieWriter:
     """A writer for the format of the ending.
 
     Raises `UsageError` for another ending, or for one without a writer on this machine.
     """
     if path.suffix == ".gif":
-        return PillowWriter(fps=RATE)
+        return _GifWriter(fps=RATE)
     if path.suffix != ".mp4":
         raise UsageError(f"--film {path}: expected a file that ends in .gif or .mp4")
     if not FFMpegWriter.isAvailable():

@@ -220,6 +220,12 @@ def test_the_file_is_written_to_the_given_path_and_finds_its_fmus(
     assert 'fmu = "fmus/A.fmu"' in printed
     again = main("connect", "fmus/A.fmu", "--out", "new/system.toml", code=2)
     assert again.stderr.startswith("quadcosim: --out new/system.toml: exists already")
+    killed = tmp_path / f".quadcosim-{12 * 'a'}.new"
+    (killed / "whole").mkdir(parents=True)
+    (killed / "whole" / "killed.toml").write_text(text)  # all but moved
+    again = main("connect", "fmus/A.fmu", "--out", "killed.toml", code=2)
+    assert again.stderr.startswith("quadcosim: --out killed.toml: exists already")
+    assert not killed.exists()
 
 
 def test_a_complete_proposal_runs(built: dict[str, Path], tmp_path: Path, main: Main) -> None:
