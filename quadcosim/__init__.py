@@ -24,6 +24,7 @@ Where to begin:
 - `sweep` runs a `Study` over axes, `compare` compares controllers, `tune` searches for gains: stored runs are not
   repeated, and results become a table with `to_pandas`;
 - `Simulation` stops a run at each sample, where your code takes the place of a controller or any other component;
+- `live` makes one HTML file in which a system runs while its numbers are changed;
 - `report` writes one HTML file of runs, with a replay;
 - `read_model` reads the variables and properties of an FMU.
 
@@ -48,6 +49,7 @@ if TYPE_CHECKING:  # also what `__getattr__` finds public names by
     from orchestration.experiments.comparison.run import Compared, compare
     from orchestration.experiments.limits.limit import find as limit
     from orchestration.experiments.limits.limit_result import Limit
+    from orchestration.experiments.live.live import Live, live
     from orchestration.experiments.report.writing import report
     from orchestration.experiments.studies.axes import Axis
     from orchestration.experiments.studies.study import Study
@@ -114,6 +116,7 @@ __all__ = [
     "FmuChoice",
     "Limit",
     "Linearised",
+    "Live",
     "Message",
     "Model",
     "Network",
@@ -150,6 +153,7 @@ __all__ = [
     "fly_until",
     "limit",
     "linearise",
+    "live",
     "load_comparison",
     "load_run",
     "load_scenario",

@@ -10,6 +10,7 @@ import struct
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -31,6 +32,12 @@ TARGETS = {
     "darwin64": {"x86_64-darwin": "x86_64-macos.11.0", "aarch64-darwin": "aarch64-macos.11.0"},
 }
 """The systems for which zig compiles: their names in FMI 3.0, and in zig."""
+_WASM = ("-target", "wasm32-wasi")
+_WASM_OPTIONS = (
+    *("-std=gnu11", "-O3", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno", "-mexec-model=reactor"),
+    *("-Wno-psabi", "-Wl,--strip-all", "-Wl,--export-dynamic", "-Wl,-z,stack-size=1048576"),
+)
+"""A module that a page runs: it imports nothing, and has no start."""
 _ONLY_IN_3 = ("linux-aarch64",)
 """Systems without a name in FMI 2.0, which uses those of FMI 3.0 (FMI 2.0.4, section 2.3)"""
 _CROSS = {"linux-aarch64": "aarch64-linux-gnu-gcc"}
@@ -86,6 +93,36 @@ def compiled_here(
     return _compiled([compiler(), *OPTIONS, *_LINUX, *options], sources, main, _MATHEMATICS[mathematics])
 
 
+@dataclass(frozen=True, kw_only=True)
+class Unit:
+    """One file to compile among its sources."""
+
+    sources: Mapping[str, bytes]
+    main: str
+    options: tuple[str, ...] = ()
+
+
+def linked_here(units: Sequence[Unit], options: Sequence[str] = ()) -> bytes:
+    """The library for this machine of several units; raises `PackagingError` without a compiler."""
+    return _linked([compiler()], [*OPTIONS, *_LINUX, *options], units, ["-lm"])
+
+
+def linked_for_wasm(units: Sequence[Unit], options: Sequence[str] = ()) -> bytes:
+    """The WebAssembly module of several units, compiled by zig; raises `PackagingError` where there is none."""
+    if importlib.util.find_spec("ziglang") is None:
+        raise PackagingError("a page needs zig, which compiles for WebAssembly: pip install 'quadcosim[live]'")
+    return _linked([sys.executable, "-m", "ziglang", "cc", *_WASM], [*_WASM_OPTIONS, *options], units, [])
+
+
+def _linked(command: list[str], options: Sequence[str], units: Sequence[Unit], after: Sequence[str]) -> bytes:
+    for_units = [option for option in options if not option.startswith("-Wl,") and option not in ("-shared", "-s")]
+    objects = {}
+    for i, unit in enumerate(units):
+        called = [*command, *for_units, *unit.options, "-c"]
+        objects[f"unit{i}.o"] = _compiled(called, unit.sources, unit.main)
+    return _compiled([*command, *options], objects, "", (*objects, *after))
+
+
 def compiled_for(
     target: str, sources: Mapping[str, bytes], main: str, version: int = 2, after: Sequence[str] = ()
 ) -> dict[str, bytes]:
@@ -119,7 +156,7 @@ def _compiled(command: list[str], sources: Mapping[str, bytes], main: str, after
     with temporary_folder() as folder:
         for name, content in sources.items():
             (folder / name).write_bytes(content)
-        output_of([*command, main, "-o", "library", *after], folder)
+        output_of([*command, *filter(None, [main]), "-o", "library", *after], folder)
         return (folder / "library").read_bytes()
 
 

@@ -60,6 +60,8 @@ class BatchArrays:
     """Values of expressions that are the same in all of a run"""
     numbers: Floats
     """Parameters, the stop time and reductions inside others that expressions name"""
+    reductions: Floats
+    """Values of the reductions at the end"""
     status: npt.NDArray[np.int32]
     """Result of a step of a component, by lane"""
 
@@ -84,5 +86,6 @@ class BatchArrays:
             seen=rows(shape.seen_count), given=rows(shape.given_count),
             state=rows(len(writer.states)), constants=rows(len(writer.constants)),
             numbers=rows(len(shape.numbers) + 1 + len(shape.inner)),
+            reductions=rows(len(shape.expressions.folds.values)),
             status=np.zeros(shape.lanes, dtype=np.int32),
         )  # fmt: skip

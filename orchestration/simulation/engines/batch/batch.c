@@ -312,6 +312,9 @@ EXPORT int run(Loop *l) {
     }
 }
 
+/* The values of the reductions at the end of the runs. */
+EXPORT void values_of_reductions(const Loop *l, double *values) { reductions(l, values); }
+
 /* The number of steps in which a kept value grows, and ends above a floor. */
 EXPORT void grown(const Loop *l, int64_t number, const double *floor, double *grown_steps) {
     const Kept *kept = &l->kept[number];

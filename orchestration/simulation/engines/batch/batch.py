@@ -16,7 +16,7 @@ from orchestration.simulation.engines.batch.arrays import BatchArrays, aligned
 from orchestration.simulation.engines.batch.batch_structures import BatchStructures
 from orchestration.simulation.engines.batch.combining import combined
 from orchestration.simulation.engines.batch.initialisation import Initialisation
-from orchestration.simulation.engines.batch.run_numbers import NO_COLUMNS, ParameterColumns, RunNumbers, end_of
+from orchestration.simulation.engines.batch.run_numbers import NO_COLUMNS, ParameterColumns, RunNumbers
 from orchestration.simulation.engines.batch.shape import Shape
 from orchestration.simulation.engines.resolved import source_values
 from orchestration.simulation.engines.sources import SourceValues
@@ -170,9 +170,10 @@ class Batch:
             raise QuadcosimError("a batch of runs: expected memory for the messages that are on their way")
 
     def _result(self, systems: Sequence[System], recorded: Sequence[Floats]) -> BatchResult:
-        loop, count, folds = self._loop, len(systems), self._shape.expressions.folds
-        end, states = np.array([end_of(system) for system in systems]), self.arrays.state[:, :count]
-        values = {call: folds.values[own](states, end) for call, own in self._shape.calls.items()}
+        loop, count, table = self._loop, len(systems), self.arrays.reductions
+        self._library.values_of_reductions(self._address, address(table))
+        places = {own: i for i, own in enumerate(self._shape.expressions.folds.values)}
+        values = {call: table[places[own], :count].copy() for call, own in self._shape.calls.items()}
         for call, own in self._shape.calls.items():
             if call.function == "growth_share":
                 values[call] = self._growth(call, own, values)

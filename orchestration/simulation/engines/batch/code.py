@@ -76,6 +76,10 @@ def expression_code(
                 *here, *rows.section.lines, *step, *writer.step.lines, *rows.next, *rows.always, *changed,
                 *folds.held.next, *held, *sampled, *after.next, *done,
             ]),
+            *_function("void reductions(const Loop *b, double *values)", [
+                "double *const state = b->state;", "(void)state;",
+                *(f"AT(values, {i}) = {value};" for i, value in enumerate(folds.values.values())),
+            ]),
         ]),
         folds=folds,
     )  # fmt: skip

@@ -1,22 +1,17 @@
 """The functions over a run, such as max and integral, as C that processes row after row: those of `reductions.py`.
 
-The value of each is computed from its final states. A signal in continuous time alone has the same value just before a
-row as at that row; a held signal has there the value of the row before.
+The value of each follows from its final states, likewise in C. A signal in continuous time alone has the same value
+just before a row as at that row; a held signal has there the value of the row before.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TypeAlias
-
-import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.engines.batch.writing import ExpressionWriter, Kind, Moment, Section
+from orchestration.systems.expressions.over_run import STOP_TIME
 from orchestration.systems.expressions.syntax import Call, Name, Node, Sampled
-
-Value: TypeAlias = Callable[[Floats, Floats], Floats]
-"""Computes a number for each lane, NaN for none, from states, shape (states, lanes), and end times, shape (lanes,)"""
 
 
 @dataclass(kw_only=True)
@@ -41,7 +36,8 @@ class Folds:
         self.rows: dict[str | None, Rows] = {None: Rows(section=writer.now, mask="m")}
         """Rows by connection; None: all"""
         self.held = Rows(section=writer.held, mask="m")
-        self.values: dict[Call, Value] = {}
+        self.values: dict[Call, str] = {}
+        """the C of each: a number for each lane, NaN for none"""
         self.kept: dict[Call, int] = {}
         """the numbers of the calls of growth_share whose values are kept"""
         self.steps: dict[Call, int] = {}
@@ -79,9 +75,8 @@ class _Fold:
 
     # -- states ----------------------------------------------------------------------------------------------------
 
-    def _state(self, begin: float = 0.0) -> tuple[str, int]:
-        name = self.folds.writer.state(begin)
-        return name, len(self.folds.writer.states) - 1
+    def _state(self, begin: float = 0.0) -> str:
+        return self.folds.writer.state(begin)
 
     def _set(self, state: str, value: str, where: str = "") -> str:
         mask = f"({self.rows.mask} & {where})" if where else self.rows.mask
@@ -101,37 +96,37 @@ class _Fold:
 
     # -- functions -------------------------------------------------------------------------------------------------
 
-    def max(self) -> Value:
+    def max(self) -> str:
         """The largest value, also just before a held signal changes."""
-        return self._extreme("q_gt", -np.inf)
+        return self._extreme("q_gt", -math.inf)
 
-    def min(self) -> Value:
+    def min(self) -> str:
         """The smallest value."""
-        return self._extreme("q_lt", np.inf)
+        return self._extreme("q_lt", math.inf)
 
-    def _extreme(self, sign: str, begin: float) -> Value:
-        state, i = self._state(begin)
+    def _extreme(self, sign: str, begin: float) -> str:
+        state = self._state(begin)
         self.rows.always.append(f"doubtful |= {self.rows.mask} & q_isnan({self.x});")
         self.rows.always.append(self._set(state, self.x, f"{sign}({self.x}, {state})"))
         if self._is_mixed:
             end = self._at("end")
             self.rows.next.append(self._set(state, end, f"{sign}({end}, {state})"))
-        return lambda states, end: states[i]
+        return state
 
-    def integral(self) -> Value:
+    def integral(self) -> str:
         """integral, and mean, rms and share by it; of a sampled signal the mean of its values."""
-        total, i = self._state()
+        total = self._state()
         if self.sampled:
-            count, j = self._state()
+            count = self._state()
             value = self._of_value(self.x, None)
             self.rows.always += [self._set(total, f"{total} + {value}"), self._set(count, f"{count} + q_all(1.0)")]
             if self.call.function == "integral":
-                return lambda states, end: np.where(states[j] > 0, states[i], np.nan)
-            return self._rooted(lambda states, end: states[i] / np.where(states[j] > 0, states[j], np.nan))
+                return _only_if(f"q_gt({count}, 0.0)", total)
+            return self._rooted(f"{total} / {_only_if(f'q_gt({count}, 0.0)', count)}")
         self.folds.rows[None].next.append(f"{total} = {total} + {self._mean_of_step()} * dt;")
         if self.call.function == "integral":
-            return lambda states, end: states[i]
-        return self._rooted(lambda states, end: states[i] / end)
+            return total
+        return self._rooted(f"{total} / {self.folds.writer.leaf(STOP_TIME).code}")
 
     def _mean_of_step(self) -> str:
         """The C of the mean over the step that ends at this row."""
@@ -151,55 +146,54 @@ class _Fold:
             return f"TRUE(q_ne({x}, 0.0))"
         return f"({x} * {x})" if self.call.function == "rms" else x
 
-    def _rooted(self, mean: Value) -> Value:
-        return (lambda states, end: np.sqrt(mean(states, end))) if self.call.function == "rms" else mean
+    def _rooted(self, mean: str) -> str:
+        return f"q_sqrt({mean})" if self.call.function == "rms" else mean
 
-    def first(self) -> Value:
+    def first(self) -> str:
         """The first value."""
-        state, i = self._state(np.nan)
+        state = self._state(math.nan)
         if not self.sampled:
             self.rows.first.append(self._set(state, self.x))
-            return lambda states, end: states[i]
-        seen, j = self._state()
+            return state
+        seen = self._state()
         where = f"q_eq({seen}, 0.0)"
         self.rows.always += [self._set(state, self.x, where), self._set(seen, "q_all(1.0)")]
-        return lambda states, end: np.where(states[j] > 0, states[i], np.nan)
+        return _only_if(f"q_gt({seen}, 0.0)", state)
 
-    def last(self) -> Value:
+    def last(self) -> str:
         """The last value."""
-        state, i = self._state(np.nan)
+        state = self._state(math.nan)
         self.rows.always.append(self._set(state, self.x))
-        return lambda states, end: states[i]
+        return state
 
-    def peak_time(self) -> Value:
+    def peak_time(self) -> str:
         """The time of the first largest value."""
-        best, _ = self._state(-np.inf)
-        time, i = self._state(np.nan)
+        best, time = self._state(-math.inf), self._state(math.nan)
         more = f"q_gt({self.x}, {best})"
         self.rows.always.append(f"doubtful |= {self.rows.mask} & q_isnan({self.x});")
         self.rows.always += [self._set(time, "t", more), self._set(best, self.x, more)]
-        return lambda states, end: states[i]
+        return time
 
-    def settling_time(self) -> Value:
+    def settling_time(self) -> str:
         """The time from which |x| stays within the band."""
-        since, i = self._state(-1.0)
+        since = self._state(-1.0)
         band = self.folds.writer.value(self.call.arguments[1], "row", self.rows.section)
         inside = f"q_le(q_fabs({self.x}), {band})"
         value = f"q_select({inside}, q_select(q_lt({since}, 0.0), t, {since}), q_all(-1.0))"
         self.rows.always.append(self._set(since, value))
-        return lambda states, end: np.where(states[i] < 0.0, np.nan, states[i])
+        return _only_if(f"q_ge({since}, 0.0)", since)
 
-    def total_variation(self) -> Value:
+    def total_variation(self) -> str:
         """The sum of the changes of x, including jumps."""
-        total, i = self._state()
+        total = self._state()
         if self.sampled:
-            last, _ = self._state(np.nan)
+            last = self._state(math.nan)
             step = f"q_fabs({self.x} - {last})"
             self.rows.always += [
                 self._set(total, f"{total} + {step}", f"q_eq({last}, {last})"),
                 self._set(last, self.x),
             ]
-            return lambda states, end: states[i]
+            return total
         if self.rows is self.folds.held:  # NaN would be kept although other rows have numbers
             self.rows.always.append(f"doubtful |= m & q_isnan({self.x} - {self.x});")
         before = self.folds.writer.before(self.node)
@@ -208,28 +202,32 @@ class _Fold:
             end = self._at("end")
             step = f"(q_fabs({end} - {before}) + q_fabs({self.x} - {end}))"
         self.rows.next.append(self._set(total, f"{total} + {step}"))
-        return lambda states, end: states[i]
+        return total
 
-    def growth_share(self) -> Value:
+    def growth_share(self) -> str:
         """The share of the steps between values that grow and end above the floor: the values are kept."""
-        last, _ = self._state(np.nan)
-        steps, i = self._state(-1.0)
+        last, steps = self._state(math.nan), self._state(-1.0)
         number = self.folds.kept.setdefault(self.call, len(self.folds.kept))
-        self.folds.steps[self.call] = i
+        self.folds.steps[self.call] = len(self.folds.writer.states) - 1
         self.rows.always += [
             self._set(last, self.x), self._set(steps, f"{steps} + q_all(1.0)"),
             f"if (!keep(&b->kept[{number}], {last})) return 0;",
         ]  # fmt: skip
-        return lambda states, end: np.full(len(end), np.nan)  # its floor is known at the end of the run
+        return 'q_all(__builtin_nan(""))'  # its floor is known at the end of the run
 
 
-LANES: Mapping[str, Callable[[_Fold], Value]] = {
+LANES: Mapping[str, Callable[[_Fold], str]] = {
     "min": _Fold.min, "max": _Fold.max, "mean": _Fold.integral, "rms": _Fold.integral, "last": _Fold.last,
     "first": _Fold.first, "integral": _Fold.integral, "peak_time": _Fold.peak_time,
     "settling_time": _Fold.settling_time, "total_variation": _Fold.total_variation, "share": _Fold.integral,
     "growth_share": _Fold.growth_share,
 }  # fmt: skip
 """The writers of reductions in C, by function: with one that is not here, runs are executed one at a time"""
+
+
+def _only_if(condition: str, value: str) -> str:
+    """The C of a value that there is only under a condition."""
+    return f'q_select({condition}, {value}, q_all(__builtin_nan("")))'
 
 
 def _has_time(node: Node) -> bool:

@@ -34,14 +34,19 @@ def preferred_lanes() -> int:
 
 
 def component(name: str, model: Model, lanes: int) -> Lanes:
-    """A component in lanes; raises `UsageError` naming it if its FMU has no sources for them."""
+    """A component in lanes; raises as `sources_of`."""
+    return _compiled(tuple(sorted(sources_of(name, model).items())), lanes)
+
+
+def sources_of(name: str, model: Model) -> Mapping[str, bytes]:
+    """The sources of a component's lanes; raises `UsageError` naming it if its FMU has none."""
     sources = _sources_in(model.path, model.path.stat().st_mtime_ns)
     if MAIN not in sources or model.version != 2:
         raise UsageError(
             f"components.{name}: {model.path.name}: expected a native FMU of this project's kit, as quadcosim build "
             "--native makes them, to be one of many at once"
         )
-    return _compiled(tuple(sorted(sources.items())), lanes)
+    return sources
 
 
 @functools.lru_cache(maxsize=64)
@@ -68,6 +73,7 @@ def batch(sizes: str, expressions: str, lanes: int) -> Any:
     expect_same_sizes(library, shared(lanes))
     for name in ("run", "clear", "free_all"):
         getattr(library, name).argtypes = (ctypes.c_void_p,)
+    library.values_of_reductions.argtypes = (ctypes.c_void_p, ctypes.c_void_p)
     library.grown.argtypes = (ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)
     return library
 

@@ -144,7 +144,8 @@ class Shape:
 
     def read(self, name: str) -> Booleans:
         """Whether a connection or an expression reads each variable of a component."""
-        index, is_read = self.names.index(name), np.zeros(self.kernels[name].variables, dtype=np.bool_)
+        index, count = self.names.index(name), 1 + max(v.reference for v in self.models[name].variables.values())
+        is_read = np.zeros(count, dtype=np.bool_)
         is_read[self.connected[name]] = True
         is_read[[int(place) for owner, place in _SIGNAL.findall(self.expressions.text) if int(owner) == index]] = True
         return is_read
@@ -233,7 +234,7 @@ class Shape:
         if self.condition is not None:
             (condition,) = scalars(self.condition, self._vectors)
         return expression_code(
-            self._leaves,
+            self.leaves,
             self._lines,
             known,
             list(self.calls.values()),
@@ -295,7 +296,8 @@ class Shape:
         return {end: i for i, x in enumerate(self.system.connections) if x.hold == "first" for end in x.end}
 
     @property
-    def _leaves(self) -> dict[str, Leaf]:
+    def leaves(self) -> dict[str, Leaf]:
+        """What expressions may name."""
         numbers = {name: Leaf(code=f"NUMBER({i})", kind="number") for i, name in enumerate((*self.numbers, STOP_TIME))}
         return {**self._signals, TIME: Leaf(code="t", kind="continuous"), **numbers}
 

@@ -1,0 +1,1 @@
+"""One HTML file in which a system runs while its numbers are changed."""

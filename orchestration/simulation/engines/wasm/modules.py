@@ -1,0 +1,75 @@
+"""Compiles a system in C: to a WebAssembly module for a page, or to a library of this machine, which tests call."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from fmu_kit import libraries
+from fmu_kit.bundle import PackagingError
+from fmu_kit.compiler.pack.c_compiler import FOR_THIS_PROCESSOR, Unit, linked_for_wasm, linked_here
+from fmu_kit.compiler.runtime import FOLDER
+from orchestration.foundation.basics.errors import QuadcosimError
+from orchestration.simulation.engines.batch.kernels import FILES, sources_of
+from orchestration.simulation.engines.batch.shape import Shape
+from orchestration.simulation.engines.wasm.tables_of_system import SystemTables
+from orchestration.systems.schedule.compiled_timetable import FILES as TIMETABLE
+
+_HERE = Path(__file__).parent
+_FORGETFUL = b"""#include "lanes.c"
+
+/* Forget how often the straight line was left: a page flies one system after another. */
+EXPORT void quadcosim_forget(void);
+void quadcosim_forget(void) { memset(&line, 0, sizeof line); }
+"""
+_OF_COMPONENTS = ("lanes", "places", "variables", "divergence", "begin", "initialise", "do_step", "line", "forget")
+
+
+def units_of(tables: SystemTables, lanes: int) -> list[Unit]:
+    """What is compiled of a system."""
+    shape, defined = tables.shape, (f"-DQUADCOSIM_LANES={lanes}",)
+    units = [_component(i, shape, defined) for i in range(len(shape.names))]
+    ours = {path.name: path.read_bytes() for path in (_HERE / "live.h", _HERE / "live.c", _HERE / "timing.c")}
+    timing = {path.name: path.read_bytes() for path in TIMETABLE} | {"timing.h": tables.timing.encode()}
+    bits = ", ".join(f"1ull << {lane}" for lane in range(lanes))
+    sizes = (
+        f"#define CHANNELS {len(shape.system.connections) or 1}\n"
+        f"#define HAS_CONDITION {int(shape.condition is not None)}\n"
+        f"#define KEPT {len(shape.expressions.folds.kept)}\n#define LANE_BITS {{{bits}}}\n"
+    )
+    system = {path.name: path.read_bytes() for path in (*FILES, FOLDER / "integers.h")} | {
+        "sizes.h": sizes.encode(), "expressions.h": shape.expressions.text.encode(),
+        "system.h": tables.system.encode(), "defaults.h": tables.defaults.encode(),
+    }  # fmt: skip
+    units.append(Unit(sources={**ours, **timing}, main="timing.c", options=defined))
+    units.append(Unit(sources={**ours, **system}, main="live.c", options=defined))
+    return units
+
+
+def _component(i: int, shape: Shape, defined: tuple[str, ...]) -> Unit:
+    name = shape.names[i]
+    sources = {**sources_of(name, shape.models[name]), "forgetful.c": _FORGETFUL}
+    renamed = tuple(f"-Dquadcosim_{each}=c{i}_{each}" for each in _OF_COMPONENTS)
+    return Unit(sources=sources, main="forgetful.c", options=(*defined, *renamed))
+
+
+def module_of(tables: SystemTables, lanes: int) -> bytes:
+    """The WebAssembly module of a system for a number of SIMD lanes; raises `QuadcosimError` without its compiler."""
+    return _cached("wasm", tables, lanes, ("-msimd128",) if lanes > 1 else ()).read_bytes()
+
+
+def library_of(tables: SystemTables, lanes: int) -> Path:
+    """The same as a library of this machine; raises `QuadcosimError` without a compiler."""
+    return _cached("live", tables, lanes, (*FOR_THIS_PROCESSOR, "-Wno-psabi"))
+
+
+def _cached(kind: str, tables: SystemTables, lanes: int, options: Sequence[str]) -> Path:
+    units = units_of(tables, lanes)
+    sources: Mapping[str, bytes] = {
+        f"{i}/{name}": text for i, u in enumerate(units) for name, text in u.sources.items()
+    }
+    linked = linked_for_wasm if kind == "wasm" else linked_here
+    try:
+        return libraries.cached_library(
+            kind, dict(sources), (kind, lanes, options, tuple(u.options for u in units)), lambda: linked(units, options)
+        )
+    except (PackagingError, OSError) as error:
+        raise QuadcosimError(str(error)) from error

@@ -1,0 +1,115 @@
+"""The settings of a system: the numbers of a run that a page may change, by path, and the values that are allowed."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from decimal import Decimal
+
+from orchestration.components.fmi.instance import convert_value, number_of
+from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
+from orchestration.components.fmi.read_description import NUMERIC, Model, Variable
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.systems.schedule.plan import MAX_TIME
+from orchestration.systems.system.distribution import Distribution
+from orchestration.systems.system.model import System
+
+_LATEST = MAX_TIME / 1e9
+_MOST = 1.7976931348623157e308
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setting:
+    """One number of a run."""
+
+    path: str
+    """Path in the system"""
+    value: float
+    low: float = -_MOST
+    high: float = _MOST
+    excludes_low: bool = False
+    is_whole: bool = False
+
+    @property
+    def decimal(self) -> tuple[int, int]:
+        """Digits and exponent of its decimal form: value = digits · 10^exponent."""
+        return decimal_of(self.value)
+
+
+def decimal_of(value: float) -> tuple[int, int]:
+    """Digits and exponent of the shortest decimal form of a number: value = digits · 10^exponent."""
+    sign, digits, exponent = Decimal(repr(value)).normalize().as_tuple()
+    assert isinstance(exponent, int)
+    number = int("".join(map(str, digits)))
+    return (-number if sign else number), exponent if number else 0
+
+
+class Settings:
+    """All settings of a system, in the order in which C has them."""
+
+    def __init__(self, system: System, models: Mapping[str, Model]) -> None:
+        """Raises `UsageError` for a value that is no number, as a distribution is."""
+        self.all: list[Setting] = []
+        self.at: dict[str, int] = {}
+        """Places by path"""
+        self._add("stop_time", system.stop_time, 0.0, _LATEST, excludes_low=True)
+        self._add("seed", system.seed, 0.0, 2.0**63, is_whole=True)
+        for name, component in system.components.items():
+            place = f"components.{name}"
+            if component.step is not None:
+                self._add(f"{place}.step", component.step, 0.0, _LATEST, excludes_low=True)
+            sampling = component.sampling
+            if sampling is not None:
+                self._add(f"{place}.sampling.period", sampling.period, 0.0, _LATEST, excludes_low=True)
+                self._add(f"{place}.sampling.offset", sampling.offset, 0.0, _LATEST)
+                self._add(f"{place}.sampling.jitter", sampling.jitter, 0.0, _LATEST)
+                self._add(f"{place}.sampling.clock_ratio", sampling.clock_ratio, 0.0, excludes_low=True)
+            for variable in models[name].variables.values():
+                self._add_parameter(place, variable, component.parameters.get(variable.name))
+        for x in system.connections:
+            place = f"connections.{x.name}"
+            self._add(f"{place}.delay", x.delay, 0.0, _LATEST)
+            self._add(f"{place}.delay_jitter", x.delay_jitter, 0.0, _LATEST)
+            self._add(f"{place}.loss", x.loss, 0.0, 1.0)
+            if x.burst_length is not None:
+                self._add(f"{place}.burst_length", x.burst_length, 1.0)
+            for what, values in (("noise", x.noise), ("quantisation", x.quantisation)):
+                each = [0.0] * len(x.start)
+                for signal, value in values.items():
+                    for i in x.places(signal):
+                        each[i] = value
+                for start, value in zip(x.start, each):
+                    self._add(f"{place}.{what}.{start.partition('.')[2]}", value, 0.0)
+            self._add(f"{place}.scale", x.scale)
+            self._add(f"{place}.offset", x.offset)
+        for name, source in system.sources.items():
+            for key in ("constant", "noise", "period", "scale"):
+                if (value := getattr(source, key)) is not None:
+                    excludes = key == "period"
+                    self._add(f"sources.{name}.{key}", value, 0.0 if key in ("noise", "period") else -_MOST,
+                              excludes_low=excludes)  # fmt: skip
+
+    def _add(self, path: str, value: object, low: float = -_MOST, high: float = _MOST,
+             *, excludes_low: bool = False, is_whole: bool = False) -> None:  # fmt: skip
+        if isinstance(value, Distribution):
+            raise UsageError(f"{path}: expected one number for a page; it is a distribution")
+        assert isinstance(value, (int, float))
+        self.at[path] = len(self.all)
+        self.all.append(
+            Setting(path=path, value=value, low=low, high=high, excludes_low=excludes_low, is_whole=is_whole)
+        )
+
+    def _add_parameter(self, place: str, variable: Variable, given: object) -> None:
+        is_one = variable.causality == "parameter" and not variable.is_constant and variable.kind in NUMERIC
+        if not is_one or variable.name in (SAMPLE_PERIOD, SAMPLE_OFFSET):
+            return
+        value = variable.start if given is None else convert_value(variable, given, variable.name)
+        number = None if value is None else number_of(variable, value)
+        if number is None or not math.isfinite(number):
+            return
+        low = -_MOST if variable.minimum is None else variable.minimum
+        high = _MOST if variable.maximum is None else variable.maximum
+        if variable.kind == "Boolean":
+            low, high = 0.0, 1.0
+        elif variable.kind != "Real":
+            low, high = max(low, -(2.0**31)), min(high, 2.0**31 - 1)
+        self._add(f"{place}.parameters.{variable.name}", number, low, high, is_whole=variable.kind != "Real")
