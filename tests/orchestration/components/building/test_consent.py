@@ -8,6 +8,7 @@ import pytest
 
 import quadcosim
 from tests.commands import Main
+from tests.orchestration.components.fmi.small import nothing_known
 
 MODULE = """\
 from pathlib import Path
@@ -42,7 +43,7 @@ last = "max(it.y)"
 @pytest.fixture
 def mark(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A file that is there once the module has run."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    nothing_known(tmp_path / "cache", monkeypatch)
     return tmp_path / "mark"
 
 

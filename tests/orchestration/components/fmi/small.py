@@ -79,7 +79,7 @@ def nothing_known(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A user's cache, from now on, in which nothing is known of any FMU; what is built is shared with all tests."""
     usual, own = (Path(each) / "quadcosim" for each in (platformdirs.user_cache_dir(), folder))
     own.mkdir(parents=True)
-    for name in ("batch", "built", "lanes", "loader", "loop", "native"):
+    for name in ("batch", "built", "lanes", "loader", "loop", "native", "scheduler", "timetable"):
         (usual / name).mkdir(parents=True, exist_ok=True)
         (own / name).symlink_to(usual / name)
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
