@@ -112,6 +112,11 @@ class Excitation:
         """The name of the instance."""
         return self._fmu.name
 
+    def is_like(self, other: "Excitation") -> bool:
+        """Whether it is of the same instance and signals, at rest with the same inputs."""
+        signals = (self.inputs, self.outputs) == (other.inputs, other.outputs)
+        return self._fmu is other._fmu and signals and np.array_equal(self.held, other.held)
+
     @property
     def pulses(self) -> Floats:
         """The pulse of each input."""

@@ -8,13 +8,14 @@ has to predict the response to a random input.
 """
 
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS
-from orchestration.theory.stability.excitation import ROUNDING, Errors, Excitation, Pair, Rung, SavedState
+from orchestration.theory.stability.excitation import ROUNDING, Errors, Excitation, Pair, Rest, Rung, SavedState
 from orchestration.theory.stability.linear_simulator import LinearSimulator
 
 STANDS_OUT = 10.0
@@ -95,14 +96,32 @@ class Tangent(LinearSimulator):
             )
         return found
 
+    def about(self, rest: Rest) -> "Tangent | None":
+        """This tangent, if it holds to `LINEAR` where the same instance with the same inputs rests now; else None."""
+        excitation = Excitation(rest)
+        if not excitation.is_like(self._excitation):
+            return None
+        again = copy(self)
+        again.state, again.input, again.output = (np.zeros_like(x) for x in (self.state, self.input, self.output))
+        try:
+            again._prove(excitation)
+        except UsageError:
+            return None
+        return again if again.accuracy <= LINEAR else None
+
     def prove(self, h: float, duration: float) -> None:
         """Compare its response to a random input, in steps of `h` over a `duration` [s], with that of the component.
 
         Raises `UsageError` where they differ; else `accuracy` is their largest difference, relative.
         """
-        excitation, rung, rng = self._excitation, self._rung(h), np.random.default_rng(0)
+        self._proof = h, duration
+        self._prove(self._excitation)
+
+    def _prove(self, excitation: Excitation) -> None:
+        h, duration = self._proof
+        rung, rng = self._rung(h), np.random.default_rng(0)
         count = int(np.clip(duration / h, 2, PROOF_STEPS))
-        moves = rng.uniform(-1.0, 1.0, (count, len(self.inputs))) * excitation.pulses
+        moves = rng.uniform(-1.0, 1.0, (count, len(self.inputs))) * self._excitation.pulses
         moves[(count + 1) // 2 :] = 0.0
         measured, predicted = excitation.response_to(moves, rung), np.zeros((count, len(self.outputs)))
         by_state, by_input = self.derivatives(h)

@@ -10,6 +10,7 @@ from orchestration.foundation.basics.errors import SimulatorError, UsageError
 from orchestration.simulation.requests.ranges import Varied
 from orchestration.systems.system.model import System
 from orchestration.theory.stability.known_loops import LOOPS, LinearLimit
+from orchestration.theory.stability.loop_at_rest import KnownTangents
 from orchestration.theory.stability.operating_point import NotAnEquilibriumError
 from orchestration.theory.stability.period_map import growth_of_loop
 from orchestration.theory.stability.perturbed_runs import growth_of
@@ -57,10 +58,10 @@ def about_rest(at: Callable[[float], System], span: Range) -> LinearLimit:
 
 def _through_saved_states(at: Callable[[float], System], span: Range, instances: Instances) -> LinearLimit:
     """Its accuracy includes the effect of another pulse size."""
-    growths: dict[float, float] = {}
+    growths, known = dict[float, float](), KnownTangents()
 
     def growth(value: float) -> float:
-        growths[value] = found = growth_of_loop(at(value), instances)
+        growths[value] = found = growth_of_loop(at(value), instances, known=known)
         return found
 
     found = _first_growth(growth, span, LOOP_TOLERANCE, LOOP)

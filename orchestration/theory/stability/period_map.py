@@ -25,7 +25,7 @@ from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.model import Criterion, System
 from orchestration.theory.stability.linear_simulator import LinearSimulator, OpenPort
-from orchestration.theory.stability.loop_at_rest import AtRest, at_rest
+from orchestration.theory.stability.loop_at_rest import AtRest, KnownTangents, at_rest
 
 MAX_STATES = 400
 """states of a loop"""
@@ -59,12 +59,15 @@ def period_map(loop: AtRest, ports: Mapping[str, OpenPort] | None = None) -> Flo
     return result
 
 
-def growth_of_loop(system: System, instances: Instances, factor: float = 1.0) -> float:
+def growth_of_loop(
+    system: System, instances: Instances, factor: float = 1.0, known: KnownTangents | None = None
+) -> float:
     """The growth rate [1/s] of small deviations from the operating point of `system`; negative: they decay.
 
-    Raises `UsageError` where the system does not rest there, or has no linear loop, saying why.
+    Tangents are kept in `known`, as by `at_rest`. Raises `UsageError` where the system does not rest there, or has no
+    linear loop, saying why.
     """
-    with at_rest(system, instances, factor) as loop:
+    with at_rest(system, instances, factor, known=known) as loop:
         radius = float(np.abs(np.linalg.eigvals(period_map(loop))).max(initial=0.0))
         return math.log(radius) / (float(loop.period) / NANOSECONDS) if radius > 0.0 else -math.inf
 

@@ -1,5 +1,6 @@
 """A component measured through saved states, with stubs whose states are known."""
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -107,6 +108,28 @@ class Drifting(Line):
 def test_a_model_that_does_not_predict_the_response_to_a_random_input_is_refused() -> None:
     with pytest.raises(UsageError, match=r"line: its linear model, of 2 states, does not predict the response"):
         tangent(Drifting(3))
+
+
+class Switched(Line):
+    """One that responds ten times as much once it is switched."""
+
+    gain = 1.0
+
+    def step(self, t: float, h: float) -> None:
+        self.kept = np.concatenate([[self.u * self.gain], 0.9 * self.kept[:-1]])
+
+
+def test_a_model_holds_where_the_same_instance_rests_again_and_responds_alike() -> None:
+    fmu = Switched(3)
+    measured = tangent(fmu)
+    before = responses(measured, 4)
+    again = measured.about(rest(fmu))
+    assert again is not None
+    assert responses(again, 4) == before
+    assert measured.about(rest(Switched(3))) is None
+    assert measured.about(dataclasses.replace(rest(fmu), held=np.ones(1))) is None
+    fmu.gain = 10.0
+    assert measured.about(rest(fmu)) is None
 
 
 def test_states_are_saved_and_put_back() -> None:

@@ -21,7 +21,10 @@ from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.stability import local_limit as local
+from orchestration.theory.stability import loop_at_rest
+from orchestration.theory.stability.linearised_component import Tangent
 from orchestration.theory.stability.local_limit import LOOP, TWINS, local_limits
+from orchestration.theory.stability.loop_at_rest import KnownTangents
 from orchestration.theory.stability.period_map import growth_of_loop
 from orchestration.theory.stability.perturbed_runs import Growth, growth_of
 from quadcosim import Scenario, Timing, UsageError
@@ -160,6 +163,25 @@ def test_sampled_components_without_a_common_hyperperiod_are_refused(system: Sys
         growth_of_loop(chosen, instances)
 
 
+def test_a_component_that_rests_as_for_another_value_is_identified_once(
+    system: System, instances: Instances, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    identified: list[str] = []
+
+    def tangent(loop: Any, name: str, factor: float) -> Tangent:
+        identified.append(name)
+        return usual(loop, name, factor)
+
+    usual = loop_at_rest._tangent
+    monkeypatch.setattr(loop_at_rest, "_tangent", tangent)
+    known = KnownTangents()
+    values = [(0.5, 0.3), (0.5, 0.4), (0.4, 0.3), (0.6, 0.3), (0.1, 0.05)]
+    for period, delay in values:
+        varied = changed(system, {PERIOD: period, DELAY: delay})
+        assert growth_of_loop(varied, instances, known=known) == pytest.approx(theory(period, delay), abs=1e-10)
+    assert identified == ["plant", "controller", "controller", "plant", "controller", "plant", "controller"]
+
+
 # -- which method is used ---------------------------------------------------------------------------------
 
 
@@ -195,7 +217,7 @@ SPAN = Range(first=0.05, step=0.01, last=0.09, tolerance=0.001)
 def test_the_quadrotor_with_a_hold_that_the_hover_loop_has_not_is_linearised_as_any_other_system(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(local, "growth_of_loop", lambda *arguments: by_rule(0.072)(*arguments).rate)
+    monkeypatch.setattr(local, "growth_of_loop", lambda *arguments, known=None: by_rule(0.072)(*arguments).rate)
     found = local_limits(Varied(request=Scenario(timing=Timing(hold="first")), of="period"), SPAN)
     assert found.limit == pytest.approx(0.072, abs=1e-5)
     assert found.method == f"{LOOP} (the loop about hover is for zero-order hold only)"
