@@ -33,10 +33,10 @@ def many_short_runs() -> tuple[float, float]:
     """Median time of a run of one plant step [ms], FMUs loaded, and growth of memory over the last half [KiB]."""
     system = Scenario(stop_time=0.001).as_system()
     system = with_files(system, files_of(system).fmus)
-    task = RunTask(index=0, key="", settings={}, system=system, keep_signals=False)
+    task = RunTask(index=0, key="", system=system)
     durations, memory, runner = [], [], Runner()
     for i in range(MANY):
-        durations.append(runner.run(dataclasses.replace(task, index=i)).row.duration)
+        durations.append(float(runner.run(dataclasses.replace(task, index=i)).durations[0]))
         memory.append(resident())
     return statistics.median(durations) * 1e3, memory[-1] - memory[MANY // 2]
 

@@ -11,9 +11,10 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from itertools import islice
 from pathlib import Path
 from typing import TypeVar
+
+import numpy as np
 
 from orchestration.experiments.studies.axes import Axis
 from orchestration.experiments.studies.drawing import draw_study
@@ -21,7 +22,7 @@ from orchestration.experiments.studies.store import Store, open_for_reading, ope
 from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.table import export, frame
 from orchestration.quadrotor.scenarios.scenario import Scenario
-from orchestration.simulation.workers.row import Row
+from orchestration.simulation.workers.row import Results, Rows
 
 ROWS = 1_000_000
 TOGETHER = 1000
@@ -34,28 +35,34 @@ STUDY = Study(name="stores", base=Scenario(), axes=AXES, method="random", sample
 Result = TypeVar("Result")
 
 
-def rows(number: int) -> Iterator[Row]:
-    """Rows, every tenth of a diverged run."""
+def design(number: int) -> Iterator[tuple[int, str, str]]:
+    """The points of the design."""
     draw = random.Random(0)
     for index in range(number):
-        diverged = index % 10 == 0
-        fate = {"outcome": "diverged" if diverged else "settled", "good": not diverged, "diverged": diverged}
-        measured = {name: None if diverged else draw.random() for name in OBJECTIVES}
-        yield Row(
-            index=index, key=f"{index:064x}", settings={axis.name: draw.random() for axis in AXES}, seed=index,
-            metrics={**fate, **measured, "horizon": 30.0, "steps": 30000}, message=None, duration=draw.random(),
-            machine="a machine",
-        )  # fmt: skip
+        yield index, f"{index:064x}", json.dumps({axis.name: draw.random() for axis in AXES})
+
+
+def rows(first: int) -> Rows:
+    """Rows, every tenth of a diverged run."""
+    draw, index = np.random.default_rng(first), np.arange(first, first + TOGETHER)
+    diverged = index % 10 == 0
+    measured = {name: np.where(diverged, np.nan, draw.random(TOGETHER)) for name in OBJECTIVES}
+    fate = {"good": ~diverged, "diverged": diverged, "horizon": 30.0 * np.ones(TOGETHER)}
+    results = Results(
+        numbers={name: 1.0 * values for name, values in (fate | measured).items()},
+        texts=["diverged" if is_lost else "settled" for is_lost in diverged], failed=np.zeros(TOGETHER, dtype=np.bool_),
+        messages=[None] * TOGETHER, durations=draw.random(TOGETHER), engines=["batch"] * TOGETHER, machine="a machine",
+    )  # fmt: skip
+    return Rows(index=index.tolist(), key=[f"{i:064x}" for i in index], seed=index.tolist(), results=results)
 
 
 def write(path: Path, number: int) -> None:
     """Write a store of `number` rows."""
     about: dict[str, object] = {"axes": [axis.name for axis in AXES], "grid": None, "guids": {}, "versions": {}}
     with open_for_writing(path, OBJECTIVES) as store:
-        store.describe({name: json.dumps(value) for name, value in about.items()})
-        remaining = rows(number)
-        while some := list(islice(remaining, TOGETHER)):
-            store.add(some)
+        store.describe({name: json.dumps(value) for name, value in about.items()}, design(number))
+        for first in range(0, number, TOGETHER):
+            store.add(rows(first))
 
 
 def timed(what: str, do: Callable[[], Result]) -> Result:

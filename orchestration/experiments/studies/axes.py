@@ -9,7 +9,7 @@ import numpy as np
 from orchestration.experiments.studies import sensitivity
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.records import Scalar, record
-from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.simulator import Floats, Integers
 
 Value = Scalar
 Scale = Literal["linear", "logarithmic"]
@@ -62,6 +62,13 @@ class Axis:
             return math.exp(math.log(self.low) + share * math.log(self.high / self.low))
         return self.low + share * (self.high - self.low)
 
+    def at_each(self, shares: Floats) -> list[Value]:
+        """The values at many shares."""
+        if self.scale == "logarithmic":  # NumPy's exponential function has other last bits
+            return [self.at(share) for share in shares.tolist()]
+        values: list[Value] = (self.low + shares * (self.high - self.low)).tolist()
+        return values
+
 
 def span(name: str, low: float, high: float, number: int, scale: Scale) -> tuple[float, ...]:
     """`number` values from `low` to `high`, in equal steps or equal ratios; the ends are exact."""
@@ -110,6 +117,18 @@ class Points(Sequence[dict[str, Value]]):
         if isinstance(index, slice):
             return [self._point(i) for i in range(*index.indices(self._number))]
         return self._point(range(self._number)[index])
+
+    def columns(self, indices: Integers) -> dict[str, list[Value]]:
+        """The values of some points by axis: the same as of each point alone, to the bit."""
+        rest, draw = np.divmod(indices, self._draws)
+        columns: dict[str, list[Value]] = {}
+        for axis in reversed(self._axes):
+            if axis.values is not None:
+                rest, place = np.divmod(rest, len(axis.values))
+                columns[axis.name] = [axis.values[i] for i in place.tolist()]
+        for column, axis in enumerate(self._sampled):
+            columns[axis.name] = axis.at_each(self._shares[draw, column])
+        return {axis.name: columns[axis.name] for axis in self._axes}
 
     def _point(self, index: int) -> dict[str, Value]:
         rest, draw = divmod(index, self._draws)

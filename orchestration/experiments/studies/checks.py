@@ -3,8 +3,10 @@
 from collections.abc import Hashable, Mapping
 from typing import Any
 
+import numpy as np
+
+from orchestration.experiments.studies.run_columns import MOST_KINDS, Kind, RunColumns
 from orchestration.experiments.studies.store_columns import expect_columns
-from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import warn
 from orchestration.simulation.engines.batch.shape import outline
@@ -18,30 +20,58 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.request import errors_in_own_terms
 
 
-def check_design(study: Study, files: Files) -> tuple[str, ...]:
+def check_design(columns: RunColumns) -> tuple[str, ...]:
     """The references of its runs and the components that follow them.
 
-    Raises `UsageError` for the first invalid run of `study`, with the number of further ones.
+    Raises `UsageError` for the first invalid run of a study, with the number of further ones.
     """
-    expect_columns(study.metric_names)
-    first, invalid = "", 0
-    starts, longest, checks = files.start_values_of(study.origin), study.origin, _SystemChecks(files)
-    for index in range(len(study.points)):
-        try:
-            with errors_in_own_terms(study.base):
-                system = study.system(index, starts)
-                checks.expect(system)
-            longest = max(longest, system, key=lambda one: one.stop_time)
-        except UsageError as error:
-            first = first or f"{describe_run(index, study.points[index])}: {error}"
-            invalid += 1
+    expect_columns(columns.study.metric_names)
+    first, invalid, checks = "", 0, _RunChecks(columns)
+    for block in columns.blocks():
+        refused = columns.refused(block)
+        for kind, places in block.kinds.items():
+            allowed = [place for place in places if not refused[place]]
+            if allowed and not checks.accepts(kind, int(block.indices[allowed[0]])):
+                refused[places] = True
+        if refused.any() and not first:
+            index = int(block.indices[np.argmax(refused)])
+            first = f"{describe_run(index, columns.study.points[index])}: {checks.error(index)}"
+        invalid += int(np.count_nonzero(refused))
     if invalid:
         raise UsageError(first + (f" ({invalid - 1} more runs are invalid)" if invalid > 1 else ""))
-    with errors_in_own_terms(study.base):
-        expect_tables(connect_references(longest, files.models_of(longest)))
-    for remark in checks.remarks:
+    with errors_in_own_terms(columns.study.base):
+        expect_tables(connect_references(checks.longest, columns.files.models_of(checks.longest)))
+    for remark in checks.systems.remarks:
         warn(remark)
-    return tuple(filter(None, checks.follows))
+    return tuple(filter(None, checks.systems.follows))
+
+
+class _RunChecks:
+    """Checks a run of each kind, as built for itself."""
+
+    def __init__(self, columns: RunColumns) -> None:
+        self._columns, self._accepted = columns, dict[Kind, bool]()
+        self.systems, self.longest = _SystemChecks(columns.files), columns.study.origin
+
+    def accepts(self, kind: Kind, index: int) -> bool:
+        """Whether the runs of a kind are valid, but for the parameters that it leaves open; one is at `index`."""
+        if kind not in self._accepted:
+            if len(self._accepted) == MOST_KINDS:
+                self._accepted.clear()
+            self._accepted[kind] = self.error(index) is None
+        return self._accepted[kind]
+
+    def error(self, index: int) -> UsageError | None:
+        """Why a run is invalid; None if it is valid."""
+        study = self._columns.study
+        try:
+            with errors_in_own_terms(study.base):
+                system = study.system(index, self._columns.starts)
+                self.systems.expect(system)
+        except UsageError as error:
+            return error
+        self.longest = max(self.longest, system, key=lambda one: one.stop_time)
+        return None
 
 
 class _SystemChecks:

@@ -9,14 +9,12 @@ changed, since 0.0 may switch off an effect. A run whose metrics do not change i
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 from orchestration.components.building.fmus import look_up, python_twin, python_twins
 from orchestration.components.fmi.read_description import Model, Variable
 from orchestration.experiments.studies import kept_agreement
-from orchestration.simulation.workers.batching import TOLERATED, LaneAgreement, Pair, sample
+from orchestration.simulation.workers.batching import TOLERATED, LaneAgreement, Pair, Repeated, Sample
 from orchestration.simulation.workers.executors import TaskRunner
-from orchestration.simulation.workers.row import Row
 from orchestration.simulation.workers.task import RunTask, TaskBatch
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.files import Files
@@ -36,15 +34,16 @@ def with_python_twins(files: Files) -> Files:
 
 
 def lane_agreement(
-    lanes: Mapping[str, Row], files: Files, task_of: Callable[[int, str], RunTask], run: TaskRunner, *, here: bool
+    sample: Sample, files: Files, task_of: Callable[[int, str], RunTask], run: TaskRunner, *, here: bool
 ) -> LaneAgreement | None:
     """The agreement of a sample of runs in lanes with the same runs by FMUs; None if there were no runs in lanes.
 
-    `lanes` are their rows by key; `task_of` makes the task of a run from its index and key. `run` works with `files`,
-    as returned by `with_python_twins`. With all workers `here`, on this machine, one run is enough if a whole sample of
+    `task_of` makes the task of a run from its index and key. `run` works with `files`, as returned by
+    `with_python_twins`. With all workers `here`, on this machine, one run is enough if a whole sample of
     runs of the same code has agreed before.
     """
-    chosen = [task_of(lanes[key].index, key) for key in sorted(sample(lanes))]
+    lanes = sample.runs
+    chosen = [task_of(one.run, key) for key, one in lanes.items()]
     if not chosen:
         return None
     if not here:
@@ -59,26 +58,29 @@ def lane_agreement(
     return found
 
 
-def _agreement(chosen: Sequence[RunTask], lanes: Mapping[str, Row], files: Files, run: TaskRunner) -> LaneAgreement:
+def _agreement(
+    chosen: Sequence[RunTask], lanes: Mapping[str, Repeated], files: Files, run: TaskRunner
+) -> LaneAgreement:
     beginnings = [_beginning(task) for task in chosen if _has_twins(task.system, files)]
     tasks: list[RunTask | TaskBatch] = [*chosen, *map(_in_python, beginnings)]
     if beginnings:
         nudged = (_nudged(one, files.models_of(one.system)) for one in beginnings)
-        tasks.append(TaskBatch(tasks=(*beginnings, *nudged)))
+        tasks.append(TaskBatch.of([*beginnings, *nudged]))
     # A run that exceeds the time limit outside of lanes is not compared: lanes are faster.
-    rows = {one.row.key: one.row for outcomes in run(tasks) for one in outcomes if not one.ended}
+    rows = {
+        key: Repeated.of(some, place)
+        for some in run(tasks)
+        for place, key in enumerate(some.key)
+        if place not in some.results.ended
+    }
 
-    def pairs(tasks: Iterable[RunTask], one: Mapping[str, Row], prefix: str) -> list[Pair]:
+    def pairs(tasks: Iterable[RunTask], one: Mapping[str, Repeated], prefix: str) -> list[Pair]:
         both = ((task, one.get(task.key), rows.get(prefix + task.key)) for task in tasks)
-        return [(task.index, _metrics(here), _metrics(there)) for task, here, there in both if here and there]
+        return [(task.index, here.metrics, there.metrics) for task, here, there in both if here and there]
 
     steady = [one for one in beginnings if LaneAgreement.of(pairs([one], rows, _NUDGED)).difference <= TOLERATED]
     python = LaneAgreement.of(pairs(steady, rows, _PYTHON)) if steady else None
     return replace(LaneAgreement.of(pairs(chosen, lanes, "")), python=python)
-
-
-def _metrics(row: Row) -> Mapping[str, Any]:
-    return row.metrics or {"status": row.message}
 
 
 def _has_twins(system: System, files: Files) -> bool:

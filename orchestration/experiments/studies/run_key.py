@@ -3,19 +3,22 @@
 import dataclasses
 import hashlib
 import json
+import re
 from collections.abc import Container, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.identity import IdentityCache
+from orchestration.foundation.basics.records import replaced
 from orchestration.simulation.results.own_metrics import OwnMetric
 from orchestration.simulation.workers.provenance import machine, versions
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.computers import Computer, Network
-from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.connection import Connection, component_of, variable_of
 from orchestration.systems.system.files import Files, files_read_by
 from orchestration.systems.system.model import Criterion, System
+from orchestration.systems.system.paths import with_values
 from orchestration.systems.system.source import Source
 
 
@@ -24,6 +27,52 @@ def run_key(system: System, files: Files, metrics: Sequence[OwnMetric] = ()) -> 
 
     A parameter with the start value of its FMU counts as not set.
     """
+    return hashlib.sha256(_text(system, files, metrics).encode()).hexdigest()
+
+
+class KeyText:
+    """The text of which the keys of runs are hashes, with places for their seeds and some Real parameters."""
+
+    def __init__(self, system: System, files: Files, metrics: Sequence[OwnMetric], names: Sequence[str]) -> None:
+        """`names` are the parameters, as COMPONENT.NAME, all of which the system has set."""
+        self._system, self._files, self._metrics = system, files, metrics
+        components = dict(system.components)
+        for number, name in enumerate(names):
+            owner, own = component_of(name), {variable_of(name): f"{_PLACE}{number}"}
+            components[owner] = replaced(components[owner], parameters={**components[owner].parameters, **own})
+        seeded: Any = replaced(system, components=components, seed=f"{_PLACE}{len(names)}")
+        begin, *parts = _IN_TEXT.split(_text(seeded, files, metrics))
+        self._begin, self._ends = hashlib.sha256(begin.encode()), parts[1::2]
+        self._order = [[*names, _SEED][int(number)] for number in parts[::2]]
+        starts = {name: files.start_values[system.components[component_of(name)].fmu] for name in names}
+        self._starts = {name: starts[name].get(variable_of(name)) for name in names}
+
+    def keys(self, seeds: Sequence[int], parameters: Mapping[str, Sequence[float]]) -> list[str]:
+        """The keys of runs with these seeds, and a value of each parameter."""
+        texts = {name: [*map(repr, values)] for name, values in parameters.items()} | {_SEED: [*map(str, seeds)]}
+        columns = ([f"{text}{end}" for text in texts[name]] for name, end in zip(self._order, self._ends))
+        keys = []
+        for rest in zip(*columns):
+            whole = self._begin.copy()
+            whole.update("".join(rest).encode())
+            keys.append(whole.hexdigest())
+        for run in {run for name, column in parameters.items() for run in self._unset(name, column)}:
+            own = {name: column[run] for name, column in parameters.items()}
+            keys[run] = run_key(with_values(self._system, seeds[run], own), self._files, self._metrics)
+        return keys
+
+    def _unset(self, name: str, values: Sequence[float]) -> Iterable[int]:
+        """The runs in which a parameter counts as not set."""
+        start = self._starts[name]
+        return (run for run, value in enumerate(values) if value == start)
+
+
+_PLACE, _SEED = "\0", ""
+_IN_TEXT = re.compile(r'"\\u0000(\d+)"')
+"""What holds the place of a value, as it is in the text"""
+
+
+def _text(system: System, files: Files, metrics: Sequence[OwnMetric]) -> str:
     content = {
         **_texts_shared(
             system.connections, system.sources, system.computers, system.networks, system.objectives, system.streams,
@@ -38,7 +87,7 @@ def run_key(system: System, files: Files, metrics: Sequence[OwnMetric] = ()) -> 
     if metrics:
         content["metrics"] = json.dumps([(metric.name, metric.source) for metric in metrics])
     text = ", ".join(f'"{key}": {content[key]}' for key in sorted(content))
-    return hashlib.sha256(f"{{{text}}}".encode()).hexdigest()
+    return f"{{{text}}}"
 
 
 def _json(content: Any) -> str:

@@ -1,20 +1,21 @@
 """The rows of a study in one SQLite file, written by the coordinator alone and readable by others meanwhile."""
 
 import json
-import math
 import shutil
 import sqlite3
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from fmu_kit.scratch import temporary_folder
 from orchestration.experiments.studies import store_columns as columns
 from orchestration.experiments.studies import store_integrity as integrity
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
-from orchestration.simulation.workers.row import Row
+from orchestration.foundation.basics.simulator import Floats, Integers
+from orchestration.simulation.workers.row import TEXT, Rows
 
 
 def note_on_engines(engines: Mapping[str, int]) -> str | None:
@@ -30,13 +31,8 @@ def store_path(study: str, folder: str | Path | None = None) -> Path:
     return Path(folder or Path("results") / study) / "study.sqlite"
 
 
-@dataclass(frozen=True, kw_only=True)
-class DesignPoint:
-    """One point of a design: the key of its run and the value of each axis."""
-
-    index: int
-    key: str
-    settings: Mapping[str, Any]
+DesignPoint = tuple[int, str, str]
+"""One point of a design: its index, the key of its run, and the value of each axis as JSON"""
 
 
 class Store:
@@ -65,21 +61,29 @@ class Store:
             self._insert("about", about.items())
             if design is not None:
                 self._connection.execute("DELETE FROM design")
-                self._insert("design", ((point.index, point.key, json.dumps(point.settings)) for point in design))
+                self._insert("design", design)
 
-    def missing(self, *, failed_too: bool = False) -> dict[int, str]:
-        """Indices and keys of the design whose runs have no row, or a failed one; of equal runs the first."""
-        return self._pairs(
-            "SELECT min(design_index), key FROM design LEFT JOIN runs USING (key) "
-            "WHERE status IS NULL OR (? AND status = 'failed') GROUP BY key ORDER BY 1",
-            failed_too,
-        )
+    def missing(self, *, failed_too: bool = False) -> Integers:
+        """Points of the design whose runs have no row, or a failed one, shape (n, 2); of equal runs the first.
 
-    def missing_counts(self) -> dict[str, int]:
-        """The keys of the runs of the design that have no row, each with its number of points."""
-        return self._pairs(
-            "SELECT key, count(*) FROM design LEFT JOIN runs USING (key) WHERE status IS NULL GROUP BY key"
+        The index of each, and how many points lack the row of its run. Of a million no more is kept in memory.
+        """
+        self.expect_whole()
+        query = (
+            "SELECT min(design_index), count(*) * (status IS NULL) FROM design LEFT JOIN runs USING (key) "
+            "WHERE status IS NULL OR (? AND status = 'failed') GROUP BY key ORDER BY 1"
         )
+        with integrity.store_errors(self.path):
+            rows = self._connection.execute(query, (failed_too,))
+            return np.fromiter(rows, dtype=np.dtype((np.int64, 2)))
+
+    def keys(self, indices: Integers) -> list[str]:
+        """The keys of the runs of some points of the design, in order."""
+        query = "SELECT design_index, key FROM design WHERE design_index BETWEEN ? AND ? ORDER BY design_index"
+        wanted = {*indices.tolist()}
+        with integrity.store_errors(self.path):
+            rows = self._connection.execute(query, (int(indices.min()), int(indices.max())))
+            return [key for index, key in rows if index in wanted]
 
     def counts(self) -> dict[str, int]:
         """The number of points of the design by the status of their rows."""
@@ -91,18 +95,16 @@ class Store:
             "SELECT engine, count(*) FROM design JOIN runs USING (key) WHERE engine IS NOT NULL GROUP BY engine"
         )
 
-    def _pairs(self, query: str, *values: bool) -> dict[Any, Any]:
+    def _pairs(self, query: str) -> dict[Any, Any]:
         """The two columns of a query over a store that is whole, the second by the first."""
         self.expect_whole()
         with integrity.store_errors(self.path):
-            return dict(self._connection.execute(query, values))
+            return dict(self._connection.execute(query))
 
-    def add(self, rows: Iterable[Row]) -> None:
-        """Write rows in one transaction, replacing rows of the same runs."""
-        rows = list(rows)
+    def add(self, rows: Rows) -> None:
+        """Write rows of points of the design in one transaction, replacing rows of the same runs."""
         with integrity.store_errors(self.path), self._connection:
-            self._insert("design", ((row.index, row.key, json.dumps(row.settings)) for row in rows))
-            self._insert("runs", (_values(row, self.metrics) for row in rows))
+            self._insert("runs", zip(*_columns(rows, self.metrics), strict=True))
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """All rows sorted by design index, as values by column; `settings` is a dictionary."""
@@ -262,18 +264,26 @@ def _read_only(path: Path) -> sqlite3.Connection:
     return connection
 
 
-def _values(row: Row, metrics: Iterable[str]) -> tuple[Any, ...]:
-    measured = {name: (row.metrics or {}).get(name) for name in metrics}
-    return (
-        row.key, row.status, row.message, row.seed, _real(row.duration), row.machine, row.engine,
-        *(_text(value) if name in columns.TEXTS else _real(value) for name, value in measured.items()),
-    )  # fmt: skip
+def _columns(rows: Rows, metrics: Iterable[str]) -> Iterator[Sequence[Any]]:
+    """The values of rows by column of the table of runs, as SQLite has them."""
+    results, count = rows.results, len(rows)
+    yield rows.key
+    yield ["failed" if failed else "done" for failed in results.failed.tolist()]
+    yield results.messages
+    yield rows.seed
+    yield _reals(results.durations)
+    yield [results.machine] * count
+    yield results.engines
+    for name in metrics:
+        if name == TEXT:
+            yield results.texts
+        else:
+            yield _reals(results.numbers[name]) if name in results.numbers else [None] * count
 
 
-def _text(value: Any) -> str | None:
-    return None if value is None else str(value)
-
-
-def _real(value: Any) -> float | None:
-    """A number as SQLite stores it: with one zero, and NULL for NaN."""
-    return None if value is None or math.isnan(value) else float(value) + 0.0
+def _reals(numbers: Floats) -> list[float | None]:
+    """Numbers as SQLite stores them: with one zero, and NULL for NaN."""
+    values: list[float | None] = (numbers + 0.0).tolist()
+    for place in np.flatnonzero(np.isnan(numbers)).tolist():
+        values[place] = None
+    return values

@@ -4,8 +4,9 @@ from collections.abc import Iterable
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.results.objectives import FIXED
+from orchestration.simulation.workers.row import TEXT
 
-TEXTS = ("outcome",)
+TEXTS = (TEXT,)
 """Metrics that are texts; all others are numbers"""
 MAX_OBJECTIVES = 1000
 """Largest number of columns, a limit of SQLite"""

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -79,7 +79,7 @@ class Study:
         return (*self.origin.objectives, *(metric.name for metric in self.metrics))
 
     @cached_property
-    def points(self) -> Sequence[Mapping[str, Value]]:
+    def points(self) -> Points:
         """The value of each axis by run, computed on access."""
         return Points(self.axes, self.method, self.samples, self.design_seed)
 
@@ -95,27 +95,7 @@ class Study:
 
         Raises `UsageError` for an invalid value.
         """
-        return self.settings_and_system(index, starts)[1]
-
-    def settings_and_system(self, index: int, starts: Mapping[str, float]) -> tuple[Mapping[str, Value], System]:
-        """The value of each axis in one run, and its system; raises as `system` does."""
-        cached, cached_starts = self._cache
-        if cached_starts != starts:
-            cached_starts.clear()
-            cached.clear()
-            cached_starts.update(starts)
-        if index in cached:
-            return cached[index]
-        point = self.points[index]
-        run = point, self._system(point, starts)
-        if len(cached) < _CACHE_SIZE:
-            cached[index] = run
-        return run
-
-    @cached_property
-    def _cache(self) -> tuple[dict[int, tuple[Mapping[str, Value], System]], dict[str, float]]:
-        """Runs, each of which is requested for checks, for its key and for its execution; and the start values used."""
-        return {}, {}
+        return self._system(self.points[index], starts)
 
     def _system(self, point: Mapping[str, Value], starts: Mapping[str, float]) -> System:
         changes: dict[str, Any] = {}
@@ -124,14 +104,14 @@ class Study:
         with errors_in_own_terms(self.base):
             for axis in self.axes:
                 value = point[axis.name]
-                for path in self._paths_of(axis.targets):
-                    changes[path] = _product(value, path, {}, self.origin, starts) if axis.multiplies else value
+                for path in self.paths_of(axis.targets):
+                    changes[path] = product(value, path, {}, self.origin, starts) if axis.multiplies else value
             for each in self.together:
                 sets, multiplies = each.of(point)
                 changes |= {path: value for target, value in sets.items() for path in self._paths[target]}
                 for target, factor in multiplies.items():
                     for path in self._paths[target]:
-                        changes[path] = _product(factor, path, changes, self.origin, starts)
+                        changes[path] = product(factor, path, changes, self.origin, starts)
             system = changed(self.origin, changes)
         return native_twins(system) if self._varies_fmu else system
 
@@ -140,7 +120,8 @@ class Study:
         """Whether it is native, and an axis sets FMUs, which may not be."""
         return self.native and any(names_fmu(path) for paths in self._paths.values() for path in paths)
 
-    def _paths_of(self, targets: Iterable[str]) -> Iterator[str]:
+    def paths_of(self, targets: Iterable[str]) -> Iterator[str]:
+        """The paths of its targets."""
         return (path for target in targets for path in self._paths[target])
 
     def keeps_signals(self, index: int) -> bool:
@@ -150,7 +131,7 @@ class Study:
     def files(self) -> Files:
         """The files of all runs; missing FMUs are built."""
         values = [
-            (path, str(v)) for axis in self.axes for path in self._paths_of(axis.targets) for v in axis.values or ()
+            (path, str(v)) for axis in self.axes for path in self.paths_of(axis.targets) for v in axis.values or ()
         ]
         linked = [item for each in self.together for sets in each.sets.values() for item in sets.items()]
         values += [(path, str(value)) for target, value in linked for path in self._paths[target]]
@@ -167,8 +148,6 @@ def _traces(values: Iterable[tuple[str, str]]) -> list[str]:
     return [path for path in paths if path is not None]
 
 
-_CACHE_SIZE = 2**14
-"""Runs, some kB each"""
 _NAME = re.compile(r"[^\W_][\w .+-]{0,99}")
 
 
@@ -183,7 +162,7 @@ def _own_seed(seed: int, point: Mapping[str, Value]) -> int:
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:6], "big")
 
 
-def _product(value: Value, path: str, changes: Mapping[str, Any], origin: System, starts: Mapping[str, float]) -> float:
+def product(value: Value, path: str, changes: Mapping[str, Any], origin: System, starts: Mapping[str, float]) -> float:
     """`value` times the changed value at a path, else that of the base, else that of its FMU."""
     if not isinstance(value, (int, float)):
         raise UsageError(f"{path}: expected a number to multiply with, got {value}")

@@ -2,18 +2,21 @@
 
 import contextlib
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fmu_kit.new_files import write_atomically
 from orchestration.experiments.studies import store
 from orchestration.experiments.studies.checks import check_design, describe_run
 from orchestration.experiments.studies.lane_agreement import lane_agreement, with_python_twins
-from orchestration.experiments.studies.run_key import design_parts, difference, place_parts, run_key, study_parts
+from orchestration.experiments.studies.run_columns import TOGETHER, RunColumns
+from orchestration.experiments.studies.run_key import design_parts, difference, place_parts, study_parts
 from orchestration.experiments.studies.store_columns import UNITS
 from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.swept import Swept
@@ -21,19 +24,20 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.interrupt import Interrupted
 from orchestration.foundation.basics.progress import CountProgress, runs_reporter
+from orchestration.foundation.basics.simulator import Integers
 from orchestration.foundation.basics.terminal import Count, inform
-from orchestration.simulation.engines.master import BATCH, Engine
+from orchestration.simulation.engines.master import Engine
 from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.simulation.requests.ranges import paths_in, unit_at
 from orchestration.simulation.results.own_metrics import metrics_from_sources
 from orchestration.simulation.runs.result import Result
-from orchestration.simulation.workers.batching import chunks
+from orchestration.simulation.workers.batching import Sample, chunks
 from orchestration.simulation.workers.choice import EngineChoice, Execution, choose_execution
 from orchestration.simulation.workers.executors import TaskRunner, cluster, expect_scheduler, local_workers
 from orchestration.simulation.workers.pool import Inputs
 from orchestration.simulation.workers.provenance import versions
-from orchestration.simulation.workers.row import Row
-from orchestration.simulation.workers.task import RunTask, TaskOutcome
+from orchestration.simulation.workers.row import Rows
+from orchestration.simulation.workers.task import RunTask, TaskBatch
 from orchestration.systems.system.files import Files
 from orchestration.systems.system.model import System
 
@@ -84,33 +88,40 @@ def sweep(
         raise UsageError(f"--time-limit {time_limit:g}: expected a positive number of seconds")
     if metrics is not None:
         study = replace(study, metrics=metrics_from_sources(metrics))
-    study, files, execution, follows = prepare(study, engine)
+    columns, execution, follows = prepare(study, engine)
+    study, files = columns.study, columns.files
     path = store.store_path(study.name, folder)
     with runs_reporter(progress) as report, store.open_for_writing(path, study.metric_names) as opened:
-        _describe(opened, study, files)
+        _describe(opened, columns)
         if engine == "auto":
             before = opened.about().get(ENGINE, execution.name)
             execution = execution.as_before(before, str(path), "another one needs another --out")
         missing = _missing(opened, study, retry_failed)
-        sweep_progress = _Progress(len(study.points), opened, report, announce)
+        sweep_progress = _Progress(study, missing, report, announce)
         agreement = None
-        if missing:
+        if len(missing):
             opened.describe({ENGINE: execution.name})
             if announce is not None and engine == "auto":
                 execution.tell(announce)
             all_files = with_python_twins(files) if execution.in_lanes else files
             task_of = partial(_task, study, files.start_values_of(study.origin), time_limit)
-            tasks = (task_of(index, key, execution.engine) for index, key in missing.items())
-            lanes: dict[str, Row] = {}
+            sample, chunk = Sample(), partial(chunks, total=len(missing), workers=workers)
+            windows = _windows(opened, missing[:, 0])
+            tasks: Iterable[RunTask | TaskBatch]
+            if execution.in_lanes:
+                tasks = _in_lanes(columns, windows, partial(task_of, engine=None), time_limit, chunk)
+            else:
+                tasks = (
+                    task_of(i, key, execution.engine) for some, keys in windows for i, key in zip(some.tolist(), keys)
+                )
             try:
                 with _workers(Inputs.of(all_files), workers, dask) as run:
-                    parts = chunks(tasks, len(missing), workers) if execution.in_lanes else tasks
-                    with contextlib.closing(run(parts)) as results:
-                        for outcomes in results:
-                            _keep(outcomes, opened)
-                            sweep_progress.add(outcomes)
-                            lanes |= {each.row.key: each.row for each in outcomes if each.row.engine == BATCH}
-                    agreement = lane_agreement(lanes, all_files, partial(task_of, engine=None), run, here=dask is None)
+                    with contextlib.closing(run(tasks)) as results:
+                        for rows in results:
+                            _keep(rows, opened)
+                            sweep_progress.add(rows)
+                            sample.add(rows)
+                    agreement = lane_agreement(sample, all_files, partial(task_of, engine=None), run, here=dask is None)
             except KeyboardInterrupt:
                 raise Interrupted(f"with {sweep_progress.done} of {sweep_progress.total} runs done") from None
         if agreement is not None:
@@ -123,25 +134,25 @@ def sweep(
     )  # fmt: skip
 
 
-def prepare(study: Study, engine: EngineChoice) -> tuple[Study, Files, Execution, tuple[str, ...]]:
-    """A study as an engine runs it, its files, how it is executed, and its references with their followers.
+def prepare(study: Study, engine: EngineChoice) -> tuple[RunColumns, Execution, tuple[str, ...]]:
+    """The runs of a study as an engine runs them, how they are executed, and its references with their followers.
 
     Raises `UsageError` for an invalid run.
     """
-    candidates: dict[bool, tuple[Study, Files, tuple[str, ...]]] = {}
+    candidates: dict[bool, tuple[RunColumns, tuple[str, ...]]] = {}
 
     def first(native: bool) -> tuple[System, Files]:
         candidate = replace(study, native=native)
-        files = candidate.files()
-        candidates[native] = candidate, files, check_design(candidate, files)
-        return candidate.system(0, files.start_values_of(candidate.origin)), files
+        columns = RunColumns(candidate, candidate.files())
+        candidates[native] = columns, check_design(columns)
+        return candidate.system(0, columns.starts), columns.files
 
     no_lanes = "metrics that are functions need whole runs, one at a time" if study.metrics else None
     execution = choose_execution(engine, study.native, first, no_lanes=no_lanes)
     if execution.native not in candidates:
         first(execution.native)
-    prepared, files, follows = candidates[execution.native]
-    return prepared, files, execution, follows
+    columns, follows = candidates[execution.native]
+    return columns, execution, follows
 
 
 def _expect_workers(workers: int, dask: str | None) -> None:
@@ -175,26 +186,49 @@ def expect_current(opened: store.Store, study: Study) -> None:
 class _Progress:
     """Counts the runs of a sweep, and reports progress and failures."""
 
-    def __init__(self, total: int, opened: store.Store, report: Count, announce: Announce | None) -> None:
-        self.total, self.failed = total, 0
-        self._callback, self._announce = report, announce
-        self._missing = opened.missing_counts()
-        self.done = total - sum(self._missing.values())
+    def __init__(self, study: Study, missing: Integers, report: Count, announce: Announce | None) -> None:
+        """`missing` as the store has it."""
+        self.total, self.failed = len(study.points), 0
+        self._study, self._callback, self._announce = study, report, announce
+        self._indices, self._points = missing.T
+        self.done = self.total - int(self._points.sum())
         self._report()
 
-    def add(self, outcomes: Iterable[TaskOutcome]) -> None:
+    def add(self, rows: Rows) -> None:
         """Count runs that have been written."""
-        for row in (outcome.row for outcome in outcomes):
-            if row.status == "failed":
-                self.failed += 1
-                if self._announce is not None and self.failed <= _ANNOUNCED:
-                    more = "; further ones are not shown" if self.failed == _ANNOUNCED else ""
-                    self._announce(f"{describe_run(row.index, row.settings)} failed: {row.message}{more}")
-            self.done += self._missing.pop(row.key, 0)
+        for place in np.flatnonzero(rows.results.failed).tolist():
+            self.failed += 1
+            if self._announce is not None and self.failed <= _ANNOUNCED:
+                more = "; further ones are not shown" if self.failed == _ANNOUNCED else ""
+                run = describe_run(rows.index[place], self._study.points[rows.index[place]])
+                self._announce(f"{run} failed: {rows.results.messages[place]}{more}")
+        self.done += int(self._points[np.searchsorted(self._indices, rows.index)].sum())
         self._report()
 
     def _report(self) -> None:
         self._callback(self.done, self.total)
+
+
+def _windows(opened: store.Store, indices: Integers) -> Iterator[tuple[Integers, list[str]]]:
+    """Indices and keys of runs, some thousands at a time."""
+    for first in range(0, len(indices), TOGETHER):
+        some = indices[first : first + TOGETHER]
+        yield some, opened.keys(some)
+
+
+def _in_lanes(
+    columns: RunColumns,
+    windows: Iterable[tuple[Integers, list[str]]],
+    task_of: Callable[[int, str], RunTask],
+    limit: float | None,
+    chunk: Callable[[Iterable[TaskBatch]], Iterator[TaskBatch]],
+) -> Iterator[RunTask | TaskBatch]:
+    """Tasks of many runs, but of one run where signals are kept."""
+    for indices, keys in windows:
+        kept = {index for index in indices.tolist() if columns.study.keeps_signals(index)}
+        yield from (task_of(index, key) for index, key in zip(indices.tolist(), keys) if index in kept)
+        if rest := [place for place, index in enumerate(indices.tolist()) if index not in kept]:
+            yield from chunk([columns.batch(columns.block(indices[rest]), [keys[place] for place in rest], limit)])
 
 
 def _task(
@@ -205,43 +239,42 @@ def _task(
     key: str,
     engine: Engine | None,
 ) -> RunTask:
-    settings, system = study.settings_and_system(index, starts)
     return RunTask(
-        index=index, key=key, settings=settings, system=system,
+        index=index, key=key, system=study.system(index, starts),
         keep_signals=study.keeps_signals(index), metrics=study.metrics, engine=engine, time_limit=time_limit,
     )  # fmt: skip
 
 
-def _missing(opened: store.Store, study: Study, retry_failed: bool) -> dict[int, str]:
-    """The indices and keys of the design to run: without a row, or without the signals to keep."""
+def _missing(opened: store.Store, study: Study, retry_failed: bool) -> Integers:
+    """The points of the design to run, as the store has them: without a row, or without the signals to keep."""
     missing = opened.missing(failed_too=retry_failed)
     if not study.keep_signals:
         return missing
-    without_signals = {
-        row["design_index"]: row["key"]
+    without_signals = [
+        (row["design_index"], 0)
         for row in opened.rows()
         if study.keeps_signals(row["design_index"])
         and row["status"] == "done"
         and not _signals_path(opened, row["key"]).is_file()
-    }
-    return dict(sorted({**missing, **without_signals}.items()))
+    ]
+    both = np.concatenate([missing, np.array(without_signals, dtype=np.int64).reshape(-1, 2)])
+    return both[np.unique(both[:, 0], return_index=True)[1]]
 
 
 def _signals_path(opened: store.Store, key: str) -> Path:
     return opened.path.parent / "signals" / f"{key[:16]}.parquet"
 
 
-def _keep(outcomes: Sequence[TaskOutcome], opened: store.Store) -> None:
+def _keep(rows: Rows, opened: store.Store) -> None:
     """Write signals first, then the rows, so that every row has its signals."""
-    for outcome in outcomes:
-        if outcome.signals is not None:
-            write_atomically(_signals_path(opened, outcome.row.key), outcome.signals)
-    opened.add([outcome.row for outcome in outcomes])
+    for place, signals in rows.results.signals.items():
+        write_atomically(_signals_path(opened, rows.key[place]), signals)
+    opened.add(rows)
 
 
-def _describe(opened: store.Store, study: Study, files: Files) -> None:
+def _describe(opened: store.Store, columns: RunColumns) -> None:
     """Describe the study in its store, which may hold no other; the design may grow."""
-    about = opened.about()
+    about, study, files = opened.about(), columns.study, columns.files
     parts, place = study_parts(study), place_parts(study, files)
     if STUDY_PARTS in about:
         changes = difference(
@@ -268,7 +301,11 @@ def _describe(opened: store.Store, study: Study, files: Files) -> None:
             "versions": json.dumps(versions()),
             UNITS: json.dumps(_units(study, files)),
         },
-        _design_points(study, files),
+        (
+            point
+            for block in columns.blocks()
+            for point in zip(block.indices.tolist(), columns.keys(block), block.settings)
+        ),
     )
 
 
@@ -282,10 +319,3 @@ def _units(study: Study, files: Files) -> dict[str, str]:
         if axis.targets and not axis.multiplies
     }
     return {name: unit for name, unit in of_axes.items() if unit} | check_against_fmus(first, models).units
-
-
-def _design_points(study: Study, files: Files) -> Iterator[store.DesignPoint]:
-    starts = files.start_values_of(study.origin)
-    for index in range(len(study.points)):
-        settings, system = study.settings_and_system(index, starts)
-        yield store.DesignPoint(index=index, key=run_key(system, files, study.metrics), settings=settings)

@@ -13,10 +13,8 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.systems.system.check import check_parameter
 from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import System
-from orchestration.systems.system.paths import changed, value_at
+from orchestration.systems.system.paths import changed, parameter_name, parameter_path, value_at
 from orchestration.systems.system.request import Request
-
-_COMPONENTS, _PARAMETERS = "components.", ".parameters."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +45,7 @@ class Columns:
 
     def alone(self, run: int) -> System:
         """The system of one run, with all of its values."""
-        parameters = {_path(name): float(column[run]) for name, column in self.parameters.items()}
+        parameters = {parameter_path(name): float(column[run]) for name, column in self.parameters.items()}
         return changed(self.systems[run], parameters)
 
 
@@ -70,7 +68,7 @@ def columns(request: Request, system: System, models: Mapping[str, Model], value
         column = np.broadcast_to(array, (count,))
         for path in request.paths_of(target):
             value_at(system, path)
-            name = _name(path)
+            name = parameter_name(path)
             if name in parameters or path in settings:
                 raise UsageError(f"values of {target}: are given twice; expected each path once")
             if path.endswith(".fmu"):
@@ -112,19 +110,9 @@ def _real(target: str, column: Any) -> Floats:
 
 def _expect_accepted(system: System, models: Mapping[str, Model], path: str, values: Any) -> None:
     """Raise `UsageError` for values of a parameter that its FMU rejects; of Reals `values` are least and largest."""
-    component, _, parameter = path.removeprefix(_COMPONENTS).partition(_PARAMETERS)
+    name = str(parameter_name(path))
     for value in values:
-        check_parameter(changed(system, {path: value.item()}), models, component, parameter)
-
-
-def _name(path: str) -> str | None:
-    """COMPONENT.NAME of the path of a parameter of an FMU; None for any other."""
-    component, is_parameter, parameter = path.removeprefix(_COMPONENTS).partition(_PARAMETERS)
-    return f"{component}.{parameter}" if path.startswith(_COMPONENTS) and is_parameter else None
-
-
-def _path(name: str) -> str:
-    return f"{_COMPONENTS}{component_of(name)}{_PARAMETERS}{variable_of(name)}"
+        check_parameter(changed(system, {path: value.item()}), models, component_of(name), variable_of(name))
 
 
 def _is_real(models: Mapping[str, Model], name: str) -> bool:

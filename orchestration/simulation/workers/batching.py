@@ -6,11 +6,13 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from itertools import islice
-from typing import Any
+from typing import Any, NamedTuple
 
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.simulation.engines.batch.kernels import preferred_lanes
 from orchestration.simulation.engines.batch.shape import outline
+from orchestration.simulation.engines.master import BATCH
+from orchestration.simulation.workers.row import Rows
 from orchestration.simulation.workers.task import RunTask, TaskBatch
 from orchestration.systems.schedule.schedule_cache import schedule_key
 from orchestration.systems.system.requirements import is_number
@@ -23,24 +25,62 @@ CHUNK, SORTED = 256, 4096
 """Largest number of runs in a chunk, and number of runs sorted at a time so that those of a chunk are alike"""
 
 
-def chunks(tasks: Iterable[RunTask], total: int, workers: int) -> Iterator[RunTask | TaskBatch]:
-    """Tasks in chunks, several for each worker; tasks whose signals are kept remain single."""
-    size = max(preferred_lanes(), min(CHUNK, total // (4 * workers) // preferred_lanes() * preferred_lanes()))
+def batched(tasks: Iterable[RunTask]) -> Iterator[TaskBatch]:
+    """Single tasks by column, as many as are sorted at a time."""
     waiting = iter(tasks)
     while window := list(islice(waiting, SORTED)):
-        yield from (task for task in window if task.keep_signals)
-        places: dict[Any, int] = {}
-        rest = [(task, (outline(task.system), schedule_key(task.system))) for task in window if not task.keep_signals]
-        for _, key in rest:
-            places.setdefault(key, len(places))
-        ordered = [task for task, _ in sorted(rest, key=lambda pair: places[pair[1]])]
-        for first in range(0, len(ordered), size):
-            yield TaskBatch(tasks=tuple(ordered[first : first + size]))
+        yield TaskBatch.of(window)
 
 
-def sample(keys: Iterable[str]) -> set[str]:
-    """The keys of the runs to repeat with FMUs, chosen by their content alone."""
-    return set(sorted(keys, key=lambda key: hashlib.sha256(f"sample {key}".encode()).digest())[:SAMPLE])
+def chunks(batches: Iterable[TaskBatch], total: int, workers: int) -> Iterator[TaskBatch]:
+    """Batches in chunks, several for each worker, each of runs that are alike."""
+    size = max(preferred_lanes(), min(CHUNK, total // (4 * workers) // preferred_lanes() * preferred_lanes()))
+    for batch in batches:
+        keys = [(outline(system), schedule_key(system)) for system in batch.systems]
+        alike, same = dict[Any, int](), dict[Any, int]()
+        order = []
+        for run, (place, seed) in enumerate(zip(batch.places, batch.seed)):
+            shape, timing = keys[place]
+            first = alike.setdefault((shape, timing.regular), len(alike))
+            order.append((first, same.setdefault((first, timing.with_seed(seed).drawn), len(same)), run))
+        ordered = [run for *_, run in sorted(order)]
+        for begin in range(0, len(ordered), size):
+            yield batch.some(ordered[begin : begin + size])
+
+
+class Sample:
+    """The runs in lanes to repeat with FMUs, chosen by the content of their keys alone."""
+
+    def __init__(self) -> None:
+        self._chosen: list[tuple[bytes, str, Repeated]] = []
+
+    def add(self, rows: Rows) -> None:
+        """Consider rows, of which those in lanes may be chosen."""
+        for place, (key, engine) in enumerate(zip(rows.key, rows.results.engines)):
+            if engine != BATCH:
+                continue
+            digest = hashlib.sha256(f"sample {key}".encode()).digest()
+            if len(self._chosen) < SAMPLE or digest < self._chosen[-1][0]:
+                self._chosen = sorted([*self._chosen, (digest, key, Repeated.of(rows, place))], key=lambda run: run[:2])
+                del self._chosen[SAMPLE:]
+
+    @property
+    def runs(self) -> dict[str, "Repeated"]:
+        """Those that are chosen so far, by key, sorted."""
+        return {key: run for _, key, run in sorted(self._chosen, key=lambda run: run[1])}
+
+
+class Repeated(NamedTuple):
+    """A run, and what came of it."""
+
+    run: int
+    metrics: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, rows: Rows, place: int) -> "Repeated":
+        """One of some rows; that of a run that failed has its message."""
+        metrics = rows.results.metrics(place)
+        return cls(rows.index[place], {"status": rows.results.messages[place]} if metrics is None else metrics)
 
 
 Pair = tuple[int, Mapping[str, Any], Mapping[str, Any]]

@@ -14,15 +14,16 @@ from typing import Any
 
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.simulation.engines.master import Engine
-from orchestration.simulation.workers.batching import chunks
+from orchestration.simulation.workers.batching import batched, chunks
 from orchestration.simulation.workers.pool import Inputs, InterruptedWorker, Pool
-from orchestration.simulation.workers.task import RunTask, TaskBatch, TaskOutcome
+from orchestration.simulation.workers.row import Results, Rows
+from orchestration.simulation.workers.task import RunTask, TaskBatch
 from orchestration.systems.system.files import Files
 from orchestration.systems.system.model import System
 
-TaskRunner = Callable[[Iterable[RunTask | TaskBatch]], Generator[list[TaskOutcome], None, None]]
-"""Yields the outcomes of tasks as they come, in any order."""
-Submit = Callable[[RunTask | TaskBatch], "Future[list[TaskOutcome]]"]
+TaskRunner = Callable[[Iterable[RunTask | TaskBatch]], Generator[Rows, None, None]]
+"""Yields the rows of tasks as they come, in any order."""
+Submit = Callable[[RunTask | TaskBatch], "Future[Results]"]
 _PATIENCE = 10.0
 """Time to wait for the scheduler [s]"""
 _WORKERS_PATIENCE = 60.0
@@ -55,9 +56,11 @@ class RunEvaluator:
             return self.run_until(systems, stop=lambda metrics: False)
         tasks = (self._task(i, system) for i, system in enumerate(systems))
         metrics: list[Any] = [None] * len(systems)
-        for future in [self._submit(part) for part in chunks(tasks, len(systems), self._workers)]:
-            for outcome in future.result():
-                metrics[outcome.row.index] = _metrics(outcome)
+        parts = [*chunks(batched(tasks), len(systems), self._workers)]
+        for part, future in zip(parts, [self._submit(part) for part in parts]):
+            results = future.result()
+            for place, index in enumerate(part.index):
+                metrics[index] = _metrics(results, place)
         return metrics
 
     def run_until(
@@ -72,8 +75,7 @@ class RunEvaluator:
         metrics: list[Any] = []
         try:
             for future in futures:
-                (outcome,) = future.result()
-                metrics.append(_metrics(outcome))
+                metrics.append(_metrics(future.result(), 0))
                 report(len(metrics))
                 if stop(metrics[-1]):
                     break
@@ -83,14 +85,15 @@ class RunEvaluator:
         return metrics
 
     def _task(self, index: int, system: System) -> RunTask:
-        return RunTask(index=index, key="", settings={}, system=system, keep_signals=False, engine=self._engine)
+        return RunTask(index=index, key="", system=system, engine=self._engine)
 
 
-def _metrics(outcome: TaskOutcome) -> Any:
+def _metrics(results: Results, place: int) -> Any:
     """The metrics of a run; raises `QuadcosimError` if it has failed."""
-    if outcome.row.metrics is None:
-        raise QuadcosimError(str(outcome.row.message))
-    return outcome.row.metrics
+    metrics = results.metrics(place)
+    if metrics is None:
+        raise QuadcosimError(str(results.messages[place]))
+    return metrics
 
 
 @contextmanager
@@ -133,7 +136,7 @@ def cluster(inputs: Inputs, address: str) -> Iterator[TaskRunner]:
         executor = stack.enter_context(client.get_executor(pure=False))
         slots = sum(client.nthreads().values())
 
-        def submit(task: RunTask | TaskBatch) -> "Future[list[TaskOutcome]]":
+        def submit(task: RunTask | TaskBatch) -> "Future[Results]":
             return executor.submit(run_on_cluster, task, scattered)  # type: ignore[no-any-return]
 
         try:
@@ -156,8 +159,8 @@ def expect_scheduler(address: str) -> None:
         raise QuadcosimError(f"--dask {address}: expected a dask scheduler with workers there: {error}") from error
 
 
-def run_on_cluster(task: RunTask | TaskBatch, inputs: Inputs) -> list[TaskOutcome]:
-    """The outcomes of runs; called in a dask worker, simulates in a separate process there too."""
+def run_on_cluster(task: RunTask | TaskBatch, inputs: Inputs) -> Results:
+    """The results of runs; called in a dask worker, simulates in a separate process there too."""
     with _POOLS_LOCK:
         if inputs.digest not in _POOLS:
             _POOLS[inputs.digest] = pool = Pool(inputs)
@@ -181,18 +184,17 @@ def _local_submit(stack: ExitStack, inputs: Inputs, workers: int) -> Submit:
     return lambda task: executor.submit(pool.run, task)
 
 
-def _drain(tasks: Iterable[RunTask | TaskBatch], submit: Submit, most: int) -> Generator[list[TaskOutcome], None, None]:
-    """Keep `most` tasks in progress; yield their outcomes as they finish, of several the one that was begun first."""
+def _drain(tasks: Iterable[RunTask | TaskBatch], submit: Submit, most: int) -> Generator[Rows, None, None]:
+    """Keep `most` tasks in progress; yield their rows as they finish, of several the one that was begun first."""
     waiting = iter(tasks)
-    in_progress = [submit(task) for task in islice(waiting, most)]
+    in_progress = {submit(task): task for task in islice(waiting, most)}
     try:
         while in_progress:
             done, _ = concurrent.futures.wait(in_progress, timeout=1.0, return_when=concurrent.futures.FIRST_COMPLETED)
-            finished = [future for future in in_progress if future in done]
-            in_progress = [future for future in in_progress if future not in done]
-            for future in finished:
-                yield future.result()
-            in_progress += [submit(task) for task in islice(waiting, len(finished))]
+            finished = {future: in_progress.pop(future) for future in [*in_progress] if future in done}
+            for future, task in finished.items():
+                yield task.rows(future.result())
+            in_progress |= {submit(task): task for task in islice(waiting, len(finished))}
     finally:
         for future in in_progress:
             future.cancel()

@@ -8,7 +8,7 @@ import signal
 import tempfile
 import threading
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,8 @@ from orchestration.foundation.processes import subprocesses
 from orchestration.foundation.processes.child import Child, Died
 from orchestration.simulation.workers import task as tasks
 from orchestration.simulation.workers.provenance import sources, versions
-from orchestration.systems.system.files import Files, all_with_files, with_files
+from orchestration.simulation.workers.row import Outcome, Results
+from orchestration.systems.system.files import Files
 
 ATTEMPTS = 3
 """Number of tries of a run, from the second one in a new process, before the death of its worker is its result"""
@@ -70,7 +71,7 @@ class WorkerProcess:
         """Send a task and return the answer; raises `Died`, also at its time limit."""
         self._child.allow(task.time_limit)
         self._child.send(task)
-        kind: Any = list[tasks.TaskOutcome] | tasks.EnvironmentFailure
+        kind: Any = Results | tasks.EnvironmentFailure
         answer = self._child.receive_by(lambda answer: tasks.of_task(task, answer), kind)
         self._child.allow(None)
         return answer
@@ -97,13 +98,12 @@ class Supervisor:
         self._worker: WorkerProcess | None = None
         self._machine: str | None = None
 
-    def run(self, task: tasks.RunTask | tasks.TaskBatch) -> list[tasks.TaskOutcome]:
-        """The outcomes of a run, or of many in lanes; a run that ends its process `ATTEMPTS` times has failed.
+    def run(self, task: tasks.RunTask | tasks.TaskBatch) -> Results:
+        """The results of a run, or of many in lanes; a run that ends its process `ATTEMPTS` times has failed.
 
         Runs that end their process or exceed their time limit together are repeated each by itself, in lanes too: the
         bits of a row do not depend on deaths. Raises `QuadcosimError` for failures not caused by a run.
         """
-        several = task.tasks if isinstance(task, tasks.TaskBatch) else (task,)
         crashes = killed = 0
         while True:
             worker = self._ready_worker()
@@ -113,34 +113,32 @@ class Supervisor:
                 self._drop()
                 _expect_no_interrupt(death)
                 from_outside = death.ending.reached is None and death.ending.code in _FROM_OUTSIDE
-                if len(several) > 1 and not from_outside:
-                    return [outcome for one in several for outcome in self.run(tasks.TaskBatch(tasks=(one,)))]
+                if isinstance(task, tasks.TaskBatch) and len(task) > 1 and not from_outside:
+                    return Results.joined([self.run(task.some([run])) for run in range(len(task))])
                 if death.ending.reached is not None:
-                    return [self._failed(several[0], f"it was ended: {death.ending.reached}", ended=True)]
+                    return self._failed(f"it was ended: {death.ending.reached}", ended=True)
                 if from_outside:
                     killed += 1
                 else:
                     crashes += 1
                 if crashes == ATTEMPTS:
-                    return [
-                        self._failed(
-                            several[0],
-                            f"its worker process {death}, {ATTEMPTS} times, the last times in a new process",
-                        )
-                    ]
+                    return self._failed(
+                        f"its worker process {death}, {ATTEMPTS} times, the last times in a new process"
+                    )
                 if killed == ATTEMPTS:
+                    first = task.index if isinstance(task, tasks.RunTask) else task.index[0]
                     raise QuadcosimError(
-                        f"the worker process of run {several[0].index} {death} {ATTEMPTS} times: not caused by the "
+                        f"the worker process of run {first} {death} {ATTEMPTS} times: not caused by the "
                         "run, or too little memory; start the sweep again, with fewer workers"
                     ) from None
                 continue
             if isinstance(answer, tasks.EnvironmentFailure):
                 raise tasks.WorkerEnvironmentError(f"not a failure of a run: {answer.message}")
-            outcomes: list[tasks.TaskOutcome] = answer
-            return outcomes
+            results: Results = answer
+            return results
 
-    def _failed(self, task: tasks.RunTask, message: str, *, ended: bool = False) -> tasks.TaskOutcome:
-        return tasks.TaskOutcome(row=tasks.row_of(task, None, message, 0.0, self._machine), ended=ended)
+    def _failed(self, message: str, *, ended: bool = False) -> Results:
+        return Results.of([Outcome(metrics=None, message=message, ended=ended)], self._machine)
 
     def close(self) -> None:
         """End the process; a waiting `run` raises `QuadcosimError`."""
@@ -209,18 +207,14 @@ class Pool:
             self._scratch.remove()
             raise
 
-    def run(self, task: tasks.RunTask | tasks.TaskBatch) -> list[tasks.TaskOutcome]:
-        """The outcomes of runs; may be called from several threads, each of which gets its own process.
+    def run(self, task: tasks.RunTask | tasks.TaskBatch) -> Results:
+        """The results of runs; may be called from several threads, each of which gets its own process.
 
         Raises `QuadcosimError` once it is closed.
         """
         supervisor = self._supervisor()
         try:
-            if isinstance(task, tasks.TaskBatch):
-                systems = all_with_files([each.system for each in task.tasks], self._paths)
-                each = tuple(replace(one, system=system) for one, system in zip(task.tasks, systems))
-                return supervisor.run(replace(task, tasks=each))
-            return supervisor.run(replace(task, system=with_files(task.system, self._paths)))
+            return supervisor.run(task.at(self._paths))
         finally:
             self._idle.put(supervisor)
 

@@ -2,25 +2,28 @@
 
 import io
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from orchestration.components.fmi.instance import Instance
 from orchestration.components.fmi.read_description import read_model
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError
+from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.processes.passable import passable
 from orchestration.foundation.processes.typed_frames import FrameError
 from orchestration.simulation.engines.master import BATCH, Engine
 from orchestration.simulation.results.own_metrics import OwnMetric
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.simulation.runs.result import Result
-from orchestration.simulation.workers.row import Row
+from orchestration.simulation.workers.row import Outcome, Results, Rows
+from orchestration.systems.system.files import all_with_files, with_files
 from orchestration.systems.system.input_files import input_files
 from orchestration.systems.system.model import System
+from orchestration.systems.system.paths import with_values
 
 if TYPE_CHECKING:
     from orchestration.simulation.engines.batch.batches import Batches
@@ -32,9 +35,8 @@ class RunTask:
 
     index: int
     key: str
-    settings: Mapping[str, Any]
     system: System
-    keep_signals: bool
+    keep_signals: bool = False
     metrics: tuple[OwnMetric, ...] = ()
     """the study's own metrics, besides those of the system"""
     engine: Engine | None = None
@@ -42,29 +44,76 @@ class RunTask:
     time_limit: float | None = None
     """Limit of processor time [s]; None: unlimited"""
 
+    def __len__(self) -> int:
+        """One run."""
+        return 1
+
+    def rows(self, results: Results) -> Rows:
+        """Its row."""
+        return Rows(index=[self.index], key=[self.key], seed=[self.system.seed], results=results)
+
+    def at(self, paths: Mapping[str, Path]) -> "RunTask":
+        """The same with its files at these paths."""
+        return replace(self, system=with_files(self.system, paths))
+
 
 @dataclass(frozen=True, kw_only=True)
 class TaskBatch:
-    """Runs of a study that are simulated in SIMD lanes, all with native FMUs and without keeping signals."""
+    """Runs of a study that are simulated in SIMD lanes, by column: all with native FMUs, without keeping signals."""
 
-    tasks: tuple[RunTask, ...]
+    index: Sequence[int]
+    key: Sequence[str]
+    seed: Sequence[int]
+    systems: Sequence[System]
+    """those that differ in more than a seed and `parameters`"""
+    places: Sequence[int]
+    """of the system of each run among these"""
+    parameters: Mapping[str, Floats] = field(default_factory=dict)
+    """Real ones of each run, as COMPONENT.NAME, overriding those of its system"""
+    limit: float | None = None
+    """Limit of processor time of a run [s]; None: unlimited"""
+
+    @classmethod
+    def of(cls, tasks: Sequence[RunTask]) -> "TaskBatch":
+        """The runs of single tasks."""
+        return cls(
+            index=[task.index for task in tasks], key=[task.key for task in tasks],
+            seed=[task.system.seed for task in tasks], systems=[task.system for task in tasks],
+            places=range(len(tasks)), limit=tasks[0].time_limit if tasks else None,
+        )  # fmt: skip
+
+    def __len__(self) -> int:
+        """The number of runs."""
+        return len(self.index)
 
     @property
     def time_limit(self) -> float | None:
         """[s] of processor time for all of them; None: unlimited."""
-        limits = [task.time_limit for task in self.tasks if task.time_limit is not None]
-        return sum(limits) if len(limits) == len(self.tasks) else None
+        return None if self.limit is None else self.limit * len(self)
 
+    def some(self, runs: Sequence[int]) -> "TaskBatch":
+        """Some of the runs, in this order."""
+        used = [*dict.fromkeys(self.places[i] for i in runs)]
+        at = {place: i for i, place in enumerate(used)}
+        return TaskBatch(
+            index=[self.index[i] for i in runs], key=[self.key[i] for i in runs], seed=[self.seed[i] for i in runs],
+            systems=[self.systems[place] for place in used], places=[at[self.places[i]] for i in runs],
+            parameters={name: values[runs] for name, values in self.parameters.items()}, limit=self.limit,
+        )  # fmt: skip
 
-@passable
-@dataclass(frozen=True, kw_only=True)
-class TaskOutcome:
-    """The row of a run, and its signals as the bytes of a Parquet file if they are kept."""
+    def alone(self, run: int) -> RunTask:
+        """One of the runs as a task of its own."""
+        parameters = {name: float(values[run]) for name, values in self.parameters.items()}
+        system = with_values(self.systems[self.places[run]], self.seed[run], parameters)
+        return RunTask(index=self.index[run], key=self.key[run], system=system, time_limit=self.limit)
 
-    row: Row
-    signals: bytes | None = None
-    ended: bool = False
-    """whether it was stopped at a limit"""
+    def rows(self, results: Results) -> Rows:
+        """Their rows, whatever their worker, which runs foreign code, says that they are of."""
+        return Rows(index=self.index, key=self.key, seed=self.seed, results=results)
+
+    def at(self, paths: Mapping[str, Path]) -> "TaskBatch":
+        """The same with their files at these paths."""
+        return replace(self, systems=all_with_files(self.systems, paths))
 
 
 @passable
@@ -84,25 +133,11 @@ class EnvironmentFailure:
     message: str
 
 
-def of_task(
-    task: RunTask | TaskBatch, answer: list[TaskOutcome] | EnvironmentFailure
-) -> list[TaskOutcome] | EnvironmentFailure:
-    """An answer with the rows of its task, whatever its worker, which runs foreign code, says that they are of.
-
-    Raises `FrameError` if it has not one for each run.
-    """
-    several = task.tasks if isinstance(task, TaskBatch) else (task,)
-    if isinstance(answer, EnvironmentFailure):
-        return answer
-    if len(answer) != len(several):
+def of_task(task: RunTask | TaskBatch, answer: Results | EnvironmentFailure) -> Results | EnvironmentFailure:
+    """An answer to a task; raises `FrameError` if it has not one entry for each run."""
+    if isinstance(answer, Results) and not answer.fits(len(task)):
         raise FrameError("expected one outcome of each run")
-    return [
-        replace(
-            outcome,
-            row=replace(outcome.row, index=one.index, key=one.key, settings=one.settings, seed=one.system.seed),
-        )
-        for one, outcome in zip(several, answer)
-    ]
+    return answer
 
 
 class WorkerEnvironmentError(QuadcosimError):
@@ -117,11 +152,15 @@ class Runner:
         self._machine = machine
         self._batches: Batches | None = None
 
-    def run(self, task: RunTask) -> TaskOutcome:
-        """Simulate one run; its own failure becomes its row.
+    def run(self, task: RunTask | TaskBatch) -> Results:
+        """Simulate a run, or many at once and one by one those that a batch cannot complete.
 
-        Raises `WorkerEnvironmentError` for other failures.
+        The failure of a run becomes its result; raises `WorkerEnvironmentError` for other failures.
         """
+        outcomes = self._in_lanes(task) if isinstance(task, TaskBatch) else [self._alone(task)]
+        return Results.of(outcomes, self._machine)
+
+    def _alone(self, task: RunTask) -> Outcome:
         started = time.perf_counter()
         metrics, message, signals, engine = None, None, None, None
         _expect_files(task.system)
@@ -140,31 +179,28 @@ class Runner:
             raise WorkerEnvironmentError(str(error) or type(error).__name__) from error
         except Exception as error:
             message = f"{type(error).__name__}: {error}"
-        return TaskOutcome(
-            row=row_of(task, metrics, message, time.perf_counter() - started, self._machine, engine), signals=signals
-        )
+        duration = time.perf_counter() - started
+        return Outcome(metrics=metrics, message=message, duration=duration, engine=engine, signals=signals)
 
-    def run_chunk(self, chunk: TaskBatch) -> list[TaskOutcome]:
-        """Simulate many runs at once, and one by one those that a batch cannot complete.
-
-        Raises `WorkerEnvironmentError` for failures not caused by a run.
-        """
+    def _in_lanes(self, batch: TaskBatch) -> list[Outcome]:
         started = time.perf_counter()
-        _expect_files(chunk.tasks[0].system)
+        for system in batch.systems[:1]:
+            _expect_files(system)
         try:
             if self._batches is None:
                 from orchestration.simulation.engines.batch.batches import Batches  # deferred: slow to load
 
                 self._batches = Batches()
-            outcomes = self._batches.run([task.system for task in chunk.tasks])
+            systems = [batch.systems[place] for place in batch.places]
+            found = self._batches.run(systems, batch.parameters, batch.seed)
         except (QuadcosimError, OSError, MemoryError) as error:
             raise WorkerEnvironmentError(str(error) or type(error).__name__) from error
-        duration = (time.perf_counter() - started) / len(chunk.tasks)
+        duration = (time.perf_counter() - started) / len(batch)
         return [
-            self.run(task)
+            self._alone(batch.alone(run))
             if each is None
-            else TaskOutcome(row=row_of(task, each.metrics, each.message, duration, self._machine, BATCH))
-            for task, each in zip(chunk.tasks, outcomes, strict=True)
+            else Outcome(metrics=each.metrics, message=each.message, duration=duration, engine=BATCH)
+            for run, each in enumerate(found)
         ]
 
     @contextmanager
@@ -193,21 +229,6 @@ def _expect_files(system: System) -> None:
             read_model(fmu)
     except QuadcosimError as error:
         raise WorkerEnvironmentError(str(error)) from error
-
-
-def row_of(
-    task: RunTask,
-    metrics: dict[str, Any] | None,
-    message: str | None,
-    duration: float,
-    machine: str | None,
-    engine: str | None = None,
-) -> Row:
-    """The row of a task; without metrics the run has failed."""
-    return Row(
-        index=task.index, key=task.key, settings=task.settings, seed=task.system.seed, metrics=metrics,
-        message=message, duration=duration, machine=machine, engine=engine,
-    )  # fmt: skip
 
 
 def _parquet(result: Result) -> bytes:

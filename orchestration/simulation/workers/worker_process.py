@@ -39,7 +39,7 @@ def main(own_folder: str) -> None:
 
 def _run(runner: tasks.Runner, task: tasks.RunTask | tasks.TaskBatch) -> object:
     try:
-        return runner.run_chunk(task) if isinstance(task, tasks.TaskBatch) else [runner.run(task)]
+        return runner.run(task)
     except tasks.WorkerEnvironmentError as error:
         return tasks.EnvironmentFailure(message=str(error))
 

@@ -26,8 +26,12 @@ class ScheduleKey:
 
     regular: Hashable
     """Key of the regular part"""
-    drawn: Hashable
+    drawn: tuple[int, Hashable] | None
     """the seed and the streams; None: nothing is random"""
+
+    def with_seed(self, seed: int) -> "ScheduleKey":
+        """That of the same system with another seed."""
+        return self if self.drawn is None else ScheduleKey(self.regular, (seed, self.drawn[1]))
 
 
 def schedule_key(system: System) -> ScheduleKey:

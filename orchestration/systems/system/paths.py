@@ -9,13 +9,14 @@ from orchestration.foundation.basics.errors import UsageError, did_you_mean, pre
 from orchestration.foundation.basics.records import replaced
 from orchestration.systems.system.component import Component, Sampling, SamplingOnArrival, TaskSampling
 from orchestration.systems.system.computers import Arrivals, Computer, Network
-from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.connection import Connection, component_of, variable_of
 from orchestration.systems.system.distribution import parsed_fields
 from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import SHARED
 from orchestration.systems.system.source import Source
 
 TOP = ("stop_time", "seed")
+_COMPONENTS, _PARAMETERS = "components.", ".parameters."
 
 
 def changed(system: System, changes: Mapping[str, Any]) -> System:
@@ -71,6 +72,22 @@ def _only_numbers(grouped: Mapping[tuple[str, str], Mapping[str, Any]], top: Map
 
 def _are_parameters(keys: Iterable[str]) -> bool:
     return all(key.startswith("parameters.") for key in keys)
+
+
+def parameter_name(path: str) -> str | None:
+    """COMPONENT.NAME of the path of a parameter of an FMU; None for any other."""
+    component, is_parameter, parameter = path.removeprefix(_COMPONENTS).partition(_PARAMETERS)
+    return f"{component}.{parameter}" if path.startswith(_COMPONENTS) and is_parameter else None
+
+
+def parameter_path(name: str) -> str:
+    """The path of the parameter COMPONENT.NAME."""
+    return f"{_COMPONENTS}{component_of(name)}{_PARAMETERS}{variable_of(name)}"
+
+
+def with_values(system: System, seed: int, parameters: Mapping[str, float]) -> System:
+    """A system with another seed and other parameters by COMPONENT.NAME."""
+    return changed(system, {"seed": seed, **{parameter_path(name): value for name, value in parameters.items()}})
 
 
 def is_source_file(path: str) -> bool:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from orchestration.components.fmi.read_description import read_model
+from orchestration.foundation.basics.records import replaced
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import seconds
 from orchestration.simulation.engines.batch.batch import Batch, BatchResult, Group
@@ -46,34 +47,48 @@ class Batches:
         self._lanes = preferred_lanes()
         self._shapes: dict[Hashable, tuple[Shape, Batch]] = {}
 
-    def run(self, systems: Sequence[System]) -> list[RunSummary | None]:
+    def run(
+        self, systems: Sequence[System], parameters: ParameterColumns = NO_COLUMNS, seeds: Sequence[int] | None = None
+    ) -> list[RunSummary | None]:
         """The summaries of runs, in their order; None for one that must be run alone. Raises as `each`."""
         summaries: list[RunSummary | None] = [None] * len(systems)
-        for place, summary, _ in self.each(systems):
+        for place, summary, _ in self.each(systems, parameters=parameters, seeds=seeds):
             summaries[place] = summary
         return summaries
 
     def each(
-        self, systems: Sequence[System], record: Sequence[str] | None = None, parameters: ParameterColumns = NO_COLUMNS
+        self,
+        systems: Sequence[System],
+        record: Sequence[str] | None = None,
+        parameters: ParameterColumns = NO_COLUMNS,
+        seeds: Sequence[int] | None = None,
     ) -> Iterator[BatchOutcome]:
         """Runs as they end: their places among `systems`, their summaries, and the rows of the columns in `record`.
 
         The summary is None for a run that must be repeated alone, by an engine for any FMUs; rows have the time [s]
-        first and are valid until the next run. `parameters` of each run override those of its system, which many may
-        share. Raises `UsageError` for systems that cannot be run in lanes.
+        first and are valid until the next run. `parameters` and `seeds` of each run override those of its system, which
+        many may share. Raises `UsageError` for systems that cannot be run in lanes.
         """
-        known = {id(system): (outline(system), schedule_key(system)) for system in systems}
+        several = {id(system): system for system in systems}
+        known = {key: (outline(system), schedule_key(system)) for key, system in several.items()}
+        seeded = {key for key, system in several.items() if seeds is not None and system.depends_on_seed}
         shapes: dict[Hashable, list[int]] = {}
         for place, system in enumerate(systems):
             shapes.setdefault(known[id(system)][0], []).append(place)
         for key, places in shapes.items():
             shape, batch = self._batch_of(key, systems[places[0]])
-            timings = {place: known[id(systems[place])][1] for place in places}
             several = {id(systems[place]): systems[place] for place in places}
             connected = {key: connect_references(system, shape.models) for key, system in several.items()}
+            seed_of = {i: seeds[i] for i in places if id(systems[i]) in seeded} if seeds is not None else {}
+            timings = {
+                i: timing.with_seed(seed_of[i]) if i in seed_of else timing
+                for i, (_, timing) in ((i, known[id(systems[i])]) for i in places)
+            }
             for group in _groups(places, timings, self._lanes):
+                own = (connected[id(systems[i])] for i in group)
                 runs = Group(
-                    systems=[connected[id(systems[i])] for i in group], timings=[timings[i] for i in group],
+                    systems=[replaced(x, seed=seed_of[i]) if i in seed_of else x for i, x in zip(group, own)],
+                    timings=[timings[i] for i in group],
                     parameters={name: values[group] for name, values in parameters.items()},
                 )  # fmt: skip
                 result = batch.run(runs, record)

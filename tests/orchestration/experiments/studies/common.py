@@ -9,18 +9,18 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from orchestration.experiments.studies import sweep as sweeping
 from orchestration.experiments.studies.axes import Axis
-from orchestration.experiments.studies.store import open_for_reading, store_path
+from orchestration.experiments.studies.store import Store, open_for_reading, store_path
 from orchestration.experiments.studies.store_columns import metrics_with
 from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.swept import Swept
 from orchestration.quadrotor.scenarios.translation import paths_of, quadrotor
-from orchestration.simulation.workers.row import Row
+from orchestration.simulation.workers.row import Outcome, Results, Rows
 from orchestration.systems.system.files import Files, files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import value_at
@@ -122,14 +122,38 @@ def at(system: System, target: str) -> Any:
     return found[0]
 
 
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Row:
+    """One row, with the value of each axis."""
+
+    index: int
+    key: str
+    settings: Mapping[str, Any]
+    seed: int
+    outcome: Outcome
+
+
 def row(index: int = 0, **fields: Any) -> Row:
     """A row that was never run."""
-    given: dict[str, Any] = {
-        "index": index, "key": f"key {index}", "settings": {"timing.period": 0.001 * index}, "seed": index,
-        "metrics": {"outcome": "settled", "good": True, "position_rmse": 0.5, "diverged": False, "steps": 3},
-        "message": None, "duration": 0.1,
-    }  # fmt: skip
-    return Row(**{**given, **fields})
+    metrics = {"outcome": "settled", "good": True, "position_rmse": 0.5, "diverged": False, "steps": 3}
+    outcome = {"metrics": metrics, "message": None, "duration": 0.1}
+    given = {"index": index, "key": f"key {index}", "settings": {"timing.period": 0.001 * index}, "seed": index}
+    of_run = {name: value for name, value in fields.items() if name not in given}
+    own = {name: value for name, value in fields.items() if name in given}
+    return Row(**{**given, **own, "outcome": Outcome(**{**outcome, **of_run})})
+
+
+def add(store: Store, rows: Iterable[Row]) -> None:
+    """Write rows, and points of the design for them beside those that are there."""
+    rows = list(rows)
+    points = {
+        index: (index, key, settings) for index, key, settings, _ in store._connection.execute("SELECT * FROM design")
+    }
+    points |= {each.index: (each.index, each.key, json.dumps(each.settings)) for each in rows}
+    store.describe({}, points.values())
+    results = Results.of([each.outcome for each in rows])
+    index, key, seed = ([getattr(each, name) for each in rows] for name in ("index", "key", "seed"))
+    store.add(Rows(index=index, key=key, seed=seed, results=results))
 
 
 def bits(path: Path) -> list[dict[str, Any]]:

@@ -30,7 +30,7 @@ from orchestration.foundation.basics.statistics import wilson
 from orchestration.simulation.figures import cells
 from orchestration.simulation.figures.style import SCREEN
 from quadcosim import UsageError
-from tests.orchestration.experiments.studies.common import OBJECTIVES, axis, row, short, study, sweep
+from tests.orchestration.experiments.studies.common import OBJECTIVES, add, axis, row, short, study, sweep
 from tests.pictures import expect_picture
 
 PERIODS = axis("timing.period", 0.01, 0.02, 0.03, 0.04)
@@ -57,7 +57,7 @@ def invented(folder: Path, chosen: Study) -> Study:
     with open_for_writing(store_path(chosen.name, folder), OBJECTIVES) as store:
         about: dict[str, Any] = {"axes": names, "grid": None, "guids": {}, "versions": {}}
         store.describe({name: json.dumps(value) for name, value in about.items()})
-        store.add(rows)
+        add(store, rows)
     return chosen
 
 

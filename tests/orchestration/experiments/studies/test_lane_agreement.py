@@ -12,9 +12,9 @@ from orchestration.experiments.studies import kept_agreement
 from orchestration.experiments.studies.lane_agreement import lane_agreement, with_python_twins
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import QuadcosimError
-from orchestration.simulation.workers.batching import SAMPLE, LaneAgreement
-from orchestration.simulation.workers.row import Row
-from orchestration.simulation.workers.task import RunTask, TaskBatch, TaskOutcome
+from orchestration.simulation.workers.batching import SAMPLE, LaneAgreement, Sample
+from orchestration.simulation.workers.row import Outcome, Results, Rows
+from orchestration.simulation.workers.task import RunTask, TaskBatch
 from orchestration.systems.system.model import System
 from quadcosim import Scenario
 from tests.orchestration.components.fmi.small import needs_compiler, nothing_known
@@ -36,21 +36,23 @@ def agreement(chosen: Study, error: Error, count: int = 2, *, here: bool = False
     """The agreement of runs if each kind of run has this error."""
     files = with_python_twins(chosen.files())
 
-    def row(task: RunTask, chunk: bool) -> Row:
+    def rows(task: RunTask, chunk: bool) -> Rows:
         metrics = {"x": 1.0 + error(task, chunk)}
-        return Row(index=task.index, key=task.key, settings={}, seed=0, metrics=metrics, message=None, duration=0.0)
+        return task.rows(Results.of([Outcome(metrics=metrics, message=None, engine="batch" if chunk else "compiled")]))
 
     def task(index: int, key: str) -> RunTask:
-        return RunTask(index=index, key=key, settings={}, system=chosen.system(index, {}), keep_signals=False)
+        return RunTask(index=index, key=key, system=chosen.system(index, {}))
 
-    def run(tasks: Iterable[RunTask | TaskBatch]) -> Generator[list[TaskOutcome], None, None]:
+    def run(tasks: Iterable[RunTask | TaskBatch]) -> Generator[Rows, None, None]:
         for each in tasks:
-            for one in each.tasks if isinstance(each, TaskBatch) else (each,):
+            for one in map(each.alone, range(len(each))) if isinstance(each, TaskBatch) else (each,):
                 assert files.fmus.keys() >= {*one.system.fmus.values()}
-                yield [TaskOutcome(row=row(one, isinstance(each, TaskBatch)))]
+                yield rows(one, isinstance(each, TaskBatch))
 
-    lanes = {str(i): row(task(i, str(i)), True) for i in range(count)}
-    return lane_agreement(lanes, files, task, run, here=here)
+    sample = Sample()
+    for i in range(count):
+        sample.add(rows(task(i, str(i)), True))
+    return lane_agreement(sample, files, task, run, here=here)
 
 
 def in_python(task: RunTask) -> bool:

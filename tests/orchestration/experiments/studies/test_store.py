@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -25,19 +26,18 @@ from hypothesis import strategies as st
 from orchestration.components.building import fmus
 from orchestration.experiments.studies import store as stores
 from orchestration.experiments.studies.run_key import run_key
-from orchestration.experiments.studies.store import DesignPoint, open_for_reading, open_for_writing
+from orchestration.experiments.studies.store import open_for_reading, open_for_writing
 from orchestration.experiments.studies.store_columns import TEXTS, metrics_with
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
 from orchestration.quadrotor.scenarios.translation import ReferenceChoice
 from orchestration.quadrotor.scenarios.wiring import DEFAULT_PLANT
 from orchestration.simulation.workers import provenance
 from orchestration.simulation.workers.provenance import Sources, imported, simulation_sources, sources_hash, versions
-from orchestration.simulation.workers.row import Row
 from orchestration.systems.system.distribution import Distribution
 from orchestration.systems.system.files import Files, files_of
 from orchestration.systems.system.paths import changed as with_changes
 from quadcosim import QuadcosimError, Scenario, UsageError
-from tests.orchestration.experiments.studies.common import METRICS, OBJECTIVES, files_in, one_line, row
+from tests.orchestration.experiments.studies.common import METRICS, OBJECTIVES, Row, add, files_in, one_line, row
 from tests.places import ROOT
 
 NUMBERS = [name for name in METRICS if name not in TEXTS]
@@ -53,7 +53,7 @@ def path(tmp_path: Path) -> Path:
 def written(path: Path, *rows: Row) -> Path:
     with open_for_writing(path, OBJECTIVES) as store:
         store.describe({"name": "value"})
-        store.add(rows)
+        add(store, rows)
     return path
 
 
@@ -127,12 +127,13 @@ def test_a_row_of_the_same_run_is_replaced_and_one_of_another_run_takes_its_plac
 
 def test_a_changed_design_keeps_the_rows_of_its_runs_at_their_new_indices(path: Path) -> None:
     with open_for_writing(path, OBJECTIVES) as store:
-        store.add([row(0, seed=10), row(1, seed=11, metrics=None)])
-        places = [DesignPoint(index=i, key=key, settings={}) for i, key in enumerate(["new", "key 1", "key 0", "new"])]
+        add(store, [row(0, seed=10), row(1, seed=11, metrics=None)])
+        places = [(i, key, "{}") for i, key in enumerate(["new", "key 1", "key 0", "new"])]
         store.describe({"name": "value"}, places)
         assert [(found["design_index"], found["seed"]) for found in store.rows()] == [(1, 11), (2, 10)]
-        assert [*store.missing()] == [0]
-        assert [*store.missing(failed_too=True)] == [0, 1]
+        assert store.missing().tolist() == [[0, 2]]
+        assert store.missing(failed_too=True).tolist() == [[0, 2], [1, 0]]
+        assert store.keys(np.array([0, 2])) == ["new", "key 0"]
         assert store.counts() == {"done": 1, "failed": 1}
 
 
@@ -148,7 +149,7 @@ def test_rows_that_cannot_be_written_together_are_not_written_at_all(path: Path)
     bad = dataclasses.replace(row(2), key=None)  # type: ignore[arg-type]
     with open_for_writing(path, OBJECTIVES) as store:
         with pytest.raises(QuadcosimError, match="NOT NULL"):
-            store.add([row(1), bad])
+            add(store, [row(1), bad])
         assert kept(path) == ["key 0"]
 
 
@@ -160,7 +161,7 @@ def test_a_second_writer_in_this_process_is_refused_in_one_line(path: Path) -> N
         with pytest.raises(QuadcosimError, match="another sweep is writing into it") as caught:
             written(path, row(1))
         one_line(caught.value)
-        store.add([row(0)])
+        add(store, [row(0)])
     assert indices(written(path, row(1))) == [0, 1]
 
 
@@ -168,10 +169,10 @@ WRITER = """
 import sys
 from pathlib import Path
 from orchestration.experiments.studies.store import open_for_writing
-from tests.orchestration.experiments.studies.common import OBJECTIVES, row
+from tests.orchestration.experiments.studies.common import OBJECTIVES, add, row
 with open_for_writing(Path(sys.argv[1]), OBJECTIVES) as store:
     for index in range(100):
-        store.add([row(index)])
+        add(store, [row(index)])
         print(index, flush=True)
         sys.stdin.readline()
 """
@@ -231,7 +232,7 @@ def test_a_reader_does_not_keep_the_writer_from_finishing(path: Path) -> None:
         reading = store.rows()
         assert next(reading)["design_index"] == 0
         with open_for_writing(path, OBJECTIVES) as writing:
-            writing.add([row(2)])
+            add(writing, [row(2)])
             assert writing.counts() == {"done": 3}
             del reading  # lets the checkpoint at the end go through
     assert indices(path) == [0, 1, 2]
@@ -245,7 +246,7 @@ def test_readers_leave_nothing_beside_a_store_and_do_not_change_it(path: Path) -
             assert one.counts() == other.counts() == {"done": 2}
         assert len(list(one.rows())) == 2
         with pytest.raises(QuadcosimError, match="readonly"):
-            one.add([row(2)])
+            add(one, [row(2)])
     assert {file.name: file.read_bytes() for file in path.parent.iterdir()} == before
     assert {*before} <= {path.name, f"{path.name}.lock"}
 
@@ -274,7 +275,7 @@ def test_a_store_without_write_access_is_read_with_the_content_of_its_log(
     frozen = tmp_path / "frozen" / "study.sqlite"
     frozen.parent.mkdir()
     with open_for_writing(path, OBJECTIVES) as store:
-        store.add([row(0), row(1)])
+        add(store, [row(0), row(1)])
         for suffix in ("", "-wal"):  # as if its writer had been killed now
             shutil.copyfile(f"{path}{suffix}", f"{frozen}{suffix}")
     assert Path(f"{frozen}-wal").stat().st_size > 0
@@ -320,7 +321,7 @@ def test_a_full_disk_is_reported_in_one_line_and_the_store_is_unchanged(path: Pa
     pages = path.stat().st_size // 4096 + 2
     with connections(f"PRAGMA max_page_count = {pages}"), open_for_writing(path, OBJECTIVES) as store:
         with pytest.raises(QuadcosimError, match=r"study.sqlite: the store cannot be used: .*full") as caught:
-            store.add(row(20 + index, message="x" * 1000) for index in range(100))
+            add(store, [row(20 + index, message="x" * 1000) for index in range(100)])
         one_line(caught.value)
         assert store.counts() == {"done": 20}
     assert integrity(path) == "ok"
@@ -386,7 +387,7 @@ def test_a_store_without_a_study_takes_the_objectives_of_the_next_one(path: Path
         pass
     with open_for_writing(path, ["of_the_next"]) as store:
         assert store.metrics == metrics_with(["of_the_next"])
-        store.add([row(0)])
+        add(store, [row(0)])
     with open_for_writing(path, ["of_the_last"]) as store:
         assert store.metrics == metrics_with(["of_the_next"])
 
@@ -397,10 +398,10 @@ def test_a_locked_store_is_reported_in_one_line_and_remains_intact(path: Path) -
         other.execute("BEGIN EXCLUSIVE")
         with open_for_writing(path, OBJECTIVES) as store:
             with pytest.raises(QuadcosimError, match=r"the store cannot be used: database is locked") as caught:
-                store.add([row(1)])
+                add(store, [row(1)])
             one_line(caught.value)
             other.rollback()
-            store.add([row(2)])
+            add(store, [row(2)])
     assert indices(path) == [0, 2]
     assert integrity(path) == "ok"
 

@@ -64,7 +64,7 @@ def test_the_order_of_runs_does_not_change_them(folder: Path, reference: list[di
     files = chosen.files()
     for index in (15, 3, 8, 0):
         system = with_files(chosen.system(index, starts()), files.fmus)
-        metrics = runner.run(RunTask(index=0, key="", settings={}, system=system, keep_signals=False)).row.metrics
+        metrics = runner.run(RunTask(index=0, key="", system=system)).metrics(0)
         assert metrics is not None
         assert metrics["position_rmse"].hex() == reference[index]["position_rmse"]
         assert metrics["control_effort.torque"].hex() == reference[index]["control_effort.torque"]

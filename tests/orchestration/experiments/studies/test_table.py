@@ -17,12 +17,13 @@ from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.study_file import load_study
 from orchestration.experiments.studies.table import dataset, export, frame
 from orchestration.simulation.workers.provenance import versions
-from orchestration.simulation.workers.row import Row
 from quadcosim import Scenario, UsageError
 from tests.orchestration.experiments.studies.common import (
     GRID,
     METRICS,
     OBJECTIVES,
+    Row,
+    add,
     axis,
     files_in,
     row,
@@ -48,7 +49,7 @@ def stored(path: Path, rows: list[Row], grid: dict[str, list[Any]] | None) -> Pa
     with open_for_writing(path, OBJECTIVES) as store:
         about = {"axes": ["timing.period"], "grid": grid, "guids": {"plant": "{p}"}, "versions": {"numpy": "1"}}
         store.describe({name: json.dumps(value) for name, value in about.items()})
-        store.add(rows)
+        add(store, rows)
     return path
 
 

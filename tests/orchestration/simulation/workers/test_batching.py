@@ -14,8 +14,9 @@ from orchestration.experiments.studies.sweep import AGREEMENT
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.foundation.processes.child import Died, Ending
 from orchestration.simulation.engines.batch.batches import Batches
-from orchestration.simulation.workers.batching import SAMPLE, LaneAgreement, chunks, sample
+from orchestration.simulation.workers.batching import SAMPLE, LaneAgreement, Sample, batched, chunks
 from orchestration.simulation.workers.pool import Inputs, Supervisor
+from orchestration.simulation.workers.row import Outcome, Results, Rows
 from orchestration.simulation.workers.task import RunTask, TaskBatch
 from orchestration.systems.system.files import with_files
 from tests.commands import Main
@@ -116,25 +117,30 @@ def test_a_difference_names_run_and_metric() -> None:
 
 def test_a_sample_is_chosen_by_content_alone() -> None:
     keys = [f"{i:064x}" for i in range(100)]
-    assert sample(keys) == sample(reversed(keys))
-    assert len(sample(keys)) == SAMPLE
-    assert sample(keys) != set(keys[:SAMPLE])
+    one, other = Sample(), Sample()
+    one.add(in_lanes(*keys))
+    for key in reversed(keys):
+        other.add(in_lanes(key))
+        other.add(in_lanes(f"no {key}", engine=None))
+    assert one.runs == other.runs
+    assert len(one.runs) == SAMPLE
+    assert {*one.runs} != {*keys[:SAMPLE]}
 
 
-def tasks(count: int, keep: tuple[int, ...] = ()) -> list[RunTask]:
+def in_lanes(*keys: str, engine: str | None = "batch") -> Rows:
+    results = Results.of([Outcome(metrics={"steps": 1}, message=None, engine=engine)] * len(keys))
+    return Rows(index=[0] * len(keys), key=keys, seed=[0] * len(keys), results=results)
+
+
+def tasks(count: int) -> list[RunTask]:
     chosen = study(axis("timing.period", 0.01, 0.02), base=short())
-    return [
-        RunTask(index=i, key=str(i), settings={}, system=chosen.system(i % 2, {}), keep_signals=i in keep)
-        for i in range(count)
-    ]
+    return [RunTask(index=i, key=str(i), system=chosen.system(i % 2, {})) for i in range(count)]
 
 
-def test_chunks_group_similar_runs_without_those_whose_signals_are_kept() -> None:
-    items = list(chunks(tasks(64, keep=(5,)), 64, 1))
-    assert [each.index for each in items if isinstance(each, RunTask)] == [5]
-    lanes = [each.tasks for each in items if isinstance(each, TaskBatch)]
-    assert sorted(task.index for each in lanes for task in each) == [i for i in range(64) if i != 5]
-    assert [len({task.index % 2 for task in each}) for each in lanes].count(2) <= 1
+def test_chunks_group_similar_runs() -> None:
+    lanes = [each.index for each in chunks(batched(tasks(64)), 64, 1)]
+    assert sorted(index for each in lanes for index in each) == [*range(64)]
+    assert [len({index % 2 for index in each}) for each in lanes].count(2) <= 1
 
 
 @pytest.mark.parametrize(
@@ -147,17 +153,15 @@ def test_runs_whose_process_ends_are_repeated_in_lanes(
 
     class DiesOnce:
         def request(self, what: Any) -> Any:
-            asked.append([task.index for task in what.tasks])
+            asked.append([*what.index])
             if len(asked) == 1:
                 raise Died(Ending(code=code))
-            return asked[-1]
+            return Results.of([Outcome(metrics={"steps": index}, message=None) for index in asked[-1]])
 
     monkeypatch.setattr(Supervisor, "_ready_worker", lambda self: DiesOnce())
-    outcomes = Supervisor(tmp_path, Inputs(contents={}, own_fmus=frozenset(), versions={})).run(
-        TaskBatch(tasks=tuple(tasks(3)))
-    )
+    found = Supervisor(tmp_path, Inputs(contents={}, own_fmus=frozenset(), versions={})).run(TaskBatch.of(tasks(3)))
     assert asked == repeated
-    assert outcomes == [0, 1, 2]
+    assert found.numbers["steps"].tolist() == [0, 1, 2]
 
 
 def test_a_run_that_ends_its_process_in_lanes_fails_and_is_not_run_by_another_engine(
@@ -169,14 +173,9 @@ def test_a_run_that_ends_its_process_in_lanes_fails_and_is_not_run_by_another_en
             raise Died(Ending(code=-6))
 
     monkeypatch.setattr(Supervisor, "_ready_worker", lambda self: Dying())
-    found = Supervisor(tmp_path, Inputs(contents={}, own_fmus=frozenset(), versions={})).run(
-        TaskBatch(tasks=tuple(tasks(2)))
-    )
-    assert [(one.row.index, one.row.status, one.row.engine) for one in found] == [
-        (0, "failed", None),
-        (1, "failed", None),
-    ]
-    assert str(found[0].row.message).startswith("its worker process ended by SIGABRT, 3 times")
+    found = Supervisor(tmp_path, Inputs(contents={}, own_fmus=frozenset(), versions={})).run(TaskBatch.of(tasks(2)))
+    assert (found.failed.tolist(), found.engines) == ([True, True], [None, None])
+    assert str(found.messages[0]).startswith("its worker process ended by SIGABRT, 3 times")
 
 
 def test_the_bits_of_a_run_in_lanes_do_not_depend_on_the_runs_beside_it(tmp_path: Path) -> None:

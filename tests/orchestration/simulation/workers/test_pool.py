@@ -13,7 +13,8 @@ from orchestration.simulation.workers import pool
 from orchestration.simulation.workers.executors import _local_submit
 from orchestration.simulation.workers.pool import Inputs, Pool
 from orchestration.simulation.workers.provenance import Sources, sources, versions
-from orchestration.simulation.workers.task import RunTask, TaskBatch, TaskOutcome
+from orchestration.simulation.workers.row import Results
+from orchestration.simulation.workers.task import RunTask, TaskBatch
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.model import System
 from quadcosim import QuadcosimError, UsageError
@@ -41,7 +42,7 @@ def inputs(**contents: bytes) -> Inputs:
 
 def task() -> RunTask:
     system = System(stop_time=1.0, components={"it": Component(fmu="a.fmu", step=0.1)})
-    return RunTask(index=0, key="", settings={}, system=system, keep_signals=False)
+    return RunTask(index=0, key="", system=system)
 
 
 def study(
@@ -117,7 +118,7 @@ def test_temporary_files_are_removed_after_the_last_thread_that_could_leave_more
     started, closed = threading.Event(), threading.Event()
 
     class Slow(pool.Supervisor):
-        def run(self, task: RunTask | TaskBatch) -> list[TaskOutcome]:
+        def run(self, task: RunTask | TaskBatch) -> Results:
             started.set()
             closed.wait()
             (self._root / "late").mkdir(parents=True)

@@ -7,7 +7,8 @@ import pytest
 
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.quadrotor.scenarios.scenario import Scenario
-from orchestration.simulation.workers.task import Runner, RunTask, TaskOutcome, WorkerEnvironmentError
+from orchestration.simulation.workers.row import Results
+from orchestration.simulation.workers.task import Runner, RunTask, WorkerEnvironmentError
 from orchestration.systems.system.files import with_files
 from quadcosim import QuadcosimError
 from tests.orchestration.experiments.studies.common import FAILS, files_in, short
@@ -15,7 +16,7 @@ from tests.orchestration.experiments.studies.common import FAILS, files_in, shor
 
 def task(scenario: Scenario, index: int = 0) -> RunTask:
     system = with_files(scenario.as_system(), files_in(scenario).fmus)
-    return RunTask(index=index, key="", settings={}, system=system, keep_signals=False)
+    return RunTask(index=index, key="", system=system)
 
 
 @pytest.fixture
@@ -32,9 +33,10 @@ def instantiated(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return names
 
 
-def rmse(outcome: TaskOutcome) -> str:
-    assert outcome.row.metrics is not None, outcome.row.message
-    return str(outcome.row.metrics["position_rmse"].hex())
+def rmse(results: Results) -> str:
+    metrics = results.metrics(0)
+    assert metrics is not None, results.messages
+    return str(metrics["position_rmse"].hex())
 
 
 def test_each_fmu_is_instantiated_once_in_a_process(instantiated: list[str]) -> None:
@@ -47,7 +49,7 @@ def test_each_fmu_is_instantiated_once_in_a_process(instantiated: list[str]) -> 
 def test_an_fmu_that_failed_is_replaced_and_the_next_run_is_unaffected(instantiated: list[str]) -> None:
     runner = Runner()
     before = rmse(runner.run(task(short())))
-    assert runner.run(task(short().with_changes(parameters={"plant.mass": FAILS}))).row.metrics is None
+    assert runner.run(task(short().with_changes(parameters={"plant.mass": FAILS}))).metrics(0) is None
     assert rmse(runner.run(task(short()))) == before
     assert instantiated.count("plant") == 2
 
