@@ -69,7 +69,7 @@ class KeyText:
 
 _PLACE, _SEED = "\0", ""
 _IN_TEXT = re.compile(r'"\\u0000(\d+)"')
-"""What holds the place of a value, as it is in the text"""
+"""The text that holds the place of a value"""
 
 
 def _text(system: System, files: Files, metrics: Sequence[OwnMetric]) -> str:

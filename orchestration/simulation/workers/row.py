@@ -50,9 +50,9 @@ class Results:
     machine: str | None = None
     """the kind of machine that ran them"""
     signals: Mapping[int, bytes] = field(default_factory=dict)
-    """by the place of the run"""
+    """Signals by the place of the run"""
     ended: frozenset[int] = frozenset()
-    """places of those that were stopped at a limit"""
+    """Places of those that were stopped at a limit"""
 
     def __len__(self) -> int:
         """The number of runs."""

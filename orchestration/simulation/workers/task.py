@@ -65,9 +65,9 @@ class TaskBatch:
     key: Sequence[str]
     seed: Sequence[int]
     systems: Sequence[System]
-    """those that differ in more than a seed and `parameters`"""
+    """Systems that differ in more than a seed and `parameters`"""
     places: Sequence[int]
-    """of the system of each run among these"""
+    """The place of the system of each run among these"""
     parameters: Mapping[str, Floats] = field(default_factory=dict)
     """Real ones of each run, as COMPONENT.NAME, overriding those of its system"""
     limit: float | None = None
