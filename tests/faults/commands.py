@@ -104,6 +104,7 @@ def _before(words: str, killed_at: int = 0) -> Before:
 
 
 _RUN = "run --native --no-figures --stop-time 0.05"
+RUN = tuple(_RUN.split())
 BEFORE = {
     "flight": _before(f"{_RUN} --out flight"),
     "paused": _before(f"{_RUN} --pause-at 0.02 --out paused"),

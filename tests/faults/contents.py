@@ -11,11 +11,12 @@ from pathlib import Path
 HIDDEN = re.compile(r"(^|/)\.quadcosim-|\.new$|\.partial$")
 """What the next process removes"""
 _WHOLE = re.compile(r"(|.*/)\.quadcosim-[0-9a-f]+\.new/whole/(.+)")
-JOURNALS = ("-wal", "-shm", ".lock")
+JOURNALS = ("-wal", "-shm", "-journal", ".lock")
 """Endings of files beside a store that are there or not"""
 VARYING = ("duration", "machine", "checksum")
 """Columns of a store's rows that differ from run to run"""
 STORE = ".sqlite"
+EMPTY = "empty folder"
 NOTHING = hashlib.sha256(b"").hexdigest()
 
 Contents = dict[str, str]
@@ -27,12 +28,12 @@ def contents(folder: Path) -> Contents:
     found: Contents = {}
     for path in folder.rglob("*"):
         name = path.relative_to(folder).as_posix()
-        if path.suffix == STORE and path.stat().st_size:
+        if path.suffix == STORE:
             found |= {name: "store", **{f"{name}: {row}": "row" for row in rows(path)}}
         elif path.is_file() and not name.endswith(JOURNALS):
             found[name] = _digest(path)
         elif path.is_dir() and not any(path.iterdir()):
-            found[name] = "empty folder"
+            found[name] = EMPTY
     return found
 
 
@@ -67,7 +68,7 @@ def difference(one: Contents, other: Contents) -> str:
 def rows(store: Path, *, whole: bool = False) -> list[str]:
     """The rows of a store, with its journal; `whole` ones have the columns that vary, too."""
     with tempfile.TemporaryDirectory() as folder:  # reading may move the journal into the store
-        for path in (store, store.with_name(f"{store.name}-wal")):
+        for path in (store.with_name(f"{store.name}{ending}") for ending in ("", "-wal", "-journal")):
             if path.exists():
                 shutil.copy(path, folder)
         with closing(sqlite3.connect(Path(folder) / store.name)) as connection:
@@ -79,7 +80,8 @@ def _tables(connection: sqlite3.Connection) -> list[str]:
 
 
 def _rows(connection: sqlite3.Connection, table: str, whole: bool) -> list[str]:
-    found = connection.execute(f'SELECT * FROM "{table}"')
+    chosen = " WHERE name != 'agreement'" if table == "about" else ""  # it is of the runs that were made last
+    found = connection.execute(f'SELECT * FROM "{table}"{chosen}')
     names = [column[0] for column in found.description]
     kept = [i for i, name in enumerate(names) if whole or name not in VARYING]
     return [f"{table} {[row[i] for i in kept]}" for row in found]

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from fmu_kit.new_files import NewFiles, WriteError
+from fmu_kit.new_files import NewFiles, WriteError, clear
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 
 
@@ -28,6 +28,7 @@ def new_folder(place: Path, replaceable: Callable[[Path], bool], expected: str) 
     Raises `UsageError` at once if `place` holds something that is not `replaceable`, stating what was `expected`, or if
     nothing can be written there; `WriteError`; `QuadcosimError` stating where a precious one is kept.
     """
+    clear(place.parent)
     _expect_place(place, replaceable, expected)
     try:
         files = NewFiles(place.parent)

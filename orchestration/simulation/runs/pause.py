@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_kit.new_files import new_file, write_atomically
+from fmu_kit.new_files import clear, new_file, write_atomically
 from orchestration.components.fmi.trust import content_hash
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import nanoseconds
@@ -90,6 +90,7 @@ def resume(
     reference or an FMU has changed since the pause.
     """
     folder = Path(folder)
+    clear(folder.parent)  # its results may be all but moved to their place
     if not (folder / STATE).is_file():
         raise UsageError(f"{folder}: expected the directory of a paused run; it has no {STATE}")
     request = load_request(folder / SCENARIO)
