@@ -84,8 +84,9 @@ def _serve(module: str, connection: socket.socket, environment: Mapping[str, str
         for descriptor, number in ((connection.fileno(), 0), (silent, 1), (silent, 2)):
             os.dup2(descriptor, number)
         os.closerange(3, os.sysconf("SC_OPEN_MAX"))
+        variables = {**environment, **family.room_for_names()}
         os.environ.clear()
-        os.environ.update({**environment, **family.room_for_names()})
+        os.environ.update(variables)
         request = fork_server_process.main(module, socket.socket(fileno=os.dup(0)))
         if request is not None:
             importlib.import_module(module).main(*request.arguments)
