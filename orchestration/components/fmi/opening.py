@@ -118,5 +118,8 @@ def open_instance(path: Path, instance_name: str) -> Instance:
 
 def open_here(path: Path, instance_name: str) -> NativeInstance:
     """An instance in this process in any case."""
-    kind = Fmi3Instance if read_model(path).version == 3 else Fmi2Instance
+    model = read_model(path)
+    if not model.is_own:  # it may limit the size of files, and half a file of bytecode would be kept
+        sys.dont_write_bytecode = True
+    kind = Fmi3Instance if model.version == 3 else Fmi2Instance
     return kind(path, instance_name)

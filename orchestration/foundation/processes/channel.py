@@ -1,7 +1,8 @@
 """Messages between a process and its parent, over the child's standard streams.
 
 A process that was started trusts the one that started it, whose messages are pickled. What comes back is typed: foreign
-code in that process can write into its streams whatever it likes.
+code in that process can write into its streams whatever it likes. Once it has been asked something, its messages begin
+with a secret that came with the question, so that what such code writes is not taken for an answer.
 """
 
 import contextlib
@@ -36,9 +37,12 @@ class LongError(FrameError):
     """A frame is longer than allowed."""
 
 
-def to_frame(content: object) -> bytes:
-    """`content` as a frame for a process that trusts this one; raises what `pickle` raises."""
-    return _framed(pickle.dumps(content, pickle.HIGHEST_PROTOCOL))
+def to_frame(content: object, secret: bytes) -> bytes:
+    """`content`, and the secret of its answers, as a frame for a process that trusts this one.
+
+    Raises what `pickle` raises.
+    """
+    return _framed(pickle.dumps((secret, content), pickle.HIGHEST_PROTOCOL))
 
 
 def write_frame(stream: IO[bytes], frame: bytes) -> None:
@@ -47,20 +51,23 @@ def write_frame(stream: IO[bytes], frame: bytes) -> None:
     stream.flush()
 
 
-def read_frame(stream: IO[bytes], limit: float) -> Any:
+def read_frame(stream: IO[bytes], limit: float, secret: bytes) -> Any:
     """The content of the next typed frame; raises `EOFError` if there is none, `FrameError` if it is not one.
 
-    Raises `LongError`, before it is read, if it has more than `limit` bytes.
+    Raises `LongError`, before it is read, if it has more than `limit` bytes. One without the secret is none.
     """
     buffered = cast(BufferedReader, stream)
     (length,) = _HEADER.unpack(_exactly(buffered, _HEADER.size, has_begun=False))
     if length > limit:
         raise LongError
-    return unpack(_exactly(buffered, length, has_begun=True))
+    content = memoryview(_exactly(buffered, length, has_begun=True))
+    if content[: len(secret)] != secret:
+        raise FrameError("expected the secret of its question")
+    return unpack(content[len(secret) :])
 
 
-def _framed(data: bytes) -> bytes:
-    return _HEADER.pack(len(data)) + data
+def _framed(data: bytes, secret: bytes = b"") -> bytes:
+    return _HEADER.pack(len(secret) + len(data)) + secret + data
 
 
 def _exactly(stream: BufferedReader, count: int, *, has_begun: bool) -> bytes:
@@ -101,12 +108,12 @@ class Parent:
         os.dup2(nothing, 0)
         os.close(nothing)
         os.dup2(2, 1)
-        self._on_orphaned, self._leaving = on_orphaned, threading.Lock()
+        self._on_orphaned, self._leaving, self._secret = on_orphaned, threading.Lock(), b""
         threading.Thread(target=self._leave_with_parent, daemon=True).start()
 
     def send(self, content: object) -> None:
         """Send one message; raises `TypeError` for what is no data."""
-        frame = _framed(pack(content))
+        frame = _framed(pack(content), self._secret)
         try:
             write_frame(self._answers, frame)
         except OSError:  # the parent has closed its end
@@ -123,7 +130,8 @@ class Parent:
         with contextlib.suppress(EOFError, struct.error, pickle.UnpicklingError):  # the last one may not be whole
             while True:
                 (length,) = _HEADER.unpack(self._requests.read(_HEADER.size))
-                yield pickle.loads(self._requests.read(length))
+                self._secret, message = pickle.loads(self._requests.read(length))
+                yield message
 
     def leave(self) -> NoReturn:
         """End this process because its parent has ended."""

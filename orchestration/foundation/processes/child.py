@@ -3,6 +3,7 @@
 import contextlib
 import math
 import os
+import secrets
 import signal
 import subprocess
 import sys
@@ -27,6 +28,8 @@ Result = TypeVar("Result")
 
 _KEPT = 16_384
 """Bytes kept of the end of the process's output"""
+_SECRET = 16
+"""Bytes of the secret with which its answers begin"""
 _NO_MESSAGE = "it sends what is no message of quadcosim"
 _OUT_OF_PROCESSOR = "it uses more processor time than the system allows (ulimit -t)"
 _PATIENCE = 60.0
@@ -93,7 +96,7 @@ class Child:
         self.pid = process.pid
         self._is_limited = math.isfinite(limits.time)
         self._output = None if process.stderr is None else _Output(process.stderr)
-        self._longest_message = limits.message
+        self._longest_message, self._secret = limits.message, b""
         self._watch = Watch(process, family, limits, self._output)
         self._end = weakref.finalize(self, _terminate, process, family, self._watch)
 
@@ -114,7 +117,9 @@ class Child:
     def send(self, content: object) -> None:
         """Send one message; raises `Died`, and what `pickle` raises."""
         assert self._process.stdin is not None
-        frame = to_frame(content)
+        secret = self._secret or secrets.token_bytes(_SECRET)
+        frame = to_frame(content, secret)
+        self._secret = secret
         try:
             write_frame(self._process.stdin, frame)
         except (OSError, ValueError):  # it has ended, or was closed by another thread
@@ -124,7 +129,7 @@ class Child:
         """The next message, which must fit `kind`, an annotation; raises `Died`, also if it does not."""
         assert self._process.stdout is not None
         try:
-            return expect(read_frame(self._process.stdout, self._longest_message * 1e6), kind)
+            return expect(read_frame(self._process.stdout, self._longest_message * 1e6, self._secret), kind)
         except FrameError as error:
             raise self._ended_for(error) from None
         except (EOFError, OSError, ValueError):  # it has ended, or was closed by another thread

@@ -79,7 +79,8 @@ def set_again(limits: dict[int, tuple[int, int]]) -> bool:
 
 
 def restrict(size: float) -> None:
-    """Allow this process no file of more than `size` MB, and no core dump."""
+    """Allow this process no file of more than `size` MB, no core dump, and no bytecode, half of which would be kept."""
+    sys.dont_write_bytecode = True
     if sys.platform == "win32":
         return
     import resource

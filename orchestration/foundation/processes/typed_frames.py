@@ -46,7 +46,7 @@ def pack(content: object) -> bytes:
     return data
 
 
-def unpack(data: bytes, depth: int = 0) -> Any:
+def unpack(data: bytes | memoryview, depth: int = 0) -> Any:
     """The content of bytes that are not trusted; raises `FrameError`."""
     if depth > DEEPEST:
         raise FrameError("it is nested too deeply")

@@ -1,5 +1,6 @@
 """Worker processes in their coordinator: the assignment of tasks, and what follows from the death of a worker."""
 
+import contextlib
 import hashlib
 import os
 import pickle
@@ -15,7 +16,7 @@ from typing import Any
 
 from fmu_kit import scratch
 from fmu_kit.new_files import write_atomically
-from orchestration.components.fmi.trust import is_own_content
+from orchestration.components.fmi.trust import content_hash, is_own_content
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.processes import subprocesses
 from orchestration.foundation.processes.child import Child, Died
@@ -67,7 +68,7 @@ class WorkerProcess:
             environment=subprocesses.environment(**dict.fromkeys(("TMPDIR", "TEMP", "TMP"), path)),
         )
 
-    def request(self, task: tasks.RunTask | tasks.TaskBatch) -> Any:
+    def request(self, task: tasks.RunTask | tasks.TaskBatch | tasks.LoadTask) -> Any:
         """Send a task and return the answer; raises `Died`, also at its time limit."""
         self._child.allow(task.time_limit)
         self._child.send(task)
@@ -102,9 +103,10 @@ class Supervisor:
         """The results of a run, or of many in lanes; a run that ends its process `ATTEMPTS` times has failed.
 
         Runs that end their process or exceed their time limit together are repeated each by itself, in lanes too: the
-        bits of a row do not depend on deaths. Raises `QuadcosimError` for failures not caused by a run.
+        bits of a row do not depend on deaths. So is one that ends as if the environment had failed, though all FMUs can
+        be loaded: third-party ones may be the cause. Raises `QuadcosimError` for failures not caused by a run.
         """
-        crashes = killed = 0
+        crashes = killed = complaints = 0
         while True:
             worker = self._ready_worker()
             try:
@@ -114,7 +116,7 @@ class Supervisor:
                 _expect_no_interrupt(death)
                 from_outside = death.ending.reached is None and death.ending.code in _FROM_OUTSIDE
                 if isinstance(task, tasks.TaskBatch) and len(task) > 1 and not from_outside:
-                    return Results.joined([self.run(task.some([run])) for run in range(len(task))])
+                    return self._one_by_one(task)
                 if death.ending.reached is not None:
                     return self._failed(f"it was ended: {death.ending.reached}", ended=True)
                 if from_outside:
@@ -133,9 +135,43 @@ class Supervisor:
                     ) from None
                 continue
             if isinstance(answer, tasks.EnvironmentFailure):
-                raise tasks.WorkerEnvironmentError(f"not a failure of a run: {answer.message}")
+                self._expect_environment(task, answer)
+                if isinstance(task, tasks.TaskBatch) and len(task) > 1:
+                    return self._one_by_one(task)
+                complaints += 1
+                if complaints == ATTEMPTS:
+                    return self._failed(f"{answer.message}, {ATTEMPTS} times, each in a new process")
+                continue
             results: Results = answer
             return results
+
+    def _one_by_one(self, batch: tasks.TaskBatch) -> Results:
+        return Results.joined([self.run(batch.some([run])) for run in range(len(batch))])
+
+    def _expect_environment(self, task: tasks.RunTask | tasks.TaskBatch, failure: tasks.EnvironmentFailure) -> None:
+        """Raise `QuadcosimError` for a failure unless third-party FMUs may be its cause; the process is a new one then.
+
+        They may be where a new process can load all FMUs.
+        """
+        message = failure.message
+        system = task.system if isinstance(task, tasks.RunTask) else task.systems[0]
+        if not all(self._is_own(Path(component.fmu)) for component in system.components.values()):
+            self._drop()
+            try:
+                answer = self._ready_worker().request(tasks.LoadTask(system=system))
+            except Died as death:
+                answer = None
+                _expect_no_interrupt(death)
+            self._drop()
+            if not isinstance(answer, tasks.EnvironmentFailure):
+                return
+            message = answer.message
+        raise tasks.WorkerEnvironmentError(f"not a failure of a run: {message}")
+
+    def _is_own(self, fmu: Path) -> bool:
+        with contextlib.suppress(OSError):  # it is no longer there
+            return content_hash(fmu) in self._inputs.own_fmus
+        return False
 
     def _failed(self, message: str, *, ended: bool = False) -> Results:
         return Results.of([Outcome(metrics=None, message=message, ended=ended)], self._machine)

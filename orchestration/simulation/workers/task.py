@@ -116,6 +116,18 @@ class TaskBatch:
         return replace(self, systems=all_with_files(self.systems, paths))
 
 
+@dataclass(frozen=True, kw_only=True)
+class LoadTask:
+    """The FMUs of a run, to be loaded and not to be called: whether the environment is to blame for its failure."""
+
+    system: System
+    time_limit: float | None = None
+
+    def __len__(self) -> int:
+        """No run."""
+        return 0
+
+
 @passable
 @dataclass(frozen=True, kw_only=True)
 class Ready:
@@ -133,7 +145,7 @@ class EnvironmentFailure:
     message: str
 
 
-def of_task(task: RunTask | TaskBatch, answer: Results | EnvironmentFailure) -> Results | EnvironmentFailure:
+def of_task(task: RunTask | TaskBatch | LoadTask, answer: Results | EnvironmentFailure) -> Results | EnvironmentFailure:
     """An answer to a task; raises `FrameError` if it has not one entry for each run."""
     if isinstance(answer, Results) and not answer.fits(len(task)):
         raise FrameError("expected one outcome of each run")
@@ -152,13 +164,22 @@ class Runner:
         self._machine = machine
         self._batches: Batches | None = None
 
-    def run(self, task: RunTask | TaskBatch) -> Results:
-        """Simulate a run, or many at once and one by one those that a batch cannot complete.
+    def run(self, task: RunTask | TaskBatch | LoadTask) -> Results:
+        """Simulate a run, or many at once and one by one those that a batch cannot complete; or only load.
 
         The failure of a run becomes its result; raises `WorkerEnvironmentError` for other failures.
         """
+        if isinstance(task, LoadTask):
+            self._expect_loadable(task.system)
+            return Results.of([], self._machine)
         outcomes = self._in_lanes(task) if isinstance(task, TaskBatch) else [self._alone(task)]
         return Results.of(outcomes, self._machine)
+
+    def _expect_loadable(self, system: System) -> None:
+        _expect_files(system)
+        with ExitStack() as stack:
+            for name, component in system.components.items():
+                stack.enter_context(self._load(Path(component.fmu), name))
 
     def _alone(self, task: RunTask) -> Outcome:
         started = time.perf_counter()

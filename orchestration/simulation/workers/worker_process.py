@@ -37,7 +37,7 @@ def main(own_folder: str) -> None:
     parent.leave()
 
 
-def _run(runner: tasks.Runner, task: tasks.RunTask | tasks.TaskBatch) -> object:
+def _run(runner: tasks.Runner, task: tasks.RunTask | tasks.TaskBatch | tasks.LoadTask) -> object:
     try:
         return runner.run(task)
     except tasks.WorkerEnvironmentError as error:

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import sys
 import zipfile
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from fmu_kit.archive import SOURCE_HASH_FILE, read_source_hash
 from orchestration.components.building import builder
 from orchestration.components.fmi import trust
 from orchestration.components.fmi.foreign_calls import LostError, isolated_call
+from orchestration.components.fmi.opening import open_here
 from orchestration.components.fmi.read_description import read_model
 from orchestration.components.fmi.surroundings import LIMITS, ROUNDING
 from orchestration.foundation.basics.errors import QuadcosimError
@@ -64,6 +66,16 @@ def test_what_a_worker_may_run_beside_itself_is_told_by_its_coordinator(
     assert not trust.is_own(built["QuadrotorPlant"])
     trust.accept(own)
     assert trust.is_own(built["QuadrotorPlant"])
+
+
+def writes_bytecode(fmu: Path) -> bool:
+    with open_here(fmu, "it"):
+        return not sys.dont_write_bytecode
+
+
+@needs_compiler
+def test_a_process_with_a_foreign_fmu_writes_no_bytecode(tmp_path: Path) -> None:
+    assert not isolated_call([small(tmp_path)], writes_bytecode, small(tmp_path))
 
 
 @needs_compiler

@@ -278,6 +278,28 @@ def write(content):
     assert not (tmp_path / "made").exists()
 
 
+FORGES = """
+import sys
+from orchestration.foundation.processes.channel import Parent
+parent = Parent()
+parent.receive()
+if sys.argv[1] == "forged":
+    parent._secret = b"?" * len(parent._secret)
+parent.send("done")
+parent.receive()
+"""
+
+
+def test_a_message_without_the_secret_of_the_question_is_none() -> None:
+    with Child([sys.executable, "-c", FORGES, "true"]) as one:
+        one.send("a question")
+        assert one.receive(str) == "done"
+    with Child([sys.executable, "-c", FORGES, "forged"]) as one:
+        one.send("a question")
+        with pytest.raises(Died, match=NO_MESSAGE):
+            one.receive(str)
+
+
 def test_sending_to_a_child_closed_by_another_thread_reports_its_death(
     child: Callable[..., Child],
 ) -> None:
