@@ -2,9 +2,12 @@
 
 import atexit
 import concurrent.futures
+import contextlib
+import logging
 import re
 import socket
 import threading
+import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
@@ -13,6 +16,7 @@ from itertools import islice
 from typing import Any
 
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
+from orchestration.foundation.basics.terminal import warn
 from orchestration.simulation.engines.master import Engine
 from orchestration.simulation.workers.batching import batched, chunks
 from orchestration.simulation.workers.pool import Inputs, InterruptedWorker, Pool
@@ -28,6 +32,11 @@ _PATIENCE = 10.0
 """Time to wait for the scheduler [s]"""
 _WORKERS_PATIENCE = 60.0
 """Time to wait for its first worker [s]"""
+SILENCE, TOLD_AFTER = 120.0, 10.0
+"""Times without an answer of the scheduler after which a sweep ends, and after which it says so [s]"""
+_POLL = 1.0
+"""Time between two checks whether it has answered [s]"""
+_KEPT = "finished runs are kept, start the sweep again"
 _ADDRESS = re.compile(r"(?:(?:tcp|tls|ws|wss)://)?(\[[0-9a-fA-F:.]+\]|[^\s:/\[\]]+):(\d{1,5})")
 
 
@@ -114,38 +123,106 @@ def local_workers(inputs: Inputs, workers: int) -> Iterator[TaskRunner]:
 def cluster(inputs: Inputs, address: str) -> Iterator[TaskRunner]:
     """Run tasks in the workers of a dask scheduler.
 
-    Raises `QuadcosimError` if the scheduler cannot be reached or has no workers, and for failures not caused by a run.
+    Raises `QuadcosimError` if the scheduler cannot be reached, has no workers or no longer answers, and for failures
+    not caused by a run.
     """
     import asyncio
 
     import distributed
 
+    # The TimeoutErrors are distinct before Python 3.11.
+    unreachable = (OSError, TimeoutError, asyncio.TimeoutError, ValueError)
     with ExitStack() as stack:
+        stack.enter_context(_silent("distributed", "tornado", "asyncio"))
         try:
-            client: Any = stack.enter_context(distributed.Client(address, timeout=_PATIENCE, set_as_default=False))
-            client.wait_for_workers(1, timeout=_WORKERS_PATIENCE)
-        except (
-            OSError,
-            TimeoutError,
-            asyncio.TimeoutError,
-            ValueError,
-        ) as error:  # the TimeoutErrors are distinct before Python 3.11
-            raise QuadcosimError(f"--dask {address}: expected a dask scheduler with workers there: {error}") from error
-        # Files are sent once, identified by the hash of their content.
-        scattered = client.scatter(inputs, broadcast=True, hash=True)
-        executor = stack.enter_context(client.get_executor(pure=False))
-        slots = sum(client.nthreads().values())
+            client: Any = distributed.Client(address, timeout=_PATIENCE, set_as_default=False)
+        except unreachable as error:
+            raise _unreachable(address, error) from error
+        stack.callback(_close, client)
+
+        async def begin() -> Any:
+            await client.wait_for_workers(1, timeout=_WORKERS_PATIENCE)
+            # Files are sent once, identified by the hash of their content.
+            return await client.scatter(inputs, broadcast=True, hash=True), await client.scheduler.ncores()
+
+        def ask(question: Callable[[], Any]) -> "Future[Any]":
+            return asyncio.run_coroutine_threadsafe(question(), client.loop.asyncio_loop)
+
+        heartbeat = Heartbeat(address, lambda: ask(client.scheduler.ncores))
+        begun = ask(begin)
+        try:
+            while not concurrent.futures.wait([begun], timeout=_POLL).done:
+                heartbeat.check()
+            scattered, threads = begun.result()
+        except unreachable as error:
+            raise _unreachable(address, error) from error
+        executor = client.get_executor(pure=False)
+        stack.callback(executor.shutdown, wait=False)
 
         def submit(task: RunTask | TaskBatch) -> "Future[Results]":
             return executor.submit(run_on_cluster, task, scattered)  # type: ignore[no-any-return]
 
         try:
-            yield partial(_drain, submit=submit, most=2 * max(1, slots))
+            yield partial(_drain, submit=submit, most=2 * max(1, sum(threads.values())), waiting_for=heartbeat.check)
         except (concurrent.futures.CancelledError, OSError, distributed.KilledWorker) as error:
             raise QuadcosimError(
-                f"--dask {address}: the scheduler or its workers were lost ({type(error).__name__}); finished "
-                "runs are kept, start the sweep again"
+                f"--dask {address}: the scheduler or its workers were lost ({type(error).__name__}); {_KEPT}"
             ) from error
+
+
+class Heartbeat:
+    """Whether a scheduler answers and has workers: a warning says that it does not, an error that it has not long."""
+
+    def __init__(
+        self, address: str, ask: Callable[[], "Future[Any]"], clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        """`ask` begins a question to it, whose answer is its workers."""
+        self._address, self._ask, self._clock = address, ask, clock
+        self._question, self._since, self._is_told = ask(), clock(), False
+
+    def check(self) -> None:
+        """Look for an answer, and ask again once there is one; raises `QuadcosimError` after `SILENCE`."""
+        now = self._clock()
+        if self._question.done():
+            if self._question.exception() is None and self._question.result():
+                self._since, self._is_told = now, False
+            self._question = self._ask()
+        silence = now - self._since
+        if silence > SILENCE:
+            raise QuadcosimError(
+                f"--dask {self._address}: the scheduler has not answered for {SILENCE:g} s, or has no workers; {_KEPT}"
+            )
+        if silence > TOLD_AFTER and not self._is_told:
+            self._is_told = True
+            warn(
+                f"the dask scheduler {self._address} has not answered for {TOLD_AFTER:g} s, or has no workers; the "
+                f"sweep ends after {SILENCE:g} s"
+            )
+
+
+def _unreachable(address: str, error: BaseException) -> QuadcosimError:
+    return QuadcosimError(f"--dask {address}: expected a dask scheduler with workers there: {error}")
+
+
+@contextmanager
+def _silent(*libraries: str) -> Iterator[None]:
+    """Keep what libraries log, as tracebacks of lost connections, from standard error: the loss is one line here."""
+    found = [name for name in logging.Logger.manager.loggerDict if name.partition(".")[0] in libraries]
+    loggers = [logging.getLogger(name) for name in {*found, *libraries}]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for logger, level in zip(loggers, levels):
+            logger.setLevel(level)
+
+
+def _close(client: Any) -> None:
+    """Close a client whose scheduler may not answer."""
+    with contextlib.suppress(Exception):
+        client.close(timeout=_PATIENCE)
 
 
 def expect_scheduler(address: str) -> None:
@@ -156,7 +233,7 @@ def expect_scheduler(address: str) -> None:
     try:
         socket.create_connection((match[1].strip("[]"), int(match[2])), timeout=_PATIENCE).close()
     except OSError as error:
-        raise QuadcosimError(f"--dask {address}: expected a dask scheduler with workers there: {error}") from error
+        raise _unreachable(address, error) from error
 
 
 def run_on_cluster(task: RunTask | TaskBatch, inputs: Inputs) -> Results:
@@ -184,13 +261,22 @@ def _local_submit(stack: ExitStack, inputs: Inputs, workers: int) -> Submit:
     return lambda task: executor.submit(pool.run, task)
 
 
-def _drain(tasks: Iterable[RunTask | TaskBatch], submit: Submit, most: int) -> Generator[Rows, None, None]:
-    """Keep `most` tasks in progress; yield their rows as they finish, of several the one that was begun first."""
+def _drain(
+    tasks: Iterable[RunTask | TaskBatch], submit: Submit, most: int, waiting_for: Callable[[], None] = lambda: None
+) -> Generator[Rows, None, None]:
+    """Keep `most` tasks in progress; yield their rows as they finish, of several the one that was begun first.
+
+    `waiting_for` is called while none finishes.
+    """
     waiting = iter(tasks)
     in_progress = {submit(task): task for task in islice(waiting, most)}
     try:
         while in_progress:
-            done, _ = concurrent.futures.wait(in_progress, timeout=1.0, return_when=concurrent.futures.FIRST_COMPLETED)
+            done, _ = concurrent.futures.wait(
+                in_progress, timeout=_POLL, return_when=concurrent.futures.FIRST_COMPLETED
+            )
+            if not done:
+                waiting_for()
             finished = {future: in_progress.pop(future) for future in [*in_progress] if future in done}
             for future, task in finished.items():
                 yield task.rows(future.result())

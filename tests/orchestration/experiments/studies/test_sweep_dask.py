@@ -1,6 +1,9 @@
 """Sweeps on a dask cluster."""
 
+import os
+import signal
 from collections.abc import Iterator
+from concurrent.futures import Future
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -10,6 +13,8 @@ import pytest
 from orchestration.experiments.studies.axes import Axis
 from orchestration.experiments.studies.store import open_for_reading
 from orchestration.experiments.studies.study import Study
+from orchestration.simulation.workers import executors
+from orchestration.simulation.workers.executors import SILENCE, TOLD_AFTER, Heartbeat
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.model import System
 from quadcosim import QuadcosimError
@@ -20,6 +25,7 @@ from tests.orchestration.experiments.studies.common import (
     RUNS,
     STORE,
     Cluster,
+    axis,
     bits,
     one_line,
     rows_in,
@@ -28,6 +34,7 @@ from tests.orchestration.experiments.studies.common import (
     sweep,
     wait_for_rows,
 )
+from tests.orchestration.experiments.studies.test_sweep_hostile import expect_its_own_runs_to_fail, hostile
 from tests.patience import PATIENCE
 
 
@@ -61,6 +68,17 @@ def test_a_run_that_hangs_in_a_dask_worker_is_a_failed_row_with_the_reason(tmp_p
     assert rows == {0: None, 1: "it was ended: it takes more than the time limit of 2 s"}
 
 
+@needs_compiler
+def test_fmus_run_in_children_of_dask_workers_and_send_no_pickle(tmp_path: Path, cluster: Cluster) -> None:
+    tells = f'{{ char name[999]; snprintf(name, 999, "{tmp_path}/pid%d", (int)getpid()); FILE *p = fopen(name, "w");'
+    chosen = hostile(tmp_path, more=f"{tells} if (p) fclose(p); }}")
+    found = sweep(chosen, folder=tmp_path / "out", dask=cluster.address, progress=None, announce=None)
+    expect_its_own_runs_to_fail(found.path, tmp_path)
+    told = {int(file.name.removeprefix("pid")) for file in tmp_path.glob("pid*")}
+    assert told
+    assert not told & {os.getpid(), cluster.scheduler.pid, *(worker.pid for worker in cluster.workers)}
+
+
 def test_the_death_of_a_dask_worker_loses_nothing(
     folder: Path, reference: list[dict[str, Any]], cluster: Cluster
 ) -> None:
@@ -83,8 +101,8 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
         def __init__(self, address: str, **options: Any) -> None:
             super().__init__(address, **{**options, "timeout": 0.5})
 
-        def wait_for_workers(self, n_workers: int, timeout: float | None = None) -> None:
-            super().wait_for_workers(n_workers, timeout=0.5)
+        def wait_for_workers(self, n_workers: int, timeout: float | None = None) -> Any:
+            return super().wait_for_workers(n_workers, timeout=0.5)
 
     monkeypatch.setattr(distributed, "Client", Impatient)
 
@@ -114,3 +132,86 @@ def test_a_scheduler_without_workers_is_reported_in_one_line(tmp_path: Path) -> 
     with closing(Cluster(tmp_path, workers=0)) as deserted, pytest.raises(QuadcosimError, match=said) as caught:
         sweep(study(PERIODS), folder=tmp_path / "out", dask=deserted.address)
     one_line(caught.value)
+
+
+# -- a scheduler that does not answer ---------------------------------------------------------------------
+
+
+class Scheduler:
+    """A scheduler that is asked, and a clock."""
+
+    def __init__(self) -> None:
+        self.time, self.questions = 0.0, list[Future[Any]]()
+        self.heartbeat = Heartbeat("tcp://host:1", self.ask, lambda: self.time)
+
+    def ask(self) -> "Future[Any]":
+        self.questions.append(Future())
+        return self.questions[-1]
+
+    def at(self, time: float) -> None:
+        self.time = time
+        self.heartbeat.check()
+
+
+def said(capsys: pytest.CaptureFixture[str]) -> list[str]:
+    return capsys.readouterr().err.splitlines()
+
+
+def test_of_a_scheduler_that_answers_nothing_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    scheduler = Scheduler()
+    for time in range(500):
+        scheduler.questions[-1].set_result({"worker": 2})
+        scheduler.at(float(time))
+    assert said(capsys) == []
+
+
+@pytest.mark.parametrize("answer", ["none", "no workers", "a lost connection"])
+def test_that_a_scheduler_does_not_answer_is_said_once_and_ends_the_sweep(
+    answer: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scheduler = Scheduler()
+    times = [TOLD_AFTER / 2, TOLD_AFTER, TOLD_AFTER + 1.0, TOLD_AFTER + 2.0, SILENCE]
+    for time, lines in zip(times, (0, 0, 1, 0, 0)):
+        if answer == "no workers":
+            scheduler.questions[-1].set_result({})
+        elif answer == "a lost connection":
+            scheduler.questions[-1].set_exception(OSError())
+        scheduler.at(time)
+        assert len(said(capsys)) == lines
+    with pytest.raises(QuadcosimError, match="has not answered for 120 s, or has no workers; finished runs are kept"):
+        scheduler.at(SILENCE + 1.0)
+
+
+def test_a_scheduler_that_answers_again_is_waited_for_anew(capsys: pytest.CaptureFixture[str]) -> None:
+    scheduler = Scheduler()
+    scheduler.at(SILENCE - 1.0)
+    assert len(said(capsys)) == 1
+    scheduler.questions[-1].set_result({"worker": 2})
+    scheduler.at(SILENCE)
+    scheduler.at(2.0 * SILENCE - 1.0)
+    assert len(said(capsys)) == 1
+
+
+@pytest.mark.parametrize("end", [signal.SIGSTOP, signal.SIGKILL])
+def test_a_scheduler_that_is_stopped_ends_the_sweep_in_one_line_and_it_can_be_resumed(
+    end: signal.Signals, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    chosen = study(axis("timing.period", 0.01, 0.02, 0.03, 0.04))
+    whole = bits(sweep(chosen, folder=tmp_path / "whole").path)
+
+    def stop(done: int, total: int) -> None:
+        if done and own.scheduler.poll() is None:
+            monkeypatch.setattr(executors, "SILENCE", 0.0)
+            os.kill(own.scheduler.pid, end)
+            if end == signal.SIGKILL:
+                own.scheduler.wait()
+
+    with closing(Cluster(tmp_path, workers=1)) as own:
+        with pytest.raises(QuadcosimError, match=r"finished runs are kept, start the sweep again$") as caught:
+            sweep(chosen, folder=tmp_path / "out", dask=own.address, progress=stop)
+        one_line(caught.value)
+    assert capfd.readouterr().err == ""
+    assert 0 < rows_in(tmp_path / "out" / "study.sqlite") < 4
+    found = sweep(chosen, folder=tmp_path / "out")
+    assert found.flown < 4
+    assert bits(found.path) == whole
