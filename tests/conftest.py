@@ -43,7 +43,43 @@ for variable in ("COLUMNS", "FORCE_COLOR", "GITHUB_ACTIONS", "PY_COLORS", "TERMI
 
 DATA = Path(__file__).parent / "data"
 
+LONGEST = (
+    "docs/test_comparisons.py",
+    "fmus/test_mutants.py",
+    "orchestration/command/test_cli.py",
+    "orchestration/experiments/studies/test_sweep_killed.py",
+    "fmus/test_other_masters.py",
+    "orchestration/components/building/test_variants.py",
+    "fmus/test_errors.py",
+    "docs/test_notebooks.py",
+    "orchestration/simulation/interop/test_interop.py",
+    "orchestration/components/scaffold/test_folder.py",
+    "orchestration/simulation/engines/test_compiled.py",
+    "orchestration/experiments/limits/test_limit.py",
+    "docs/test_guides.py",
+    "fmus/test_native_c.py",
+    "orchestration/simulation/requests/ssp/test_flights.py",
+    "fmus/test_validation.py",
+    "fmus/test_packaging.py",
+    "orchestration/components/scaffold/test_everywhere.py",
+    "docs/test_site.py",
+    "orchestration/simulation/engines/test_on_computers.py",
+    "orchestration/simulation/engines/batch/test_signals.py",
+    "orchestration/components/checks/doctor/test_command.py",
+    "orchestration/components/building/test_fmus.py",
+    "orchestration/experiments/studies/test_sweep_dask.py",
+    "orchestration/experiments/studies/test_engines.py",
+)
+"""Files that take from 55 to 15 s of a core, the longest first: in parallel, no process is left with one at the end."""
+
 gc.disable()  # while thousands of tests are collected, of which none is garbage
+
+
+@pytest.hookimpl(tryfirst=True)  # fixtures of the session group what is in one process
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The longest files begin first."""
+    rank = {DATA.parent / name: place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: rank.get(item.path, len(rank)))
 
 
 def pytest_collection_finish() -> None:

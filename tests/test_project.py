@@ -11,6 +11,7 @@ import yaml
 
 from docs import make_architecture
 from orchestration.foundation.basics.documents import read_toml
+from tests.conftest import LONGEST
 from tests.places import ROOT
 
 SETTINGS = read_toml(ROOT / "pyproject.toml", "project")
@@ -48,6 +49,10 @@ def test_every_path_that_is_named_exists(text: str) -> None:
     named = set(re.findall(rf"(?<![\w/.-])(?:{folders})/[\w./-]*\w", text))
     assert len(named) >= 3
     assert not [path for path in named if not (ROOT / path).exists()]
+
+
+def test_the_tests_that_begin_first_are_there() -> None:
+    assert [name for name in LONGEST if not (ROOT / "tests" / name).is_file()] == []
 
 
 def test_the_architecture_shows_the_districts_and_rooms_that_there_are() -> None:
