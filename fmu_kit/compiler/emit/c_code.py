@@ -51,19 +51,14 @@ class FunctionWriter(ExpressionWriter):
         f = self.function
         for symbol, name in zip(f.parameters, self.parameters):
             self.scopes[0][id(symbol)] = name
-        for symbol in self.used.values():
-            if symbol.op == "load" and symbol.data[1] == 0:
-                self.scopes[0][id(symbol)] = self._define(symbol, self._load(symbol))
+        self._load_places()
         self._block(f.body)
         if not ends(f.body):
             self._line(self.through)
-        parameters = [f"{c_type(symbol)} {name}" for symbol, name in zip(f.parameters, self.parameters)]
-        parameters += ["q_real *out"] if f.results else []
-        head = f"static {self.type} {c_name(f.name)}({', '.join([*self.first, *parameters])})\n{{\n"
+        head = f"static {self.type} {c_name(f.name)}({', '.join([*self.first, *self._parameters()])})\n{{\n"
         doc = f"/* {f.doc.replace('*/', '* /')} */\n" if f.doc else ""
         before = self._memory()
-        unused = [name for symbol, name in zip(f.parameters, self.parameters) if id(symbol) not in self.used]
-        before.append(", ".join(f"(void){name}" for name in (*self.always, *unused)) + ";")
+        before.append(", ".join(f"(void){name}" for name in (*self.always, *self._unused_parameters())) + ";")
         return doc + head + "\n".join([*(f"    {line}" for line in (*before, *self.declared)), *self.lines[0]]) + "\n}"
 
     type: ClassVar = "int"
@@ -87,6 +82,14 @@ class FunctionWriter(ExpressionWriter):
                 found += self._named_in(inner)
         return found
 
+    def _parameters(self) -> list[str]:
+        """The declarations of its parameters after the first ones."""
+        parameters = [f"{c_type(symbol)} {name}" for symbol, name in zip(self.function.parameters, self.parameters)]
+        return [*parameters, "q_real *out"] if self.function.results else parameters
+
+    def _unused_parameters(self) -> list[str]:
+        return [name for symbol, name in zip(self.function.parameters, self.parameters) if id(symbol) not in self.used]
+
     # -- memory ----------------------------------------------------------------------------------------------
 
     always: ClassVar[tuple[str, ...]] = ("v",)
@@ -104,6 +107,15 @@ class FunctionWriter(ExpressionWriter):
     def _place(self, name: str) -> str:
         of = name.removeprefix(TANGENT)
         return f"v[{self.places[of]}]" if of == name else f"d[{self.places[of]}]"
+
+    def _load_places(self) -> None:
+        """Write the values that places have at the beginning."""
+        for symbol in self.used.values():
+            if symbol.op == "load" and symbol.data[1] == 0:
+                self._take_from_memory(symbol)
+
+    def _take_from_memory(self, symbol: Symbol) -> None:
+        self.scopes[-1][id(symbol)] = self._define(symbol, self._load(symbol))
 
     def _load(self, symbol: Symbol) -> str:
         value = self._place(symbol.data[0])

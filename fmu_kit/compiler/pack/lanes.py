@@ -33,11 +33,12 @@ def preferred_lanes() -> int:
 
 
 def compiled_lanes(
-    sources: Mapping[str, bytes], lanes: int | None = None, *, mathematics: Mathematics = "own"
+    sources: Mapping[str, bytes], lanes: int | None = None, *, several: bool = False, mathematics: Mathematics = "own"
 ) -> bytes:
     """The library for this machine that computes the slave of an FMU's `sources`, by name, in lanes.
 
-    `lanes` is 1 or a power of two up to 64; default: `preferred_lanes`. Raises `PackagingError` for sources without
+    `lanes` is 1 or a power of two up to 64; default: `preferred_lanes`. `several`: with a function that does several
+    steps at once. Raises `PackagingError` for sources without
     lanes, and, naming what to install, without a compiler.
     """
     if MAIN not in sources:
@@ -46,6 +47,7 @@ def compiled_lanes(
     if count not in (2**k for k in range(7)):
         raise PackagingError(f"lanes = {lanes}: expected 1 or a power of two up to {MAX_LANES}")
     options: tuple[str, ...] = (*FOR_THIS_PROCESSOR, f"-DQUADCOSIM_LANES={count}", "-Wno-psabi")
+    options += ("-DQUADCOSIM_SEVERAL",) if several else ()
     compiled = [name for name in sources if name.endswith(".o")]  # a user's own code
     options += (*compiled, "-lm") if compiled else ()
     return compiled_here(sources, MAIN, mathematics=mathematics, options=options)
@@ -68,6 +70,12 @@ class Lanes:
     def step(self) -> int:
         """The address of the function that advances the lanes, called as `do_step`."""
         return ctypes.cast(self._library.quadcosim_do_step, ctypes.c_void_p).value or 0
+
+    @property
+    def steps(self) -> int:
+        """The address of the function that does several steps, as `lanes.c` has it; 0 if there is none."""
+        function = getattr(self._library, "quadcosim_do_steps", None)
+        return ctypes.cast(function, ctypes.c_void_p).value or 0 if function else 0
 
     @property
     def line(self) -> tuple[int, int]:

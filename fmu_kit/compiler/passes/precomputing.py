@@ -8,14 +8,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from fmu_kit.compiler.trace.statements import Block, Call, Function, Place, Statement, statement, symbols_of
-from fmu_kit.compiler.trace.symbols import Symbol, closure, node, unknown_below
+from fmu_kit.compiler.trace.symbols import CHEAP, Symbol, closure, node, unknown_below
 from fmu_kit.compiler.trace.tracing import Program
 
 TAKING = "take_parameters"
 """The function that reads the parameters."""
-_CHEAP = frozenset(
-    {"add", "sub", "mul", "neg", "abs", "lt", "le", "gt", "ge", "eq", "ne", "and", "or", "not", "select"}
-)
 
 
 def precompute(program: Program) -> Program:
@@ -121,7 +118,7 @@ class _Precomputing:
         """Record whether a value depends on parameters alone, and whether it is costly, given this for its operands."""
         below = [self._kinds[id(arg)] for arg in symbol.args] if symbol.op != "phi" else [(False, False)]
         fixed = all(of for of, _ in below)
-        costly = bool(below) and (symbol.op not in _CHEAP or any(of for _, of in below))
+        costly = bool(below) and (symbol.op not in CHEAP or any(of for _, of in below))
         if not below:
             fixed = symbol.op == "constant" or (symbol.op == "load" and symbol.data[0] in self.fixed)
         self._kinds[id(symbol)] = fixed, costly

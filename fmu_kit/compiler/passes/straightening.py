@@ -56,7 +56,7 @@ def straightened(program: Program) -> Function | None:
     except (_NoLineError, KeyError):  # the path depends on an unknown value
         return None
     fails = statement("raise", (), (LEAVES, ()))
-    guards = [statement("if", (guard,), None, ((fails,), ())) for guard in dict.fromkeys(line.guards)]
+    guards = dict.fromkeys(part for guard in line.guards for part in _alternatives(guard))
     stores = [
         statement("store", (value,), place)
         for place, value in line.memory.items()
@@ -65,7 +65,7 @@ def straightened(program: Program) -> Function | None:
     return replace(
         step,
         name=f"{step.name} in a line",
-        body=(*guards, *stores, statement("return", ())),
+        body=(*(statement("if", (guard,), None, ((fails,), ())) for guard in guards), *stores, statement("return", ())),
         stores=frozenset(each.data for each in stores),
         raises=frozenset({LEAVES}),
         doc="As do_step, where it takes its usual way; it does nothing where it does not.",
@@ -301,3 +301,12 @@ def _raises(block: Block) -> bool:
         return False
     last = block[-1]
     return last.op == "raise" or (last.op == "if" and all(map(_raises, last.blocks)))
+
+
+def _alternatives(condition: Symbol) -> list[Symbol]:
+    """Conditions of which any holds where the given one does."""
+    if condition.op == "or":
+        return [part for each in condition.args for part in _alternatives(each)]
+    if condition.op == "not" and condition.args[0].op == "and":
+        return [part for each in condition.args[0].args for part in _alternatives(truth(negation(each)))]
+    return [condition]

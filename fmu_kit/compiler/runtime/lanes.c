@@ -9,7 +9,8 @@
    and Booleans as doubles, those behind them are the slave's own. `active` has all bits set in an active lane, and none
    in others, which stay unchanged. `status` becomes 0 in an active lane, or the number of the error with which an
    instance would have failed; such a lane must not be used any more. `wanted` states for each variable whether it is
-   read: the others may keep the value of an earlier step. NULL: all are read.
+   read: the others may keep the value of an earlier step. NULL: all are read. QUADCOSIM_SEVERAL adds a function that
+   does several steps at once, if the slave's usual step is a straight line.
 
    Values that an instance would refuse are not checked here. The caller must ensure that Reals, the start time too, are
    finite, Integers whole numbers of 32 bits, Booleans 0 or 1, and write only inputs and, before the first step,
@@ -35,10 +36,47 @@ typedef q_real q_place __attribute__((aligned(QUADCOSIM_LANES < 8 ? 8 * QUADCOSI
 typedef q_real q_place;
 #endif
 
+enum { LANES = QUADCOSIM_LANES };
+
+static q_real values_of(const double *of_lanes)
+{
+    q_real value;
+    memcpy(&value, of_lanes, sizeof value);
+    return value;
+}
+
+#ifdef QUADCOSIM_SEVERAL
+
+enum { MOST_STEPS = 32 }; /* of a straight line */
+
+typedef struct { /* steps of one length that follow one another */
+    int64_t count;
+    q_real h;            /* [s] */
+    const double *times; /* [s] where each begins, for all lanes */
+    int lane;            /* one that is active */
+    int (*between)(void *);
+    void *given;
+} Steps;
+
+/* Whether a value has the same bits in all active lanes. */
+Q_ONE int is_one(q_real x, q_mask live, int lane)
+{
+    return !q_any(live & q_has(q_to_bits(x) ^ q_to_bits(q_all(q_lane(x, lane))), ~(uint64_t)0));
+}
+
+/* Keep the values of a step, or, if its lanes are steps, of all of these. */
+Q_ONE void fill(q_place *to, q_real x, int of_steps)
+{
+    if (!of_steps)
+        *to = x;
+    else
+        for (int lane = 0; lane < LANES; lane++)
+            to[lane] = q_all(q_lane(x, lane));
+}
+
+#endif
 
 #include "lane_functions.h"
-
-enum { LANES = QUADCOSIM_LANES };
 
 static q_mask lanes_of(const uint64_t *active)
 {
@@ -55,13 +93,6 @@ static void tell_status(const uint64_t *active, q_mask through, q_real failed, i
             status[lane] = (int32_t)q_lane(number, lane);
 }
 
-static q_real values_of(const double *of_lanes)
-{
-    q_real value;
-    memcpy(&value, of_lanes, sizeof value);
-    return value;
-}
-
 EXPORT int quadcosim_lanes(void);
 int quadcosim_lanes(void) { return LANES; }
 
@@ -75,6 +106,10 @@ int quadcosim_variables(void) { return VARIABLES; }
 EXPORT int quadcosim_divergence(void);
 int quadcosim_divergence(void) { return DIVERGENCE; }
 
+/* Counts how often the straight line was tried, and left, in which case the step is done twice. If it is left too
+   often, it is not tried for a while: other states may come. This changes no bit of the results. */
+static struct { int64_t tried, left, waited; } line;
+
 /* The start values, in all lanes. */
 EXPORT void quadcosim_begin(double *memory);
 void quadcosim_begin(double *memory)
@@ -84,6 +119,7 @@ void quadcosim_begin(double *memory)
     for (int place = 0; place < PLACES; place++)
         for (int lane = 0; lane < LANES; lane++)
             memory[place * LANES + lane] = start[place];
+    memset(&line, 0, sizeof line);
 }
 
 /* Take over the set values, and compute outputs at the start time [s]: once at the end of initialisation, and before
@@ -99,10 +135,6 @@ void quadcosim_initialise(double *memory, const uint64_t *active, const double *
     tell_status(active, through, failed, status);
 }
 
-/* Counts how often the straight line was tried, and left, in which case the step is done twice. If it is left too
-   often, it is not tried for a while: other runs may come. This changes no bit of the results. */
-static struct { int64_t tried, left, waited; } line;
-
 EXPORT void quadcosim_line(int64_t *tried, int64_t *left);
 void quadcosim_line(int64_t *tried, int64_t *left) { *tried = line.tried, *left = line.left; }
 
@@ -111,13 +143,20 @@ void quadcosim_line(int64_t *tried, int64_t *left) { *tried = line.tried, *left 
 /* After the trials, one step of so many may leave the line; the steps until it is tried again. */
 enum { TRIALS = 256, OF_WHICH_ONE = 20, PAUSE = 64 * TRIALS };
 
+static int is_tried(void)
+{
+    if (line.tried < TRIALS || line.left * OF_WHICH_ONE <= line.tried)
+        return 1;
+    if (++line.waited < PAUSE)
+        return 0;
+    memset(&line, 0, sizeof line);
+    return 1;
+}
+
 static int step_straight(q_place *v, q_mask live, const uint8_t *wanted, q_real t, q_real h)
 {
-    if (line.tried >= TRIALS && line.left * OF_WHICH_ONE > line.tried) {
-        if (++line.waited < PAUSE)
-            return 0;
-        memset(&line, 0, sizeof line);
-    }
+    if (!is_tried())
+        return 0;
     line.tried++;
     if (q_any(STRAIGHT_STEP(v, live, wanted, t, h)))
         return 1;
@@ -146,6 +185,33 @@ void quadcosim_do_step(double *memory, const uint64_t *active, const double *t, 
     const q_mask through = model_do_step(v, live, &failed, values_of(t), values_of(h));
     tell_status(active, through, failed, status);
 }
+
+#ifdef STRAIGHT_STEPS
+
+/* Advance by up to `count` steps of one length h [s] that follow one another: `times` are where they begin [s], the same
+   in all lanes, and behind them a finite number for each lane. After each step but the last of the `count`,
+   `between(given)` may read variables, and returns whether to go on. The number of steps that were done: it ends where
+   a step is not the usual one, or would fail, which quadcosim_do_step can then do. */
+EXPORT int64_t quadcosim_do_steps(double *memory, const uint64_t *active, const double *times, double h, int64_t count,
+                                  const uint8_t *wanted, int (*between)(void *), void *given);
+int64_t quadcosim_do_steps(double *memory, const uint64_t *active, const double *times, double h, int64_t count,
+                           const uint8_t *wanted, int (*between)(void *), void *given)
+{
+    Steps steps = {.h = q_all(h), .between = between, .given = given};
+    int64_t done = 0;
+    while (steps.lane < LANES - 1 && !active[steps.lane])
+        steps.lane++;
+    for (int goes_on = is_tried(); goes_on; goes_on = done < count && between(given)) {
+        steps.count = count - done < MOST_STEPS ? count - done : MOST_STEPS, steps.times = times + done;
+        const int64_t some = STRAIGHT_STEPS((q_place *)memory, lanes_of(active), wanted, &steps);
+        line.tried += some, done += some;
+        if (some < steps.count)
+            break;
+    }
+    return done;
+}
+
+#endif
 
 #else
 typedef int quadcosim_no_lanes; /* C does not allow an empty file */

@@ -561,6 +561,10 @@ def _bitwise(of_conditions: Callable[[Any, Any], Any], op: str, a: Any, b: Any) 
     return whole_number(op, a, b)
 
 
+CHEAP = frozenset({"add", "sub", "mul", "neg", "abs", "lt", "le", "gt", "ge", "eq", "ne", "and", "or", "not", "select"})
+"""Operations that take a few instructions"""
+
+
 def closure(symbols: Iterable[Symbol]) -> dict[int, Symbol]:
     """All symbols from which some are computed, by identity, each after its operands.
 

@@ -126,6 +126,7 @@ typedef struct {
     int64_t connected;
     List feeds;
     /* of kernels */
+    void *steps; /* does several at once; NULL: there is no such function */
     double *memory;
     const int64_t *places; /* of the connected outputs in it */
     const bool *wanted;    /* of each variable, whether it is read */
@@ -160,6 +161,7 @@ typedef struct { /* runs that share a schedule */
     int64_t times[2], stepped_at[2], posted_at[2], measured_at[2], arrivals_at[2], samples_at[2]; /* its tables */
     int64_t *moving;
     int64_t source_row; /* the index of the regular instant, or ~ that of the own one */
+    int64_t put_off, put_off_from, put_off_length; /* regular instants not yet processed, the first, the steps [ns] */
     int64_t kind, more; /* [ns] of the next instant with more than a step */
     const double *seen[L], *given[L]; /* values of sources for expressions and for inputs, at regular instants */
     const double *seen_own[L], *given_own[L]; /* at own ones */

@@ -1,6 +1,7 @@
 """A slave in lanes beside instances of it, one for each lane: what they hold, to the last bit."""
 
-from collections.abc import Mapping, Sequence
+import ctypes
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -118,6 +119,20 @@ class Together:
         given = (self.memory, self._mask(active), t, h, self.status)
         memory, live, begin, length, status = (a.ctypes.data for a in given)
         self.lanes.do_step(memory, live, begin, length, status, None if wanted is None else wanted.ctypes.data)
+
+    def several(
+        self, active: NDArray[np.bool_], times: NDArray[np.float64], h: float, between: Callable[[], bool]
+    ) -> int:
+        """Steps that begin at some times; `between` is asked whether to go on. The number of those that are done."""
+        back = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
+        do_steps = ctypes.CFUNCTYPE(
+            ctypes.c_int64, *[ctypes.c_void_p] * 3, ctypes.c_double, ctypes.c_int64, ctypes.c_void_p, back,
+            ctypes.c_void_p,
+        )(self.lanes.steps)  # fmt: skip
+        begin, live = np.append(times, [times[-1]] * self.count), self._mask(active)
+        given = (self.memory.ctypes.data, live.ctypes.data, begin.ctypes.data, h, len(times))
+        done: int = do_steps(*given, None, back(lambda _: between()), None)
+        return done
 
     def _mask(self, active: NDArray[np.bool_]) -> NDArray[np.uint64]:
         return np.where(active, ~np.uint64(0), np.uint64(0))

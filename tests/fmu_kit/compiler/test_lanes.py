@@ -56,10 +56,10 @@ def _random_values(
     }
 
 
-def in_lanes(sources: dict[str, bytes], lanes: int, folder: Path) -> None:
+def in_lanes(sources: dict[str, bytes], lanes: int, folder: Path, *, several: bool = False) -> None:
     """Compile the sources as `lanes.so`, from the cache of the engine if it is there."""
-    key = (OPTIONS, FOR_THIS_PROCESSOR, lanes)
-    content = libraries.cached_content("lanes", sources, key, lambda: compiled_lanes(sources, lanes))
+    key = (OPTIONS, FOR_THIS_PROCESSOR, lanes, several)
+    content = libraries.cached_content("lanes", sources, key, lambda: compiled_lanes(sources, lanes, several=several))
     (folder / "lanes.so").write_bytes(content)
 
 
@@ -95,10 +95,10 @@ def _statuses(folder: Path, target: Target, guid: str) -> set[int]:
     alone = [Alone.made(folder / "alone.so", together.lanes.places, types, guid) for _ in range(together.count)]
     usual = (slave_class(target).usual_parameters, 0.0, 0.0, (0.0,))
     unusual: tuple[Mapping[str, float], float, float, tuple[float, ...]] = ({}, 0.3, 0.02, (0.0, 0.5, -1.0))
-    found = {
-        status for case in (usual, unusual, unusual) * 6 for status in _simulate(together, alone, variables, rng, *case)
-    }
-    tried, left = together.lanes.line
+    found, tried, left = set[int](), 0, 0
+    for case in (usual, unusual, unusual) * 6:
+        found |= set(_simulate(together, alone, variables, rng, *case))
+        tried, left = (sum(pair) for pair in zip((tried, left), together.lanes.line))
     if target.model == "Loops":
         assert tried == 0, "a loop of any number of rounds is no straight line"
     else:
@@ -196,6 +196,42 @@ def test_unread_variables_are_left_out_and_nothing_else_changes(model: str, tmp_
     assert left_out > 0, "unread variables are not computed"
 
 
+@pytest.mark.parametrize("frequencies", [1, 8])
+def test_several_steps_at_once_are_the_same_steps(frequencies: int, tmp_path: Path) -> None:
+    compiler("cc")
+    path = Path(fmpy.extract(str(fmus.locate("native/QuadrotorPlant")), str(tmp_path)))
+    sources = {file.name: file.read_bytes() for file in (path / "sources").iterdir()}
+    in_lanes(sources, 8, tmp_path, several=True)
+    slave, rng = slave_class(Target.parse(MODELS["QuadrotorPlant"])), np.random.default_rng(1)
+    at_once, one_by_one = (Together(tmp_path / "lanes.so") for _ in range(2))
+    variables, active = list(slave.variables), rng.random(8) < 0.8
+    usual = {k: slave.usual_parameters[v.name] for k, v in enumerate(variables) if v.name in slave.usual_parameters}
+    of_wind = {v.name: k for k, v in enumerate(variables) if v.name.startswith("wind.")}
+    for each in (at_once, one_by_one):
+        each.begin()
+        for lane in range(8):
+            each.put(lane, {**usual, of_wind["wind.frequency"]: 1.0 + lane % frequencies / 8})
+            each.put(lane, {of_wind["wind.amplitude.x"]: 0.1 * lane, of_wind["wind.amplitude.z"]: 0.3})
+        each.initialise(active, np.zeros(8))
+    h, k = 0.001, 0
+    for count in (1, 2, 7, 8, 9, 31, 32, 33, 80):
+        inputs = _random_values(rng, variables, "input", 0.5, 0.0)
+        for lane, each in itertools.product(range(8), (at_once, one_by_one)):
+            each.put(lane, inputs)
+        times, seen = np.array([h * i for i in range(k, k + count)]), list[list[bytes]]()
+
+        def between(seen: list[list[bytes]] = seen) -> bool:
+            seen.append(at_once.held())
+            return True
+
+        assert at_once.several(active, times, h, between) == count
+        k += count
+        for i, t in enumerate(times):
+            one_by_one.step(active, np.full(8, t), np.full(8, h))
+            assert one_by_one.held() == (seen[i] if i < count - 1 else at_once.held())
+    assert at_once.several(active, np.array([h * i for i in range(9)]), h, lambda: False) == 1
+
+
 def test_lanes_are_refused_by_name() -> None:
     with pytest.raises(PackagingError, match=r"lanes = 3: expected 1 or a power of two up to 64"):
         compiled_lanes({"lanes.c": b""}, 3)
@@ -219,8 +255,8 @@ def test_the_straight_line_is_tried_again_after_other_runs_have_left_it(tmp_path
     (period,) = (k for k, variable in enumerate(variables) if variable.name == "sample_period")
     every, h = np.ones(together.count, np.bool_), np.full(together.count, 0.01)
     left = []
+    together.begin()
     for periods, count in (((0.05, 0.0), 300), ((0.0, 0.0), 20_000)):
-        together.begin()
         for lane in range(together.count):
             together.put(lane, {period: periods[lane % 2]})
         together.initialise(every, 0.0 * h)

@@ -65,18 +65,28 @@ static void set(Loop *l, Channel *c, Lanes lanes, const double *value, const Ins
 
 typedef void Step(double *, const uint64_t *, const double *, const double *, int32_t *, const bool *);
 
-static void step(Loop *l, int64_t index, Lanes lanes, q_real begin, q_real length, int64_t until, const Instant *now) {
-    const Component *c = &l->components[index];
+static Lanes failed_in_step(Loop *l, const Component *c, Lanes lanes, q_real begin, q_real length) {
     q_bits active = bits_of(lanes);
     int32_t any = 0;
     ((Step *)c->step)(
         c->memory, (const uint64_t *)&active, (const double *)&begin, (const double *)&length, l->status, c->wanted);
     for (int lane = 0; lane < L; lane++) any |= l->status[lane];
-    if (!any) return;
+    if (!any) return 0;
     Lanes failed = 0;
     EACH(lane, lanes) failed |= (Lanes)(l->status[lane] != 0) << lane;
     memset(l->status, 0, L * sizeof *l->status);
-    end_some(l, failed, FAILED, index, now);
+    return failed;
+}
+
+static void step_from_put_off(Loop *l, Track *track, int64_t index, Lanes lanes, const Instant *now);
+
+static void step(Loop *l, int64_t index, Lanes lanes, q_real begin, q_real length, int64_t until, const Instant *now) {
+    if (l->tracks->put_off && index == l->continuous.items[0]) {
+        step_from_put_off(l, l->tracks, index, lanes, now);
+        return;
+    }
+    Lanes failed = failed_in_step(l, &l->components[index], lanes, begin, length);
+    if (failed) end_some(l, failed, FAILED, index, now);
 }
 
 /* End the lanes in which a connected output is not finite. */
@@ -155,12 +165,45 @@ static int64_t next_more(const Span *span) {
     return time;
 }
 
+enum { MOST_PUT_OFF = 127 }; /* steps in one call, less one */
+
+/* Whether at a regular instant nothing but a step of the one component in continuous time happens. */
+static int only_steps(const Track *track, int64_t at) {
+    const Instants *regular = &track->span.regular;
+    return at < regular->count && regular->times[at] < track->more && regular->stepped[at];
+}
+
+/* Whether the next instant of a track is this time, and the one component is stepped to it. */
+static int is_stepped_to(const Track *track, int64_t time) {
+    const Instants *regular = &track->span.regular, *own = &track->span.own;
+    return next_time(&track->span) == time &&
+           ((time_in(regular) == time && regular->stepped[regular->at]) || (time_in(own) == time && own->stepped[own->at]));
+}
+
+static int puts_off(const Loop *l) {
+    return l->track_count == 1 && l->stays && l->components[l->continuous.items[0]].steps;
+}
+
+/* Put off instants at which nothing but steps of one length happen, until the step to the instant that follows them: the
+   component then does all of these in one call. */
+static void put_off(const Loop *l, Track *track) {
+    Instants *regular = &track->span.regular;
+    int64_t from = regular->at, before = track->now[l->continuous.items[0]], length = regular->times[from] - before;
+    for (; only_steps(track, regular->at) && regular->at - from < MOST_PUT_OFF; regular->at++) {
+        if (regular->times[regular->at] - before != length) break;
+        before = regular->times[regular->at];
+    }
+    regular->at -= !is_stepped_to(track, before + length); /* that follows them: it is the last of them */
+    track->put_off = regular->at - from, track->put_off_from = from, track->put_off_length = length;
+}
+
 /* Put the next instant of a track's span into its schedule, if there is one. */
 static void advance(Loop *l, Track *track) {
     Span *s = &track->span;
     Instants *regular = &s->regular, *own = &s->own;
     int64_t count = l->continuous.count, one_moves = count == 1 && !l->some_by_themselves, moving = 0;
-    if (time_in(regular) < track->more && one_moves && regular->stepped[regular->at]) { /* the usual case */
+    if (one_moves && puts_off(l) && only_steps(track, regular->at)) put_off(l, track);
+    if (one_moves && only_steps(track, regular->at)) { /* the usual case */
         track->times[0] = time_in(regular), track->source_row = regular->at++, track->kind = 0, track->count = 1;
         return;
     }
@@ -250,6 +293,67 @@ static void only_step(Loop *l, Instant *now, Lanes tracks) {
     Lanes moved = move(l, index, now->lanes, begin, length, until, now);
     if (moved & l->alive) look(l, moved & l->alive, now);
     if (l->settles) hold(l, index, now->lanes & l->alive, now);
+}
+
+typedef struct { /* instants that were put off, of which `now` is the next */
+    Loop *l;
+    Track *track;
+    int64_t index, last; /* of the component, and of the last regular instant of these */
+    Lanes lanes;
+    Instant now;
+} PutOff;
+
+static void reach_put_off(PutOff *off, int64_t row) {
+    off->track->source_row = row;
+    off->now.lanes = 0;
+    reach_time(&off->now, off->lanes, off->track->span.regular.times[row]);
+}
+
+/* Process such an instant after the step to it, and reach the next: whether all its runs go on. */
+static int pass_put_off(void *put_off) {
+    PutOff *off = put_off;
+    Loop *l = off->l;
+    const Lanes lanes = off->lanes;
+    take_sources(l, &off->now);
+    count_steps(l, lanes);
+    read_outputs(l, off->index, lanes, &off->now);
+    if (lanes & l->alive) look(l, lanes & l->alive, &off->now);
+    off->lanes = lanes & l->alive;
+    if (off->lanes && !next_row(l, &off->now, mask_of(off->lanes))) l->no_memory = 1;
+    if (l->record_limit) record(l, &off->now, off->lanes);
+    if (off->track->source_row < off->last) reach_put_off(off, off->track->source_row + 1);
+    return off->lanes == lanes && !l->no_memory;
+}
+
+typedef int64_t
+Steps(double *, const uint64_t *, const double *, double, int64_t, const bool *, int (*)(void *), void *);
+
+/* Step to the instants that were put off, and to the present one. */
+static void step_from_put_off(Loop *l, Track *track, int64_t index, Lanes lanes, const Instant *present) {
+    const Component *c = &l->components[index];
+    const int64_t from = track->put_off_from, count = track->put_off + 1, source_row = track->source_row;
+    const int64_t length = track->put_off_length, before = track->span.regular.times[from] - length;
+    double times[MOST_PUT_OFF + 1 + L];
+    for (int64_t i = 0; i < count; i++) times[i] = (double)(before + i * length) / NANOSECONDS;
+    for (int64_t i = count; i < count + L; i++) times[i] = times[count - 1];
+    PutOff off;
+    off.l = l, off.track = track, off.index = index, off.last = from + count - 2, off.lanes = lanes;
+    off.now.tracks = present->tracks, off.now.marks = present->marks, off.now.still = 1;
+    reach_put_off(&off, from);
+    for (int64_t i = 0; i < count && off.lanes && !l->no_memory;) {
+        const q_bits active = bits_of(off.lanes);
+        const double of_each = (double)length / NANOSECONDS;
+        const int64_t done = ((Steps *)c->steps)(
+            c->memory, (const uint64_t *)&active, times + i, of_each, count - i, c->wanted, pass_put_off, &off);
+        i += done;
+        if (done) continue;
+        Lanes failed = failed_in_step(l, c, off.lanes, q_all(times[i]), q_all(of_each));
+        const int is_present = ++i == count;
+        if (failed) end_some(l, failed, FAILED, index, is_present ? present : &off.now);
+        if ((off.lanes &= l->alive) && !is_present) pass_put_off(&off);
+    }
+    track->put_off = 0, track->source_row = source_row;
+    take_sources(l, present);
 }
 
 /* Write such a step as a schedule, for tracks that are processed together with others in which more happens. */

@@ -44,10 +44,11 @@ class BatchStructures(SystemStructures):
 
     def _component(self, index: int) -> Any:
         shape, arrays, c, name = self._shape, self._arrays, self.types, self._shape.names[index]
+        kernel = shape.kernels[name]
         changing = shape.fed[name] if shape.given_count else []
         fed = self.table(c.Fed, (c.Fed(source=source, place=place) for source, place in changing))
         return self.component(
-            index, step=shape.kernels[name].step, memory=address(arrays.memories[index]),
+            index, step=kernel.step, steps=kernel.steps, memory=address(arrays.memories[index]),
             places=self.address(shape.connected[name]), connected=len(shape.connected[name]),
             wanted=address(arrays.wanted[index]), ratio=address(arrays.ratios[index]),
             fed=ctypes.addressof(fed), fed_count=len(fed),

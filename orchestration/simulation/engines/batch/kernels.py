@@ -33,9 +33,9 @@ def preferred_lanes() -> int:
         raise QuadcosimError(str(error)) from error
 
 
-def component(name: str, model: Model, lanes: int) -> Lanes:
-    """A component in lanes; raises as `sources_of`."""
-    return _compiled(tuple(sorted(sources_of(name, model).items())), lanes)
+def component(name: str, model: Model, lanes: int, *, several: bool) -> Lanes:
+    """A component in lanes, which can do `several` steps at once; raises as `sources_of`."""
+    return _compiled(tuple(sorted(sources_of(name, model).items())), lanes, several)
 
 
 def sources_of(name: str, model: Model) -> Mapping[str, bytes]:
@@ -57,9 +57,10 @@ def _sources_in(path: Path, changed: int) -> Mapping[str, bytes]:
 
 
 @functools.lru_cache(maxsize=64)
-def _compiled(sources: tuple[tuple[str, bytes], ...], lanes: int) -> Lanes:
-    key = (OPTIONS, FOR_THIS_PROCESSOR, lanes)
-    return Lanes(_cached_library("lanes", dict(sources), key, lambda: compiled_lanes(dict(sources), lanes)))
+def _compiled(sources: tuple[tuple[str, bytes], ...], lanes: int, several: bool) -> Lanes:
+    key = (OPTIONS, FOR_THIS_PROCESSOR, lanes, several)
+    compile_ = functools.partial(compiled_lanes, dict(sources), lanes, several=several)
+    return Lanes(_cached_library("lanes", dict(sources), key, compile_))
 
 
 @functools.lru_cache(maxsize=256)

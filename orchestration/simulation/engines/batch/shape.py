@@ -88,7 +88,11 @@ class Shape:
     @cached_property
     def kernels(self) -> Mapping[str, Lanes]:
         """The kernel of each component; raises `UsageError` naming one that has none."""
-        return {name: component(name, model, self.lanes) for name, model in self.models.items()}
+        components = self.system.components
+        return {
+            name: component(name, model, self.lanes, several=components[name].sampling is None)
+            for name, model in self.models.items()
+        }
 
     @cached_property
     def waits(self) -> Set[str]:

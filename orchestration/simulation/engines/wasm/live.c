@@ -11,16 +11,14 @@ typedef void DoStep(double *, const uint64_t *, const double *, const double *, 
     DoStep c##_do_step; \
     void c##_begin(double *); \
     int c##_places(void); \
-    void c##_forget(void); \
     void c##_initialise(double *, const uint64_t *, const double *, int32_t *);
-#define COMPONENT(c) c##_do_step, c##_begin, c##_initialise, c##_places, c##_forget
+#define COMPONENT(c) c##_do_step, c##_begin, c##_initialise, c##_places
 
 typedef struct {
     DoStep *step;
     void (*begin)(double *);
     void (*initialise)(double *, const uint64_t *, const double *, int32_t *);
     int (*places)(void);
-    void (*forget)(void);
     const int64_t *outputs;
     int64_t connected, variables;
     List held, ahead, behind;
@@ -445,7 +443,6 @@ static int fly_once(int count, const double *inner) {
 EXPORT int fly(int count, int records) {
     refusal = (Refusal){0, -1};
     loop.record_limit = 0;
-    for (int i = 0; i < COMPONENTS; i++) component_table[i].forget();
     for (int lane = 0; lane < count; lane++)
         if (!set_out(lane, records)) return 0;
     for (int turn = 0; turn < PASSES; turn++) {

@@ -6,6 +6,7 @@ from pathlib import Path
 from fmu_kit import libraries
 from fmu_kit.bundle import PackagingError
 from fmu_kit.compiler.pack.c_compiler import FOR_THIS_PROCESSOR, Unit, linked_for_wasm, linked_here
+from fmu_kit.compiler.pack.lanes import MAIN
 from fmu_kit.compiler.runtime import FOLDER
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.simulation.engines.batch.kernels import FILES, sources_of
@@ -14,13 +15,7 @@ from orchestration.simulation.engines.wasm.tables_of_system import SystemTables
 from orchestration.systems.schedule.compiled_timetable import FILES as TIMETABLE
 
 _HERE = Path(__file__).parent
-_FORGETFUL = b"""#include "lanes.c"
-
-/* Forget how often the straight line was left: a page flies one system after another. */
-EXPORT void quadcosim_forget(void);
-void quadcosim_forget(void) { memset(&line, 0, sizeof line); }
-"""
-_OF_COMPONENTS = ("lanes", "places", "variables", "divergence", "begin", "initialise", "do_step", "line", "forget")
+_OF_COMPONENTS = ("lanes", "places", "variables", "divergence", "begin", "initialise", "do_step", "line")
 
 
 def units_of(tables: SystemTables, lanes: int) -> list[Unit]:
@@ -46,9 +41,8 @@ def units_of(tables: SystemTables, lanes: int) -> list[Unit]:
 
 def _component(i: int, shape: Shape, defined: tuple[str, ...]) -> Unit:
     name = shape.names[i]
-    sources = {**sources_of(name, shape.models[name]), "forgetful.c": _FORGETFUL}
     renamed = tuple(f"-Dquadcosim_{each}=c{i}_{each}" for each in _OF_COMPONENTS)
-    return Unit(sources=sources, main="forgetful.c", options=(*defined, *renamed))
+    return Unit(sources=sources_of(name, shape.models[name]), main=MAIN, options=(*defined, *renamed))
 
 
 def module_of(tables: SystemTables, lanes: int) -> bytes:
