@@ -32,19 +32,58 @@ Kind = tuple[str, ...]
 """The values, as JSON, of the axes that make a kind of run"""
 
 
-@dataclass(frozen=True, kw_only=True)
 class Block:
-    """Some runs by column."""
+    """Some runs by column; what is not asked for is not computed."""
 
-    indices: Integers
-    settings: Sequence[str]
-    """the value of each axis, as JSON"""
-    kinds: Mapping[Kind, Sequence[int]]
-    """the places of the runs of each kind"""
-    parameters: Mapping[str, Floats]
-    """those that kinds leave open, as COMPONENT.NAME"""
-    seeds: Sequence[int] | None
-    """None: those of their kinds"""
+    def __init__(self, columns: "RunColumns", indices: Integers) -> None:
+        self._columns, self.indices = columns, indices
+        self._values = columns.study.points.columns(indices)
+
+    @cached_property
+    def settings(self) -> Sequence[str]:
+        """The value of each axis, as JSON."""
+        return [f"{{{', '.join(row)}}}" for row in zip(*(self._named(name) for name in self._values))]
+
+    @cached_property
+    def kinds(self) -> Mapping[Kind, Sequence[int]]:
+        """The places of the runs of each kind."""
+        fixed = [self._texts[name] for name in self._columns.fixed]
+        if not fixed:
+            return {(): range(len(self.indices))}
+        kinds: dict[Kind, list[int]] = {}
+        for place, kind in enumerate(zip(*fixed)):
+            kinds.setdefault(kind, []).append(place)
+        return kinds
+
+    @cached_property
+    def parameters(self) -> Mapping[str, Floats]:
+        """Those that kinds leave open, as COMPONENT.NAME."""
+        return {
+            name: np.array(self._values[axis], dtype=np.float64) * (1.0 if factor is None else factor)
+            for axis, path, factor in self._columns.open
+            if (name := parameter_name(path)) is not None
+        }
+
+    @cached_property
+    def seeds(self) -> Sequence[int] | None:
+        """None: those of their kinds."""
+        study = self._columns.study
+        axes = [axis for axis, path, _ in self._columns.open if path == _SEED]
+        if axes:
+            return [int(seed) for seed in self._values[axes[0]]]
+        if not study.vary_seed or self._columns.seed_is_fixed or _SEED in self._values:
+            return None
+        begin, rows = f"[{study.origin.seed}, {{", zip(*(self._named(name) for name in sorted(self._values)))
+        contents = (f"{begin}{', '.join(row)}}}]".encode() for row in rows)  # as a study has them for single runs
+        return [int.from_bytes(hashlib.sha256(content).digest()[:6], "big") for content in contents]
+
+    @cached_property
+    def _texts(self) -> Mapping[str, Sequence[str]]:
+        return {name: [*map(_json, values)] for name, values in self._values.items()}
+
+    def _named(self, name: str) -> Sequence[str]:
+        begin = f"{json.dumps(name)}: "
+        return [begin + text for text in self._texts[name]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,9 +100,13 @@ class RunColumns:
     def __init__(self, study: Study, files: Files) -> None:
         self.study, self.files = study, files
         self.starts = files.start_values_of(study.origin)
-        self._factors = {axis.name: self._open(axis) for axis in study.axes}
-        self._fixed = [name for name, factors in self._factors.items() if factors is None]
+        factors = {axis.name: self._open(axis) for axis in study.axes}
+        self.fixed = [name for name, paths in factors.items() if paths is None]
         """axes that make kinds"""
+        self.open = [(axis, path, factor) for axis, paths in factors.items() for path, factor in (paths or {}).items()]
+        """other axes, what they set, and the factors of those that multiply"""
+        targets = (target for axis in study.axes if axis.name in self.fixed for target in axis.targets)
+        self.seed_is_fixed = _SEED in study.paths_of(targets)
         self._kinds: dict[Kind, _Made] = {}
 
     def blocks(self) -> Iterator[Block]:
@@ -74,26 +117,7 @@ class RunColumns:
 
     def block(self, indices: Integers) -> Block:
         """Some runs."""
-        columns = self.study.points.columns(indices)
-        texts = {name: [*map(_json, values)] for name, values in columns.items()}
-        kinds: dict[Kind, list[int]] = {}
-        fixed = [texts[name] for name in self._fixed]
-        for place, kind in enumerate(zip(*fixed) if fixed else [()] * len(indices)):
-            kinds.setdefault(kind, []).append(place)
-        parameters: dict[str, Floats] = {}
-        seeds = self._own_seeds(texts) if self.study.vary_seed and _SEED not in columns else None
-        for axis, factors in self._factors.items():
-            for path, factor in (factors or {}).items():
-                name, numbers = parameter_name(path), columns[axis]
-                if name is None:
-                    seeds = [int(seed) for seed in numbers]
-                else:
-                    parameters[name] = np.array(numbers, dtype=np.float64) * (1.0 if factor is None else factor)
-        if _SEED in self._paths_of_fixed:
-            seeds = None
-        rows = zip(*([f"{json.dumps(name)}: {text}" for text in column] for name, column in texts.items()))
-        settings = [f"{{{', '.join(row)}}}" for row in rows]
-        return Block(indices=indices, settings=settings, kinds=kinds, parameters=parameters, seeds=seeds)
+        return Block(self, indices)
 
     def refused(self, block: Block) -> Booleans:
         """The runs of which an open parameter is one that its FMU does not allow."""
@@ -139,17 +163,11 @@ class RunColumns:
             if len(self._kinds) == MOST_KINDS:
                 self._kinds.clear()
             system = self.study.system(index, self.starts)
-            paths = (path for factors in self._factors.values() for path in factors or ())
-            names = [name for path in paths if (name := parameter_name(path)) is not None]
+            names = [name for _, path, _ in self.open if (name := parameter_name(path)) is not None]
             self._kinds[kind] = _Made(system=system, key=KeyText(system, self.files, self.study.metrics, names))
         return self._kinds[kind]
 
     # -- which axes leave values open ------------------------------------------------------------------------------
-
-    @cached_property
-    def _paths_of_fixed(self) -> set[str]:
-        axes = [axis for axis in self.study.axes if self._factors[axis.name] is None]
-        return {path for axis in axes for path in self.study.paths_of(axis.targets)}
 
     def _open(self, axis: Axis) -> Mapping[str, float | None] | None:
         """The paths that an axis sets in runs of one kind, with factors if it multiplies; None: it makes kinds."""
@@ -176,13 +194,6 @@ class RunColumns:
 
     def _is_open(self, path: str) -> bool:
         return path == _SEED or parameter_name(path) in self.starts
-
-    def _own_seeds(self, texts: Mapping[str, Sequence[str]]) -> list[int]:
-        """Seeds as a study has them for single runs."""
-        columns = ([f"{json.dumps(name)}: {text}" for text in texts[name]] for name in sorted(texts))
-        begin = f"[{self.study.origin.seed}, {{"
-        contents = (f"{begin}{', '.join(row)}}}]" for row in zip(*columns))
-        return [int.from_bytes(hashlib.sha256(text.encode()).digest()[:6], "big") for text in contents]
 
 
 def _json(value: Value) -> str:

@@ -239,11 +239,20 @@ def _fits(value: Any, kind: Any) -> bool:
     return _items_fit(value, origin, arguments)
 
 
+@functools.cache
+def _plain_types(kind: Any) -> Set[type]:
+    """Types of plain data of which each value fits an annotation."""
+    alternatives = typing.get_args(kind) if typing.get_origin(kind) in (typing.Union, types.UnionType) else (kind,)
+    found = {one for one in (str, bool, int, float) if one in alternatives}
+    return found | ({type(None)} if {None, type(None)} & {*alternatives} else set())
+
+
 def _items_fit(value: Any, origin: type, arguments: tuple[Any, ...]) -> bool:
     if issubclass(origin, tuple) and arguments[-1:] != (Ellipsis,):
         return len(value) == len(arguments) and all(map(_fits, value, arguments))
     if issubclass(origin, Mapping):
         return all(_fits(name, arguments[0]) and _fits(item, arguments[1]) for name, item in value.items())
     if issubclass(origin, Sequence | Set):
-        return arguments[0] is Any or all(_fits(item, arguments[0]) for item in value)
+        kind = arguments[0]
+        return kind is Any or {*map(type, value)} <= _plain_types(kind) or all(_fits(item, kind) for item in value)
     return True  # an array, whose numbers are of any type

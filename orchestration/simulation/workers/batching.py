@@ -36,13 +36,15 @@ def chunks(batches: Iterable[TaskBatch], total: int, workers: int) -> Iterator[T
     """Batches in chunks, several for each worker, each of runs that are alike."""
     size = max(preferred_lanes(), min(CHUNK, total // (4 * workers) // preferred_lanes() * preferred_lanes()))
     for batch in batches:
-        keys = [(outline(system), schedule_key(system)) for system in batch.systems]
-        alike, same = dict[Any, int](), dict[Any, int]()
-        order = []
+        alike, same, order = dict[Any, int](), dict[Any, int](), []
+        timings = [schedule_key(system) for system in batch.systems]
+        kinds = [
+            alike.setdefault((outline(system), timing.regular), len(alike))
+            for system, timing in zip(batch.systems, timings)
+        ]
         for run, (place, seed) in enumerate(zip(batch.places, batch.seed)):
-            shape, timing = keys[place]
-            first = alike.setdefault((shape, timing.regular), len(alike))
-            order.append((first, same.setdefault((first, timing.with_seed(seed).drawn), len(same)), run))
+            drawn = None if timings[place].drawn is None else seed
+            order.append((kinds[place], same.setdefault((kinds[place], drawn), len(same)), run))
         ordered = [run for *_, run in sorted(order)]
         for begin in range(0, len(ordered), size):
             yield batch.some(ordered[begin : begin + size])
