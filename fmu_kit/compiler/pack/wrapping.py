@@ -76,7 +76,7 @@ def build(code: UserCode, out: Path, version: int = 2, systems: Sequence[str] = 
         raise PackagingError("wrap: expected Linux on x86-64 or ARM; it uses sections of ELF")
     with temporary_folder() as folder:
         user = folder / f"user_code{'.cpp' if code.is_cxx else '.c'}"
-        user.write_text(user_code(code), encoding="utf-8")
+        (folder / user.name).write_text(user_code(code), encoding="utf-8")
         objects = build_objects(code, user, folder)
         for name, text in _probe(code, objects).items():
             (folder / name).write_text(text, encoding="utf-8")

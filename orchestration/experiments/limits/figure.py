@@ -21,7 +21,7 @@ from orchestration.simulation.results import quantities
 from orchestration.simulation.results.quantities import Quantity
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.request import Request, system_of
-from orchestration.theory.stability.known_loops import LOOPS, KnownLoop
+from orchestration.theory.stability.known_loops import LOOPS
 
 DIGITS = 4
 """Digits of values in text"""
@@ -147,13 +147,12 @@ def draw_spectral_radius(request: Request, result: Limit, folder: Path, style: S
 
     Raises `UsageError` where linear theory does not apply, and `LostError` as `isolated_call` does.
     """
-    known = LOOPS.of(request.kind)
-    if known is None:
+    if LOOPS.of(request.kind) is None:
         return []
     ends = [limit for limit in (result.local_limit, result.large_signal_limit) if limit is not None]
     last = 1.3 * max(ends, default=0.1)
     values = np.array([0.001 + i / 199.0 * (last - 0.001) for i in range(200)])
-    radii = isolated_call(files_of(system_of(request)).fmus.values(), _radii, known, request, result.of, values)
+    radii = isolated_call(files_of(system_of(request)).fmus.values(), _radii, request, result.of, values)
     if radii is None:
         return []
     path = folder / f"spectral_radius_{result.of}"
@@ -181,7 +180,8 @@ def spectral_radius(result: Limit, values: Floats, radii: Floats, style: Style =
     return figure
 
 
-def _radii(known: KnownLoop, request: Request, of: str, values: Floats) -> Floats | None:
+def _radii(request: Request, of: str, values: Floats) -> Floats | None:
     """The spectral radius at each value; None if the loop is not known as a function of the quantity."""
-    radius = known.radius_over(request, of)
+    known = LOOPS.of(request.kind)
+    radius = None if known is None else known.radius_over(request, of)
     return None if radius is None else np.array([radius(value) for value in values])

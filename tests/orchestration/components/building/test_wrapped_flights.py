@@ -1,0 +1,152 @@
+"""Controllers in C fly as any other: limits, lanes, exported laws wrapped again, and what `new --c` writes."""
+
+import contextlib
+import json
+import re
+import sqlite3
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fmu_kit.bundle import Target
+from orchestration.components.building import builder
+from orchestration.components.building.models import CONTROLLERS, MODELS
+from orchestration.components.scaffold.folder import write
+from orchestration.experiments.studies.sweep import sweep
+from orchestration.simulation.runs.simulation import run
+from quadcosim import FmuChoice, Scenario, changed, load_study, load_system
+from tests.commands import Main
+from tests.orchestration.components.building.test_wrap import PD, PD_C, PD_H
+from tests.places import ROOT
+
+EXAMPLE = ROOT / "examples" / "double_integrator"
+
+
+@pytest.fixture(scope="module")
+def integrator(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The system file of the double integrator under a PD in C."""
+    folder = tmp_path_factory.mktemp("integrator")
+    text = (EXAMPLE / "system.toml").read_text().replace("StateFeedback.fmu", "pd.toml")
+    files = {"pd.c": PD_C, "pd.h": PD_H, "pd.toml": PD, "system.toml": text}
+    for name, content in {**files, "plant.py": (EXAMPLE / "plant.py").read_text()}.items():
+        (folder / name).write_text(content)
+    return folder / "system.toml"
+
+
+def test_its_local_limit_on_the_double_integrator_is_that_of_the_law(integrator: Path, main: Main) -> None:
+    period = "components.controller.sampling.period"
+    asked = ("--of", period, "--from", "1.9", "--to", "2.1", "--scan", "0.1", "--json", "--build")
+    found = main("limit", integrator, *asked, "--out", integrator.parent / "limit")
+    assert json.loads(found.stdout)["local_limit"] == pytest.approx(2.0, abs=1e-3)
+    assert "its code believes 0.05 s; at other periods this is the limit of that code" in found.stdout
+
+
+def test_a_run_at_another_period_warns_and_at_its_own_does_not(integrator: Path) -> None:
+    system = load_system(integrator)
+    assert run(changed(system, {"stop_time": 1.0})).warnings == ()
+    slow = changed(system, {"stop_time": 1.0, "components.controller.sampling.period": 0.2})
+    assert run(slow).warnings == (
+        "controller (Pd): is sampled every 0.2 s, but its code believes 0.05 s: what it computes of time is wrong by "
+        "that ratio",
+    )
+
+
+def bits(path: Path) -> list[tuple[Any, ...]]:
+    """What is stored of each run, but for how long it took and by which engine."""
+    with contextlib.closing(sqlite3.connect(path)) as store:
+        columns = "middle, late, outcome, divergence_time, steps"
+        return store.execute(f"SELECT {columns} FROM runs ORDER BY 1, 2, 3, 4").fetchall()
+
+
+def test_in_lanes_it_has_the_bits_of_its_runs_one_by_one(integrator: Path) -> None:
+    folder = integrator.parent
+    (folder / "study.toml").write_text("""
+scenario = "system.toml"
+[[axes]]
+name = "T"
+sets = ["components.controller.sampling.period"]
+values = [0.05, 0.3, 1.9, 2.1]
+[[axes]]
+name = "k"
+sets = ["components.controller.parameters.k_p"]
+values = [0.5, 1.0, 1.5]
+""")
+    study = load_study(folder / "study.toml")
+    lanes = sweep(study, folder=folder / "lanes", engine="batch")
+    singly = sweep(study, folder=folder / "singly", engine="compiled")
+    assert (lanes.engine, singly.engine, lanes.failed) == ("batch", "compiled", 0)
+    assert bits(lanes.path) == bits(singly.path)
+
+
+def wrapped_export(name: str, folder: Path) -> Path:
+    """A law that `export-c` has written, wrapped again: its variables are those that its header names."""
+    builder.export_c([Target.parse(MODELS[name])], folder)
+    tables: dict[str, list[str]] = {"in": [], "out": [], "par": []}
+    table = None
+    for line in (folder / f"{name}.h").read_text().splitlines():
+        found = re.match(r" {8}double (\w+); +/\* ([\w.]+)(?: \[(.*?)\])?:", line)
+        if found and table is None:
+            table = "in"
+        if found and table in tables:
+            unit = f', unit = "{found[3]}"' if found[3] else ""
+            tables[table].append(f'"{found[2]}" = {{ c = "law.{table}.{found[1]}"{unit} }}')
+        if closed := re.match(r"    } (\w+);", line):
+            table = {"in": "out", "out": "par", "par": "local"}.get(closed[1], "local")
+    lines = [
+        f'name = "Wrapped{name}"',
+        "period = 0.01",
+        f'sources = ["{name}.c"]',
+        f'headers = ["{name}.h"]',
+        'include = ["."]',
+        f'declare = "static {name} law; static long long tick;"',
+        f'init = "{name}_init(&law);"',
+        f'after_parameters = "{name}_start(&law, 0.0);"',
+        f'step = "{name}_step(&law, (double)(10000000 * tick) / 1e9, 0.01); tick++;"',
+    ]
+    for key, own in (("inputs", "in"), ("outputs", "out"), ("parameters", "par")):
+        lines += [f"[{key}]", *tables[own]]
+    (folder / f"{name}.toml").write_text("\n".join(lines))
+    return folder / f"{name}.toml"
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_a_law_exported_to_c_and_wrapped_again_flies_the_same_bits(name: str, tmp_path: Path) -> None:
+    flight = Scenario(stop_time=0.5, plant=FmuChoice(fmu="native/QuadrotorPlant"))
+    one = run(flight.with_changes(controller=FmuChoice(fmu=f"native/{name}")))
+    other = run(flight.with_changes(controller=FmuChoice(fmu=str(wrapped_export(name, tmp_path)))))
+    exchanged = [column for column in one.columns if column.startswith("plant.") or column == "time"]
+    assert len(exchanged) > 15
+    differing = [  # before its first step it has what start leaves
+        name for name in exchanged if one.signals[name][1:].tobytes() != other.signals[name][1:].tobytes()
+    ]
+    assert differing == []
+    assert np.ptp(one.signals["plant.position.x"]) > 0.01
+
+
+def test_a_crash_in_the_c_is_one_line_with_its_signal(integrator: Path, main: Main) -> None:
+    file = integrator.parent / "pd.toml"
+    step = "static int n; if (n++ == 3) *(volatile int *)0 = 1; pd_step(&in, &out);"
+    (integrator.parent / "bad.toml").write_text(
+        file.read_text().replace("pd_step(&in, &out);", step).replace('"Pd"', '"Bad"')
+    )
+    text = integrator.read_text().replace("pd.toml", "bad.toml")
+    (integrator.parent / "bad_system.toml").write_text(text)
+    done = main("run", integrator.parent / "bad_system.toml", "--build", code=1)
+    (line,) = [line for line in done.stderr.splitlines() if line.startswith("quadcosim:")]
+    assert "SIGSEGV" in line
+
+
+def test_what_new_writes_in_c_passes_its_tests_and_flies_a_vehicle(tmp_path: Path) -> None:
+    write("controller", "hover_c", tmp_path, author='A "quoted" name', license="MIT", in_c=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "hover_c"],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    mine = FmuChoice(fmu=str(tmp_path / "hover_c" / "hover_c.toml"))
+    result = run(Scenario(stop_time=0.3, controller=mine, plant=FmuChoice(fmu="native/QuadrotorPlant")))
+    assert not result.metrics["diverged"]
