@@ -98,9 +98,9 @@ def _summary(shape: Any) -> str:
 
 
 def _default(field: Any) -> str:
-    if field.is_required():
+    if field.is_required:
         return "must be there"
-    value = field.get_default(call_default_factory=True)
+    value = field.default
     if value is None or value in ({}, [], ()) or fields_of(value):
         return ""
     if isinstance(value, (list, tuple)):

@@ -28,6 +28,7 @@ from orchestration.command import (
     wrap,
 )
 from orchestration.command.options import option
+from orchestration.command.plain_values import TakesPlainValues
 from orchestration.command.registry import OutputOptions, ask, option_group
 from orchestration.components.building import consent
 from orchestration.foundation.basics.errors import (
@@ -51,7 +52,7 @@ class _OutputClosed(Exception):
     """The reader of standard output has closed it."""
 
 
-class _Commands(typer.core.TyperGroup):
+class _Commands(TakesPlainValues, typer.core.TyperGroup):
     def invoke(self, ctx: Any) -> Any:
         try:
             return super().invoke(ctx)

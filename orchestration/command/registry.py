@@ -14,6 +14,7 @@ from typing import Annotated, Any
 import typer
 
 from orchestration.command.options import option
+from orchestration.command.plain_values import PlainCommand
 from orchestration.foundation.basics import terminal
 from orchestration.foundation.basics.documents import plain
 from orchestration.foundation.basics.errors import UsageError
@@ -115,7 +116,7 @@ def set_output_options(options: OutputOptions, *, anew: bool = False) -> None:
 def add(app: typer.Typer, group: str, *commands: Callable[..., CommandResult]) -> None:
     """Add commands to the command line, in a group of its help."""
     for command in commands:
-        app.command(rich_help_panel=group)(_printing(command))
+        app.command(cls=PlainCommand, rich_help_panel=group)(_printing(command))
 
 
 def _printing(command: Callable[..., CommandResult]) -> Callable[..., None]:

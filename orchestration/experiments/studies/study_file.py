@@ -120,7 +120,7 @@ def _study(file: StudyFile, path: Path) -> Study:
         name=file.name or path.stem,
         base=base,
         axes=tuple(axis_of(table, path.parent) for table in file.axes),
-        **file.design.model_dump(),
+        **file.design.as_dict(),
         keep_signals=file.keep_signals if isinstance(file.keep_signals, bool) else tuple(file.keep_signals),
     )
     if not study.points:

@@ -72,7 +72,7 @@ def _tuning(file: TuningFile, path: Path) -> Tuning | ExactTuning:
         if axis.values is not None or axis.multiplies:
             raise UsageError(f"parameters {axis.name}: expected start and stop, and what it sets")
     common: dict[str, Any] = {
-        "name": file.name or path.stem, "parameters": parameters, "cost": file.cost.cost, **file.search.model_dump()
+        "name": file.name or path.stem, "parameters": parameters, "cost": file.cost.cost, **file.search.as_dict()
     }  # fmt: skip
     if file.cost.by == "expect":
         for key, present in (("cost.bad", file.cost.bad is not None), ("starts", file.starts is not None)):
@@ -82,7 +82,7 @@ def _tuning(file: TuningFile, path: Path) -> Tuning | ExactTuning:
     if file.cost.bad is None:
         raise UsageError("cost.bad: expected a value")
     starts = file.starts or StartsTable()
-    ensemble = Starts(**starts.model_dump(exclude={"judged"}))
+    ensemble = Starts(**starts.as_dict(without=("judged",)))
     base = control_loop_of(file, path.parent)
     return Tuning(base=base, **common, bad=file.cost.bad, starts=ensemble, judged=starts.judged)
 

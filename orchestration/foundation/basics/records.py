@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 from typing_extensions import dataclass_transform
 
 from orchestration.foundation.basics.errors import UsageError, no_such_key, shown
+from orchestration.foundation.basics.fitting import Before, MisfitError, fitted, hints_of
 from orchestration.foundation.processes.passable import passable
 
 if TYPE_CHECKING:
@@ -24,11 +25,10 @@ Class = TypeVar("Class", bound=type)
 Record = TypeVar("Record")
 
 
-class _Scalar:
+class _Scalar(Before):
     """The schema of a scalar: NumPy's integers stay integers, and the most frequent type is tried first."""
 
-    @staticmethod
-    def __get_pydantic_core_schema__(_source: Any, _handler: Any) -> "CoreSchema":
+    def __get_pydantic_core_schema__(self, _source: Any, _handler: Any) -> "CoreSchema":
         from pydantic_core import core_schema
 
         truth, real, text = core_schema.bool_schema(), core_schema.float_schema(), core_schema.str_schema()
@@ -40,7 +40,7 @@ class _Scalar:
         )
 
 
-Scalar = Annotated[bool | int | float | str, _Scalar]
+Scalar = Annotated[bool | int | float | str, _Scalar(lambda value: value)]
 """The value of an FMU's parameter or of an axis"""
 
 _CONFIG: "pydantic.ConfigDict" = {"extra": "forbid", "strict": True, "arbitrary_types_allowed": True}
@@ -54,7 +54,7 @@ def record(place: str = "") -> Callable[[Class], Class]:
     and a path for text, and a NumPy number for one of Python's. Its `repr` shows the fields that differ from their
     defaults.
 
-    Pydantic is loaded by the first constructor call: processes that simulate receive their records by pickle.
+    Pydantic is loaded by the first value that does not fit as it is.
     """
 
     def declared(cls: Class) -> Class:
@@ -65,6 +65,8 @@ def record(place: str = "") -> Callable[[Class], Class]:
 
         @functools.wraps(record_class.__init__)
         def checked(self: Any, *args: Any, **kwargs: Any) -> None:
+            if not args and _fits(self, cls, kwargs):
+                return
             import pydantic
 
             try:
@@ -79,6 +81,7 @@ def record(place: str = "") -> Callable[[Class], Class]:
                     raise UsageError(_first_problem(error, place, kwargs)) from None
 
         record_class.__init__ = checked
+        record_class.of_table = classmethod(_of_table)
         result: Class = passable(record_class)
         return result
 
@@ -96,6 +99,33 @@ def validated(record: type) -> Any:
 def is_record(kind: Any) -> bool:
     """Whether it is a class made by `record`."""
     return isinstance(kind, type) and "__pydantic_config__" in vars(kind) and dataclasses.is_dataclass(kind)
+
+
+def _fits(record: Any, cls: type, values: Mapping[str, Any], *, from_file: bool = False) -> bool:
+    """Set the fields of a record to values that fit as they are; false if one does not, or is missing or unknown."""
+    try:
+        vars(record).update(_fitted_fields(cls, values, from_file))
+        if hasattr(cls, "__post_init__"):
+            record.__post_init__()
+    except (MisfitError, ValueError, AssertionError):
+        return False
+    return True
+
+
+def _fitted_fields(cls: Any, values: Mapping[str, Any], from_file: bool) -> dict[str, Any]:
+    fields, hints = {field.name: default_of(field) for field in dataclasses.fields(cls)}, hints_of(cls)
+    fields |= {name: fitted(value, hints.get(name), from_file=from_file) for name, value in values.items()}
+    if len(fields) > len(dataclasses.fields(cls)) or any(value is dataclasses.MISSING for value in fields.values()):
+        raise MisfitError
+    return fields
+
+
+def _of_table(cls: type, table: Mapping[str, Any]) -> Any:
+    """The record of a table of a file; raises `MisfitError`."""
+    made: Any = object.__new__(cls)
+    if not _fits(made, cls, table, from_file=True):
+        raise MisfitError
+    return made
 
 
 def _fill(record: Any, cls: type, args: Sequence[Any], kwargs: Mapping[str, Any]) -> None:
@@ -156,7 +186,7 @@ def _expect_names(cls: type, place: str, args: Sequence[Any], kwargs: Mapping[st
 
 
 def _holds_path(cls: Any, name: str) -> bool:
-    hint = validated(cls).__pydantic_fields__[name].annotation
+    hint = hints_of(cls)[name]
     return hint is Path or Path in typing.get_args(hint)
 
 

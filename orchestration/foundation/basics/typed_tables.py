@@ -1,38 +1,82 @@
 """Tables of files, typed like the records that they describe; the first wrong key or type is a one-line error."""
 
+import contextlib
+import copy
 import dataclasses
+import functools
+import inspect
 import json
 import types
 import typing
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, TypeVar
-
-import pydantic
+from collections.abc import Callable, Collection, Mapping, Sequence, Set
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from orchestration.foundation.basics.attribute_docs import attribute_docs
 from orchestration.foundation.basics.errors import UsageError, no_such_key, shown
-from orchestration.foundation.basics.records import default_of, is_record, validated
+from orchestration.foundation.basics.fitting import MisfitError, fitted, hints_of
+from orchestration.foundation.basics.records import default_of, is_record
 
+if TYPE_CHECKING:
+    import pydantic
+
+Made = TypeVar("Made")
 Shape = TypeVar("Shape")
 
 
-def _add_descriptions(schema: dict[str, Any], table: type["Table"]) -> None:
-    """Describe each key in a JSON schema by the docstring of its field."""
-    for key, text in docs_of_keys(table).items():
-        schema["properties"][key]["description"] = text
+@dataclass(frozen=True, kw_only=True)
+class Key:
+    """A key of a table of a file."""
+
+    annotation: Any
+    default: Any = dataclasses.MISSING
+    alias: str | None = None
+    """the key, where it differs from the field's name"""
+
+    @property
+    def is_required(self) -> bool:
+        """Whether a file must have it."""
+        return self.default is dataclasses.MISSING
 
 
-class Table(pydantic.BaseModel):
-    """A table of a file; unknown keys are refused."""
+class Table:
+    """A table of a file; its attributes are the values of its keys, given or by default."""
 
-    model_config = pydantic.ConfigDict(
-        extra="forbid",
-        strict=True,
-        frozen=True,
-        protected_namespaces=(),
-        json_schema_extra=_add_descriptions,
-    )
     declared_by: ClassVar[type]
+    given: Set[str]
+    """Names of the fields that the file has"""
+
+    def __init__(self, **values: Any) -> None:
+        defaults = {name: copy.copy(key.default) for name, key in _keys_of(type(self)).items()}
+        vars(self).update(defaults | values, given=frozenset(values))
+
+    def as_dict(self, *, without: Collection[str] = ()) -> dict[str, Any]:
+        """The values by the names of the fields."""
+        return {name: getattr(self, name) for name in _keys_of(type(self)) if name not in without}
+
+    @classmethod
+    def of_table(cls, table: Mapping[str, Any]) -> "Table":
+        """The table of a document; raises `MisfitError`."""
+        keys = _keys_of(cls)
+        names = {key.alias or name: name for name, key in keys.items()}
+        if not table.keys() <= names.keys():
+            raise MisfitError
+        given = {names[key]: fitted(value, keys[names[key]].annotation, from_file=True) for key, value in table.items()}
+        if any(key.is_required and name not in given for name, key in keys.items()):
+            raise MisfitError
+        return cls(**given)
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, _source: Any, handler: Any) -> Any:
+        from pydantic_core import core_schema
+
+        def table(model: "pydantic.BaseModel") -> Table:
+            return cls(**{name: getattr(model, name) for name in model.model_fields_set})
+
+        return core_schema.no_info_after_validator_function(
+            table, handler.generate_schema(_model(cls)),
+            serialization=core_schema.plain_serializer_function_ser_schema(lambda table: table.as_dict()),
+        )  # fmt: skip
 
 
 def table_of(
@@ -50,18 +94,63 @@ def table_of(
     `within` the tables of the records in it, and `other` the types and defaults of keys whose form in a file differs
     from that in the constructor.
     """
-    tables = {each.declared_by: each for each in within}
-    hints = typing.get_type_hints(record, include_extras=True)
-    fields: dict[str, Any] = {}
-    for field in dataclasses.fields(record):
-        if field.name in only if only else field.name not in without:
-            hint, default = other.get(field.name, (_in_file(hints[field.name], tables), default_of(field)))
-            default = tables[type(default)]() if type(default) in tables else default
-            default = ... if default is dataclasses.MISSING else default
-            fields[field.name] = (hint, pydantic.Field(default, alias=(called or {}).get(field.name)))
-    table = pydantic.create_model(f"{record.__name__}Table", __base__=Table, __doc__=record.__doc__, **fields)
-    table.declared_by = record
-    return table
+
+    def declared() -> dict[str, Key]:
+        tables = {each.declared_by: each for each in within}
+        keys: dict[str, Key] = {}
+        for field in dataclasses.fields(record):
+            if field.name in only if only else field.name not in without:
+                hint, default = other.get(
+                    field.name, (_in_file(hints_of(record)[field.name], tables), default_of(field))
+                )
+                default = tables[type(default)]() if type(default) in tables else default
+                keys[field.name] = Key(annotation=hint, default=default, alias=(called or {}).get(field.name))
+        return keys
+
+    about = {"__doc__": record.__doc__, "declared_by": record, "_declared": staticmethod(declared)}
+    return type(f"{record.__name__}Table", (Table,), about)
+
+
+def _once(function: Callable[[Any], Made]) -> Callable[[Any], Made]:
+    """The same, computed once for each class."""
+    return functools.cache(function)
+
+
+@_once
+def _keys_of(table: Any) -> Mapping[str, Key]:
+    """The keys of a table by the names of its fields: those of a record, and those that its class declares."""
+    keys: dict[str, Key] = {}
+    for cls in reversed(table.__mro__[: table.__mro__.index(Table)]):
+        if "_declared" in vars(cls):
+            keys |= vars(cls)["_declared"]()
+        for name in inspect.get_annotations(cls):
+            keys[name] = Key(annotation=hints_of(cls)[name], default=vars(cls).get(name, dataclasses.MISSING))
+    return keys
+
+
+@_once
+def _model(table: Any) -> Any:
+    """The model by which Pydantic words what is wrong with a table, and makes its JSON schema."""
+    import pydantic
+
+    def add_descriptions(schema: dict[str, Any]) -> None:
+        for key, text in docs_of_keys(table).items():
+            schema["properties"][key]["description"] = text
+
+    fields: dict[str, Any] = {
+        name: (key.annotation, pydantic.Field(... if key.is_required else key.default, alias=key.alias))
+        for name, key in _keys_of(table).items()
+    }
+    config = pydantic.ConfigDict(
+        extra="forbid", strict=True, protected_namespaces=(), json_schema_extra=add_descriptions
+    )
+    return pydantic.create_model(table.__name__, __config__=config, __doc__=table.__doc__, **fields)
+
+
+def schema_of(table: type[Table]) -> dict[str, Any]:
+    """The JSON schema of a table."""
+    schema: dict[str, Any] = _model(table).model_json_schema(by_alias=True)
+    return schema
 
 
 def _in_file(hint: Any, tables: Mapping[Any, Any]) -> Any:
@@ -75,17 +164,17 @@ def _in_file(hint: Any, tables: Mapping[Any, Any]) -> Any:
     return typing.Union[within] if origin in (typing.Union, types.UnionType) else origin[within]  # noqa: UP007
 
 
-def fields_of(shape: Any) -> dict[str, Any]:
-    """The pydantic fields of a table or a record by the keys of its file; empty for another type."""
-    return {field.alias or name: field for name, field in _fields(shape).items()}
+def fields_of(shape: Any) -> dict[str, Key]:
+    """The keys of a table or a record, as in its file; empty for another type."""
+    return {key.alias or name: key for name, key in _fields(shape).items()}
 
 
-def _fields(shape: Any) -> dict[str, Any]:
-    kind = shape if isinstance(shape, type) else type(shape)
-    if is_record(kind):
-        kind = validated(kind)
-    fields: dict[str, Any] = getattr(kind, "__pydantic_fields__", {})
-    return fields
+def _fields(shape: Any) -> Mapping[str, Key]:
+    kind: Any = shape if isinstance(shape, type) else type(shape)
+    if issubclass(kind, Table):
+        return _keys_of(kind)
+    fields = dataclasses.fields(kind) if is_record(kind) else ()
+    return {field.name: Key(annotation=hints_of(kind)[field.name], default=default_of(field)) for field in fields}
 
 
 def docs_of_keys(shape: Any) -> dict[str, str]:
@@ -117,6 +206,11 @@ def _table_in(hint: Any) -> tuple[Any, bool]:
 
 def parsed(tables: Mapping[str, Any], shape: type[Shape]) -> Shape:
     """The typed form of a TOML document; raises `UsageError` in one line for the first error."""
+    with contextlib.suppress(MisfitError, UsageError, ValueError, AssertionError, RecursionError):
+        found: Shape = fitted(dict(tables), shape, from_file=True)
+        return found
+    import pydantic  # what is wrong is known to Pydantic
+
     try:
         return pydantic.TypeAdapter(shape).validate_json(json.dumps(tables, default=str))
     except pydantic.ValidationError as error:
@@ -130,7 +224,7 @@ _UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
 """Pydantic's names of the error of an unknown key"""
 
 
-def _most_relevant(error: pydantic.ValidationError) -> Any:
+def _most_relevant(error: "pydantic.ValidationError") -> Any:
     """The first error of a document; for a missing key, an unknown key beside it, which is likely a misspelling."""
     problems = error.errors()
     first = _of_a_table(problems)
@@ -162,7 +256,7 @@ def _place(problem: Any, document: Any) -> list[Any]:
     return parts if problem["type"] not in _MISSING else [*parts, problem["loc"][-1]]
 
 
-def _first_problem(error: pydantic.ValidationError, file: type, document: Mapping[str, Any]) -> str:
+def _first_problem(error: "pydantic.ValidationError", file: type, document: Mapping[str, Any]) -> str:
     """The first error of a document of the shape `file`, in one line that states what is valid."""
     problem = _most_relevant(error)
     parts = _place(problem, document)

@@ -7,11 +7,10 @@ from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
-from pydantic import BeforeValidator
-
 from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD, USE_REFERENCE_INPUTS
 from orchestration.foundation.basics.bisection import Range
 from orchestration.foundation.basics.errors import UsageError, no_such_key, shown
+from orchestration.foundation.basics.fitting import Before
 from orchestration.foundation.basics.records import record
 from orchestration.quadrotor.scenarios import translation, wiring
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice, Record
@@ -51,7 +50,7 @@ class Scenario:
     model_mismatch: bool = False
     """Whether it is intended if the controller's nominal mass or inertia is not the plant's; it only silences a
     warning."""
-    vehicle: Annotated[Vehicle | None, BeforeValidator(_loaded_vehicle)] = None
+    vehicle: Annotated[Vehicle | None, Before(_loaded_vehicle)] = None
     """The vehicle, of `load_vehicle`, by name or by the path of its file; its parameters hold unless `controller` or
     `plant` sets them."""
     controller: FmuChoice = field(default_factory=lambda: FmuChoice(fmu=wiring.DEFAULT_CONTROLLER))

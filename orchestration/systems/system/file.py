@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 from orchestration.components.building.models import PATHS
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError, prefixed
-from orchestration.foundation.basics.typed_tables import fields_of, parsed, table_of
+from orchestration.foundation.basics.typed_tables import fields_of, parsed, schema_of, table_of
 from orchestration.systems.system.choices import Order
 from orchestration.systems.system.component import Component, Sampling, SamplingOnArrival, flattened, parameters_in
 from orchestration.systems.system.computers import Arrivals, Computer, Message, Network, Task
@@ -66,7 +66,7 @@ def schema() -> dict[str, Any]:
     """The JSON schema of a system file."""
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        **SystemTable.model_json_schema(by_alias=True),
+        **schema_of(SystemTable),
         "title": "quadcosim system",
     }
 
@@ -101,7 +101,7 @@ def system_from_tables(tables: Mapping[str, Any], folder: Path) -> System:
             "sources": {name: _source(name, value, folder) for name, value in table.sources.items()},
             "computers": {name: _computer(name, value, folder) for name, value in table.computers.items()},
             "networks": {name: _network(name, value, folder) for name, value in table.networks.items()},
-            "criterion": _part("criterion", Criterion, table.criterion.model_dump()),
+            "criterion": _part("criterion", Criterion, table.criterion.as_dict()),
             "operating_point": dict(flattened(table.operating_point)),
         }
     )
@@ -115,7 +115,7 @@ def system_from_tables(tables: Mapping[str, Any], folder: Path) -> System:
 
 def _component(name: str, table: Any, folder: Path) -> Component:
     place = f"components.{name}"
-    keys = table.model_dump(exclude={"sampling"})
+    keys = table.as_dict(without=("sampling",))
     keys["fmu"] = str(folder / table.fmu) if table.fmu.endswith(PATHS) else table.fmu
     keys["parameters"] = parameters_in(table.parameters, f"{place}.parameters")
     if table.sampling is not None:
@@ -134,17 +134,17 @@ def _sampling(place: str, table: Any, folder: Path) -> Sampling:
 def _computer(name: str, table: Any, folder: Path) -> Computer:
     place = f"computers.{name}"
     tasks = {key: _with_arrivals(f"{place}.tasks.{key}", Task, task, folder) for key, task in table.tasks.items()}
-    return _part(place, Computer, table.model_dump(exclude={"tasks"}) | {"tasks": tasks})
+    return _part(place, Computer, table.as_dict(without=("tasks",)) | {"tasks": tasks})
 
 
 def _network(name: str, table: Any, folder: Path) -> Network:
     place, of = f"networks.{name}", table.messages.items()
     messages = {key: _with_arrivals(f"{place}.messages.{key}", Message, one, folder) for key, one in of}
-    return _part(place, Network, table.model_dump(exclude={"messages"}) | {"messages": messages})
+    return _part(place, Network, table.as_dict(without=("messages",)) | {"messages": messages})
 
 
 def _with_arrivals(place: str, kind: type[Part], table: Any, folder: Path) -> Part:
-    arrivals = table.arrivals and _part(f"{place}.arrivals", Arrivals, table.arrivals.model_dump())
+    arrivals = table.arrivals and _part(f"{place}.arrivals", Arrivals, table.arrivals.as_dict())
     return _part(place, kind, with_distributions(f"{place}.", table, folder) | {"arrivals": arrivals})
 
 
@@ -152,7 +152,7 @@ def _connection(index: int, table: Any, order: Order, folder: Path) -> Connectio
     name = table.name if table.name is not None else str(index)
     keys = with_distributions(f"connections.{name}.", table, folder) | {"name": name}
     keys["order"] = table.order or order
-    keys["stated"] = bool({"scale", "offset"} & table.model_fields_set)
+    keys["stated"] = bool({"scale", "offset"} & table.given)
     for what in ("noise", "quantisation"):
         keys[what] = for_each(table.start, keys[what])
         for variable, value in keys[what].items():
@@ -163,7 +163,7 @@ def _connection(index: int, table: Any, order: Order, folder: Path) -> Connectio
 
 def _source(name: str, table: Any, folder: Path) -> Source:
     file = None if table.file is None else folder / table.file
-    return _part(f"sources.{name}", Source, {**table.model_dump(), "file": file})
+    return _part(f"sources.{name}", Source, {**table.as_dict(), "file": file})
 
 
 def _part(place: str, kind: type[Part], keys: Mapping[str, Any]) -> Part:
@@ -173,7 +173,7 @@ def _part(place: str, kind: type[Part], keys: Mapping[str, Any]) -> Part:
 
 def with_distributions(place: str, table: Any, folder: Path) -> dict[str, Any]:
     """The keys of a table of a file, with distributions in place of their tables; `place` ends with its dot."""
-    keys: dict[str, Any] = table.model_dump()
+    keys: dict[str, Any] = table.as_dict()
     for key in keys:
         value = getattr(table, key)
         if isinstance(value, DistributionTable):
@@ -189,6 +189,6 @@ def parsed_distribution(place: str, table: Mapping[str, Any]) -> Distribution:
 
 
 def _distribution(place: str, table: Any, folder: Path) -> Distribution:
-    keys = table.model_dump() | {"file": None if table.file is None else folder / table.file}
+    keys = table.as_dict() | {"file": None if table.file is None else folder / table.file}
     with prefixed(f"{place}."):
         return Distribution(**keys)

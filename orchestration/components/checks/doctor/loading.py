@@ -91,7 +91,7 @@ def main(path: str, folder: str, size: str) -> None:
 
 def _try(path: Path, folder: Path, size_limit: float, send: Callable[[object], None]) -> None:
     restrict(size_limit)
-    importlib.import_module("pydantic")  # as every command that runs an FMU: it may be that of another Python
+    importlib.import_module("pydantic")  # as commands that report what is wrong: it may be that of another Python
     try:
         fmu = inspected(path, size_limit)
     except UnreadableFmuError as error:
