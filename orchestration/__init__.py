@@ -1,9 +1,23 @@
 """Runs FMUs under a realistic digital clock. Its Python API is the package `quadcosim`, and is found here too."""
 
+import os
+import sys
 from importlib import import_module
 from typing import Any
 
-import orchestration.quadrotor.flight  # noqa: F401 - registers figures and analyses of flights in the tables of lower rooms
+
+def _tell(kind: type[BaseException], *_: object) -> None:
+    """Print what has ended the start of the command, without a traceback."""
+    if kind is MemoryError:
+        print("quadcosim: there is not enough memory", file=sys.stderr)
+
+
+try:
+    import orchestration.quadrotor.flight  # noqa: F401 - registers figures and analyses of flights in the tables of lower rooms
+except (KeyboardInterrupt, MemoryError):
+    if os.path.basename(sys.argv[0]) == "quadcosim":  # the script is not yet in its `main`
+        sys.excepthook = _tell
+    raise
 
 
 def __getattr__(name: str) -> Any:

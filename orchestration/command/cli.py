@@ -43,6 +43,9 @@ from orchestration.foundation.basics.extras import lack_of
 from orchestration.foundation.basics.terminal import banners_to_stderr, inform, report_error
 from orchestration.foundation.processes.subprocesses import misleading_variables
 
+NO_THREAD = "can't start new thread"
+"""What Python says if the system has no room for another one"""
+
 
 class _Interrupted(Exception):
     """Ctrl-C; the text states the progress of the work."""
@@ -181,6 +184,8 @@ def _report(error: Exception) -> int:
         text = f"{misuse} (see --help)"
     elif isinstance(error, MemoryError):
         text = "there is not enough memory" + (f": {error}" if str(error) else "")
+    elif isinstance(error, RuntimeError) and str(error) == NO_THREAD:
+        text = f"there is not enough memory, or there are too many processes: {error}"
     elif isinstance(error, ModuleNotFoundError) and (lack := lack_of(error.name)) is not None:
         text = lack
     elif isinstance(error, ImportError) and (variables := misleading_variables()):

@@ -27,6 +27,8 @@ def main() -> None:
         from orchestration.command import cli
     except KeyboardInterrupt:
         sys.exit(130)
+    except MemoryError:
+        sys.exit("quadcosim: there is not enough memory")
     except Exception as error:
         misleading = misleading_variables()
         if not misleading or sys.flags.ignore_environment:

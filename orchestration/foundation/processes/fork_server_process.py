@@ -150,5 +150,8 @@ if __name__ == "__main__":
     if request is not None:
         module = importlib.import_module(name)
         sys.argv = [str(module.__file__), *request.arguments]
-        module.main(*request.arguments)
+        try:
+            module.main(*request.arguments)
+        except MemoryError:
+            sys.exit(f"{name}: there is not enough memory")
         _leave()

@@ -1,6 +1,7 @@
 """Commands load what they use: of the large packages none that the command at hand does without."""
 
 import json
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -54,25 +55,50 @@ def test_the_version_is_printed_without_loading_the_command_line() -> None:
     assert not (LARGE | {"numpy", "pydantic", "typer"}) & loaded("--version")
 
 
-INTERRUPTED = """
+ENDED = """
 import sys
 
-class Interrupts:
+class Ends:
     def find_spec(self, name, *_):
-        if name == "orchestration.command.cli":
-            raise KeyboardInterrupt
+        if name == "{module}":
+            raise {error}
 
-sys.meta_path.insert(0, Interrupts())
+sys.argv = ["/usr/bin/quadcosim", "run"]
+sys.meta_path.insert(0, Ends())
 from orchestration.command.start import main
 main()
 """
 
 
-def test_ctrl_c_while_the_command_line_is_loaded_prints_no_traceback() -> None:
-    done = subprocess.run([sys.executable, "-c", INTERRUPTED], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (130, "")
+@pytest.mark.parametrize("module", ["orchestration.quadrotor.flight", "orchestration.command.cli"])
+@pytest.mark.parametrize(
+    ("error", "codes", "line"),
+    [
+        ("KeyboardInterrupt", (130, -signal.SIGINT), ""),
+        ("MemoryError", (1,), "quadcosim: there is not enough memory\n"),
+    ],
+)
+def test_what_ends_the_start_of_the_command_prints_no_traceback(
+    module: str, error: str, codes: tuple[int, ...], line: str
+) -> None:
+    program = ENDED.format(module=module, error=error)
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.returncode in codes
+    assert done.stderr == line
 
 
-def test_a_lack_of_memory_is_no_error_of_this_project(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli._report(MemoryError("Unable to allocate 3 GiB")) == 1
-    assert capsys.readouterr().err == "quadcosim: there is not enough memory: Unable to allocate 3 GiB\n"
+@pytest.mark.parametrize(
+    ("error", "line"),
+    [
+        (MemoryError("Unable to allocate 3 GiB"), "there is not enough memory: Unable to allocate 3 GiB"),
+        (
+            RuntimeError(cli.NO_THREAD),
+            "there is not enough memory, or there are too many processes: can't start new thread",
+        ),
+    ],
+)
+def test_a_lack_of_memory_is_no_error_of_this_project(
+    error: Exception, line: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli._report(error) == 1
+    assert capsys.readouterr().err == f"quadcosim: {line}\n"

@@ -291,8 +291,8 @@ class Cluster:
         return subprocess.Popen(command, stdout=self._log, stderr=self._log, cwd=self._file.parent)
 
 
-def reference_store(folder: Path, text: str = NOISY) -> Path:
+def reference_store(folder: Path, text: str = NOISY, engine: str = "compiled") -> Path:
     """The store of a study run without interruption by one worker, through the command."""
     (folder / "study.toml").write_text(text)
-    quadcosim("sweep", "study.toml", "--engine", "compiled", cwd=folder)
+    quadcosim("sweep", "study.toml", "--engine", engine, cwd=folder)
     return store_path("study", folder / "results" / "study")

@@ -12,11 +12,13 @@ import pytest
 
 from orchestration.components.building import fmus
 from orchestration.experiments.studies.store import open_for_reading, store_path
+from orchestration.experiments.studies.study_file import load_study
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
 from orchestration.simulation.workers.pool import Pool
 from orchestration.simulation.workers.provenance import versions
 from quadcosim import QuadcosimError
 from tests.commands import Main
+from tests.orchestration.components.fmi.small import needs_compiler
 from tests.orchestration.experiments.studies.common import (
     NOISY,
     PERIODS,
@@ -110,6 +112,15 @@ def test_whatever_is_killed_the_table_is_that_of_an_undisturbed_sweep(
 ) -> None:
     tally = disturbed(tmp_path, reference, workers=workers, kills=kills, seed=workers)
     assert tally.kills == kills
+
+
+@needs_compiler
+def test_a_sweep_in_lanes_whose_coordinator_is_killed_has_the_same_bits(tmp_path: Path) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text(NOISY)
+    whole = bits(sweep(load_study(path), folder=tmp_path / "whole", engine="batch").path)
+    tally = disturbed(tmp_path, whole, workers=1, kills=1, engine="batch", seed=141)
+    assert (tally.coordinators, tally.workers) == (1, 0)
 
 
 @pytest.mark.parametrize("whom", ["the coordinator", "a worker"])
