@@ -1,11 +1,11 @@
 """The numbers that a page lets its reader change, and the two of its map."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from orchestration.components.fmi.read_description import Model
-from orchestration.foundation.basics.registry import Registry
+from orchestration.experiments.live.known_sliders import KNOWN_SLIDERS
 from orchestration.systems.system.component import Sampling, has_scheduled_instants
 from orchestration.systems.system.distribution import Distribution
 from orchestration.systems.system.model import System
@@ -37,9 +37,6 @@ class Sliders:
     measure: str | None = None
     """The objective that the map shows"""
 
-
-KNOWN_SLIDERS: Registry[Callable[[Request], Sliders]] = Registry()
-"""Those of kinds of requests, which rooms above register"""
 
 _MOST_PARAMETERS = 12
 

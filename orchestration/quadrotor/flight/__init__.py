@@ -5,7 +5,7 @@ from pkgutil import resolve_name
 
 from orchestration.components.checks.validation.roles import ROLES
 from orchestration.experiments.comparison.crossovers import CROSSOVERS
-from orchestration.experiments.live.sliders import KNOWN_SLIDERS
+from orchestration.experiments.live.known_sliders import KNOWN_SLIDERS
 from orchestration.experiments.report.known_layouts import LAYOUTS
 from orchestration.quadrotor.flight.names import FIGURES, KIND, NEEDED
 from orchestration.quadrotor.flight.ports import CONTROLLER, PLANT
