@@ -117,8 +117,8 @@ class Engine {
     const value = Object.values(runs[0]).length ? runs.map(each => each[target] ?? each[path]).find(each => each !== undefined) ?? this.defaults[i] : this.defaults[i];
     const fixed = low === high;
     const expected = [
-      "", fixed ? `${low}: here it changes how the system is connected; set it in its file` : low > -1e300 ? `a number ${this.system.settings[i][4] ? "above" : "of at least"} ${low}` : "a larger number",
-      fixed ? `${low}: here it changes how the system is connected; set it in its file` : `at most ${high}`, "a whole number", "a number", "less than the period", "fewer losses for bursts of this length",
+      "", fixed ? `${low}, to which it is fixed in this page: set it in the file` : low > -1e300 ? `a number ${this.system.settings[i][4] ? "above" : "of at least"} ${low}` : "a larger number",
+      fixed ? `${low}, to which it is fixed in this page: set it in the file` : `at most ${high}`, "a whole number", "a number", "less than the period", "fewer losses for bursts of this length",
       "at least a nanosecond", "a simpler fraction of a second", "fewer instants: this page has room for a million",
     ][reason];
     return `${target} = ${value}: expected ${expected}`;

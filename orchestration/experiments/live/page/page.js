@@ -1,7 +1,5 @@
 "use strict";
 const $ = id => document.getElementById(id), css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-const text = id => $(id).textContent.trim();
-const unpack = async packed => new Response(new Blob([Uint8Array.from(atob(packed), x => x.charCodeAt(0))]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
 const BUCKETS = 600;
 
 // -- workers: the latest value wins --------------------------------------------------------------------------------
@@ -363,15 +361,15 @@ function listen() {
 
 async function begin() {
   const begun = performance.now();
-  system = JSON.parse(await unpack(text("system")));
-  const url = URL.createObjectURL(new Blob([await unpack(text("engine"))], { type: "text/javascript" }));
-  flier = new Flier(url, text("single"), system);
+  system = JSON.parse(await unpackedText("system"));
+  const url = URL.createObjectURL(new Blob([unpacked.toString(), "\n", await unpackedText("engine")], { type: "text/javascript" }));
+  flier = new Flier(url, packed("single"), system);
   document.title = $("title").textContent = system.title;
   addControls(), readHash(), plan(), listen();
   if (system.map) {
     planMap();
     const most = Math.max(1, Math.min(4, (navigator.hardwareConcurrency || 2) - 1));
-    mappers = Array.from({ length: most }, () => Object.assign(new Flier(url, text("pair"), system), { onmap }));
+    mappers = Array.from({ length: most }, () => Object.assign(new Flier(url, packed("pair"), system), { onmap }));
   }
   await flier.ready;
   quadcosim.stats = { ready: performance.now() - begun };
@@ -379,7 +377,7 @@ async function begin() {
   if (system.map) Promise.all(mappers.map(each => each.ready)).then(startMap);
 }
 
-window.quadcosim = {
+Object.defineProperties(window.quadcosim, Object.getOwnPropertyDescriptors({
   /** Runs with other values by path, and returns everything about it; a refusal rejects. */
   async run(given = {}) {
     await quadcosim.ready;
@@ -389,5 +387,4 @@ window.quadcosim = {
   get last() { return last; },
   get map() { return { cells, spent, axes }; },
   get command() { return command(); },
-};
-window.quadcosim.ready = begin();
+}));

@@ -1,8 +1,6 @@
 // What a worker does: it flies what the page asks for, and reduces rows to what is drawn.
 let engine, ready, mapping = 0;
 
-const unpacked = async text => new Uint8Array(await new Response(new Blob([Uint8Array.from(atob(text), x => x.charCodeAt(0))]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer());
-
 /** Of each bucket of the run its least and greatest value. */
 function buckets(count, stop, rows, width, value) {
   const out = new Float32Array(2 * count).fill(NaN), n = rows.length / width;

@@ -1,5 +1,6 @@
 """Compiles a system in C: to a WebAssembly module for a page, or to a library of this machine, which tests call."""
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -10,18 +11,18 @@ from fmu_kit.compiler.pack.lanes import MAIN
 from fmu_kit.compiler.runtime import FOLDER
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.simulation.engines.batch.kernels import FILES, sources_of
-from orchestration.simulation.engines.batch.shape import Shape
 from orchestration.simulation.engines.wasm.tables_of_system import SystemTables
 from orchestration.systems.schedule.compiled_timetable import FILES as TIMETABLE
 
 _HERE = Path(__file__).parent
+_FUNCTIONS = "lane_functions.h"
 _OF_COMPONENTS = ("lanes", "places", "variables", "divergence", "begin", "initialise", "do_step", "line")
 
 
 def units_of(tables: SystemTables, lanes: int) -> list[Unit]:
     """What is compiled of a system."""
     shape, defined = tables.shape, (f"-DQUADCOSIM_LANES={lanes}",)
-    units = [_component(i, shape, defined) for i in range(len(shape.names))]
+    units = [_component(i, tables, defined) for i in range(len(shape.names))]
     ours = {path.name: path.read_bytes() for path in (_HERE / "live.h", _HERE / "live.c", _HERE / "timing.c")}
     timing = {path.name: path.read_bytes() for path in TIMETABLE} | {"timing.h": tables.timing.encode()}
     bits = ", ".join(f"1ull << {lane}" for lane in range(lanes))
@@ -34,15 +35,37 @@ def units_of(tables: SystemTables, lanes: int) -> list[Unit]:
         "sizes.h": sizes.encode(), "expressions.h": shape.expressions.text.encode(),
         "system.h": tables.system.encode(), "defaults.h": tables.defaults.encode(),
     }  # fmt: skip
-    units.append(Unit(sources={**ours, **timing}, main="timing.c", options=defined))
+    units.append(Unit(sources={**ours, **timing}, main="timing.c", options=(*defined, "-Os")))
     units.append(Unit(sources={**ours, **system}, main="live.c", options=defined))
     return units
 
 
-def _component(i: int, shape: Shape, defined: tuple[str, ...]) -> Unit:
-    name = shape.names[i]
+def _component(i: int, tables: SystemTables, defined: tuple[str, ...]) -> Unit:
+    name = tables.shape.names[i]
+    sources = dict(sources_of(name, tables.shape.models[name]))
+    sources[_FUNCTIONS] = _specialised(sources[_FUNCTIONS].decode(), _fixed(name, tables)).encode()
     renamed = tuple(f"-Dquadcosim_{each}=c{i}_{each}" for each in _OF_COMPONENTS)
-    return Unit(sources=sources_of(name, shape.models[name]), main=MAIN, options=(*defined, *renamed))
+    return Unit(sources=sources, main=MAIN, options=(*defined, *renamed))
+
+
+def _fixed(component: str, tables: SystemTables) -> dict[str, float]:
+    """The whole numbers among the parameters of a component that a page cannot change; those by name are chosen by
+    their index unless that is 0.
+    """
+    fixed, place = {}, f"components.{component}.parameters."
+    for setting in tables.settings.all:
+        if setting.path.startswith(place) and setting.is_whole and setting.low == setting.high:
+            fixed[setting.path.removeprefix(place)] = setting.value
+    return {name: value for name, value in fixed.items() if fixed.get(f"{name}_index", 0.0) == 0.0}
+
+
+def _specialised(code: str, fixed: Mapping[str, float]) -> str:
+    """The code with fixed parameters as constants where they are read: what they do not choose is left out."""
+    for name, value in fixed.items():
+        place = f"v[AT_{re.sub(r'[^A-Z0-9]', '_', name.upper())}]"
+        is_set = f"{place} =" in code and f"{name}_index" not in fixed
+        code = code if is_set else re.sub(rf"{re.escape(place)}(?! =)", f"q_all({value!r})", code)
+    return code
 
 
 def module_of(tables: SystemTables, lanes: int) -> bytes:

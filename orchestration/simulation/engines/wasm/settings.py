@@ -1,7 +1,7 @@
 """The settings of a system: the numbers of a run that a page may change, by path, and the values that are allowed."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 
@@ -46,8 +46,12 @@ def decimal_of(value: float) -> tuple[int, int]:
 class Settings:
     """All settings of a system, in the order in which C has them."""
 
-    def __init__(self, system: System, models: Mapping[str, Model]) -> None:
-        """Raises `UsageError` for a value that is no number, as a distribution is."""
+    def __init__(self, system: System, models: Mapping[str, Model], free: Collection[str] = ()) -> None:
+        """Parameters that are whole numbers choose between laws: only the `free` ones, by path, may be changed.
+
+        Raises `UsageError` for a value that is no number, as a distribution is.
+        """
+        self._free = free
         self.all: list[Setting] = []
         self.at: dict[str, int] = {}
         """Places by path"""
@@ -112,4 +116,7 @@ class Settings:
             low, high = 0.0, 1.0
         elif variable.kind != "Real":
             low, high = max(low, -(2.0**31)), min(high, 2.0**31 - 1)
-        self._add(f"{place}.parameters.{variable.name}", number, low, high, is_whole=variable.kind != "Real")
+        path, is_whole = f"{place}.parameters.{variable.name}", variable.kind != "Real"
+        if is_whole and path not in self._free:
+            low = high = number
+        self._add(path, number, low, high, is_whole=is_whole)

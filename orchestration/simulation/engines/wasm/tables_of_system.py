@@ -1,6 +1,6 @@
 """The tables of a system as C: timing.h and system.h, which timing.c and live.c include."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from orchestration.components.fmi.instance import number_of
@@ -43,8 +43,8 @@ class SystemTables:
     """The values of the settings, which no other text has"""
 
 
-def tables_of(shape: Shape, settings: Settings | None = None) -> SystemTables:
-    """The tables of a system, with these settings if they are known.
+def tables_of(shape: Shape, settings: Settings | None = None, free: Collection[str] = ()) -> SystemTables:
+    """The tables of a system, with these settings if they are known; `free` as `Settings` has it.
 
     Raises `UsageError`, naming it, for what a page cannot have.
     """
@@ -54,7 +54,7 @@ def tables_of(shape: Shape, settings: Settings | None = None) -> SystemTables:
     for name, component in system.components.items():
         if component.sampling is not None and component.sampling.clock == "fmu":
             raise UsageError(f"components.{name}.sampling.clock = fmu: expected master in a page")
-    settings = settings or Settings(system, shape.models)
+    settings = settings or Settings(system, shape.models, free)
     sources = SourcesInC(shape, settings)
     defaults = ["static const Setting default_settings[] = {"]
     for setting in settings.all:
