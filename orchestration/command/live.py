@@ -1,5 +1,7 @@
 """The command `live`."""
 
+import sys
+import webbrowser
 from pathlib import Path
 from typing import Annotated
 
@@ -21,7 +23,10 @@ def live(
     *,
     flags: FlightFlags,
 ) -> CommandResult:
-    """Write one HTML file in which a system runs while its numbers are changed; it needs no network."""
+    """Write one HTML file in which a system runs while its numbers are changed; it needs no network.
+
+    Without arguments it is the paper's flight, and a terminal opens it.
+    """
     from orchestration.experiments.live.live import live as page_of
     from orchestration.experiments.live.live import ranges_of
 
@@ -37,4 +42,7 @@ def live(
         None if axes is None else (axes[0], axes[1]),
         name=None if scenario is None else str(scenario),
     )
-    return result_of_files([page.save(out)])
+    written = page.save(out)
+    if scenario is None and vary is None and map is None and flags == FlightFlags() and sys.stdout.isatty():
+        webbrowser.open(written.resolve().as_uri())
+    return result_of_files([written])

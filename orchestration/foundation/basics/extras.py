@@ -15,6 +15,7 @@ EXTRAS = {
     "control": ("control",),
     "certificates": ("clarabel", "flint", "python-flint"),
     "can": ("cantools",),
+    "live": ("ziglang",),
 }
 """Packages by the extra that installs them"""
 

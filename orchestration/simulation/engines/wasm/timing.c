@@ -106,7 +106,8 @@ static double count_of(const Grid *of, int64_t stop) {
 /* Draw the first samples; 0 with the refusal if the settings are. */
 int begin_timing(int number, const Setting *s, int64_t *first_samples, Refusal *refusal) {
     Lane *lane = &lanes[number];
-    int64_t stop = as_nanoseconds(s + STOP_TIME_SETTING), seed = s[SEED_SETTING].digits;
+    int64_t stop = as_nanoseconds(s + STOP_TIME_SETTING);
+    uint64_t seed = (uint64_t)s[SEED_SETTING].digits * (uint64_t)power_of_ten(s[SEED_SETTING].exponent);
     double instants = 1.0;
     if (lane->table) timetable_free(lane->table);
     lane->table = NULL;
@@ -150,7 +151,7 @@ int begin_timing(int number, const Setting *s, int64_t *first_samples, Refusal *
             return refuse(refusal, TOO_FINE, post_table[i].step);
     }
     lane->outline = (Outline){lane->routes, lane->clocks, lane->posts, ROUTES, CLOCKS, POSTS, CONTINUOUS, stop};
-    lane->seed[0] = (uint32_t)seed, lane->seed[1] = (uint32_t)((uint64_t)seed >> 32);
+    lane->seed[0] = (uint32_t)seed, lane->seed[1] = (uint32_t)(seed >> 32);
     lane->table = timetable_new(&lane->outline, lane->seed, 2, first_samples);
     return lane->table ? 1 : refuse(refusal, WITHOUT_MEMORY, -1);
 }

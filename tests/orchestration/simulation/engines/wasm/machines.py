@@ -73,32 +73,32 @@ class Wasm:
 
 
 class Page:
-    """What engine.js does."""
+    """What engine.js does: `settings` are values by path in their order, `place` finds a column, `names` objectives."""
 
-    def __init__(self, machine, of):
-        self._machine, self.tables = machine, of
+    def __init__(self, machine, settings, place, names):
+        self._machine, self._settings, self._place, self._names = machine, settings, place, names
         machine.call("set_up")
         self.lanes = machine.call("lane_count")
 
     def fly(self, runs, columns):
         """The hash of the rows, the outcome, the time and the objectives of each run; or why they are refused."""
-        call, read, settings = self._machine.call, self._machine.read, self.tables.settings
+        call, read, settings = self._machine.call, self._machine.read, self._settings
         for lane, values in enumerate(runs):
-            assert set(values) <= set(settings.at)
-            for i, setting in enumerate(settings.all):
-                value = values.get(setting.path, setting.value)
+            assert set(values) <= set(settings)
+            for i, (path, start) in enumerate(settings.items()):
+                value = values.get(path, start)
                 row = struct.pack("<dqq", float(value), *decimal_of(value))
                 self._machine.write(call("settings_of", lane) + 24 * i, row)
         call("record_columns", len(columns))
         for i, column in enumerate(columns):
-            call("record_at", i, *map(int, self.tables.shape.place(column)))
+            call("record_at", i, *map(int, self._place(column)))
         if not call("fly", len(runs), 1):
-            return call("refused_reason"), settings.all[call("refused_setting")].path
+            return call("refused_reason"), [*settings][call("refused_setting")]
         outcomes, times, counts = (
             struct.unpack(f"<{self.lanes}q", read(call(name), 8 * self.lanes))
             for name in ("outcomes", "outcome_times", "row_counts")
         )
-        names = [*self.tables.shape.nodes]
+        names = self._names
         values = np.frombuffer(read(call("values_of_objectives"), 8 * self.lanes * len(names)))
         values = values.reshape(len(names), self.lanes)
         return [

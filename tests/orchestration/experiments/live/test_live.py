@@ -1,0 +1,187 @@
+"""The page of the paper's flight: its modules by wasmtime, and all of it in a browser."""
+
+import gzip
+import importlib.util
+import json
+import os
+import random
+import re
+import shutil
+
+import numpy as np
+import pytest
+
+from orchestration.experiments.live.live import live
+from orchestration.foundation.basics.errors import UsageError
+from quadcosim import Scenario, fly
+from tests.orchestration.simulation.engines.wasm.machines import Page, Wasm, hashes_of
+from tests.patience import PATIENCE
+
+ZIG = pytest.mark.skipif(
+    importlib.util.find_spec("ziglang") is None, reason="no compiler for WebAssembly: pip install 'quadcosim[live]'"
+)
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+COLUMNS = ("plant.position.x", "plant.quaternion.w", "plant.thrust")
+KNOWN = (  # period, delay, κ; outcome, time of divergence, ultimate bound, as `fly` has them
+    ({"timing.period": 0.07}, "settled", None, 0.0012746940253144442),
+    ({"timing.period": 0.08}, "diverged", 2.358, None),
+    ({"timing.period": 0.08, "controller.coupling": 0.0}, "bounded", None, 0.05187919816550872),
+    ({"timing.period": 0.1, "controller.coupling": 0.0}, "diverged", 5.557, None),
+    ({"timing.period": 0.001, "controller.coupling": 15.0}, "settled", None, 0.0007417714079406577),
+    ({"timing.period": 0.005, "controller.coupling": 15.0}, "diverged", 1.895, None),
+    ({"timing.period": 0.01, "timing.delay": 0.04}, "diverged", 5.164, None),
+)
+
+
+@pytest.fixture(scope="module")
+def paper():
+    return live(Scenario())
+
+
+def unpacked(page, part):
+    """The content of a part of a page."""
+    found = re.search(rf'id="{part}" data-size="(\d+)">([^<]*)<', page.html)
+    assert found
+    codes = [c - 33 - (c > 38) - (c > 60) - (c > 62) for c in found[2].encode()]
+    groups = np.array(codes[::2]) * 91 + np.array(codes[1::2])
+    bits = groups[:, None] >> np.arange(13) & 1
+    packed = np.packbits(bits.astype(np.uint8).ravel(), bitorder="little").tobytes()[: int(found[1])]
+    return gzip.decompress(packed)
+
+
+def machine(page, part):
+    document = json.loads(unpacked(page, "system"))
+    places = {name: (component, place) for name, component, place, _ in document["columns"]}
+    settings = {path: value for path, value, *_ in document["settings"]}
+    return Page(Wasm(unpacked(page, part)), settings, places.get, document["objectives"]), document
+
+
+@ZIG
+def test_a_page_is_small_and_asks_nothing_of_a_network(paper):
+    assert len(paper.html.encode()) < 200_000
+    assert "default-src 'none'" in paper.html
+    assert "http" not in re.sub(r"http-equiv", "", paper.html.split('id="system"')[0])
+    assert paper._repr_html_().startswith('<iframe sandbox="allow-scripts"')
+
+
+@ZIG
+@pytest.mark.parametrize("part", ["single", "pair"])
+def test_its_modules_have_the_rows_of_fly_to_the_bit(paper, part):
+    pytest.importorskip("wasmtime")
+    page, document = machine(paper, part)
+    r = random.Random(3)
+    runs = [
+        {"timing.period": round(r.uniform(0.002, 0.05), 5), "timing.delay": round(r.uniform(0.0, 0.02), 6),
+         "timing.jitter": round(r.uniform(0.0, 0.0019), 7), "timing.command_loss": r.choice([0.0, 0.3]),
+         "controller.coupling": r.uniform(0.0, 2.0), "seed": r.randrange(2**40)}
+        for _ in range(20)
+    ]  # fmt: skip
+    flights = fly(Scenario(stop_time=1.5), {path: [run[path] for run in runs] for path in runs[0]}, record=COLUMNS)
+    names = [path for path, *_ in document["settings"]]
+    found = []
+    for first in range(0, len(runs), page.lanes):
+        some = runs[first : first + page.lanes]
+        set_ = [
+            {names[i]: value for path, value in run.items() for i in document["targets"].get(path, [1])} for run in some
+        ]
+        found += [each[0] for each in page.fly([{**each, "stop_time": 1.5} for each in set_], COLUMNS)]
+    assert page.lanes == (1 if part == "single" else 2)
+    assert found == hashes_of(flights, COLUMNS)
+
+
+@pytest.fixture(scope="module")
+def browser():
+    path = next((found for name in BROWSERS if (found := shutil.which(name)) is not None), None)
+    if path is None:
+        pytest.skip(f"none of {', '.join(BROWSERS)} is on this machine")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as started:
+        place = {**os.environ, "TMPDIR": "/tmp"}  # its sockets are in it, whose paths must be short
+        opened = started.chromium.launch(executable_path=path, args=["--no-sandbox"], env=place)
+        yield opened
+        opened.close()
+
+
+def opened(browser, paper, folder, size, at=""):
+    told, asked = [], []
+    page = browser.new_page(viewport=size)
+    page.set_default_timeout(1e3 * PATIENCE)
+    page.on("console", lambda message: told.append(message.text))
+    page.on("pageerror", lambda error: told.append(str(error)))
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(paper.save(folder / "live.html").as_uri() + at)
+    page.evaluate("quadcosim.ready")
+    page.wait_for_function("quadcosim.last")
+    return page, told, asked
+
+
+WIDE = {"width": 1400, "height": 900}
+
+
+@ZIG
+def test_known_answers_come_out_of_the_page_and_it_refuses_in_words(browser, paper, tmp_path):
+    page, told, asked = opened(browser, paper, tmp_path, WIDE)
+    run = """given => quadcosim.run(given).then(r => [r.outcome, r.divergence_time, r.metrics.ultimate_bound,
+             r.sha256, r.rows.length, r.rows[1].length], error => error.message)"""
+    for given, *expected in KNOWN:
+        assert page.evaluate(run, given)[:3] == expected
+    columns = page.evaluate("quadcosim.run({}).then(r => r.columns)")
+    flight = fly(Scenario(), {"seed": [0]}, record=columns)
+    found = page.evaluate(run, {})
+    assert found[3:] == [*hashes_of(flight, columns), 30_001, len(columns) + 1]
+    refused = {
+        "timing.jitter": (0.02, "less than the period"), "timing.period": (0.0, "a number above 0"),
+        "timing.command_loss": (1.5, "at most 1"), "timing.nothing": (1.0, "one of timing.period"),
+    }  # fmt: skip
+    for path, (value, words) in refused.items():
+        assert words in page.evaluate(run, {path: value})
+    assert told == []
+    assert [url for url in asked if not url.startswith(("file:", "blob:"))] == []
+
+
+@ZIG
+def test_cells_of_the_map_are_the_single_runs(browser, paper, tmp_path):
+    page, _, _ = opened(browser, paper, tmp_path, WIDE)
+    page.wait_for_function("quadcosim.map.cells.size > 60")
+    wrong = page.evaluate("""async () => {
+        const { cells, axes } = quadcosim.map, wrong = [];
+        for (const [key, [outcome, value]] of [...cells].slice(0, 30)) {
+          const given = { [axes[0].path]: axes[0].at(Math.floor(key / 24)), [axes[1].path]: axes[1].at(key % 24) };
+          const single = await quadcosim.run(given);
+          const same = single.outcome === outcome && single.metrics.ultimate_bound === value;
+          if (!same) wrong.push([given, outcome, value]);
+        }
+        return wrong;
+    }""")
+    assert wrong == []
+
+
+@ZIG
+def test_a_key_moves_a_slider_and_the_address_keeps_it(browser, paper, tmp_path):
+    page, _, _ = opened(browser, paper, tmp_path, {"width": 390, "height": 800}, "#timing.period=0.08")
+    assert page.inner_text("#word") == "diverges"
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    page.focus("input[name='controller.coupling']")
+    page.keyboard.press("Home")
+    page.wait_for_function("document.getElementById('word').textContent.startsWith('survives')")
+    assert page.evaluate("location.hash") == "#timing.period=0.08&controller.coupling=0"
+    assert page.evaluate("quadcosim.command") == "quadcosim run --period 0.08 --set controller.coupling=0"
+
+
+@ZIG
+def test_a_page_works_inside_another(browser, paper, tmp_path):
+    outer = tmp_path / "outer.html"
+    outer.write_text(f"<!doctype html><meta charset='utf-8'>{paper._repr_html_()}", encoding="utf-8")
+    page = browser.new_page()
+    page.set_default_timeout(1e3 * PATIENCE)
+    page.goto(outer.as_uri())
+    inner = page.frame_locator("iframe").locator("#word")
+    inner.filter(has_text="settles in 4.98 s").wait_for()
+
+
+def test_what_a_page_cannot_vary_is_named():
+    with pytest.raises(UsageError, match=re.escape("timing.period = 0.1:0.01: expected LOW:HIGH")):
+        live(Scenario(), {"timing.period": (0.1, 0.01)})
+    with pytest.raises(UsageError, match=r"map timing\.delay: expected"):
+        live(Scenario(), {"timing.period": (0.01, 0.1)}, ("timing.period", "timing.delay"))
