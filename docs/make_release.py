@@ -1,8 +1,9 @@
 """Makes the files of a release in dist/: run as `make release`.
 
-The wheel and the sources; the FMUs without Python inside, for every system that zig compiles for, an archive for each
-version of FMI; the two FMUs of the paper's flight with their wiring as an SSP; and the SHA-256 of each. The same commit
-gives the same bytes with the same setuptools and ziglang: every time in the files is that of the commit.
+The wheel and the sources; the page in which the paper's flight runs; the FMUs without Python inside, for every system
+that zig compiles for, an archive for each version of FMI; the two FMUs of the paper's flight with their wiring as an
+SSP; and the SHA-256 of each. The same commit gives the same bytes with the same setuptools and ziglang: every time in
+the files is that of the commit.
 """
 
 import gzip
@@ -38,6 +39,7 @@ def main(folder: Path) -> None:
             write_fmu_archive(built, folder / f"{name}-fmi{version}.zip")
         plant, controller = (str(fmus[2] / f"{model}.fmu") for model in ("QuadrotorPlant", "UnifiedController"))
         ssp = folder / f"{name}.ssp"
+        quadcosim("live", "--out", str(folder / f"{name}.html"))
         quadcosim("ssp", "--plant", plant, "--controller", controller, "--out", str(ssp))
     (folder / SUMS).write_text(sums(folder), encoding="utf-8")
     print(sums(folder), end="")

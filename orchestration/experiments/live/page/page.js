@@ -225,6 +225,7 @@ function draw() {
   $("speed").textContent = `${last.rows.toLocaleString("en")} rows in ${last.flight.toFixed(1)} ms`;
   drawing.panels.forEach(panel => plot(panel.canvas, panel));
   drawScene(), drawClock(), drawMap();
+  document.body.dataset.drawn = "";
 }
 
 /** What is drawn: distances from references, then columns by their unit. */
