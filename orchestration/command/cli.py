@@ -44,7 +44,7 @@ from orchestration.foundation.basics.terminal import banners_to_stderr, inform, 
 from orchestration.foundation.processes.subprocesses import misleading_variables
 
 NO_THREAD = "can't start new thread"
-"""What Python says if the system has no room for another one"""
+"""Text of the error of Python if the system has no room for another one"""
 
 
 class _Interrupted(Exception):
