@@ -183,10 +183,7 @@ EXPORT void set_up(void) {
             .into = {components[of->receiver].memory, of->end, of->kinds, of->low, of->high, of->plain,
                      of->as_they_are}};
     }
-    for (int lane = 0; lane < L; lane++) {
-        tracks[lane].moving = moving[lane];
-        memcpy(settings[lane], default_settings, sizeof default_settings);
-    }
+    for (int lane = 0; lane < L; lane++) tracks[lane].moving = moving[lane];
     loop = (Loop){
         .components = components, .channels = channels, .channel_count = CONNECTIONS,
         .continuous = {continuous_, CONTINUOUS_COUNT}, .sampled = {sampled_, SAMPLED_COUNT}, .tracks = tracks,

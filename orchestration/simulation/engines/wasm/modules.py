@@ -33,7 +33,7 @@ def units_of(tables: SystemTables, lanes: int) -> list[Unit]:
     )
     system = {path.name: path.read_bytes() for path in (*FILES, FOLDER / "integers.h")} | {
         "sizes.h": sizes.encode(), "expressions.h": shape.expressions.text.encode(),
-        "system.h": tables.system.encode(), "defaults.h": tables.defaults.encode(),
+        "system.h": tables.system.encode(),
     }  # fmt: skip
     units.append(Unit(sources={**ours, **timing}, main="timing.c", options=(*defined, "-Os")))
     units.append(Unit(sources={**ours, **system}, main="live.c", options=defined))

@@ -29,11 +29,6 @@ class Setting:
     excludes_low: bool = False
     is_whole: bool = False
 
-    @property
-    def decimal(self) -> tuple[int, int]:
-        """Digits and exponent of its decimal form: value = digits · 10^exponent."""
-        return decimal_of(self.value)
-
 
 def decimal_of(value: float) -> tuple[int, int]:
     """Digits and exponent of the shortest decimal form of a number: value = digits · 10^exponent."""

@@ -39,8 +39,6 @@ class SystemTables:
     settings: Settings
     timing: str
     system: str
-    defaults: str
-    """The values of the settings, which no other text has"""
 
 
 def tables_of(shape: Shape, settings: Settings | None = None, free: Collection[str] = ()) -> SystemTables:
@@ -56,13 +54,9 @@ def tables_of(shape: Shape, settings: Settings | None = None, free: Collection[s
             raise UsageError(f"components.{name}.sampling.clock = fmu: expected master in a page")
     settings = settings or Settings(system, shape.models, free)
     sources = SourcesInC(shape, settings)
-    defaults = ["static const Setting default_settings[] = {"]
-    for setting in settings.all:
-        digits, exponent = setting.decimal
-        defaults.append(f"    {{{number_text(float(setting.value))}, {digits}, {exponent}}},")
     return SystemTables(
         shape=shape, settings=settings, timing=_timing(shape, settings, sources),
-        system=_system(shape, settings, sources), defaults="\n".join([*defaults, "};\n"]),
+        system=_system(shape, settings, sources),
     )  # fmt: skip
 
 
@@ -192,7 +186,7 @@ def _system(shape: Shape, settings: Settings, sources: SourcesInC) -> str:
         _table("struct { int32_t setting; double value; }", "named_numbers", named),
         "static __attribute__((unused)) double number_at(int i, const Setting *s) {",
         "    return named_numbers[i].setting < 0 ? named_numbers[i].value : s[named_numbers[i].setting].value;", "}",
-        sources.text, _finish(shape, calls, own), '#include "defaults.h"', "",
+        sources.text, _finish(shape, calls, own), "",
     ])  # fmt: skip
 
 
