@@ -9,7 +9,7 @@ from fmu_kit.bundle import PackagingError
 from fmu_kit.compiler.pack.c_compiler import FOR_THIS_PROCESSOR, Unit, linked_for_wasm, linked_here
 from fmu_kit.compiler.pack.lanes import MAIN
 from fmu_kit.compiler.runtime import FOLDER
-from orchestration.foundation.basics.errors import QuadcosimError
+from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.simulation.engines.batch.kernels import FILES, sources_of
 from orchestration.simulation.engines.wasm.tables_of_system import SystemTables
 from orchestration.systems.schedule.compiled_timetable import FILES as TIMETABLE
@@ -43,6 +43,8 @@ def units_of(tables: SystemTables, lanes: int) -> list[Unit]:
 def _component(i: int, tables: SystemTables, defined: tuple[str, ...]) -> Unit:
     name = tables.shape.names[i]
     sources = dict(sources_of(name, tables.shape.models[name]))
+    if _FUNCTIONS not in sources:
+        raise UsageError(f"components.{name}: a user's own C, compiled for this machine, does not run in a page")
     sources[_FUNCTIONS] = _specialised(sources[_FUNCTIONS].decode(), _fixed(name, tables)).encode()
     renamed = tuple(f"-Dquadcosim_{each}=c{i}_{each}" for each in _OF_COMPONENTS)
     return Unit(sources=sources, main=MAIN, options=(*defined, *renamed))
