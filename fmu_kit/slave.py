@@ -24,9 +24,9 @@ from fmu_kit.declared_names import expect_free_names, expect_variables
 from fmu_kit.errors import DivergenceError, FmuError, require
 from fmu_kit.failure import Failure, printf_safe, report
 from fmu_kit.interface import Declaration, declarations_in, initial_values, variables_of
+from fmu_kit.release_at_exit import release_at_exit
 from fmu_kit.saved_state import State, deserialise, expect_state, serialise
 from fmu_kit.scalar import FLOAT
-from fmu_kit.unloading import release_at_exit
 from fmu_kit.variables import INDEX, Variable
 from fmu_kit.variants import Value, with_fixed_values
 

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 from fmpy import fmi2
 
-from orchestration.components.fmi.native import NativeInstance
+from orchestration.components.fmi.native_instance import NativeInstance
 from orchestration.components.fmi.slaves import WARNING
 from orchestration.foundation.basics.errors import SimulatorError
 

@@ -7,7 +7,7 @@ import numpy as np
 from fmpy import fmi3
 
 from orchestration.components.fmi.instance import INTEGERS
-from orchestration.components.fmi.native import NativeInstance
+from orchestration.components.fmi.native_instance import NativeInstance
 from orchestration.components.fmi.slaves import WARNING
 from orchestration.foundation.basics.errors import SimulatorError
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from orchestration.components.fmi.isolated_instance import Command
-from orchestration.components.fmi.native import NativeInstance
+from orchestration.components.fmi.native_instance import NativeInstance
 from orchestration.components.fmi.opening import open_here
 from orchestration.foundation.basics.simulator import Floats, Transfer
 from orchestration.foundation.processes.channel import Parent

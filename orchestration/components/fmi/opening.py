@@ -18,7 +18,7 @@ from fmu_kit.scratch import temporary_folder
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.components.fmi.fmi3 import Fmi3Instance
 from orchestration.components.fmi.instance import Instance
-from orchestration.components.fmi.native import NativeInstance
+from orchestration.components.fmi.native_instance import NativeInstance
 from orchestration.components.fmi.read_description import read_model
 from orchestration.components.fmi.trust import content_hash
 from orchestration.foundation.processes import subprocesses

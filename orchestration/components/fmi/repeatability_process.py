@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from orchestration.components.fmi.instance import Value, start_number, within
-from orchestration.components.fmi.native import NativeInstance
+from orchestration.components.fmi.native_instance import NativeInstance
 from orchestration.components.fmi.opening import open_here
 from orchestration.components.fmi.read_description import Variable
 from orchestration.foundation.basics.errors import QuadcosimError

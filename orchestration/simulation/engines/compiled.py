@@ -19,7 +19,7 @@ from fmu_kit.compiler.runtime import FOLDER
 from fmu_kit.libraries import cached_library
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.components.fmi.fmi3 import Fmi3Instance
-from orchestration.components.fmi.native import NativeInstance
+from orchestration.components.fmi.native_instance import NativeInstance
 from orchestration.components.fmi.surroundings import ROUNDING
 from orchestration.foundation.basics.c_structures import address, declared, expect_same_sizes
 from orchestration.foundation.basics.errors import QuadcosimError

@@ -6,7 +6,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from orchestration.components.fmi.native import NativeInstance
+from orchestration.components.fmi.native_instance import NativeInstance
 from orchestration.components.fmi.transfers import TransferCall, range_of
 from orchestration.foundation.basics.simulator import Floats, Transfer
 from orchestration.simulation.engines.connection_hold import of_each

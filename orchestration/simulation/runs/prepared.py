@@ -12,7 +12,7 @@ import numpy as np
 
 from orchestration.components.fmi.instance import Instance, Loader
 from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
-from orchestration.components.fmi.native import NativeInstance
+from orchestration.components.fmi.native_instance import NativeInstance
 from orchestration.components.fmi.opening import open_instance
 from orchestration.components.fmi.read_description import Model
 from orchestration.components.fmi.surroundings import FOLDER, LIMITS, sentence

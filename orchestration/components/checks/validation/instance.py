@@ -9,7 +9,7 @@ import numpy as np
 
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.components.fmi.fmi3 import Fmi3Instance
-from orchestration.components.fmi.native import NativeInstance
+from orchestration.components.fmi.native_instance import NativeInstance
 from orchestration.components.fmi.read_description import Model, Variable
 from orchestration.components.fmi.slaves import INSTANTIATES, Message, failure_text
 from orchestration.foundation.basics.errors import SimulatorError, StoppedStepError

@@ -17,7 +17,7 @@ import pytest
 from orchestration.components.building.fmus import locate
 from orchestration.components.fmi import opening, slaves
 from orchestration.components.fmi.isolated_instance import IsolatedInstance
-from orchestration.components.fmi.native import NativeInstance
+from orchestration.components.fmi.native_instance import NativeInstance
 from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError
 from orchestration.foundation.processes import subprocesses
 from orchestration.simulation.runs.prepared import prepared

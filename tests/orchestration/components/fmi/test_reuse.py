@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from orchestration.components.fmi.isolated_instance import IsolatedInstance
-from orchestration.components.fmi.native import NativeInstance
+from orchestration.components.fmi.native_instance import NativeInstance
 from orchestration.components.fmi.opening import Repeatability, repeatability_of
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.processes.child import Child, Ending

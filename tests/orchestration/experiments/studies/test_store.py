@@ -548,7 +548,7 @@ def test_a_parameter_set_to_its_start_value_is_the_same_run() -> None:
 @pytest.mark.parametrize(
     "module", ["orchestration.simulation.engines.master", "orchestration.systems.schedule.timetable",
                "orchestration.simulation.results.objectives", "fmu_kit.trajectory",
-               "orchestration.components.fmi.native", "orchestration.simulation.workers.task",
+               "orchestration.components.fmi.native_instance", "orchestration.simulation.workers.task",
                "orchestration.quadrotor.scenarios.wiring"],
 )  # fmt: skip
 def test_an_edited_source_of_the_simulation_is_other_software(module: str, tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.components.fmi.instance import Instance
-from orchestration.components.fmi.native import NativeInstance
+from orchestration.components.fmi.native_instance import NativeInstance
 from orchestration.components.fmi.opening import open_here
 from orchestration.components.fmi.read_description import read_model
 from orchestration.components.fmi.transfers import range_of
