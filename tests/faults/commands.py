@@ -161,5 +161,5 @@ COMMANDS = (
     ),
     _command("limit", f"{_LIMIT} --out limits"),
     _command("margin", f"{_MARGIN} --out a.json", "a.json"),
-    _command("interop", f"interop {TANK / 'system.toml'} --tool libcosim --out agreement"),
+    _command("interop", f"interop {_INTEGRATOR} --tool libcosim --stop-time 0.2 --out agreement"),
 )
