@@ -40,7 +40,9 @@ class FrameError(Exception):
 def pack(content: object) -> bytes:
     """`content` in bytes; raises `TypeError` for what is no data."""
     try:
-        data: bytes = msgpack.packb(content, default=_extended, strict_types=True, unicode_errors="surrogatepass")
+        data: bytes = msgpack.packb(
+            content, default=_extended, strict_types=True, unicode_errors="surrogatepass", buf_size=4096
+        )
     except (OverflowError, ValueError, RecursionError) as error:
         raise TypeError(str(error)) from None
     return data

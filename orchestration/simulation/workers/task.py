@@ -173,7 +173,10 @@ class Runner:
             self._expect_loadable(task.system)
             return Results.of([], self._machine)
         outcomes = self._in_lanes(task) if isinstance(task, TaskBatch) else [self._alone(task)]
-        return Results.of(outcomes, self._machine)
+        try:
+            return Results.of(outcomes, self._machine)
+        except MemoryError as error:  # an FMU may have left none
+            raise WorkerEnvironmentError(str(error) or type(error).__name__) from error
 
     def _expect_loadable(self, system: System) -> None:
         _expect_files(system)

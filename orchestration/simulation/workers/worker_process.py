@@ -31,7 +31,11 @@ def main(own_folder: str) -> None:
     runner = tasks.Runner(machine())
     limits = own_limits()
     for task in parent:
-        parent.send(_run(runner, task))
+        answer = _run(runner, task)
+        try:
+            parent.send(answer)
+        except MemoryError:  # an FMU has left none; this takes less
+            parent.send(tasks.EnvironmentFailure(message="MemoryError"))
         if own_limits() != limits:  # an FMU has lowered them for good; the next run gets another process
             return
     parent.leave()
