@@ -47,7 +47,7 @@ def same(one: Any, other: Any) -> bool:
     return type(one) is type(other) and repr(one) == repr(other)
 
 
-@pytest.mark.parametrize("hint", HINTS, ids=str)
+@pytest.mark.parametrize("hint", HINTS)
 def test_what_fits_is_what_pydantic_makes_of_it(hint: Any) -> None:
     config = pydantic.ConfigDict(strict=True, arbitrary_types_allowed=True)
     adapter = pydantic.TypeAdapter(hint, config=None if hint is Sampling else config)
