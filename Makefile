@@ -2,7 +2,7 @@
 # make check: lint and the most informative fast tests, under a minute, for while you work.
 # make coverage: all tests, and which lines they run. make site: the documentation as a site, in site/.
 # make bench: time the loop. make figures, make findings, make interop: figures, tables and icons of docs/ and examples/.
-# make faults: commands whose calls of the operating system fail, and the C under sanitizers; most of an hour.
+# make faults: commands whose calls of the operating system fail, and the C under sanitizers; half an hour.
 # make release: wheel, sources, native FMUs, SSP and their checksums, in dist/.
 # make newcomer: run every block of every page in a clone of the last commit; an hour or more.
 # Each makes its own environment first.

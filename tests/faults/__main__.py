@@ -16,7 +16,7 @@ def main() -> int:
     """Start again with the shim, then work through the matrix."""
     parser = argparse.ArgumentParser(prog="python -m tests.faults")
     parser.add_argument("commands", nargs="*", help="default: all")
-    parser.add_argument("--most", type=int, default=10**9, help="numbers of each kind of call")
+    parser.add_argument("--most", type=int, default=10**9, help="numbers of each kind of call but rename")
     parser.add_argument("--out", type=Path, help="where all rows go, as JSON")
     parser.add_argument("--page", action="store_true", help="write the rows and the table of the documentation")
     options = parser.parse_args()

@@ -73,10 +73,11 @@ class Matrix:
         self._count = 0
 
     def rows(self, command: Command, faults: Iterable[Fault] = FAULTS, most: int = 10**9) -> Iterator[Row]:
-        """All cases of a command, with at most `most` numbers of a kind of call."""
+        """All cases of a command, with at most `most` numbers of a kind of call, but all renames."""
         clean = self.clean(command)
         for fault in faults:
-            for n in list(numbers(fault, clean.calls[fault.call]))[:most]:
+            chosen = list(numbers(fault, clean.calls[fault.call]))
+            for n in chosen if fault.call == "rename" else chosen[:most]:
                 place = self._place(command)
                 row = self._case(command, fault, n, clean, place)
                 shutil.rmtree(place)

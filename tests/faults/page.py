@@ -27,7 +27,8 @@ def page(text: str, rows: list[dict[str, Any]]) -> str:
 def _table(rows: list[dict[str, Any]]) -> str:
     lines = ["", "| command | cases | files as before | new files | else |", "| --- | --- | --- | --- | --- |"]
     names = list(dict.fromkeys(row["command"] for row in rows))
-    for name, counts in [(name, Counter(row["outcome"] for row in rows if row["command"] == name)) for name in names]:
+    counted = [(name, Counter(row["outcome"] for row in rows if row["command"] == name)) for name in names]
+    for name, counts in [*counted, ("all", Counter(row["outcome"] for row in rows))]:
         others = ", ".join(f"{counts[each]} {each}" for each in counts if each not in GOOD)
         lines.append(f"| {name} | {counts.total()} | {counts['old']} | {counts['new']} | {others} |")
     return "\n".join([*lines, "", ""])
