@@ -146,7 +146,7 @@ def test_of_what_is_mistyped_the_closest_is_named(arguments: list[str], meant: s
 
 
 COMPLETED = {
-    "quadcosim li": {"limit", "linearise"},
+    "quadcosim li": {"limit", "linearise", "live"},
     "quadcosim run --hold ": {"zero", "first"},
     "quadcosim run --preset ": {"px4", "crazyflie", "betaflight"},
     "quadcosim run --vehicle c": {"crazyflie"},
