@@ -129,7 +129,7 @@ function context(canvas) {
   const ratio = devicePixelRatio || 1, w = canvas.clientWidth, h = +canvas.dataset.height;
   if (canvas.width !== Math.round(w * ratio) || canvas.height !== Math.round(h * ratio)) canvas.width = Math.round(w * ratio), canvas.height = Math.round(h * ratio), canvas.style.height = `${h}px`;
   const c = canvas.getContext("2d");
-  c.setTransform(ratio, 0, 0, ratio, 0, 0), c.clearRect(0, 0, w, h), c.font = "11px system-ui, sans-serif";
+  c.setTransform(ratio, 0, 0, ratio, 0, 0), c.clearRect(0, 0, w, h), c.font = "11px system-ui, sans-serif", c.lineWidth = 1;
   return [c, w, h];
 }
 
@@ -151,7 +151,7 @@ function plot(canvas, panel) {
   c.fillStyle = css("--soft"), c.strokeStyle = css("--line"), c.lineWidth = 1, c.beginPath();
   const marks = log ? Array.from({ length: Math.round(Math.log10(high / low)) + 1 }, (_, i) => low * 10 ** i) : ticks(low, high, 4);
   for (const v of marks) c.moveTo(left, Y(v)), c.lineTo(w - 6, Y(v)), c.fillText(String(+v.toPrecision(3)), 4, Y(v) + 4);
-  for (const t of ticks(0, stop, 8)) c.moveTo(X(t), 3), c.lineTo(X(t), h - bottom), c.fillText(String(t), X(t) - 4, h - 4);
+  for (const t of ticks(0, stop, 8)) c.moveTo(X(t), 3), c.lineTo(X(t), h - bottom), c.fillText(String(t), Math.min(X(t) - 4, w - c.measureText(String(t)).width), h - 4);
   c.stroke();
   for (const run of runs) panel.lines.forEach((i, k) => {
     const line = run.lines[i], n = line.length / 2;
@@ -205,7 +205,7 @@ function drawClock() {
   canvas.dataset.height = 34 + 40 * Math.max(1, shown.length);
   const [c, w, h] = context(canvas), left = 90, until = drawing.clock, X = t => left + (w - left - 8) * t / until, Y = name => 20 + 40 * Math.max(0, shown.indexOf(name));
   c.fillStyle = css("--soft"), c.strokeStyle = css("--line"), c.beginPath();
-  for (const t of ticks(0, until, 6)) c.moveTo(X(t), 6), c.lineTo(X(t), h - 18), c.fillText(`${+(1000 * t).toPrecision(4)} ms`, X(t) - 12, h - 4);
+  for (const t of ticks(0, until, Math.min(6, (w - left) / 60))) c.moveTo(X(t), 6), c.lineTo(X(t), h - 18), c.fillText(`${+(1000 * t).toPrecision(4)} ms`, X(t) - 12, h - 4);
   for (const name of shown) c.moveTo(left, Y(name)), c.lineTo(w - 8, Y(name)), c.fillText(name.slice(0, 14), 4, Y(name) + 4);
   c.stroke(), c.strokeStyle = css("--flown"), c.lineWidth = 1.3, c.beginPath();
   for (const [t, component] of samples) { const y = Y(system.components[component]); c.moveTo(X(t), y - 9), c.lineTo(X(t), y + 3); }
@@ -294,7 +294,7 @@ function onmap({ map, cells: some, spent: time }) {
   requestAnimationFrame(drawMap);
 }
 
-const place = canvas => { const w = canvas.clientWidth, h = +canvas.dataset.height; return { left: 46, bottom: 30, W: (w - 52) / N, H: (h - 36) / N, w, h }; };
+const place = canvas => { const w = canvas.clientWidth, h = +canvas.dataset.height; return { left: 46, bottom: 30, W: (w - 52) / N, H: (h - 48) / N, w, h }; };
 
 function shade([outcome, value]) {
   if (outcome === "refused") return css("--refused");
