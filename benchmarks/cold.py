@@ -3,8 +3,9 @@
 CPU time, user and system, of a new process and of all that it starts, the smallest of several interleaved repetitions;
 it grows under other load. FMUs are built before, except for `build` itself. The sweep runs without flags into an empty
 store: flights of 20 s and of 1 s at 50 Hz, the plant at 1 ms, each with its own jitter. With an empty cache it also
-compiles. The cost of a run and the fixed cost of a sweep follow from two sizes, and so does the coordinator's part of
-both. `python -m benchmarks.cold FOLDER` measures the sweeps in turns with those of the tree in FOLDER.
+compiles, and builds FMUs: the cache vouches for them. The cost of a run and the fixed cost of a sweep follow from two
+sizes, and so does the coordinator's part of both. `python -m benchmarks.cold FOLDER` measures the sweeps in turns with
+those of the tree in FOLDER.
 """
 
 import os
