@@ -12,7 +12,7 @@ from pathlib import Path
 
 from fmu_kit.new_files import write_atomically
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.processes.subprocesses import ROOT
+from orchestration.foundation.processes.subprocesses import checkout
 
 Ask = Callable[[str], bool]
 """Asks the user a question; returns whether the answer is yes"""
@@ -67,8 +67,8 @@ def expect(fmu: Path, folder: Path) -> None:
 
 def is_of_this_project(folder: Path) -> bool:
     """Whether it is in the examples of the checkout that this package runs from."""
-    root = Path(ROOT)
-    return (root / "pyproject.toml").is_file() and folder.resolve().is_relative_to(root / "examples")
+    root = checkout()
+    return root is not None and folder.resolve().is_relative_to(root / "examples")
 
 
 def _place(folder: Path) -> Path:

@@ -25,6 +25,7 @@ from orchestration.components.building.builder import (
 )
 from orchestration.components.building.models import MODELS, PATHS, WRAPPED
 from orchestration.foundation.basics.errors import UsageError, prefixed
+from orchestration.foundation.processes.subprocesses import checkout
 
 _NOTES = logging.getLogger("quadcosim")
 
@@ -41,10 +42,9 @@ Twin = TypeVar("Twin", bound=HasTwins)
 
 def default_folder() -> Path:
     """`fmus/` of the project, or the user's cache directory if that does not exist or is not writable."""
-    root = Path(__file__).resolve().parents[3]
-    folder = root / "fmus"
-    if (root / "pyproject.toml").is_file() and os.access(folder, os.W_OK):
-        return folder
+    root = checkout()
+    if root is not None and os.access(root / "fmus", os.W_OK):
+        return root / "fmus"
     import platformdirs
 
     return Path(platformdirs.user_cache_dir("quadcosim")) / "fmus"

@@ -1,7 +1,8 @@
 """FMUs that may run in this process: those that were built here from this project's own sources.
 
-They are known by the hash of the whole file, recorded in the user's cache when it is built. What an archive says of
-itself does not count, so that a copy is what its original is, and a file of which one byte differs is foreign.
+They are known by the hash of the whole file, recorded when it is built: in the checkout that this process runs from, as
+whoever can write there can change the sources too, else in the user's cache. What an archive says of itself does not
+count, so that a copy is what its original is, and a file of which one byte differs is foreign.
 """
 
 import contextlib
@@ -12,9 +13,10 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from fmu_kit.new_files import write_atomically
+from orchestration.foundation.processes.subprocesses import checkout
 
 _accepted: set[str] = set()
-"""Hashes that this process knows without the cache: of its own builds, or from its coordinator on another machine"""
+"""Hashes that this process knows without the records: of its own builds, or from its coordinator on another machine"""
 
 
 def content_hash(path: Path) -> str:
@@ -58,6 +60,9 @@ def is_recordable() -> bool:
 
 
 def _folder() -> Path:
+    root = checkout()
+    if root is not None and os.access(root, os.W_OK):
+        return root / ".cache" / "built"
     import platformdirs
 
     return Path(platformdirs.user_cache_dir("quadcosim")) / "built"

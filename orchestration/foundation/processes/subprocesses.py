@@ -32,6 +32,11 @@ class Module:
         return command(self.name, *self.arguments)
 
 
+def checkout() -> Path | None:
+    """The checkout of the project that this process runs from; None if the package is installed."""
+    return Path(ROOT) if os.path.isfile(os.path.join(ROOT, "pyproject.toml")) else None
+
+
 def command(module: str, *arguments: object) -> list[str]:
     """The command that runs `module` in this Python."""
     return [sys.executable, "-m", module, *map(str, arguments)]

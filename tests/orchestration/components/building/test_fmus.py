@@ -17,6 +17,7 @@ from orchestration.components.fmi import trust
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.processes import subprocesses
+from orchestration.foundation.processes import subprocesses
 from quadcosim import QuadcosimError, UsageError
 
 
@@ -24,8 +25,8 @@ from quadcosim import QuadcosimError, UsageError
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder that the package takes for the one that it lies in; its cache is beside it."""
     root = tmp_path / "project"
-    (root / "orchestration" / "components" / "building").mkdir(parents=True)
-    monkeypatch.setattr(fmus, "__file__", str(root / "orchestration" / "components" / "building" / "fmus.py"))
+    root.mkdir()
+    monkeypatch.setattr(subprocesses, "ROOT", str(root))
     monkeypatch.setattr(platformdirs, "user_cache_dir", lambda name: str(tmp_path / "cache" / name))
     return root
 

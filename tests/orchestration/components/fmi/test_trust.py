@@ -61,8 +61,10 @@ def test_what_a_worker_may_run_beside_itself_is_told_by_its_coordinator(
     files = Files(fmus={"own": built["QuadrotorPlant"], "other": other}, tables={})
     own = Inputs.of(files).own_fmus
     assert own == {files.hashes["own"]}
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "of another machine"))
     monkeypatch.setattr(trust, "_accepted", set())
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "an empty cache"))
+    assert trust.is_own(built["QuadrotorPlant"])
+    monkeypatch.setattr(trust, "_folder", lambda: tmp_path / "of another machine")
     assert not trust.is_own(built["QuadrotorPlant"])
     trust.accept(own)
     assert trust.is_own(built["QuadrotorPlant"])
