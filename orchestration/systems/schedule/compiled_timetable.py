@@ -32,7 +32,6 @@ from orchestration.systems.system.model import System
 
 HEADER = Path(__file__).with_name("timetable_structures.h")
 FILES = (Path(__file__).with_name("timetable.c"), Path(__file__).with_name("timetable.h"), HEADER)
-_FASTER = ("-O3",)
 _MOST_CONTINUOUS = 64
 """Components in continuous time: C has a bit for each"""
 
@@ -53,9 +52,8 @@ def loaded(sources: dict[str, bytes]) -> Any:
     """Such a library from the texts of its files; raises as `library`."""
     try:
         path = cached_library(
-            "timetable", sources, (*OPTIONS, *_FASTER),
-            lambda: compiled_here(sources, "timetable.c", mathematics="libm", options=_FASTER),
-        )  # fmt: skip
+            "timetable", sources, OPTIONS, lambda: compiled_here(sources, "timetable.c", mathematics="libm")
+        )
         made = ctypes.CDLL(str(path))
     except (PackagingError, OSError) as error:
         raise QuadcosimError(str(error)) from error
