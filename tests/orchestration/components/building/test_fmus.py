@@ -17,7 +17,6 @@ from orchestration.components.fmi import trust
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.processes import subprocesses
-from orchestration.foundation.processes import subprocesses
 from quadcosim import QuadcosimError, UsageError
 
 
