@@ -3,6 +3,7 @@
 The program calls Python where rounding matters.
 """
 
+import functools
 import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -51,10 +52,9 @@ class Condition:
         columns = [c for c in board.columns if c != "time" and _is_named(c, named)]
         used = self._used(named)
         constants = [name for name in self.numbers if name in named]
-        order = ["", "time", *columns, *(signal for name in used for signal in self.signals_of[name]), *constants]
-        places = {name: i for i, name in enumerate(order)}
+        order = ("", "time", *columns, *(signal for name in used for signal in self.signals_of[name]), *constants)
         with prefixed("criterion.diverged: "):
-            clauses = [_Clause(clause, places) for clause in _alternatives(node)]
+            clauses = _clauses(node, order)
         get = operator.itemgetter(
             0, 0, *(board.place[column] for column in columns)
         )  # two more than needed, so that it is a tuple
@@ -130,6 +130,13 @@ class _Clause:
         left, right = node.operands
         expected = _EXPECTED[node.sign]
         return f"{text(left)} = {self._left(values):g} at t = {t:g} s, expected {expected} {text(right)}"
+
+
+@functools.lru_cache(maxsize=64)
+def _clauses(node: Node, order: Sequence[str]) -> Sequence[_Clause]:
+    """The clauses of a condition over values in this order; runs of one system have the same."""
+    places = {name: i for i, name in enumerate(order)}
+    return [_Clause(clause, places) for clause in _alternatives(node)]
 
 
 _EXPECTED = {">": "at most", ">=": "less than", "<": "at least", "<=": "more than"}

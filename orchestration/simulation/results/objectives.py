@@ -19,7 +19,8 @@ from orchestration.systems.system.request import Request, system_of
 Metrics = dict[str, float | int | bool | str | None]
 
 GOOD = "criterion.good"
-FIXED = ("outcome", "good", "horizon", "diverged", "divergence_time", "steps")
+OUTCOME = "outcome"
+FIXED = (OUTCOME, "good", "horizon", "diverged", "divergence_time", "steps")
 """Metrics that every run has beside its objectives."""
 PRINTED = ("wall_time", "engine")
 """Names that `run` prints beside them"""

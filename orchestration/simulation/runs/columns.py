@@ -1,5 +1,6 @@
-"""The values that differ between runs of one system, as arrays by path: one value for each run."""
+"""The values that differ between runs of one system, as arrays by path that broadcast to one value for each run."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,21 +17,37 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed, parameter_name, parameter_path, value_at
 from orchestration.systems.system.request import Request
 
+SEED = "seed"
+
 
 @dataclass(frozen=True, kw_only=True)
 class Columns:
     """Runs of a system: the values that they share, and those of each run."""
 
     system: System
-    count: int
+    given: Mapping[str, Any]
+    """The arrays by target, as they were given"""
+    shape: tuple[int, ...]
+    """That to which they broadcast: runs are counted in the order of C"""
     parameters: Mapping[str, Floats]
     """Real ones, as COMPONENT.NAME, shape (count,)"""
+    seeds: Sequence[int] | None
+    """None: all runs have that of the system"""
     settings: Mapping[str, Sequence[Any]]
     """all others, by path: each combination makes a system"""
 
+    @property
+    def count(self) -> int:
+        """The number of runs."""
+        return math.prod(self.shape)
+
+    def name(self, run: int) -> str:
+        """The index of a run in the arrays."""
+        return str(run) if len(self.shape) < 2 else str(tuple(map(int, np.unravel_index(run, self.shape))))
+
     @cached_property
     def systems(self) -> list[System]:
-        """The system of each run, without its `parameters`; runs of the same settings share one.
+        """The system of each run, without its `parameters` and its seed; runs of the same settings share one.
 
         Raises `UsageError` for settings that are invalid.
         """
@@ -43,29 +60,28 @@ class Columns:
             systems.append(by_settings[point])
         return systems
 
+    def seeded(self, run: int) -> System:
+        """The system of one run with its seed."""
+        return self.systems[run] if self.seeds is None else changed(self.systems[run], {SEED: self.seeds[run]})
+
     def alone(self, run: int) -> System:
         """The system of one run, with all of its values."""
         parameters = {parameter_path(name): float(column[run]) for name, column in self.parameters.items()}
-        return changed(self.systems[run], parameters)
+        return changed(self.seeded(run), parameters)
 
 
 def columns(request: Request, system: System, models: Mapping[str, Model], values: Mapping[str, Any]) -> Columns:
     """The runs of a request, whose `system` fits the `models` of its FMUs, with these `values`.
 
-    `values` has an array for each target that `request` knows, shape (runs,), or one value for all runs. Raises
-    `UsageError` for an unknown target, arrays of different lengths, and values that the FMUs do not accept.
+    `values` has an array for each target that `request` knows. Raises `UsageError` for an unknown target, arrays that
+    do not broadcast, and values that the FMUs do not accept.
     """
     arrays = {target: _array(target, value) for target, value in dict(values).items()}
-    lengths = {target: len(array) for target, array in arrays.items() if array.ndim}
-    if not lengths:
-        raise UsageError("values: expected at least one array, with a value for each run")
-    first, count = next(iter(lengths.items()))
+    shape = _common_shape(arrays)
     parameters: dict[str, Floats] = {}
     settings: dict[str, Sequence[Any]] = {}
     for target, array in arrays.items():
-        if lengths.get(target, count) != count:
-            raise UsageError(f"values of {target}: {len(array)} of them; expected {count}, as many as of {first}")
-        column = np.broadcast_to(array, (count,))
+        column = np.broadcast_to(array, shape).reshape(-1)
         for path in request.paths_of(target):
             value_at(system, path)
             name = parameter_name(path)
@@ -83,7 +99,34 @@ def columns(request: Request, system: System, models: Mapping[str, Model], value
             else:
                 settings[path] = column.tolist()
                 _expect_accepted(system, models, path, np.unique(column))
-    return Columns(system=system, count=count, parameters=parameters, settings=settings)
+    seeds = _seeds(settings.pop(SEED)) if SEED in settings else None
+    return Columns(system=system, given=arrays, shape=shape, parameters=parameters, seeds=seeds, settings=settings)
+
+
+def _common_shape(arrays: Mapping[str, Any]) -> tuple[int, ...]:
+    """The shape to which arrays broadcast; raises `UsageError` naming the first that does not with those before it."""
+    shape: tuple[int, ...] = ()
+    for i, (target, array) in enumerate(arrays.items()):
+        try:
+            shape = np.broadcast_shapes(shape, array.shape)
+        except ValueError:
+            others = ", ".join([*arrays][:i])
+            raise UsageError(
+                f"values of {target}: shape {array.shape}; expected one that broadcasts with {shape}, that of {others}"
+            ) from None
+    return shape
+
+
+def _seeds(values: Sequence[Any]) -> Sequence[int]:
+    """Seeds as whole numbers; raises `UsageError` for one that is invalid."""
+    for value in values:
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, (int, float))
+            or not (0 <= value < 2**63 and value == int(value))
+        ):
+            raise UsageError(f"seed = {shown(value)}: expected a whole number from 0 to 2^63 - 1")
+    return [int(value) for value in values]
 
 
 def _array(target: str, value: Any) -> Any:
@@ -91,9 +134,9 @@ def _array(target: str, value: Any) -> Any:
     try:
         array = np.asarray(value)
     except ValueError:  # rows of different lengths
-        array = np.zeros((0, 0))
-    if array.ndim > 1 or array.dtype.kind not in "fiubU" or not array.size:
-        raise UsageError(f"values of {target}: expected an array of shape (runs,), or one value for all runs")
+        array = np.zeros(0)
+    if array.dtype.kind not in "fiubU" or not array.size:
+        raise UsageError(f"values of {target}: expected an array of numbers, truth values or words, with one at least")
     return array
 
 

@@ -4,13 +4,14 @@ import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from orchestration.components.building import fmus
 from orchestration.components.fmi.read_description import Model, read_model
-from orchestration.foundation.basics.errors import Named, QuadcosimError, UsageError, expected_name
+from orchestration.foundation.basics.errors import QuadcosimError, UsageError, expected_name, shown
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.engines.batch.batch import MAX_ROWS
 from orchestration.simulation.engines.batch.batches import Batches
@@ -18,8 +19,9 @@ from orchestration.simulation.engines.batch.shape import expect_lanes
 from orchestration.simulation.engines.master import BATCH
 from orchestration.simulation.engines.resolved import check_against_fmus, columns_of, source_signals
 from orchestration.simulation.requests.request import RequestLike, request_of
-from orchestration.simulation.results.objectives import FIXED, Metrics
+from orchestration.simulation.results.objectives import FIXED, OUTCOME, Metrics
 from orchestration.simulation.runs.columns import Columns, columns
+from orchestration.simulation.runs.flights import Flights
 from orchestration.simulation.runs.simulation import run
 from orchestration.systems.system.check import check, connect_references, recorded_variables
 from orchestration.systems.system.connection import component_of, variable_of
@@ -29,62 +31,34 @@ from orchestration.systems.system.request import errors_in_own_terms
 _NOTES = logging.getLogger("quadcosim")
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
-class Flights(Mapping[str, Floats]):
-    """The results of many runs as arrays by name: `flights["position_rmse"]` has a value for each run."""
-
-    arrays: Mapping[str, Floats]
-    """Arrays by name: of an output shape (runs,), NaN where it has no value; of `time` and what was recorded shape
-    (runs, rows), NaN after the last row of a run that has fewer."""
-    engine: str
-    """The engine of the runs: `batch`, which is SIMD lanes, `compiled` or `python`; the numbers are the same."""
-    reason: str | None
-    """Why they did not run in lanes, in a line; None: they did."""
-    units: Mapping[str, str]
-    """The units of the outputs that have one, by name, as FMI writes them (`N.m`)."""
-
-    def __getitem__(self, name: str) -> Floats:
-        """The array of a name."""
-        return Named(self.arrays)[name]
-
-    def __iter__(self) -> Iterator[str]:
-        """Over the names."""
-        return iter(self.arrays)
-
-    def __len__(self) -> int:
-        """The number of arrays."""
-        return len(self.arrays)
-
-    def __repr__(self) -> str:
-        count = len(next(iter(self.arrays.values())))
-        return f"<Flights: {count} runs by {self.engine}; {', '.join(self.arrays)}>"
-
-
 def run_many(
     request: RequestLike,
     values: Mapping[str, Any],
     *,
     outputs: Sequence[str] | None = None,
     record: Sequence[str] = (),
+    metrics: Mapping[str, str] = MappingProxyType({}),
     in_process: bool = False,
 ) -> Flights:
     """Run a system, or a scenario, many times, from arrays into arrays, without a store or a result for each run.
 
-    `values` are arrays of shape (runs,) by path, as axes of a study name them (`plant.initial.position.x`,
-    `timing.period`, `seed`), or one value for all runs. `outputs` are names of objectives, or of `good`, `horizon` [s],
-    `diverged`, `divergence_time` [s] and `steps`; default: all of them. `record` are columns whose rows are kept, with
-    their `time` [s]. All arrays are of float64; truth values are 0.0 and 1.0.
+    `values` are arrays by path, as axes of a study name them (`plant.initial.position.x`, `timing.period`, `seed`).
+    They broadcast as NumPy's do, and outputs have the shape that they have together; with one value for each path that
+    is `()`. `outputs` are names of objectives, or of `outcome`, `good`, `horizon` [s], `diverged`, `divergence_time`
+    [s] and `steps`; default: all of them. `metrics` are objectives of your own by name, as expressions of the language
+    of objectives. `record` are columns whose rows are kept, with their `time`
+    [s], along one axis more. Numbers are float64, truth values 0.0 and 1.0, outcomes words.
 
     Native FMUs run in lanes of vector registers where this machine has a C compiler and the FMUs have code for lanes,
     else each run is one of `run`. So it is with FMUs that were not built here from this project's sources, whose runs
     have a process each; `in_process`: all may run in lanes, and in this process, which they can end.
 
-    Raises `UsageError` for a path, an output or a column that does not exist, arrays of different lengths and invalid
+    Raises `UsageError` for a path, an output or a column that does not exist, arrays that do not broadcast, and invalid
     values; and what `run` raises for a run that fails, naming it.
     """
     loaded = request_of(request)
     with errors_in_own_terms(loaded):
-        system = located(loaded.as_system())
+        system = _measured(located(loaded.as_system()), metrics)
         models = {name: read_model(Path(component.fmu)) for name, component in system.components.items()}
         check(system, models)
         system = connect_references(system, models)
@@ -92,7 +66,7 @@ def run_many(
         names = _outputs(fits.system, outputs)
         runs = columns(loaded, fits.system, models, values)
         reason = _reason_unavailable(fits.system, models, in_process)
-        table = _Table(runs.count, names, record)
+        table = _Table(runs, names, record)
         for row in (
             _one_by_one(runs, range(runs.count), record, in_process)
             if reason
@@ -102,8 +76,10 @@ def run_many(
     engine = table.engine if reason else BATCH
     _NOTES.debug("%d runs by the engine %s%s", runs.count, engine, f": {reason}" if reason else "")
     known = {"time": "s", "horizon": "s", "divergence_time": "s", **fits.units}
-    units = {name: known[name] for name in table.arrays if name in known}
-    return Flights(arrays=table.arrays, engine=engine, reason=reason, units=units)
+    return Flights(
+        arrays=table.arrays, given=runs.given, recorded=table.recorded, shape=runs.shape, engine=engine, reason=reason,
+        units={name: known[name] for name in table.arrays if name in known},
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,24 +96,28 @@ class _RunRow:
 class _Table:
     """Arrays that fill with runs."""
 
-    def __init__(self, count: int, outputs: Sequence[str], record: Sequence[str]) -> None:
-        self._outputs = {name: np.full(count, np.nan) for name in outputs}
-        self._recorded = ("time", *(name for name in record if name != "time")) if record else ()
-        self._rows: Floats = np.full((len(self._recorded), count, 0), np.nan)
+    def __init__(self, runs: Columns, outputs: Sequence[str], record: Sequence[str]) -> None:
+        self._shape = runs.shape
+        self._outputs: dict[str, Any] = {
+            name: [None] * runs.count if name == OUTCOME else np.full(runs.count, np.nan) for name in outputs
+        }
+        self.recorded = ("time", *(name for name in record if name != "time")) if record else ()
+        self._rows: Floats = np.full((len(self.recorded), runs.count, 0), np.nan)
         self.engine = BATCH
 
     @property
-    def arrays(self) -> dict[str, Floats]:
+    def arrays(self) -> dict[str, Any]:
         """All of them by name."""
-        return {**self._outputs, **dict(zip(self._recorded, self._rows))}
+        outputs = {name: np.asarray(column).reshape(self._shape) for name, column in self._outputs.items()}
+        return outputs | {name: rows.reshape(*self._shape, -1) for name, rows in zip(self.recorded, self._rows)}
 
     def put(self, run: _RunRow) -> None:
         """Add a run."""
         self.engine = run.engine
         for name, column in self._outputs.items():
             value = run.metrics[name]
-            column[run.place] = np.nan if value is None else float(value)
-        if self._recorded:
+            column[run.place] = value if name == OUTCOME else np.nan if value is None else float(value)
+        if self.recorded:
             longer = len(run.rows[0]) - self._rows.shape[2]
             if longer > 0:
                 self._rows = np.pad(self._rows, ((0, 0), (0, 0), (0, longer)), constant_values=np.nan)
@@ -147,16 +127,18 @@ class _Table:
 def _in_lanes(runs: Columns, parameters: Mapping[str, float], record: Sequence[str]) -> Iterator[_RunRow]:
     """All runs, in lanes but for those that must run alone; `parameters` are those of all components."""
     places = {name: i for i, name in enumerate(_of_components(runs.system, record), 1)}
-    for place, summary, rows in Batches().each(runs.systems, list(places) if record else None, runs.parameters):
+    for place, summary, rows in Batches().each(
+        runs.systems, list(places) if record else None, runs.parameters, runs.seeds
+    ):
         if len(rows) == MAX_ROWS:
-            raise UsageError(f"record: run {place} has more than {MAX_ROWS} rows; expected runs of fewer")
+            raise UsageError(f"record: run {runs.name(place)} has more than {MAX_ROWS} rows; expected runs of fewer")
         if summary is None:
             yield from _one_by_one(runs, [place], record, True)
             continue
         signals = {"time": rows[:, 0], **{name: rows[:, i] for name, i in places.items()}} if record else {}
         if record and len(places) < len(record):
             numbers = {**parameters, **{name: float(column[place]) for name, column in runs.parameters.items()}}
-            signals |= source_signals(runs.systems[place], numbers, signals["time"])
+            signals |= source_signals(runs.seeded(place), numbers, signals["time"])
         yield _RunRow(place=place, metrics=summary.metrics, rows=_rows(signals, record))
 
 
@@ -166,7 +148,7 @@ def _one_by_one(runs: Columns, places: Iterable[int], record: Sequence[str], in_
         try:
             result = run(runs.alone(place), in_process=in_process)
         except QuadcosimError as error:
-            raise type(error)(f"run {place}: {error}") from error
+            raise type(error)(f"run {runs.name(place)}: {error}") from error
         rows = _rows(result.signals, record)
         yield _RunRow(place=place, metrics=result.metrics, rows=rows, engine=result.provenance["engine"])
 
@@ -192,6 +174,19 @@ def located(system: System) -> System:
     return replace(system, components=components)
 
 
+def _measured(system: System, metrics: Mapping[str, str]) -> System:
+    """The system with objectives of the caller's own too; raises `UsageError` for what cannot be one."""
+    taken = [*system.objectives, *system.optional, *FIXED]
+    for name, text in metrics.items():
+        if name in taken:
+            raise UsageError(f"metrics: {name}: expected another name; this one is taken")
+        if not isinstance(text, str):
+            raise UsageError(
+                f"metrics: {name} = {shown(text)}: expected an expression as text, as in 'max(plant.tilt)'"
+            )
+    return replace(system, objectives={**system.objectives, **metrics}) if metrics else system
+
+
 def _recording(system: System, models: Mapping[str, Model], record: Sequence[str]) -> System:
     """The system, recording these columns too; raises `UsageError` for one that cannot be recorded."""
     if isinstance(record, str):
@@ -214,7 +209,7 @@ def _outputs(system: System, names: Sequence[str] | None) -> tuple[str, ...]:
     """The names of the results of a run; default: all. Raises `UsageError` for an unknown one."""
     if isinstance(names, str):
         raise UsageError(f"outputs = {names!r}: expected a list of names")
-    known = [name for name in (*system.objectives, *system.optional, *FIXED) if name != "outcome"]
+    known = [*system.objectives, *system.optional, *FIXED]
     for name in names or ():
         if name not in known:
             raise UsageError(f"outputs: {name}: {expected_name(name, known)}")

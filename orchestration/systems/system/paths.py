@@ -54,8 +54,8 @@ def changed(system: System, changes: Mapping[str, Any]) -> System:
             sources[name] = _replaced(
                 place, sources[name], _with_new_kind(sources[name], _by_parameter(sources[name], keys))
             )
-    if _only_numbers(grouped, top):
-        return replaced(system, components=components, **top)
+    if _only_numbers(system, grouped, top):
+        return replaced(system, components=components, connections=tuple(connections.values()), **top)
     result: System = _replaced(
         "",
         system,
@@ -64,10 +64,26 @@ def changed(system: System, changes: Mapping[str, Any]) -> System:
     return result
 
 
-def _only_numbers(grouped: Mapping[tuple[str, str], Mapping[str, Any]], top: Mapping[str, Any]) -> bool:
-    """Whether no change needs a check of the system: so it is in most runs of a study."""
+def _only_numbers(system: System, grouped: Mapping[tuple[str, str], Mapping[str, Any]], top: Mapping[str, Any]) -> bool:
+    """Whether no change needs a check of the whole system: so it is in most runs of a study.
+
+    Components and connections have checked their own numbers.
+    """
     is_seed = all(key == "seed" and type(value) is int and 0 <= value < 2**63 for key, value in top.items())
-    return is_seed and all(table == "components" and _are_parameters(keys) for (table, _), keys in grouped.items())
+    return is_seed and all(
+        (table == "components" and _are_parameters(keys)) or _are_times(system, table, keys)
+        for (table, _), keys in grouped.items()
+    )
+
+
+def _are_times(system: System, table: str, keys: Mapping[str, Any]) -> bool:
+    """Whether numbers of a clock or a connection, which no other part of a system without scheduler depends on."""
+    known = {"components": _OF_CLOCKS, "connections": _OF_CONNECTIONS}.get(table, ())
+    return not system.uses_scheduler and all(key in known and type(value) is float for key, value in keys.items())
+
+
+_OF_CLOCKS = ("sampling.period", "sampling.offset", "sampling.jitter", "sampling.clock_ratio")
+_OF_CONNECTIONS = ("delay", "delay_jitter", "loss", "burst_length", "noise", "quantisation")
 
 
 def _are_parameters(keys: Iterable[str]) -> bool:

@@ -123,11 +123,6 @@ class Batch:
             reductions = result.reductions
         return result
 
-    def value(self, column: str, lane: int) -> float:
-        """The value of a column at the end of a run."""
-        index, place = self._shape.place(column)
-        return float(self.arrays.memories[index][place, lane])
-
     def _run_once(self, group: Group, known: Mapping[Call, Floats], record: Sequence[str] | None) -> BatchResult:
         systems, timings = group.systems, group.timings
         loop, count = self._loop, len(systems)

@@ -155,7 +155,6 @@ def _divergence_message(shape: Shape, batch: Batch, system: System, lane: int, t
     condition = Condition(text=system.criterion.diverged, sources=sources, signals_of=signals, numbers=parameters)
     monitor = condition.watch(shape.board)
     shape.board.row[0] = t
-    for column, place in shape.board.place.items():
-        if column != "time":
-            shape.board.row[place] = batch.value(column, lane)
+    for i, index, place in shape.on_board:
+        shape.board.row[i] = batch.arrays.memories[index][place, lane]
     return monitor(t)

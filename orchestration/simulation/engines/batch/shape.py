@@ -123,6 +123,11 @@ class Shape:
         return self.names.index(component_of(end)), self.variable(end).reference
 
     @cached_property
+    def on_board(self) -> Sequence[tuple[int, int, int]]:
+        """Of each recorded column its place in a row, its component's index, and its place in the memory of that."""
+        return [(i, *self.place(column)) for column, i in self.board.place.items() if column != "time"]
+
+    @cached_property
     def first_exchange(self) -> tuple[tuple[int, ...], ...]:
         """Connections in the order of the first exchange."""
         return initial.groups(self.system.connections, lambda name, output: self.models[name].depends_on(output))

@@ -1,5 +1,6 @@
 """Arrays in, arrays out: each run has the numbers and the rows that it has alone."""
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,9 @@ def assert_as_alone(found: quadcosim.Flights, place: int, alone: quadcosim.Resul
             np.testing.assert_allclose(rows[:count], alone.signals[name], rtol=0.0, atol=1e-15 * ("refer" in name))
         else:
             value = alone.metrics[name]
+            if name == "outcome":
+                assert column[place] == value
+                continue
             assert column[place] == pytest.approx(np.nan if value is None else float(value), rel=1e-12, nan_ok=True)
 
 
@@ -39,7 +43,7 @@ def assert_as_alone(found: quadcosim.Flights, place: int, alone: quadcosim.Resul
 def test_each_run_of_arrays_is_the_run_alone() -> None:
     found = quadcosim.fly(SHORT, PLACES, record=RECORDED)
     assert (found.engine, found.reason, found.units["position_rmse"]) == ("batch", None, "m")
-    assert {column.dtype for column in found.values()} == {np.dtype(np.float64)}
+    assert {column.dtype for name, column in found.items() if name != "outcome"} == {np.dtype(np.float64)}
     assert found["position_rmse"].shape == (11,)
     assert found["plant.position.x"].shape == found["time"].shape == (11, 501)
     for place in (0, 10):
@@ -91,8 +95,50 @@ def test_where_no_lanes_can_be_had_the_next_engine_flies_the_same_and_it_is_said
     found = quadcosim.fly(SHORT, {X: [0.0, 1.0]}, record=RECORDED)
     assert (found.engine, found.reason) == ("compiled", "no compiler")
     assert list(found) == list(lanes)
-    for name in found:
+    assert found["outcome"].tolist() == lanes["outcome"].tolist() == ["bounded", "bounded"]
+    for name in set(found) - {"outcome"}:
         np.testing.assert_allclose(found[name], lanes[name], rtol=1e-12, atol=1e-15)
+
+
+@needs_compiler
+def test_arrays_of_any_shape_broadcast_and_become_the_axes_of_a_dataset() -> None:
+    across, down = np.array([-1.0, 0.0, 1.0]), np.array([[0.01], [0.02]])
+    values: dict[str, Any] = {X: across, "timing.period": down, "seed": np.arange(6).reshape(2, 3), Y: 0.5}
+    own = {"tilt_max": "max(plant.tilt)"}
+    found = quadcosim.fly(
+        SHORT, values, outputs=["outcome", "tilt_max", "steps"], record=["plant.position.x"], metrics=own
+    )
+    assert (found.shape, found["tilt_max"].shape, found["plant.position.x"].shape) == ((2, 3), (2, 3), (2, 3, 501))
+    alone = SHORT.with_values({X: 1.0, Y: 0.5, "timing.period": 0.02, "seed": 5})
+    flat = quadcosim.fly(alone, {}, outputs=["tilt_max"], record=["plant.position.x"], metrics=own)
+    assert flat["tilt_max"].shape == ()
+    assert flat["tilt_max"] == found["tilt_max"][1, 2]
+    assert flat["plant.position.x"].tobytes() == found["plant.position.x"][1, 2].tobytes()
+
+    dataset = found.to_xarray()
+    assert dataset.sizes == {"timing.period": 2, X: 3, "time": 501}
+    assert dataset["tilt_max"].sel({X: 1.0, "timing.period": 0.02}) == found["tilt_max"][1, 2]
+    assert (dataset["tilt_max"].units, dataset["time"].units, dataset["outcome"].dtype.kind) == ("rad", "s", "U")
+    table = found.to_pandas()
+    assert [*table] == [*values, "outcome", "tilt_max", "steps"]
+    assert table["timing.period"].tolist() == [0.01] * 3 + [0.02] * 3
+    assert table["tilt_max"].tolist() == found["tilt_max"].reshape(-1).tolist()
+    assert table.attrs["units"]["tilt_max"] == "rad"
+
+
+@needs_compiler
+def test_runs_of_other_lengths_have_times_of_their_own() -> None:
+    found = quadcosim.fly(SHORT, {"stop_time": [0.1, 0.2]}, outputs=["steps"], record=["plant.position.x"])
+    dataset = found.to_xarray()
+    assert dataset["plant.position.x"].dims == dataset["time"].dims == ("stop_time", "row")
+
+
+@pytest.mark.parametrize("package", ["pandas", "xarray"])
+def test_without_its_package_a_table_is_refused_in_a_line(package: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = quadcosim.Flights(arrays={}, given={}, recorded=(), shape=(0,), engine="batch", reason=None)
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(QuadcosimError, match=rf"^{package} is not installed; this needs: pip install 'quadcosim\[stu"):
+        getattr(found, f"to_{package}")()
 
 
 @needs_compiler
@@ -109,13 +155,28 @@ WRONG: list[tuple[dict[str, Any], dict[str, Any], str]] = [
     ({"plant.initial.position.w": [0.0]}, {}, r"plant.initial.position.w: QuadrotorPlant has no such variable"),
     ({"plan.mass": [1.0]}, {}, r"plan.mass: expected controller.NAME, plant.NAME"),
     ({"timing.perod": [0.1]}, {}, r"timing.perod: expected .*timing.KEY with KEY one of period"),
-    ({X: [0.0, 1.0], Y: [0.0]}, {}, rf"^values of {Y}: 1 of them; expected 2, as many as of {X}$"),
+    (
+        {X: [0.0, 1.0], Y: [0.0] * 3},
+        {},
+        rf"^values of {Y}: shape \(3,\); expected one that broadcasts with \(2,\), that of",
+    ),
     ({X: [0.0, float("nan")]}, {}, rf"^values of {X}: nan in run 1; expected finite numbers$"),
     ({X: ["far"]}, {}, rf"^values of {X}: far is no number; expected numbers$"),
-    ({X: [[0.0, 1.0]]}, {}, rf"^values of {X}: expected an array of shape \(runs,\), or one value for all runs$"),
-    ({X: [[0.0], [1.0, 2.0]]}, {}, rf"^values of {X}: expected an array of shape"),
-    ({X: []}, {}, rf"^values of {X}: expected an array of shape"),
-    ({X: 1.0}, {}, r"^values: expected at least one array, with a value for each run$"),
+    (
+        {X: [[0.0], [1.0, 2.0]]},
+        {},
+        rf"^values of {X}: expected an array of numbers, truth values or words, with one at",
+    ),
+    ({X: []}, {}, rf"^values of {X}: expected an array of numbers"),
+    ({"seed": [0, -1]}, {}, r"^seed = -1: expected a whole number from 0 to 2\^63 - 1$"),
+    ({"seed": [0.5]}, {}, r"^seed = 0.5: expected a whole number"),
+    (
+        {X: [0.0]},
+        {"metrics": {"steps": "max(plant.tilt)"}},
+        r"^metrics: steps: expected another name; this one is taken",
+    ),
+    ({X: [0.0]}, {"metrics": {"tilt": np.max}}, r"^metrics: tilt = .*: expected an expression as text"),
+    ({X: [0.0]}, {"metrics": {"tilt": "max(plant.tlt)"}}, r"plant.tlt"),
     ({"plant.mass": [1.0, -1.0]}, {}, r"^plant.mass = -1.0: expected at least 0"),
     ({"timing.period": [0.1, -1.0]}, {}, r"^timing.period = -1.0: expected a positive number$"),
     ({"controller.discretisation": ["mean", "meen"]}, {}, r"controller.discretisation = meen: did you mean mean"),
@@ -126,10 +187,10 @@ WRONG: list[tuple[dict[str, Any], dict[str, Any], str]] = [
         {"outputs": ["position_rms"]},
         r"^outputs: position_rms: did you mean position_rmse\? expected one of",
     ),
-    ({X: [0.0]}, {"outputs": ["outcome"]}, r"^outputs: outcome: expected one of"),
     ({X: [0.0]}, {"record": ["plant.positionx"]}, r"record.plant: QuadrotorPlant has no variable positionx"),
     ({X: [0.0]}, {"record": ["wing.x"]}, r"^record: wing.x: expected COMPONENT.VARIABLE of plant, controller"),
     ({X: [0.0, 0.0], "plant.initial.quaternion.w": [1.0, 0.0]}, {}, r"^run 1: "),
+    ({X: [[0.0], [0.0]], "plant.initial.quaternion.w": [1.0, 0.0]}, {}, r"^run \(0, 1\): "),
 ]
 
 

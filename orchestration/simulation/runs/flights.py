@@ -1,0 +1,109 @@
+"""The results of many runs as arrays by name, and as the tables of pandas and xarray."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from orchestration.foundation.basics.errors import Named
+from orchestration.foundation.basics.extras import explains_missing
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Flights(Mapping[str, Any]):
+    """The results of many runs as arrays by name: `flights["position_rmse"]` has a value for each run."""
+
+    arrays: Mapping[str, Any]
+    """Arrays by name: of an output the shape that the given values have together, NaN where it has no value; `time` and
+    what was recorded have one axis more, of the rows, NaN after the last row of a run that has fewer."""
+    given: Mapping[str, Any]
+    """What was given, by path, as arrays that broadcast to that shape"""
+    recorded: tuple[str, ...]
+    """The names of the arrays with rows"""
+    shape: tuple[int, ...]
+    """The shape that the given values have together, so that of the outputs"""
+    engine: str
+    """The engine of the runs: `batch`, which is SIMD lanes, `compiled` or `python`; the numbers are the same."""
+    reason: str | None
+    """Why they did not run in lanes, in a line; None: they did."""
+    units: Mapping[str, str] = field(default_factory=dict)
+    """The units of the outputs that have one, by name, as FMI writes them (`N.m`)."""
+
+    def __getitem__(self, name: str) -> Any:
+        """The array of a name."""
+        return Named(self.arrays)[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Over the names."""
+        return iter(self.arrays)
+
+    def __len__(self) -> int:
+        """The number of arrays."""
+        return len(self.arrays)
+
+    def __repr__(self) -> str:
+        return f"<Flights: {np.prod(self.shape, dtype=int)} runs by {self.engine}; {', '.join(self.arrays)}>"
+
+    @explains_missing
+    def to_pandas(self) -> "pd.DataFrame":
+        """A row for each run, in the order of C: the values that were given, then the outputs.
+
+        Units are in its `attrs["units"]`, by column. Raises `QuadcosimError` where pandas is not installed.
+        """
+        import pandas as pd
+
+        columns = {path: np.broadcast_to(each, self.shape) for path, each in self.given.items()} | self._outputs
+        table = pd.DataFrame({name: column.reshape(-1) for name, column in columns.items()})
+        table.attrs["units"] = dict(self.units)
+        return table
+
+    @explains_missing
+    def to_xarray(self) -> "xr.Dataset":
+        """The outputs and what was recorded, over the axes of the given values, as a Dataset with units.
+
+        An axis along which alone a single path varies has its name and values; others are called
+        `run`, or `axis_0` and so on. Rows have the dimension `time` if all runs have the same times, else `row`. Raises
+        `QuadcosimError` where xarray is not installed.
+        """
+        import xarray as xr
+
+        names, coordinates = self._axes()
+        rows: tuple[str, ...] = ()
+        variables = {name: (names, array) for name, array in self._outputs.items()}
+        if self.recorded:
+            time = self.arrays["time"].reshape(-1, self.arrays["time"].shape[-1])
+            is_common = bool((time == time[0]).all())
+            rows = (*names, "time" if is_common else "row")
+            coordinates["time"] = ("time", time[0]) if is_common else (rows, self.arrays["time"])
+            variables |= {name: (rows, self.arrays[name]) for name in self.recorded if name != "time"}
+        dataset = xr.Dataset(variables, coordinates)
+        for name, unit in self.units.items():
+            dataset[name].attrs["units"] = unit
+        return dataset
+
+    @property
+    def _outputs(self) -> dict[str, Any]:
+        return {name: array for name, array in self.arrays.items() if name not in self.recorded}
+
+    def _axes(self) -> tuple[tuple[str, ...], dict[str, Any]]:
+        """The names of the axes, and coordinates of the given values."""
+        count = len(self.shape)
+        along = {
+            path: [axis + count - each.ndim for axis, length in enumerate(each.shape) if length > 1]
+            for path, each in self.given.items()
+        }
+        names = ["run"] if count == 1 else [f"axis_{axis}" for axis in range(count)]
+        for axis in range(count):
+            own = [path for path, axes in along.items() if axes == [axis]]
+            if len(own) == 1:
+                names[axis] = own[0]
+        coordinates: dict[str, Any] = {}
+        for path, axes in along.items():
+            values = self.given[path].reshape([self.shape[axis] for axis in axes])
+            coordinates[path] = (tuple(names[axis] for axis in axes), values)
+        return tuple(names), coordinates
