@@ -8,6 +8,7 @@ import typer
 
 from orchestration.command import exact, registry
 from orchestration.command.flags import EngineFlag, FlightFlags, ScenarioFile, Timing, flight_options, request_from
+from orchestration.command.one_fmu import OneFmuFlags
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, expect_positive, option_group
 from orchestration.command.study_flags import TimeLimit
@@ -39,6 +40,7 @@ class ProcessFlags:
 
 
 @option_group("process", ProcessFlags)
+@option_group("one_fmu", OneFmuFlags)
 @flight_options
 def run(
     scenario: ScenarioFile = None,
@@ -54,13 +56,17 @@ def run(
     engine: EngineFlag = None,
     *,
     flags: FlightFlags,
+    one_fmu: OneFmuFlags,
     process: ProcessFlags,
 ) -> CommandResult:
-    """Run a scenario or a system and print its metrics. FMUs that are missing or out of date are built first."""
+    """Run a scenario, a system or one FMU and print its metrics. FMUs that are missing or old are built first."""
     from orchestration.simulation.engines.master import engine_named  # modules for runs are loaded only if needed
 
     if resume is not None and (scenario is not None or pause_at is not None or flags != FlightFlags()):
         raise UsageError("--resume: expected no scenario and no flags of the run; the paused run has its own")
+    fmu = scenario if scenario is not None and timing is None and scenario.suffix.lower() == ".fmu" else None
+    if fmu is None:
+        one_fmu.expect_none()
     if pause_at is not None and out is None:
         raise UsageError("--pause-at: expected --out DIR for the state")
     with progress_bar("running") as progress:
@@ -69,9 +75,9 @@ def run(
         if resume is not None:
             result = _resumed(resume, out, figures, how)
         else:
-            chosen = request_from(scenario, flags, timing)
+            chosen = request_from(scenario, flags, timing) if fmu is None else one_fmu.applied_to(fmu, flags)
             if out is None:
-                result = _plain(chosen, how)
+                result = _plain(chosen, how, keep_rows=one_fmu.output is not None)
             elif pause_at is None:
                 result = _kept(chosen, out, figures, how)
             else:
@@ -85,19 +91,21 @@ def run(
         exact.warn_if_means_are_infinite(result.request)
     if follows := result.provenance["follows"]:
         inform(f"follows {follows}")
+    if fmu is not None:
+        one_fmu.write(fmu, result)
     if out is not None:
         inform(f"results in {out}")
-    elif not registry.output_options.as_json:
+    elif not one_fmu.output and not registry.output_options.as_json:
         inform("add --out DIR to keep the signals and the figures")
     return _metrics(result)
 
 
-def _plain(chosen: "Request", how: Any) -> "Result | None":
-    """The result of a run of which nothing is kept."""
+def _plain(chosen: "Request", how: Any, *, keep_rows: bool) -> "Result | None":
+    """The result of a run without a directory; the rows are kept, or only what its metrics need of them."""
     from orchestration.simulation.results.objectives import OnlyUsed
     from orchestration.simulation.runs.simulation import simulate
 
-    return simulate(chosen, recorder=OnlyUsed(chosen), **how)
+    return simulate(chosen, recorder=None if keep_rows else OnlyUsed(chosen), **how)
 
 
 def _kept(chosen: "Request", out: Path, figures: bool, how: Any) -> "Result | None":

@@ -49,6 +49,8 @@ class Variable:
     """Type as in the description: Real, Float64, Int32 …"""
     causality: str
     variability: str
+    initial: str | None
+    """exact, approx or calculated, as declared or by the default of FMI"""
     unit: str | None
     description: str | None
     start: str | None
@@ -72,6 +74,11 @@ class Variable:
     def is_settable(self) -> bool:
         """Whether it is a parameter or an input."""
         return self.causality in ("parameter", "input", "structuralParameter")
+
+    @property
+    def has_settable_start(self) -> bool:
+        """Whether it is an output or local, as a state, whose start value can be set."""
+        return not self.is_settable and self.variability != "constant" and self.initial in ("exact", "approx")
 
     @property
     def is_constant(self) -> bool:
@@ -309,6 +316,7 @@ def scalars_of(declared: ModelVariable) -> list[Variable]:
                 type=declared.type,
                 causality=declared.causality or "local",
                 variability=declared.variability or "continuous",
+                initial=declared.initial,
                 unit=attribute(declared, "unit"),
                 description=declared.description,
                 start=start,

@@ -50,7 +50,7 @@ class ConstantValues:
 
 
 class TableValues:
-    """Columns (n, m) over increasing times (n,) [s], linear between rows; the ends are held."""
+    """Columns (n, m) over times (n,) [s], linear between rows; ends are held. Of rows of one time the last counts."""
 
     def __init__(self, time: Floats, columns: Floats) -> None:
         self.time, self.columns = time, columns

@@ -1,8 +1,7 @@
-"""Reads requests to run: a system file or a scenario of the quadrotor, both TOML; an SSP with its timing."""
+"""Reads requests to run: a system file or a scenario of the quadrotor, both TOML; an SSP with its timing; an FMU."""
 
 import copy
 import os
-import shlex
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +15,9 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request
 
 SSP_ENDINGS = (".ssp", ".ssd")
+FMU = ".fmu"
+"""Ending of the file of one FMU, which runs alone"""
+WHAT = "system or scenario file"
 SSP = "ssp"
 """Key of a file with timing: the SSP that it is for"""
 
@@ -45,8 +47,9 @@ def default_request() -> Request:
 
 
 def load_request(path: str | Path, timing: str | Path | None = None) -> Request:
-    """Read a system file, a scenario file, or an SSP with a file of its `timing`; paths are relative to their file.
+    """Read a system file, a scenario file, an FMU, or an SSP with a file of its `timing`.
 
+    Paths are relative to their file. An FMU runs alone, through its default experiment.
     A file with timing may be given alone if it names its SSP; without one, an SSP has the timing of its annotation.
     Raises `UsageError` for a file that cannot be read, a key that does not exist (naming those that do) or a value of
     the wrong type.
@@ -64,21 +67,15 @@ def load_request(path: str | Path, timing: str | Path | None = None) -> Request:
             return _from_ssp(path, overlay, path.parent if timing is None else Path(timing).parent)
     if timing is not None:
         raise UsageError(f"{timing}: expected no second file; only an SSP has its timing in one")
-    tables = tables_of_request(path)
+    if path.suffix.lower() == FMU:
+        from orchestration.simulation.requests.one_fmu import alone  # not before: loads what reads and proposes
+
+        return alone(path)
+    tables = read_toml(path, WHAT)
     with _errors_naming(path):
         if isinstance(tables.get(SSP), str):
             return _from_ssp(path.parent / tables.pop(SSP), tables, path.parent)
         return request_from_tables(tables, path.parent)
-
-
-def tables_of_request(path: Path) -> dict[str, Any]:
-    """The tables of a system or scenario file; raises `UsageError`."""
-    if path.suffix.lower() == ".fmu":
-        raise UsageError(
-            f"{path}: expected a system file, which says which FMUs are connected and when each of them steps; "
-            f"`quadcosim connect {shlex.quote(str(path))} --out system.toml` proposes one"
-        )
-    return read_toml(path, "system or scenario file")
 
 
 def request_from_tables(tables: dict[str, Any], folder: Path) -> Request:

@@ -6,15 +6,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import seconds
 from orchestration.simulation.requests.request import (
+    FMU,
     SSP,
     SSP_ENDINGS,
+    WHAT,
     RequestLike,
     request_from_tables,
     request_of,
-    tables_of_request,
 )
 from orchestration.systems.computers.results import Timeline
 from orchestration.systems.schedule.resources import timeline_of
@@ -76,9 +78,9 @@ def request_until(request: RequestLike, until: float | None) -> Request:
     """A request with this stop time; a file that is used for this only need not have one."""
     if until is None:
         return request_of(request)
-    if isinstance(request, (str, os.PathLike)) and Path(request).suffix.lower() not in SSP_ENDINGS:
+    if isinstance(request, (str, os.PathLike)) and Path(request).suffix.lower() not in (FMU, *SSP_ENDINGS):
         path = Path(request)
-        tables = tables_of_request(path)
+        tables = read_toml(path, WHAT)
         if SSP not in tables:
             return request_from_tables({**tables, "stop_time": until}, path.parent)
     if isinstance(request, Mapping):

@@ -33,25 +33,29 @@ class TableRows:
         value = shown(float(self.columns[column][row]))
         return UsageError(f"{self.path}: line {self.lines[row]}: {column} = {value}: expected {expected}")
 
-    def expect_increasing_times(self) -> None:
-        """Raise `UsageError` for a time that is not later than the one before."""
+    def expect_increasing_times(self, *, jumps: bool = False) -> None:
+        """Raise `UsageError` for a time that is not later than the one before; with `jumps` it may equal that.
+
+        The last one may not: a line needs two times.
+        """
         steps = np.diff(self.columns[TIME])
-        if not (steps > 0.0).all():
-            row = 1 + int((steps <= 0.0).argmax())
-            raise self.error(row, TIME, "times that increase")
+        wrong = steps < 0.0 if jumps else steps <= 0.0
+        wrong[-1] = steps[-1] <= 0.0
+        if wrong.any():
+            raise self.error(1 + int(wrong.argmax()), TIME, "times that increase")
 
 
 TIME = "time"
 
 
 def read_table(path: Path, columns: Sequence[str], stop_time: float) -> tuple[Floats, Floats]:
-    """Times (n,) [s] and the values of `columns` (n, m) of a CSV file with a column `time`.
+    """Times (n,) [s] and the values of `columns` (n, m) of a CSV file with a column `time`; rows of one time jump.
 
-    Raises `UsageError` if a column is missing, a value is not finite, time does not increase or the table does
-    not cover [0, stop_time].
+    Raises `UsageError` if a column is missing, a value is not finite, time decreases or the table does not cover
+    [0, stop_time].
     """
     rows = read_rows(path, (TIME, *columns))
-    rows.expect_increasing_times()
+    rows.expect_increasing_times(jumps=True)
     time = rows.columns[TIME]
     if time[0] > 0.0 or time[-1] < stop_time:
         raise UsageError(f"{path}: covers {time[0]:g} to {time[-1]:g} s, expected 0 to stop_time = {stop_time:g} s")

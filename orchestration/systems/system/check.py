@@ -175,8 +175,8 @@ def _with_article(variable: Variable) -> str:
 def expect_parameter(place: str, model: Model, name: str, value: Parameter, *, is_fed: bool = False) -> None:
     """Raise `UsageError`, naming the `place`, for a parameter that a model does not have, or for an invalid value."""
     variable = model.variable(name, place)
-    if not (variable.is_settable or variable.is_constant) or is_fed:
-        expected = "a parameter or an input that nothing is connected to"
+    if not (variable.is_settable or variable.has_settable_start or variable.is_constant) or is_fed:
+        expected = "a parameter, an input that nothing is connected to, or a variable whose start value can be set"
         raise UsageError(f"{place}: is {'connected' if is_fed else _with_article(variable)}; expected {expected}")
     if isinstance(convert_value(variable, value, place), float) and not is_finite(value):
         raise UsageError(f"{place} = {value}: expected a finite number")

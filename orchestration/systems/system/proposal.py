@@ -67,12 +67,12 @@ def propose(fmus: Sequence[tuple[str, Model]], folder: Path, resources: Proposed
     models = [model for _, model in fmus]
     for model in models:
         model.expect_no_clocks()
-    named = dict(zip(_names(models), models))
+    named = dict(zip(component_names(models), models))
     matches = match(named)
     sampled = {name: "all its outputs are discrete" for name, model in named.items() if _is_discrete(model)}
     guessed = _controllers(named, matches.matches, sampled)
     sampled |= guessed
-    stop = max((_experiment(model, "stopTime") or 0.0 for model in models), default=0.0) or STOP
+    stop = max((experiment(model, "stopTime") or 0.0 for model in models), default=0.0) or STOP
     blocks = [
         [
             "# Proposed from what the FMUs say of themselves. Look at each line: names are no proof."
@@ -125,7 +125,7 @@ def _key(name: str) -> str:
     return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _text(name)
 
 
-def _names(models: Iterable[Model]) -> list[str]:
+def component_names(models: Iterable[Model]) -> list[str]:
     """Unique names of components after the names of the models."""
     names: list[str] = []
     for model in models:
@@ -167,7 +167,7 @@ def _component(name: str, fmu: str, model: Model, folder: Path, sampled: str | N
     """The lines of a component; `sampled` is the reason for sampling it."""
     place = _relative(Path(fmu), folder) if fmu.endswith(PATHS) else fmu
     lines = [f"[components.{name}]", f"fmu = {_text(place)}"]
-    step = _experiment(model, "stepSize")
+    step = experiment(model, "stepSize")
     if sampled is not None:
         note = "" if step else "; its FMU does not say how often"
         lines.append(f"sampling = {{ period = {step or PERIOD!r} }}    # sampled, as {sampled}{note}")
@@ -184,7 +184,7 @@ def _relative(path: Path, folder: Path) -> str:
         return path.absolute().as_posix()
 
 
-def _experiment(model: Model, key: str) -> float | None:
+def experiment(model: Model, key: str) -> float | None:
     """A number of the FMU's default experiment, if present and positive."""
     try:
         value = float(getattr(model.description.defaultExperiment, key, None) or 0.0)

@@ -30,7 +30,7 @@ class Source:
     """A constant value, in the unit of the inputs."""
     file: Path | None = None
     """The path of a CSV file with `time` [s] and one column for each input, named as the input without its component,
-    or with way-points; in a file, relative to its folder."""
+    or with way-points; in a file, relative to its folder. Two rows of one time are a jump."""
     interpolation: Interpolation = "linear"
     """The values between the rows of a file: the line (linear), the row before (previous), or a smooth curve (spline)
     through the rows as way-points, with columns x, y, z [m] and either `time` [s] or, optionally, `hold` [s] and

@@ -143,7 +143,7 @@ def test_an_axis_that_a_system_does_not_have_is_refused_in_one_line(system: Syst
     ("target", "value", "said"),
     [
         ("components.controller.parameters.k_q", 1.0, "k_q"),
-        ("components.controller.parameters.x", 1.0, "expected a parameter or an input that nothing is connected to"),
+        ("components.controller.parameters.x", 1.0, "expected a parameter, an input that nothing is connected to"),
         (K_D, "stiff", f"{K_D} = stiff: expected a number"),
         (PERIOD, -1.0, f"{PERIOD} = -1.0: expected a positive number"),
         ("connections.command.loss", "often", "connections.command.loss = often: expected a probability"),

@@ -71,9 +71,17 @@ def test_an_empty_file_misses_every_column(tmp_path: Path) -> None:
     assert "no column time, reference.position.x" in refused(tmp_path, header="")
 
 
-@pytest.mark.parametrize("times", [(0.0, 1.0, 1.0, 2.0), (0.0, 1.5, 1.0, 2.0), (2.0, 0.0)])
+@pytest.mark.parametrize("times", [(0.0, 1.5, 1.0, 2.0), (2.0, 0.0), (0.0, 2.0, 2.0)])
 def test_times_that_do_not_increase_are_rejected(tmp_path: Path, times: tuple[float, ...]) -> None:
     assert "expected times that increase" in refused(tmp_path, *map(row, times))
+
+
+def test_of_rows_of_one_time_the_last_counts_from_then_on(tmp_path: Path) -> None:
+    jumping = table(tmp_path, row(0.0, 0.0), row(1.0, 4.0), row(1.0, 6.0), row(1.0, 8.0), row(2.0, 9.0))
+    times = np.array([0.5, 0.75, 1.0, 1.5, 2.0])
+    expected = [2.0, 3.0, 8.0, 8.5, 9.0]
+    assert [jumping.at(t)[0] for t in times.tolist()] == expected
+    assert jumping.at_each(times)[:, 0].tolist() == jumping.over(times)[:, 0].tolist() == expected
 
 
 @pytest.mark.parametrize("times", [(0.1, 2.0), (0.0, 1.999), (5.0, 6.0)])

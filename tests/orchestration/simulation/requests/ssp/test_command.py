@@ -182,7 +182,7 @@ def warnings_of(scenario: Scenario, folder: Path) -> list[str]:
     return lines
 
 
-UNCONNECTED = "expected a parameter or an input that nothing is connected to"
+UNCONNECTED = "expected a parameter, an input that nothing is connected to"
 
 
 @pytest.mark.parametrize(

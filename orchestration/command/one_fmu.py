@@ -1,0 +1,63 @@
+"""The flags of a run of one FMU."""
+
+from dataclasses import dataclass, fields, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from orchestration.command.flags import FlightFlags, assigned
+from orchestration.command.options import option
+from orchestration.command.registry import expect_positive
+from orchestration.foundation.basics.errors import UsageError
+
+if TYPE_CHECKING:
+    from orchestration.simulation.runs.result import Result
+    from orchestration.systems.system.model import System
+
+_of_fmu = partial(option, panel="One FMU")
+
+
+@dataclass(frozen=True, kw_only=True)
+class OneFmuFlags:
+    """The flags that only a run of one FMU has; None: not set, its default experiment applies."""
+
+    inputs: Annotated[Path | None, _of_fmu("--inputs", "Inputs over time, a column for each.", "FILE.csv")] = None
+    output: Annotated[Path | None, _of_fmu("--output", "Write the outputs as fmpy does.", "FILE.csv")] = None
+    output_interval: Annotated[
+        float | None, _of_fmu("--output-interval", "Distance of rows, and communication step.", "SECONDS")
+    ] = None
+    tolerance: Annotated[float | None, _of_fmu("--tolerance", "Relative tolerance of its solver.", "R")] = None
+    record: Annotated[
+        list[str] | None, _of_fmu("--record", "A variable to write; may be repeated; default: all outputs.", "NAME")
+    ] = None
+
+    def __post_init__(self) -> None:
+        expect_positive("--output-interval", self.output_interval, "seconds")
+        expect_positive("--tolerance", self.tolerance, "relative error")
+
+    def expect_none(self) -> None:
+        """Raise `UsageError` for any of them: what runs is not one FMU."""
+        given = [f"--{f.name.replace('_', '-')}" for f in fields(self) if getattr(self, f.name)]
+        if given:
+            raise UsageError(f"{', '.join(given)}: for one FMU only; expected run MODEL.fmu")
+
+    def applied_to(self, path: Path, flags: FlightFlags) -> "System":
+        """The FMU at `path` alone, with these flags and those of any system; `--set` has the names of the FMU."""
+        from orchestration.simulation.requests.one_fmu import alone
+
+        system = alone(
+            path, stop_time=flags.stop_time, interval=self.output_interval, tolerance=self.tolerance,
+            inputs=self.inputs, record=self.record or (), parameters=assigned("set", flags.set),
+        )  # fmt: skip
+        return replace(flags, stop_time=None, set=None).applied_to_system(system)
+
+    def write(self, path: Path, result: "Result") -> None:
+        """Write the file of `--output`, of a run of the FMU at `path`."""
+        from orchestration.components.fmi.read_description import read_model
+        from orchestration.simulation.requests.one_fmu import outputs
+        from orchestration.simulation.runs import fmpy_table
+
+        if self.output is not None:
+            model, (component,) = read_model(path), result.system.components.values()
+            chosen = (component.record or ()) if self.record else outputs(model)
+            fmpy_table.write(result, model, chosen, self.output)

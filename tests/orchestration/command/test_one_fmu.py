@@ -1,0 +1,84 @@
+"""`quadcosim run MODEL.fmu`: what `fmpy simulate` does, to the bit where its times are those of a clock."""
+
+from pathlib import Path
+
+import fmpy
+import pytest
+from fmpy.util import read_csv, write_csv
+
+from orchestration.simulation.requests.request import load_request
+from quadcosim import UsageError
+from tests.commands import Main
+from tests.orchestration.components.fmi.small import known, needs_compiler, small
+
+JUMPING = """"time","thrust","torque.x"
+0,9.75,0
+0.5,9.5,0.01
+0.5,12,0.02
+2,11,0.01
+"""
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def by_fmpy(fmu: Path, inputs: Path | None = None, **how: object) -> str:
+    """The file that fmpy writes of its run."""
+    signals = None if inputs is None else read_csv(inputs)
+    write_csv("by_fmpy.csv", fmpy.simulate_fmu(str(fmu), validate=False, input=signals, **how))
+    return Path("by_fmpy.csv").read_text()
+
+
+def test_rows_and_file_are_those_of_fmpy_to_the_bit(main: Main, built: dict[str, Path], here: Path) -> None:
+    inputs, fmu = here / "jumping.csv", built["QuadrotorPlant"]
+    inputs.write_text(JUMPING)
+    flags = ("--stop-time", "1.5", "--output-interval", "0.0625", "--set", "mass=1.2")
+    chosen = ("--record", "tilt", "--record", "position.z")
+    main("run", fmu, "--inputs", inputs, "--output", "out.csv", *chosen, *flags)
+    how = {"stop_time": 1.5, "output_interval": 0.0625, "start_values": {"mass": 1.2}}
+    assert Path("out.csv").read_text() == by_fmpy(fmu, inputs, output=["tilt", "position.z"], **how)
+
+
+@needs_compiler
+@pytest.mark.parametrize(("fmi", "start", "by_element"), [(2, "8", ["u=8"]), (3, "8 0.3", ["u[1]=8", "u[2]=0.3"])])
+def test_types_arrays_and_held_inputs_are_those_of_fmpy(
+    main: Main, here: Path, fmi: int, start: str, by_element: list[str]
+) -> None:
+    inputs, fmu = here / "held.csv", known(small(here, fmi=fmi))
+    inputs.write_text("time,on\n0,1\n0.25,0\n1,1\n")
+    flags = ("--output", "out.csv", "--output-interval", "0.125", *(w for each in by_element for w in ("--set", each)))
+    main("run", fmu, "--in-process", "--inputs", inputs, *flags)
+    how = {"output_interval": 0.125, "stop_time": 1.0, "start_values": {"u": start}}
+    assert Path("out.csv").read_text() == by_fmpy(fmu, inputs, **how)
+    assert "True" in Path("out.csv").read_text()
+
+
+def test_without_flags_the_default_experiment_runs_as_in_fmpy(built: dict[str, Path]) -> None:
+    system = load_request(built["QuadrotorPlant"]).as_system()
+    (component,) = system.components.values()
+    assert (system.stop_time, component.step) == (30.0, 0.04)  # fmpy: 0.01 s, doubled up to 1000 rows
+
+
+@needs_compiler
+def test_without_an_experiment_it_is_one_second_in_the_steps_of_fmpy(here: Path) -> None:
+    (component,) = load_request(small(here)).as_system().components.values()
+    assert component.step == fmpy.util.auto_interval(1.0)
+
+
+@needs_compiler
+def test_flags_of_one_fmu_are_refused_for_a_system_and_those_of_a_loop_for_one(main: Main, here: Path) -> None:
+    assert "--output-interval: for one FMU only" in main("run", "--output-interval", "0.1", code=2).stderr
+    assert "--delay: for the quadrotor only" in main("run", small(here), "--delay", "0.1", code=2).stderr
+    Path("wrong.csv").write_text("time,v\n0,1\n1,1\n")
+    refused = main("run", here / "small.fmu", "--inputs", "wrong.csv", code=2).stderr
+    assert "Small has no input v; its inputs are u, on" in refused
+
+
+@needs_compiler
+def test_an_experiment_that_begins_later_is_refused(here: Path) -> None:
+    fmu = small(here, tolerance='1e-6" startTime="5')  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="its default experiment begins at 5 s; expected 0"):
+        load_request(fmu)
