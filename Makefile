@@ -82,7 +82,7 @@ figures: .venv/.base
 	$(BIN)/python examples/linear/design.py
 	$(BIN)/python examples/lqg/design.py
 
-site: .venv/.test
+site: .venv/.test .venv/.release
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 	@echo "open site/index.html"
 

@@ -24,6 +24,8 @@ CLAIMS = Path(__file__).parent / "claims"
 DATA = Path(__file__).parent / "data"
 SUMMARY = "docs/findings.md"
 """The page that lists the sentences of all claims"""
+STEPS, LIVE = "docs/drag_the_clock.md", "paper_flight.html"
+"""The page of what is shown, and the page in which it runs, beside it"""
 ENOUGH = 2
 """Refuters that must have been flown, else a claim is marked"""
 ONE_ONLY = "one comparison only"
@@ -61,6 +63,21 @@ class Tried:
 
 
 @record()
+class Shown:
+    """A run that shows a claim in the page of the paper's flight."""
+
+    step: int
+    """Its place among all that are shown, from 1."""
+    says: str
+    at: str
+    """Values that the address of the page has."""
+    verdict: str
+    """Words of the page on the run."""
+    second: str = ""
+    """Words on a second law, if there is one."""
+
+
+@record()
 class Claim:
     """A claim in one sentence, with what was tried against it."""
 
@@ -75,6 +92,7 @@ class Claim:
     conditions: Conditions
     not_tried: str
     tried: Sequence[Tried] = field(default_factory=tuple)
+    shown: Sequence[Shown] = field(default_factory=tuple)
 
 
 class Number(float):
@@ -151,6 +169,26 @@ def told(claim: Claim) -> str:
     return "\n".join([*lines, "", wrapped(f"*Not tried:* {claim.not_tried}.")])
 
 
+def steps() -> list[Shown]:
+    """What all claims show, in their order."""
+    return sorted((one for claim in load_claims().values() for one in claim.shown), key=lambda one: one.step)
+
+
+def told_in_steps() -> str:
+    """The steps, each with its verdict and the claim that it shows."""
+    homes = {one.step: claim for claim in load_claims().values() for one in claim.shown}
+    texts = []
+    for one in steps():
+        home, at = Path(homes[one.step].where[0]).relative_to("docs"), f"#{one.at}" if one.at else ""
+        second = f"; the second law: **{one.second}**" if one.second else ""
+        texts += [
+            wrapped(f"{one.step}. {one.says} [Open it]({LIVE}{at}): **{one.verdict}**{second}.", "   "), "",
+        ]  # fmt: skip
+        if homes.get(one.step + 1) is not homes[one.step]:
+            texts += [textwrap.indent(wrapped(f"[The claim]({home}): {sentence(homes[one.step])}"), "   "), ""]
+    return "\n".join(texts[:-1])
+
+
 def wrapped(text: str, indent: str = "") -> str:
     """The text in lines as long as those of the pages."""
     return textwrap.fill(text, 120, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
@@ -176,6 +214,7 @@ def blocks() -> dict[str, dict[str, str]]:
         for page in others:
             pages.setdefault(page, {})[f"claim {name}"] = wrapped(sentence(claim))
         listed.setdefault(home, []).append(wrapped(f"- {sentence(claim)}", "  "))
+    pages[STEPS] = {"claims shown": told_in_steps()}
     pages[SUMMARY] = {f"claims of {Path(home).stem}": "\n".join(lines) for home, lines in listed.items()}
     return pages
 

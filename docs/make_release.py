@@ -1,14 +1,15 @@
 """Makes the files of a release in dist/: run as `make release`.
 
-The wheel and the sources; the page in which the paper's flight runs; the FMUs without Python inside, for every system
-that zig compiles for, an archive for each version of FMI; the two FMUs of the paper's flight with their wiring as an
-SSP; and the SHA-256 of each. The same commit gives the same bytes with the same setuptools and ziglang: every time in
-the files is that of the commit.
+The wheel and the sources, with the page in which the paper's flight runs, which is there by itself too; the FMUs
+without Python inside, for every system that zig compiles for, an archive for each version of FMI; the two FMUs of the
+paper's flight with their wiring as an SSP; and the SHA-256 of each. The same commit gives the same bytes with the same
+setuptools and ziglang: every time in the files is that of the commit.
 """
 
 import gzip
 import hashlib
 import os
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -17,6 +18,7 @@ from pathlib import Path
 
 from fmu_kit.archive import write_archive
 from fmu_kit.versions import project_version
+from orchestration.experiments.live.live import SHIPPED
 
 ROOT = Path(__file__).resolve().parents[1]
 SUMS = "SHA256SUMS"
@@ -28,7 +30,12 @@ def main(folder: Path) -> None:
         raise SystemExit(f"{folder}: expected an empty folder, since all that is in it is released")
     os.environ["SOURCE_DATE_EPOCH"] = time = time_of_commit()
     os.umask(0o022)
-    run(sys.executable, "-m", "build", "--outdir", str(folder), str(ROOT))
+    quadcosim("live", "--out", str(SHIPPED))
+    try:
+        run(sys.executable, "-m", "build", "--outdir", str(folder), str(ROOT))
+        shutil.copy(SHIPPED, folder / f"quadcosim-{project_version()}.html")
+    finally:
+        SHIPPED.unlink()
     for archive in folder.glob("*.tar.gz"):
         normalise(archive, int(time))
     name = f"quadcosim-{project_version()}"
@@ -39,7 +46,6 @@ def main(folder: Path) -> None:
             write_fmu_archive(built, folder / f"{name}-fmi{version}.zip")
         plant, controller = (str(fmus[2] / f"{model}.fmu") for model in ("QuadrotorPlant", "UnifiedController"))
         ssp = folder / f"{name}.ssp"
-        quadcosim("live", "--out", str(folder / f"{name}.html"))
         quadcosim("ssp", "--plant", plant, "--controller", controller, "--out", str(ssp))
     (folder / SUMS).write_text(sums(folder), encoding="utf-8")
     print(sums(folder), end="")

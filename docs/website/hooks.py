@@ -6,9 +6,11 @@ from typing import Any
 
 from mkdocs.structure.files import File, Files, InclusionLevel
 
+from docs.claim_records import LIVE
 from docs.website import answers, commands, fmus, keys, rules
 from docs.website.links import ROOT, Links, pages_elsewhere
 from docs.website.markdown import for_the_site
+from quadcosim import live
 
 GENERATED: dict[str, Callable[[], str]] = {
     f"fmus/{slave.__name__}.md": partial(fmus.page, slave) for slave in fmus.SLAVES
@@ -26,8 +28,11 @@ BEHIND = 1e-6
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Add the pages outside of `docs/`, those generated from the code, and linked files."""
+    """Add the pages outside of `docs/`, those generated from the code, the page that runs, and linked files."""
     links = Links(repo_url=config.repo_url)
+    if (old := files.get_file_from_path(LIVE)) is not None:
+        files.remove(old)
+    files.append(File.generated(config, LIVE, content=live().html))
     for address, path in pages_elsewhere().items():
         files.append(File.generated(config, address, abs_src_path=str(ROOT / path)))
     for address, picture in links.pictures().items():

@@ -28,7 +28,7 @@ def address_of(path: str) -> str:
     """The address of a repository's file on the site: `docs/` is its root, and README.md its first page."""
     if path == "README.md":
         return "index.md"
-    if path.endswith(".html"):
+    if path.endswith(".html") and not path.startswith("docs/"):
         return f"fmus/{Path(path).stem}.md"
     if path.startswith("docs/") or path.endswith((*OF_PICTURES, *OF_PAGES)):
         return path.removeprefix("docs/")

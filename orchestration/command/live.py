@@ -27,22 +27,26 @@ def live(
 
     Without arguments it is the paper's flight, and a terminal opens it.
     """
+    from orchestration.experiments.live.live import SHIPPED, Live, ranges_of
     from orchestration.experiments.live.live import live as page_of
-    from orchestration.experiments.live.live import ranges_of
 
     axes = None if map is None else tuple(map.split(","))
     if axes is not None and len(axes) != 2:
         raise UsageError(f"--map {map}: expected two paths, as PATH,PATH")
     if out.suffix.lower() not in (".html", ".htm"):
         raise UsageError(f"--out {out}: expected a file that ends in .html")
-    inform("compiling for WebAssembly, which takes a minute at first")
-    page = page_of(
-        request_from(scenario, flags),
-        ranges_of(vary or []),
-        None if axes is None else (axes[0], axes[1]),
-        name=None if scenario is None else str(scenario),
-    )
+    is_usual = scenario is None and not vary and axes is None and flags == FlightFlags()
+    if is_usual and SHIPPED.is_file():
+        page = Live(html=SHIPPED.read_text(encoding="utf-8"))
+    else:
+        inform("compiling for WebAssembly, which takes a minute at first")
+        page = page_of(
+            request_from(scenario, flags),
+            ranges_of(vary or []),
+            None if axes is None else (axes[0], axes[1]),
+            name=None if scenario is None else str(scenario),
+        )
     written = page.save(out)
-    if scenario is None and vary is None and map is None and flags == FlightFlags() and sys.stdout.isatty():
+    if is_usual and sys.stdout.isatty():
         webbrowser.open(written.resolve().as_uri())
     return result_of_files([written])

@@ -8,6 +8,7 @@ import pytest
 from docs import claim_records as records
 from docs import make_findings
 from orchestration.foundation.basics.errors import UsageError
+from quadcosim import Scenario, fly
 
 CLAIMS = records.load_claims()
 
@@ -40,6 +41,32 @@ def test_every_number_of_a_record_is_said(name: str) -> None:
     claim = CLAIMS[name]
     text = " ".join([claim.claim, *(one.number for one in claim.tried)])
     assert not [number for number in claim.numbers if f"{{{number}:" not in text]
+
+
+STEPS = records.steps()
+
+
+def values_of(at: str, prefix: str = "") -> dict[str, float]:
+    """The values of an address of the page; those of the second law have a prefix."""
+    pairs = [pair.partition("=")[::2] for pair in at.split("&") if "=" in pair]
+    own = {path: float(value) for path, value in pairs if not path.startswith("second.")}
+    return own | {
+        path.removeprefix(prefix): float(value) for path, value in pairs if prefix and path.startswith(prefix)
+    }
+
+
+def test_what_is_shown_is_what_is_flown() -> None:
+    shown = [(values_of(one.at), one.verdict) for one in STEPS]
+    shown += [(values_of(one.at, "second."), one.second) for one in STEPS if one.second]
+    usual = {"timing.period": 0.01, "controller.coupling": 1.0}
+    paths = dict.fromkeys(path for values, _ in shown for path in values)
+    flights = fly(Scenario(), {path: [values.get(path, usual.get(path, 0.0)) for values, _ in shown] for path in paths})
+    for (_, verdict), good, diverged, settling, end in zip(
+        shown, *(flights[name] for name in ("good", "diverged", "settling_time", "divergence_time"))
+    ):
+        survives = f"settles in {settling:.2f} s" if good else "survives, does not settle"
+        assert verdict == (f"diverges at {end:.2f} s" if diverged else survives)
+    assert [one.step for one in STEPS] == [*range(1, len(STEPS) + 1)]
 
 
 def record(folder: Path, **changes: object) -> Path:

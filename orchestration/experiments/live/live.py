@@ -33,6 +33,8 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed, value_at
 from orchestration.systems.system.request import Request, errors_in_own_terms
 
+SHIPPED = Path(__file__).with_name("paper_flight.html")
+"""The page of the paper's flight, which a wheel has"""
 _PAGE = resources.files("orchestration.experiments.live") / "page"
 _PLACE = re.compile(r"\{\{(\w+)\}\}")
 _LANES = {"single": 1, "pair": 2}
@@ -82,10 +84,11 @@ def live(
         check(system, models)
         chosen = _chosen(loaded, system, models, vary, map)
         system = connect_references(_with_ends(loaded, system, chosen), models)
-        system = check_against_fmus(system, models).system
+        fits = check_against_fmus(system, models)
+        system = fits.system
         free = [path for slider in chosen.sliders for path in loaded.paths_of(slider.path)]
         tables = [_tables(system, models, lanes, free) for lanes in _LANES.values()]
-        document = _document(loaded, tables[0], chosen, name)
+        document = _document(loaded, tables[0], chosen, name, fits.units)
         modules = {each: module_of(table, table.shape.lanes) for each, table in zip(_LANES, tables)}
     return Live(html=_as_html(document, modules))
 
@@ -196,7 +199,9 @@ def _on_its_side(setting: Setting, neutral: float, is_off: bool) -> Setting:
 # -- the page --------------------------------------------------------------------------------------------------------
 
 
-def _document(request: Request, tables: SystemTables, chosen: Sliders, name: str | None) -> dict[str, Any]:
+def _document(
+    request: Request, tables: SystemTables, chosen: Sliders, name: str | None, units: Mapping[str, str]
+) -> dict[str, Any]:
     shape, at = tables.shape, tables.settings.at
     system, models = shape.system, shape.models
     targets = {}
@@ -229,7 +234,7 @@ def _document(request: Request, tables: SystemTables, chosen: Sliders, name: str
         "targets": targets, "sliders": sliders, "map": chosen.map, "measure": _measure(system, chosen),
         "columns": [[column, *map(int, shape.place(column)), described[column].unit or ""] for column in columns],
         "seen": seen, "objectives": [*shape.nodes], "good": [*shape.nodes].index(GOOD) if GOOD in shape.nodes else -1,
-        "optional": [*system.optional], "outcomes": [*system.criterion.outcomes],
+        "units": dict(units), "optional": [*system.optional], "outcomes": [*system.criterion.outcomes],
         "components": [*shape.names], "connections": [[x.name, x.sender, x.receiver] for x in system.connections],
         "sampled": [shape.names[i] for i in shape.wires.sampled],
     }  # fmt: skip

@@ -27,7 +27,7 @@ function drawn({ values, columns, drawing }) {
       wanted[3 * i + k] = seen[i * every * n + drawing.scene.seen[k]];
     }
   }
-  const done = { ...result, lines, path, wanted, rows: count, clock: engine.clock(drawing.clock), flight: flown - begun, all: performance.now() - begun };
+  const done = { ...result, lines, path, wanted, rows: count, clock: engine.clock(drawing.clock), until: drawing.clock, flight: flown - begun, all: performance.now() - begun };
   return [done, [...lines, path, wanted].filter(Boolean).map(each => each.buffer)];
 }
 

@@ -7,10 +7,12 @@ import os
 import random
 import re
 import shutil
+import sys
 
 import numpy as np
 import pytest
 
+from docs.claim_records import steps
 from orchestration.experiments.live.live import live
 from orchestration.foundation.basics.errors import UsageError
 from quadcosim import Scenario, fly
@@ -174,6 +176,54 @@ def test_a_key_moves_a_slider_and_the_address_keeps_it(browser, paper, tmp_path)
     assert page.evaluate("quadcosim.command") == "quadcosim run --period 0.08 --set controller.coupling=0"
 
 
+def verdicts(page):
+    """What the page says of the run, of the second law and of the pinned run, when all of them are drawn."""
+    page.wait_for_selector("body[data-drawn]")
+    found = page.evaluate("""["word", "numbers", "secondverdict", "pinnedverdict"]
+        .map(id => document.getElementById(id)).map(element => element.hidden ? "" : element.textContent)""")
+    return f"{found[0]} {found[1]}", *found[2:]
+
+
+@ZIG
+def test_steps_of_the_guided_page_show_what_their_claims_say(browser, paper, tmp_path):
+    page, _, _ = opened(browser, paper, tmp_path, WIDE)
+    for one in steps():
+        page.evaluate(
+            """at => new Promise(go => {
+            if (location.hash.slice(1) === at) go();
+            addEventListener("hashchange", go, { once: true }), location.hash = at;
+        })""",
+            one.at,
+        )
+        own, second, _ = verdicts(page)
+        assert own.startswith(one.verdict)
+        assert second.startswith(f"second law: {one.second}" if one.second else "")
+
+
+@ZIG
+def test_a_second_law_has_the_clock_of_the_first_and_a_pin_has_its_own(browser, paper, tmp_path):
+    page, _, _ = opened(browser, paper, tmp_path, {"width": 390, "height": 800}, "#timing.period=0.079")
+    page.click("#pin"), page.click("#second")
+    page.focus("input[name='second.controller.coupling']")
+    page.keyboard.press("Home")
+    wait(page, "document.getElementById('secondverdict').textContent.includes('settles in 5.58 s')")
+    page.focus("input[name='timing.period']")
+    page.keyboard.press("Home")
+    wait(page, "document.getElementById('word').textContent.startsWith('settles')")
+    shared = page.evaluate("location.hash")
+    assert shared == (
+        "#timing.period=0.001&second&second.controller.coupling=0&pinned&pinned.timing.period=0.079"
+    )  # fmt: skip
+    found = verdicts(page)
+    assert found[2].startswith("pinned: diverges, at 2.47 s")
+    again, _, _ = opened(browser, paper, tmp_path, WIDE, shared)
+    assert verdicts(again) == found
+    assert again.evaluate("quadcosim.command").splitlines() == [
+        "quadcosim run --period 0.001", "quadcosim run --period 0.001 --set controller.coupling=0",
+        "quadcosim run --period 0.079",
+    ]  # fmt: skip
+
+
 @ZIG
 def test_a_page_works_inside_another(browser, paper, tmp_path):
     outer = tmp_path / "outer.html"
@@ -183,6 +233,17 @@ def test_a_page_works_inside_another(browser, paper, tmp_path):
     page.goto(outer.as_uri())
     inner = page.frame_locator("iframe").locator("#word")
     inner.filter(has_text="settles in 4.98 s").wait_for()
+
+
+def test_an_installed_package_has_the_page_of_the_paper(monkeypatch, tmp_path, main):
+    module = sys.modules[live.__module__]
+    shipped = tmp_path / "shipped.html"
+    shipped.write_text("the page", encoding="utf-8")
+    monkeypatch.setattr(module, "SHIPPED", shipped)
+    monkeypatch.setattr(module, "live", None)
+    monkeypatch.chdir(tmp_path)
+    assert main("live", "--out", "here.html").returncode == 0
+    assert (tmp_path / "here.html").read_text(encoding="utf-8") == "the page"
 
 
 def test_what_a_page_cannot_vary_is_named():
