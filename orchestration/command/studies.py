@@ -109,17 +109,23 @@ def export(
     """Write the rows of a study, or the signals and events of a run, as CSV, MAT or Parquet, with their units."""
     from orchestration.experiments.studies import exporting
     from orchestration.experiments.studies.store import store_path
+    from orchestration.experiments.studies.study_file import load_study
 
     if what.is_dir() and not store_path("", what).is_file():
         return result_of_files(exporting.of_run(what, out or what, formats or ()))
-    store = store_path("", what) if what.is_dir() else _current_store(what, out)
-    return result_of_files(exporting.of_study(store, formats or ()))
+    if what.is_dir():
+        return result_of_files(exporting.of_study(store_path("", what), formats or ()))
+    store, cells = _current_store(what, out), load_study(what).cell_names
+    return result_of_files(exporting.of_study(store, formats or (), cells=cells))
 
 
 @option_group("look", FigureFlags)
 def draw(
     study: StudyFile,
-    out: Out = None,
+    out: Annotated[Path | None, option("--out", "Folder of the figures; default: that of the store.", "DIR")] = None,
+    store: Annotated[
+        Path | None, option("--store", "Folder of the store; default: --out if it is there, else results/NAME.", "DIR")
+    ] = None,
     metric: Annotated[
         str | None, option("--metric", "Metric to draw; default: the first objective that varies.")
     ] = None,
@@ -129,12 +135,15 @@ def draw(
     """Draw a study: a metric over one or two axes with the good region, or sensitivity bars."""
     with progress_bar("drawing") as progress:  # first, as importing matplotlib takes time
         from orchestration.experiments.studies.drawing import draw_study, expect_metric
+        from orchestration.experiments.studies.store import store_path
         from orchestration.experiments.studies.study_file import load_study
 
         loaded = load_study(study)
         expect_metric(loaded, metric)
-        _current_store(study, out)
-        return result_of_files(draw_study(loaded, out, metric, look.figure_style, progress))
+        if store is None and out is not None and store_path(loaded.name, out).is_file():
+            store = out
+        _current_store(study, store)
+        return result_of_files(draw_study(loaded, store, metric, look.figure_style, progress, out=out))
 
 
 def _current_store(study: Path, out: Path | None) -> Path:

@@ -10,8 +10,10 @@ from matplotlib.figure import Figure
 from fmu_kit.new_files import new_files
 from orchestration.experiments.studies import figures, sensitivity
 from orchestration.experiments.studies.axes import Axis, unit_points
+from orchestration.experiments.studies.cell_figures import cell_lines, cell_maps
 from orchestration.experiments.studies.default_metric import default_metric
 from orchestration.experiments.studies.maps import heat_map
+from orchestration.experiments.studies.shares import GOOD
 from orchestration.experiments.studies.store import store_path
 from orchestration.experiments.studies.store_columns import TEXTS, metrics_with
 from orchestration.experiments.studies.study import Study
@@ -40,17 +42,21 @@ def draw_study(
     metric: str | None = None,
     style: Style = SCREEN,
     progress: Share = lambda share: None,
+    *,
+    out: Path | None = None,
 ) -> list[Path]:
-    """Draw a metric from the store of `study`, default: the first objective that varies; the paths.
+    """Draw a metric from the store of `study` in a folder, default: the first objective that varies; the paths.
 
-    Raises `UsageError` for an unknown metric, or axes for which there is no figure.
+    The figures are written to `out`, by default beside the store. With `design.repeat` the default is the share of good
+    runs. Raises `UsageError` for an unknown metric, or axes for which there is no figure.
     """
     path = store_path(study.name, folder)
     drawn, indices = study_figures(study, path, metric, style)
-    with new_files(path.parent) as new:
+    place = path.parent if out is None else out
+    with new_files(place) as new:
         tables = [sensitivity.write(indices, (new / next(iter(drawn))).with_suffix(".csv"))] if indices else []
         written = [*tables, *save(drawn, new, style, progress)]
-    return [path.parent / each.name for each in written]
+    return [place / each.name for each in written]
 
 
 def study_figures(
@@ -62,6 +68,8 @@ def study_figures(
     """
     expect_metric(study, metric)
     table, units = frame(store), units_in(store)
+    if metric is None and study.repeat is not None:
+        metric = GOOD
     if metric is None:
         metric = _default_metric_of(study, table)
     indices = indices_of(study, numbers(table, metric), metric) if _is_screened(study) else []
@@ -81,11 +89,22 @@ def study_figures(
 def _over_axes(
     study: Study, table: "pd.DataFrame", metric: str, units: Mapping[str, str], style: Style
 ) -> dict[str, Figure]:
-    axes = tuple(axis for axis in study.axes if _is_numeric(axis))
-    if len(axes) != len(study.axes):
-        raise UsageError(f"{study.name}: expected axes of numbers to draw")
     system = study.origin
     words = system.criterion.outcomes
+    axes = tuple(axis for axis in study.cell_axes if _is_numeric(axis))
+    named = [axis for axis in study.cell_axes if not _is_numeric(axis)]
+    if study.repeat is not None or named or metric == GOOD:
+        listed = all(axis.values is not None for axis in axes)
+        if len(named) > 1 or not 1 <= len(axes) <= 2 or not listed:
+            raise UsageError(
+                f"{study.name}: expected one or two axes of numbers with values, at most one of names, "
+                "and design.repeat for the axis of repetitions, to draw"
+            )
+        laws = named[0] if named else None
+        if len(axes) == 1:
+            return {metric: cell_lines(table, axes[0], laws, metric, words, units=units, style=style)}
+        both = (axes[0], axes[1])
+        return {f"{metric}_map": cell_maps(table, both, laws, metric, words, units=units, style=style)}
     if len(axes) > 2:
         return {metric: figures.scatter(table, axes, metric, words, units=units, style=style)}
     drawn = {metric: figures.lines(table, axes, metric, words, bound_of(system, metric), units=units, style=style)}

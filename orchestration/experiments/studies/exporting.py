@@ -23,11 +23,14 @@ def of_run(folder: Path, out: Path, formats: Sequence[str]) -> list[Path]:
     return [*written, *([result.to_mat(out / MAT)] if "mat" in formats else [])]
 
 
-def of_study(store: Path, formats: Sequence[str]) -> list[Path]:
-    """Write the rows of a store beside it, default: as Parquet and CSV; the paths."""
+def of_study(store: Path, formats: Sequence[str], *, cells: Sequence[str] | None = None) -> list[Path]:
+    """Write the rows of a store beside it, default: as Parquet and CSV; the paths.
+
+    With axes of `cells` also the share of good runs by their values, with its interval.
+    """
     for kind in formats:
         _expect(kind, FORMATS)
-    return export(store, store.parent, formats or FORMATS[:2])
+    return export(store, store.parent, formats or FORMATS[:2], cells=cells)
 
 
 def _expect(kind: str, known: Sequence[str], hint: str = "") -> None:

@@ -11,7 +11,7 @@ from orchestration.components.building.fmus import native_twin, native_twins
 from orchestration.experiments.studies.axes import Axis, Method, Points, Value
 from orchestration.experiments.studies.linked_settings import LinkedSettings
 from orchestration.experiments.studies.store_columns import is_column
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, expected_name
 from orchestration.foundation.basics.records import record
 from orchestration.simulation.requests.ranges import paths_in
 from orchestration.simulation.results.own_metrics import OwnMetric
@@ -19,7 +19,7 @@ from orchestration.systems.system.distribution import is_table, trace_path
 from orchestration.systems.system.files import Files, files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed, is_source_file, value_at
-from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
+from orchestration.systems.system.request import ControlLoop, Request, errors_in_own_terms, system_of
 from orchestration.systems.system.requirements import is_number
 
 
@@ -43,6 +43,9 @@ class Study:
     """The seed of the sampling."""
     vary_seed: bool = False
     """Whether each run has its own seed, derived from that of the base and the values of the axes."""
+    repeat: str | None = None
+    """The axis that repeats each combination of the others, as `seed`: `draw` and `export` give the share of good runs
+    of a cell, with its interval."""
     keep_signals: tuple[int, ...] | bool = False
     """The indices of the runs whose signals are kept, or whether all are."""
     metrics: tuple[OwnMetric, ...] = ()
@@ -62,9 +65,20 @@ class Study:
             is_of_seeds = (axis.name, axis.targets, axis.multiplies) == ("seed", ("seed",), False)
             if is_column(axis.name, self.metric_names) and not is_of_seeds:
                 raise UsageError(f"axis {axis.name}: the table of runs has a column of that name, expected another")
+        listed = [axis.name for axis in self.axes if axis.values is not None]
+        if self.repeat is not None and self.repeat not in listed:
+            raise UsageError(
+                f"design.repeat = {self.repeat}: {expected_name(self.repeat, listed)}, an axis with values"
+            )
         for each in self.together:
             if not set(each.axes) <= set(names):
                 raise UsageError(f"axes = {', '.join(names)}: expected {', '.join(each.axes)} among them")
+        has_vehicle = isinstance(self.base, ControlLoop) and self.base.vehicle is not None
+        for axis in self.axes:
+            if has_vehicle and CONTROLLER & {*axis.targets}:
+                raise UsageError(
+                    f"axis {axis.name}: expected a base without a vehicle, whose parameters are those of one controller"
+                )
         assert self._paths is not None  # raises UsageError for an unknown target
 
     @cached_property
@@ -72,6 +86,16 @@ class Study:
         """The system that the base describes."""
         system = system_of(self.base)
         return native_twins(system) if self.native else system
+
+    @property
+    def cell_axes(self) -> tuple[Axis, ...]:
+        """The axes besides the one that repeats."""
+        return tuple(axis for axis in self.axes if axis.name != self.repeat)
+
+    @property
+    def cell_names(self) -> tuple[str, ...] | None:
+        """The names of the axes of its cells; None if nothing repeats."""
+        return None if self.repeat is None else tuple(axis.name for axis in self.cell_axes)
 
     @property
     def metric_names(self) -> tuple[str, ...]:
@@ -148,6 +172,8 @@ def _traces(values: Iterable[tuple[str, str]]) -> list[str]:
     return [path for path in paths if path is not None]
 
 
+CONTROLLER = frozenset({"controller", "controller.fmu", "components.controller.fmu"})
+"""Targets that set the controller of the quadrotor, by name or path"""
 _NAME = re.compile(r"[^\W_][\w .+-]{0,99}")
 
 

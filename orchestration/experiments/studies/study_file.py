@@ -7,15 +7,16 @@ from typing import Any, Protocol, TypeVar
 
 from orchestration.components.building.models import PATHS
 from orchestration.experiments.studies.axes import Axis, Scale, Value, span
-from orchestration.experiments.studies.study import Study, names_fmu
+from orchestration.experiments.studies.linked_settings import LinkedSettings
+from orchestration.experiments.studies.study import CONTROLLER, Study, names_fmu
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError, prefixed
 from orchestration.foundation.basics.records import record
 from orchestration.foundation.basics.typed_tables import parsed, table_of
 from orchestration.simulation.requests.request import load_request, request_from_tables
 from orchestration.systems.system.distribution import as_text
-from orchestration.systems.system.paths import is_source_file
-from orchestration.systems.system.request import ControlLoop, Request
+from orchestration.systems.system.paths import is_source_file, value_at
+from orchestration.systems.system.request import ControlLoop, Request, system_of
 
 
 @record()
@@ -42,10 +43,10 @@ class AxisTable:
 
 class DesignTable(
     table_of(  # type: ignore[misc]
-        Study, only=["method", "samples", "design_seed", "vary_seed"], called={"design_seed": "seed"}
+        Study, only=["method", "samples", "design_seed", "vary_seed", "repeat"], called={"design_seed": "seed"}
     )
 ):
-    """`[design]`: how axes without values are sampled."""
+    """`[design]`: how axes without values are sampled, and which axis repeats."""
 
 
 @record()
@@ -115,11 +116,13 @@ def control_loop_of(file: HasBase, folder: Path) -> ControlLoop:
 def _study(file: StudyFile, path: Path) -> Study:
     if file.design.design_seed < 0:
         raise UsageError(f"design.seed = {file.design.design_seed}: expected a whole number from 0")
-    base = base_of(file, path.parent)
+    axes = tuple(axis_of(table, path.parent) for table in file.axes)
+    base, together = _with_controllers(base_of(file, path.parent), axes)
     study = Study(
         name=file.name or path.stem,
         base=base,
-        axes=tuple(axis_of(table, path.parent) for table in file.axes),
+        axes=axes,
+        together=together,
         **file.design.as_dict(),
         keep_signals=file.keep_signals if isinstance(file.keep_signals, bool) else tuple(file.keep_signals),
     )
@@ -127,6 +130,25 @@ def _study(file: StudyFile, path: Path) -> Study:
         raise UsageError("axes: expected at least one point")
     _expect_consumed(file, study)
     return study
+
+
+def _with_controllers(base: Request, axes: tuple[Axis, ...]) -> tuple[Request, tuple[LinkedSettings, ...]]:
+    """The base, and what an axis of controllers sets besides: each has the parameters of the base's vehicle for it."""
+    of_controllers = [axis for axis in axes if {*axis.targets} & CONTROLLER]
+    if not of_controllers or not isinstance(base, ControlLoop) or base.vehicle is None:
+        return base, ()
+    vehicle, bare = base.vehicle, base.without_vehicle()
+    sets: dict[tuple[Value, ...], dict[str, Value]] = {}
+    for controller in of_controllers[0].values or ():
+        parameters = vehicle.parameters_for(str(controller))
+        for axis in axes:
+            for target in {*axis.targets} & parameters.keys():
+                raise UsageError(
+                    f"axis {axis.name}: {target} is the vehicle's, expected no axis of it beside one of controllers"
+                )
+        given = {name for name in parameters if value_at(system_of(bare), *bare.paths_of(name)) is not None}
+        sets[controller,] = {name: value for name, value in parameters.items() if name not in given}
+    return bare, (LinkedSettings(axes=(of_controllers[0].name,), sets=sets),)
 
 
 def _expect_consumed(file: StudyFile, study: Study) -> None:
@@ -166,7 +188,10 @@ def axis_of(table: AxisTable, folder: Path) -> Axis:
 
 def _values(listed: list[Value | dict[str, Any]], targets: tuple[str, ...], folder: Path) -> tuple[Value, ...]:
     """Listed values: paths made relative to the study file, distributions as the text of their table."""
-    are_paths = all(names_fmu(target) or is_source_file(target) or target.endswith(".fmu") for target in targets)
+    are_paths = all(
+        names_fmu(target) or is_source_file(target) or target.endswith(".fmu") or target in CONTROLLER
+        for target in targets
+    )
     plain = [as_text(value, folder) if isinstance(value, dict) else value for value in listed]
     return tuple(
         str(folder / str(value)) if are_paths and str(value).endswith((*PATHS, ".csv")) else value for value in plain

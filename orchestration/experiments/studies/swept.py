@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from orchestration.experiments.studies.store import open_for_reading
 from orchestration.experiments.studies.study import Study
+from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.simulation.results import html
 from orchestration.simulation.workers.batching import LaneAgreement
@@ -77,6 +78,19 @@ class Swept:
         table = frame(self.path)
         table.attrs["units"] = units_in(self.path)
         return table
+
+    @explains_missing
+    def shares(self) -> "pd.DataFrame":
+        """A row for each combination of the axes but `repeat`: `count` of runs, `good`, their `share`, `low`, `high`.
+
+        The interval is Wilson's at 95 %. Raises `UsageError` if the study has no axis that repeats, or no criterion.
+        """
+        from orchestration.experiments.studies.shares import shares_of
+        from orchestration.experiments.studies.table import frame
+
+        if self.study.cell_names is None:
+            raise UsageError("design.repeat: expected the name of the axis that repeats each cell, as seed")
+        return shares_of(frame(self.path), self.study.cell_names)
 
     @explains_missing
     def to_xarray(self) -> "xr.Dataset":

@@ -11,6 +11,7 @@ import pyarrow.parquet as pq
 from pyarrow import csv
 
 from fmu_kit.new_files import new_files
+from orchestration.experiments.studies.shares import shares_of
 from orchestration.experiments.studies.store import Store, note_on_engines, open_for_reading
 from orchestration.experiments.studies.store_columns import SETTINGS, TEXTS, UNITS
 from orchestration.foundation.basics.errors import UsageError
@@ -105,27 +106,36 @@ def _with_units(table: Any, units: Mapping[str, str]) -> Any:
     return table.cast(pa.schema(fields, metadata=table.schema.metadata))
 
 
-def export(path: Path, folder: Path, formats: Collection[str] = ("parquet", "csv")) -> list[Path]:
+def export(
+    path: Path, folder: Path, formats: Collection[str] = ("parquet", "csv"), *, cells: Sequence[str] | None = None
+) -> list[Path]:
     """Write the rows by design index as `runs.parquet`, `runs.csv` or `runs.mat`; their paths.
 
-    Parquet has units in the metadata of its fields, as `unit`; MAT has a structure `runs` with a field for each column,
-    and `units` with the same fields. Warns of runs by several engines.
+    With axes of `cells` also the share of good runs by their values as `shares`, likewise. Parquet has units in the
+    metadata of its fields, as `unit`; MAT has a structure `runs` with a field for each column, and `units` with the
+    same fields. Warns of runs by several engines.
     """
     rows = frame(path)
     if note := note_in(rows):
         warn(note)
-    table = _with_units(pa.Table.from_pandas(rows, preserve_index=False), units_in(path))
-    writers = {"parquet": pq.write_table, "csv": csv.write_csv, "mat": _write_mat}
+    tables = {"runs": rows} if cells is None else {"runs": rows, "shares": shares_of(rows, cells)}
+    written = []
     with new_files(folder) as new:
-        for kind in formats:
-            writers[kind](table, new / f"runs.{kind}")
-    return [folder / f"runs.{kind}" for kind in formats]
+        for name, content in tables.items():
+            table = _with_units(pa.Table.from_pandas(content, preserve_index=False), units_in(path))
+            for kind in formats:
+                _WRITERS[kind](table, new / f"{name}.{kind}")
+                written.append(folder / f"{name}.{kind}")
+    return written
 
 
 def _write_mat(table: Any, file: Path) -> None:
     columns = {field.name: _column(table[field.name]) for field in table.schema}
     units = {f.name: (f.metadata or {}).get(b"unit", b"").decode() for f in table.schema}
-    mat_file.write(file, {"runs": mat_file.flat(columns), "units": mat_file.flat(units)})
+    mat_file.write(file, {file.stem: mat_file.flat(columns), "units": mat_file.flat(units)})
+
+
+_WRITERS = {"parquet": pq.write_table, "csv": csv.write_csv, "mat": _write_mat}
 
 
 def _column(values: Any) -> Any:

@@ -168,6 +168,8 @@ def paths_of(target: str) -> tuple[str, ...]:
         return (f"connections.measurement.{key}",)
     if table in ("reference", "disturbance") and key:
         return (f"sources.{table}.{SIGNAL_KEYS[table].get(key, f'parameters.{key}')}",)
+    if target == "controller":
+        return ("components.controller.fmu",)
     if table in ("controller", "plant") and key:
         return (f"components.{table}.fmu" if key == "fmu" else f"components.{table}.parameters.{key}",)
     raise UsageError(

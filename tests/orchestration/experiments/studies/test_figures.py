@@ -122,10 +122,12 @@ def test_an_unknown_metric_is_reported_with_the_known_ones(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     "axes",
     [(axis("timing.order", "jacobi", "gauss-seidel", "jacobi"),),
-     (PERIODS, axis("controller.use_reference_inputs", True, False))],
+     (PERIODS, axis("timing.order", "jacobi", "gauss-seidel"), axis("controller.use_reference_inputs", True, False))],
 )  # fmt: skip
 def test_axes_without_a_figure_are_refused(tmp_path: Path, axes: tuple[Axis, ...]) -> None:
-    with pytest.raises(UsageError, match="study: expected axes of numbers to draw"):
+    with pytest.raises(
+        UsageError, match="study: expected one or two axes of numbers with values, at most one of names"
+    ):
         draw_study(invented(tmp_path, study(*axes)), tmp_path, "ultimate_bound")
 
 

@@ -1,0 +1,222 @@
+"""Figures of cells: shares of good runs with their intervals, medians, and the difference between two laws."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from orchestration.experiments.studies.axes import Axis, Value
+from orchestration.experiments.studies.axis_labels import SCALES, edges, name_of, quantity_of
+from orchestration.experiments.studies.shares import GOOD, cells_of, certain
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.simulation.figures import cells as mesh
+from orchestration.simulation.figures.palette import BLACK, BLUE, CYCLE, DASHES, MARKS, NOT_GOOD
+from orchestration.simulation.figures.style import SCREEN, Style
+from orchestration.simulation.results import display_names as labels
+from orchestration.simulation.results.quantities import Quantity
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+HALF = 0.5
+"""Share at which a map has its line"""
+MAX_TEXTS = 20
+"""Most columns of cells, over all panels, whose shares are written into them"""
+
+
+def cell_lines(
+    table: "pd.DataFrame",
+    axis: Axis,
+    laws: Axis | None,
+    metric: str,
+    words: tuple[str, str],
+    *,
+    units: Mapping[str, str],
+    style: Style = SCREEN,
+) -> Figure:
+    """The share of good runs with its interval at 95 %, or the median of a metric, over one axis.
+
+    `laws` is an axis of names, such as controllers: a line for each.
+    """
+    across = quantity_of(axis, units)
+    figure = style.figure(32.0)
+    panel = figure.add_subplot()
+    groups = _by_law(cells_of(table, _names(axis, laws), metric), laws)
+    for i, (law, group) in enumerate(groups):
+        how: dict[str, Any] = {"color": CYCLE[i % len(CYCLE)] if law else BLUE, "linestyle": DASHES[i % len(DASHES)]}
+        at = across.of(group[axis.name])
+        panel.plot(at, group["value"], marker=MARKS[i % len(MARKS)], markersize=3.5, label=law, **how)
+        if metric == GOOD:
+            panel.fill_between(at, group["low"], group["high"], color=how["color"], alpha=0.15, linewidth=0.0)
+    panel.set(xlabel=across.title, ylabel=_title(metric, words, units), xscale=SCALES[axis.scale])
+    if metric == GOOD:
+        panel.set_ylim(-0.02, 1.02)
+    if laws is not None:
+        figure.legend(loc="outside right upper", title=name_of(laws))
+    figure.suptitle(_repetitions(table, _names(axis, laws), metric))
+    return figure
+
+
+def cell_maps(
+    table: "pd.DataFrame",
+    axes: tuple[Axis, Axis],
+    laws: Axis | None,
+    metric: str,
+    words: tuple[str, str],
+    *,
+    units: Mapping[str, str],
+    style: Style = SCREEN,
+) -> Figure:
+    """The share of good runs, or the median of a metric, over two axes; the line is where half of the runs are good.
+
+    `laws` is an axis of names, such as controllers: a panel for each, and for two of them one of their difference, with
+    dots where the interval of the difference of the shares at 95 % excludes 0.
+    """
+    x, y = (quantity_of(axis, units) for axis in axes)
+    places = (edges(axes[0], x.of(table[axes[0].name])), edges(axes[1], y.of(table[axes[1].name])))
+    groups = _by_law(cells_of(table, _names(*axes, laws), metric), laws)
+    count = 3 if len(groups) == 2 else len(groups)
+    columns = min(count, 3 if style.is_wide else 1)
+    rows = -(-count // columns)
+    figure = style.figure((24.0 if columns > 1 else 32.0) * rows + 6.0)
+    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    for panel in panels[count:]:
+        panel.set_visible(False)
+    grids = [{name: _grid(group, axes, name) for name in ("value", "share")} for _, group in groups]
+    everything = np.stack([grid["value"] for grid in grids])
+    writes = len(places[0]) * columns <= MAX_TEXTS
+    for panel, (law, group), grid in zip(panels, groups, grids):
+        filled = _fill(panel, places, grid["value"], everything, metric)
+        mesh.hatch(panel, *places, np.isnan(grid["share"]))
+        _limit(panel, places, grid["share"])
+        if metric == GOOD and writes:
+            _write_counts(panel, (x, y), axes, group)
+        panel.set_title(law or "")
+    empty = [np.where(np.isnan(grid["value"]) & ~np.isnan(grid["share"]), 0.0, np.nan) for grid in grids]
+    for panel, none_good in zip(panels, empty):
+        mesh.fill_kinds(panel, *places, none_good, (NOT_GOOD,))
+    if filled is not None:
+        title = _title(metric, words, units)
+        figure.colorbar(filled, ax=panels[: len(groups)].tolist(), label=title, location="bottom", aspect=40.0)
+    if len(groups) == 2:
+        _difference(figure, panels[2], places, groups, grids, axes, (x, y), metric)
+    for panel in panels[:count]:
+        panel.set(xscale=SCALES[axes[0].scale], yscale=SCALES[axes[1].scale], xlabel=x.title)
+        panel.xaxis.set_tick_params(labelbottom=True)
+    for panel in panels[:count:columns]:
+        panel.set_ylabel(y.title)
+    figure.suptitle(_repetitions(table, _names(*axes, laws), metric))
+    handles: list[Patch | Line2D] = []
+    if any(_has_limit(grid["share"]) for grid in grids):
+        handles.append(Line2D([], [], color=mesh.LIMIT["colors"], label=f"half of the runs {words[0]}"))
+    if np.isfinite(np.stack(empty)).any():
+        handles.append(Patch(color=NOT_GOOD, label=f"none {words[0]}"))
+    if any(np.isnan(grid["share"]).any() for grid in grids):
+        handles.append(mesh.hatched())
+    if handles:
+        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    return figure
+
+
+def _names(*axes: Axis | None) -> list[str]:
+    return [axis.name for axis in axes if axis is not None]
+
+
+def _by_law(table: "pd.DataFrame", laws: Axis | None) -> "list[tuple[str, pd.DataFrame]]":
+    """The cells of each law in the order of the axis, with its name; without an axis of laws all of them."""
+    if laws is None:
+        return [("", table)]
+    return [(_law(value), table[table[laws.name] == value]) for value in laws.values or ()]
+
+
+def _law(value: Value) -> str:
+    return str(value).rpartition("/")[2]
+
+
+def _grid(table: "pd.DataFrame", axes: tuple[Axis, Axis], column: str) -> Floats:
+    """A column by cell, shape (values of the second axis, values of the first); nan where there is no run."""
+    shape = table.pivot(index=axes[1].name, columns=axes[0].name, values=column)
+    whole = shape.reindex(index=sorted(axes[1].values or ()), columns=sorted(axes[0].values or ()))
+    return np.asarray(whole.to_numpy(float))
+
+
+def _fill(panel: Axes, places: tuple[Floats, Floats], values: Floats, everything: Floats, metric: str) -> Any:
+    """Colour the cells of a panel with the range of all panels; None if nothing has a value."""
+    if not np.isfinite(everything).any():
+        return None
+    ends = (0.0, 1.0) if metric == GOOD else (float(np.nanmin(everything)), float(np.nanmax(everything)))
+    return mesh.fill(panel, *places, values, norm=Normalize(*ends), vmin=None)
+
+
+def _limit(panel: Axes, places: tuple[Floats, Floats], share: Floats) -> None:
+    mesh.limit(panel, *places, np.where(np.isnan(share), np.nan, share >= HALF))
+
+
+def _has_limit(share: Floats) -> bool:
+    known = share[~np.isnan(share)]
+    return bool((known >= HALF).any() and (known < HALF).any())
+
+
+def _write_counts(
+    panel: Axes, quantities: tuple[Quantity, Quantity], axes: tuple[Axis, Axis], group: "pd.DataFrame"
+) -> None:
+    x, y = (quantity.of(group[axis.name]) for quantity, axis in zip(quantities, axes))
+    for across, up, good, count, share in zip(x, y, group["good"], group["count"], group["share"]):
+        color = "white" if share < HALF else BLACK
+        panel.text(across, up, f"{good}/{count}", color=color, ha="center", va="center", fontsize="x-small")
+
+
+def _difference(
+    figure: Figure,
+    panel: Axes,
+    places: tuple[Floats, Floats],
+    groups: "Sequence[tuple[str, pd.DataFrame]]",
+    grids: Sequence[Mapping[str, Floats]],
+    axes: tuple[Axis, Axis],
+    quantities: tuple[Quantity, Quantity],
+    metric: str,
+) -> None:
+    """The second law minus the first, with dots where the shares certainly differ."""
+    difference = grids[1]["value"] - grids[0]["value"]
+    known = np.abs(difference[np.isfinite(difference)])
+    size = 1.0 if metric == GOOD or not known.max(initial=0.0) else float(known.max())
+    filled = mesh.fill(panel, *places, difference, cmap="RdBu", norm=Normalize(-size, size), vmin=None)
+    of = "difference of the shares" if metric == GOOD else "difference of the medians"
+    figure.colorbar(filled, ax=panel, label=of, location="bottom", aspect=20.0)
+    panel.set_title(f"{groups[1][0]}\nminus {groups[0][0]}")
+    if metric != GOOD:
+        return
+    both = groups[0][1].merge(groups[1][1], on=_names(*axes), suffixes=(".0", ".1"))
+    columns = ("share", "low", "high")
+    marked = [
+        (row[axes[0].name], row[axes[1].name])
+        for _, row in both.iterrows()
+        if certain(*({name: row[f"{name}.{law}"] for name in columns} for law in (0, 1)))
+    ]
+    if marked:
+        x, y = (quantity.of(values) for quantity, values in zip(quantities, zip(*marked)))
+        panel.plot(x, y, "o", color=BLACK, markersize=3.5, markeredgecolor="white", markeredgewidth=0.6)
+
+
+def _title(metric: str, words: tuple[str, str], units: Mapping[str, str]) -> str:
+    if metric == GOOD:
+        return f"share that is {words[0]} [1]"
+    return f"median of {labels.metric_with_unit(metric, units.get(metric))}, where {words[0]}"
+
+
+def _repetitions(table: "pd.DataFrame", by: list[str], metric: str) -> str:
+    """The number of runs of a cell, and how wide the intervals of their shares are."""
+    counted = cells_of(table, by, metric)
+    counts = sorted(set(counted["count"]))
+    runs = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
+    if counts == [1]:
+        return ""
+    width = 0.5 * (counted["high"] - counted["low"]).max()
+    note = f"; intervals at 95 % of up to ±{width:.2f}" if metric == GOOD else ""
+    dots = "; dots: the two certainly differ" if metric == GOOD and len(by) == 3 else ""
+    return f"{runs} runs a cell{note}{dots}"

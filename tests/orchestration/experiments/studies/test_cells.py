@@ -1,0 +1,130 @@
+"""Cells of a study: shares of good runs with their intervals, laws side by side, their difference."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from orchestration.experiments.studies.cell_figures import cell_lines, cell_maps
+from orchestration.experiments.studies.shares import cells_of, certain
+from orchestration.experiments.studies.study_file import load_study
+from orchestration.foundation.basics.statistics import wilson
+from orchestration.quadrotor.scenarios.vehicle import load_vehicle
+from quadcosim import Scenario, UsageError
+from tests.commands import Main
+from tests.orchestration.experiments.studies.common import axis, study
+
+LAWS = axis("controller", "UnifiedController", "CascadedController")
+PERIODS, LOSSES = axis("timing.period", 0.01, 0.02), axis("timing.loss", 0.0, 0.1, 0.2)
+SEEDS = 8
+WORDS = ("settled", "bounded")
+
+
+def runs() -> pd.DataFrame:
+    """All runs of the first law are good; of the second as many as its cell has in its index, none at 20 ms."""
+    rows = [
+        {
+            "controller": law, "timing.period": period, "timing.loss": loss, "seed": seed, "status": "done",
+            "good": first or (period < 0.02 and seed < 3 * k), "position_rmse": 1.0 + seed,
+        }
+        for law, first in zip(LAWS.values or (), (True, False))
+        for period in (0.01, 0.02)
+        for k, loss in enumerate((0.0, 0.1, 0.2))
+        for seed in range(SEEDS)
+    ]  # fmt: skip
+    return pd.DataFrame(rows).astype({"good": "boolean"})
+
+
+def test_a_cell_is_the_share_of_its_good_runs_with_wilsons_interval() -> None:
+    cells = cells_of(runs(), ["controller", "timing.period", "timing.loss"])
+    assert cells["count"].eq(SEEDS).all()
+    cell = cells.query("controller == 'CascadedController' and `timing.period` == 0.01 and `timing.loss` == 0.1").iloc[
+        0
+    ]
+    assert (cell["good"], cell["share"]) == (3, 3 / 8)
+    assert (cell["low"], cell["high"]) == wilson(3, 8)
+
+
+def test_a_metric_of_a_cell_is_its_median_over_the_good_runs_and_failed_runs_do_not_count() -> None:
+    table = runs()
+    table.loc[0, ["status", "good"]] = ["failed", pd.NA]
+    cells = cells_of(table, ["controller", "timing.period", "timing.loss"], "position_rmse").set_index(
+        ["controller", "timing.period", "timing.loss"]
+    )
+    assert cells.loc[("CascadedController", 0.01, 0.1), "value"] == 2.0
+    assert np.isnan(cells.loc[("CascadedController", 0.02, 0.1), "value"])
+    assert cells.loc[("UnifiedController", 0.01, 0.0), "count"] == SEEDS - 1
+
+
+def test_runs_that_no_criterion_judges_have_no_share() -> None:
+    with pytest.raises(UsageError, match=r"expected criterion\.good in the base"):
+        cells_of(runs().assign(good=pd.NA), ["timing.period"])
+
+
+def test_two_shares_differ_certainly_where_newcombes_interval_excludes_0() -> None:
+    # Newcombe (1998), table II: 56/70 against 48/80 has the interval .0524 to .3339, 9/10 against 3/10 .1705 to .8090,
+    # 10/10 against 0/20 .6791 to 1, 5/56 against 0/29 -.0381 to .1926
+    def cell(good: int, count: int) -> dict[str, float]:
+        low, high = wilson(good, count)
+        return {"share": good / count, "low": low, "high": high}
+
+    assert certain(cell(56, 70), cell(48, 80))
+    assert certain(cell(9, 10), cell(3, 10))
+    assert certain(cell(0, 20), cell(10, 10))
+    assert not certain(cell(5, 56), cell(0, 29))
+
+
+def test_a_map_of_two_laws_has_a_third_panel_with_their_difference() -> None:
+    figure = cell_maps(runs(), (PERIODS, LOSSES), LAWS, "good", WORDS, units={})
+    titles = [panel.get_title() for panel in figure.axes[:3]]
+    assert titles == ["UnifiedController", "CascadedController", "CascadedController\nminus UnifiedController"]
+    (marks,) = [line for line in figure.axes[2].get_lines() if line.get_marker() == "o"]
+    shown = set(zip(*(map(float, np.round(data, 6)) for data in marks.get_data())))  # type: ignore[arg-type]
+    assert shown == {(10.0, 0.0), (10.0, 0.1), (20.0, 0.0), (20.0, 0.1), (20.0, 0.2)}  # 8 and 6 of 8 may be alike
+    assert [text.get_text() for text in figure.axes[1].texts] == ["0/8", "3/8", "6/8", "0/8", "0/8", "0/8"]
+    assert figure.get_suptitle() == ("8 runs a cell; intervals at 95 % of up to ±0.28; dots: the two certainly differ")
+
+
+def test_shares_over_one_axis_are_a_line_with_a_band_for_each_law() -> None:
+    figure = cell_lines(runs(), LOSSES, LAWS, "good", WORDS, units={})
+    panel = figure.axes[0]
+    assert [line.get_label() for line in panel.get_lines()] == list(LAWS.values or ())
+    assert len(panel.collections) == 2
+    assert panel.get_ylabel() == "share that is settled [1]"
+
+
+def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
+    tmp_path: Path, main: Main, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "study.toml"
+    path.write_text(
+        '[base]\nstop_time = 0.05\nvehicle = "crazyflie"\n[base.timing]\nplant_interval = 0.005\n'
+        '[[axes]]\nname = "controller"\nvalues = ["UnifiedController", "CascadedController"]\n'
+        '[[axes]]\nname = "timing.period"\nvalues = [0.01, 0.02]\n'
+        '[[axes]]\nname = "seed"\nvalues = [1, 2]\n[design]\nrepeat = "seed"\n'
+    )
+    loaded = load_study(path)
+    for index, law in ((0, "UnifiedController"), (4, "CascadedController")):
+        alone = Scenario(vehicle=load_vehicle("crazyflie", tmp_path)).with_values({"controller.fmu": law}).as_system()
+        in_study = loaded.system(index, {}).components
+        for name in ("plant", "controller"):  # with the vehicle's parameters for that controller
+            assert in_study[name].parameters == alone.components[name].parameters
+            assert in_study[name].fmu == alone.components[name].fmu
+    assert loaded.cell_names == ("controller", "timing.period")
+    main("sweep", "study.toml", "--engine", "compiled")
+    drawn = main("draw", "study.toml", "--out", "figures", "--format", "png").stdout.splitlines()
+    assert drawn == ["figures/good.png"]
+    main("draw", "study.toml", "--store", "results/study", "--out", "figures", "--format", "png")
+    main("export", "study.toml", "--format", "csv")
+    shares = pd.read_csv(tmp_path / "results/study/shares.csv")
+    assert list(shares) == ["controller", "timing.period", "count", "good", "share", "low", "high"]
+    assert shares["count"].tolist() == [2, 2, 2, 2]
+
+
+def test_a_study_that_cannot_be_drawn_as_cells_says_what_is_expected() -> None:
+    with pytest.raises(UsageError, match=r"design.repeat = seeds: .*expected one of timing.period, seed"):
+        study(PERIODS, axis("seed", 1, 2), repeat="seeds")
+    with pytest.raises(UsageError, match="axis controller: expected a base without a vehicle"):
+        study(LAWS, base=Scenario(vehicle=load_vehicle("crazyflie", Path())))
