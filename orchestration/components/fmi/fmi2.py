@@ -15,9 +15,10 @@ from orchestration.foundation.basics.errors import SimulatorError
 class Fmi2Instance(NativeInstance):
     """See `NativeInstance`."""
 
+    only_calls = True
     version, enumerations = 2, "Integer"
     stored: ClassVar = {"Real": np.float64, "Integer": np.int32, "Boolean": np.int32, "Enumeration": np.int32}
-    counts_values = False
+    counts_values, step_name = False, "fmi2DoStep"
     state_calls = ("getFMUstate", "serializeFMUstate", "freeFMUstate", "deSerializeFMUstate", "setFMUstate")
 
     def _load_step(self, library: Any) -> None:

@@ -9,6 +9,7 @@ from typing import Any, Protocol, TypeAlias, TypeVar
 import numpy as np
 from fmpy.model_description import ModelDescription
 
+from orchestration.components.fmi.access import USUAL, Access
 from orchestration.components.fmi.read_description import Kind, Model, Variable
 from orchestration.foundation.basics.errors import UsageError, expected_name, shown
 from orchestration.foundation.basics.simulator import Floats, Simulator
@@ -194,5 +195,5 @@ class Instance(Simulator, Protocol):
 class Loader(Protocol):
     """Provides an instance of an FMU for one run."""
 
-    def __call__(self, path: Path, instance_name: str) -> AbstractContextManager[Instance]:
+    def __call__(self, path: Path, instance_name: str, access: Access = USUAL, /) -> AbstractContextManager[Instance]:
         """An instance in the state after instantiation, with all parameters at their defaults."""

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestration.components.fmi.access import USUAL, Access
 from orchestration.components.fmi.instance import Instance, Value
 from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.basics.errors import SimulatorError, StoppedStepError
@@ -29,10 +30,10 @@ _PATIENCE = 5.0
 class IsolatedInstance(Instance):
     """An instance in a process that is started for it, and ends with it or with this process."""
 
-    def __init__(self, path: Path, instance_name: str) -> None:
+    def __init__(self, path: Path, instance_name: str, access: Access = USUAL) -> None:
         self.path = path
         self.name = instance_name
-        self.model = read_model(path)
+        self.model = read_model(path, access)
         self.warnings: list[str] = []
         self.failed = self.stopped = False
         self._waiting: list[Command] = []  # writes that have not been sent
@@ -40,7 +41,9 @@ class IsolatedInstance(Instance):
         self._fresh = False  # whether these values are current
         self._writers = 0
         self._child = Child(
-            subprocesses.Module.of("orchestration.components.fmi.isolated_process", path.absolute(), instance_name)
+            subprocesses.Module.of(
+                "orchestration.components.fmi.isolated_process", path.absolute(), instance_name, str(access)
+            )
         )
         try:
             self._request()

@@ -1,4 +1,7 @@
-"""The process of an isolated instance: `python -m orchestration.components.fmi.isolated_process FMU NAME` obeys."""
+"""The process of an isolated instance.
+
+`python -m orchestration.components.fmi.isolated_process FMU NAME ACCESS` obeys.
+"""
 
 import sys
 from collections.abc import Callable
@@ -7,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestration.components.fmi.access import Access
 from orchestration.components.fmi.isolated_instance import Command
 from orchestration.components.fmi.native_instance import NativeInstance
 from orchestration.components.fmi.opening import open_here
@@ -17,16 +21,16 @@ from orchestration.foundation.processes.channel import Parent
 class _Server:
     """The instance and the arrays of its transfers."""
 
-    def __init__(self, path: Path, name: str) -> None:
+    def __init__(self, path: Path, name: str, access: Access) -> None:
         self.instance: NativeInstance | None = None
-        self._path, self._name = path, name
+        self._how = path, name, access
         self._readers: list[tuple[Transfer, Floats]] = []
         self._writers: list[tuple[Transfer, Floats]] = []
 
     def execute(self, commands: list[Command]) -> Any:
         """The result of the last command."""
         if self.instance is None:
-            self.instance = open_here(self._path, self._name)
+            self.instance = open_here(*self._how)
         result = None
         for name, *arguments in commands:
             local: Callable[..., Any] | None = getattr(self, f"_{name}", None)
@@ -54,9 +58,9 @@ class _Server:
         return b"".join(values.tobytes() for _, values in self._readers)
 
 
-def main(path: str, name: str) -> None:
+def main(path: str, name: str, access: str) -> None:
     """Serve one instance."""
-    parent, server = Parent(), _Server(Path(path), name)
+    parent, server = Parent(), _Server(Path(path), name, Access.of(access))
     for commands in parent:
         result = error = None
         try:

@@ -20,6 +20,7 @@ from fmpy.fmi1 import FMICallException
 from fmu_kit import scratch
 from fmu_kit.scratch import Scratch
 from orchestration.components.fmi import slaves
+from orchestration.components.fmi.access import USUAL, Access
 from orchestration.components.fmi.instance import Instance, Value, convert_value, same
 from orchestration.components.fmi.read_description import Variable, read_model
 from orchestration.components.fmi.surroundings import FOLDER, LIMITS, ROUNDING, Surroundings, sentence
@@ -45,14 +46,14 @@ _NOT_USED = ("documentation/", "sources/")
 
 
 class NativeInstance(Instance):
-    """One instance of a co-simulation FMU in this process.
+    """One instance of an FMU in this process, of one for co-simulation unless a subclass says otherwise.
 
     The FMU's log is on and collected, so that a failed call raises `SimulatorError` with the FMU's own
     message. After a failed call the instance is never called again, not even to free it: FMI leaves the
     behaviour undefined.
     """
 
-    def __init__(self, path: Path, instance_name: str, unpacked: Path | None = None) -> None:
+    def __init__(self, path: Path, instance_name: str, access: Access = USUAL, *, unpacked: Path | None = None) -> None:
         """`unpacked`: the folder in which the FMU is unpacked already; None: it is unpacked for this instance."""
         self.path = path
         self.name = instance_name
@@ -63,7 +64,7 @@ class NativeInstance(Instance):
         self._arrays: dict[int, Numbers] = {}  # last values of arrays, by reference: a call sets a whole array
         self._calls: WeakKeyDictionary[Transfer, tuple[TransferCall, ...]] = WeakKeyDictionary()
         self._folder: Scratch | None = None
-        self.model = read_model(path)
+        self.model = read_model(path, access)
         self._layout = TransferLayout(instance_name, self.model, self.stored)
         self._tolerance = self.model.tolerance
         self._expect_supported()
@@ -75,6 +76,7 @@ class NativeInstance(Instance):
             raise QuadcosimError(f"{path}: {error}") from None
         try:
             self._fmu = self._instantiate(unpacked or self._unpacked())
+            self._library, self._component = self._called()
             self.restore_globals()
         except Exception as error:
             self.failed = True
@@ -83,7 +85,9 @@ class NativeInstance(Instance):
                 what = f"cannot be unpacked in {tempfile.gettempdir()}, which TMPDIR names: {error.strerror}"
                 raise QuadcosimError(f"{path}: {what}") from error
             raise self.no_instance(slaves.failure_text(self._messages, str(error))[0]) from error
-        self._component = ctypes.c_void_p(self._fmu.component)
+
+    only_calls: ClassVar[bool]
+    """Stated by each class that does no more than call functions by their addresses, so that C can do so"""
 
     # -- what differs between versions ---------------------------------------------------------------------------
 
@@ -100,9 +104,12 @@ class NativeInstance(Instance):
     state_calls: tuple[str, str, str, str, str]
     """fmpy's names of the calls that get, serialise, free, deserialise and set a state"""
 
+    step_name: ClassVar[str]
+    """the name of the function of a step"""
+
     @abstractmethod
     def _load_step(self, library: Any) -> None:
-        """Keep what every step needs of the FMU's library."""
+        """Keep what every step needs of a library."""
 
     @abstractmethod
     def _enter(self, start: float, stop: float | None) -> None:
@@ -273,12 +280,12 @@ class NativeInstance(Instance):
         return self._calls[transfer]
 
     def address(self, function: str) -> int:
-        """The address of a function of the FMU."""
-        return ctypes.cast(self._fmu.dll[function], ctypes.c_void_p).value or 0
+        """The address of a function that transfers values, or steps."""
+        return ctypes.cast(self._library[function], ctypes.c_void_p).value or 0
 
     @property
     def handle(self) -> int:
-        """The address of the instance, which its functions receive."""
+        """The address of what these functions receive."""
         return self._component.value or 0
 
     @property
@@ -304,24 +311,27 @@ class NativeInstance(Instance):
 
     def no_instance(self, why: str) -> QuadcosimError:
         """The error for an FMU that cannot be loaded or instantiated."""
-        return QuadcosimError(f"{self.path}: expected a co-simulation FMU that loads here: {why}")
+        return QuadcosimError(f"{self.path}: expected an FMU for {self.model.interface} that loads here: {why}")
 
     def _instantiate(self, folder: Path) -> Any:
         """fmpy's instance of the FMU unpacked in `folder`, which logs to `_messages`."""
-        description = self.description
-        identifier = description.coSimulation.modelIdentifier
         fmu = slaves.load_slave(
-            self.model.version, folder, token=description.guid, identifier=identifier, name=self.name
-        )
-        slaves.instantiate(fmu, self._messages)
-        self._load_step(fmu.dll)
+            self.model.version, folder, token=self.description.guid, name=self.name, interface=self.model.interface,
+            identifier=self.model.capabilities.modelIdentifier,
+        )  # fmt: skip
+        slaves.instantiate(fmu, self._messages, self.model.interface)
         return fmu
+
+    def _called(self) -> tuple[Any, ctypes.c_void_p]:
+        """The library of the functions that transfer values and step, and what they receive."""
+        self._load_step(self._fmu.dll)
+        return self._fmu.dll, ctypes.c_void_p(self._fmu.component)
 
     def _expect_supported(self) -> None:
         """Raise `UsageError` for an FMU with features that are not supported."""
         if self.model.version != self.version:
             found = self.description.fmiVersion
-            raise UsageError(f"{self.path}: FMI {found}; expected FMI {self.version}.0 for co-simulation")
+            raise UsageError(f"{self.path}: FMI {found}; expected FMI {self.version}.0")
 
     def _access(self, action: str, type: str) -> str:
         """The name of the function that does an action, Get or Set, on variables of a type."""
@@ -333,7 +343,7 @@ class NativeInstance(Instance):
         at = (np.ctypeslib.as_ctypes_type(values.dtype) * len(values)).from_buffer(values)  # type: ignore[arg-type]
         counts = (ctypes.c_size_t(len(values)),) if self.counts_values else ()
         arguments = (self._component, of, ctypes.c_size_t(len(references)), at, *counts)
-        call = self.guarded(self._fmu.dll[function])  # without argument types, by which ctypes would convert
+        call = self.guarded(self._library[function])  # without argument types, by which ctypes would convert
         failure = self.failure
 
         def transfer() -> None:

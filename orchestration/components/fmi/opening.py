@@ -15,6 +15,7 @@ from pathlib import Path
 
 from fmu_kit.new_files import write_atomically
 from fmu_kit.scratch import temporary_folder
+from orchestration.components.fmi.access import USUAL, Access
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.components.fmi.fmi3 import Fmi3Instance
 from orchestration.components.fmi.instance import Instance
@@ -41,17 +42,22 @@ class Repeatability:
     """A run of a further instance in a process, beside another one or after it, equals that of a fresh process"""
 
 
-def repeatability_of(path: Path) -> Repeatability:
+def repeatability_of(path: Path, access: Access = USUAL) -> Repeatability:
     """The repeatability of the FMU at `path`, tested now if it has not been; raises `UsageError` if it is no FMU."""
-    return _of(content_hash(path), path)
+    return _of(content_and(access, path), path, access)
+
+
+def content_and(access: Access, path: Path) -> str:
+    """What is known of FMUs is known by this text."""
+    return content_hash(path) + ("" if access == USUAL else f" {access}")
 
 
 _known: dict[str, Repeatability] = {}
 
 
-def _of(content: str, path: Path) -> Repeatability:
+def _of(content: str, path: Path, access: Access) -> Repeatability:
     if content not in _known:
-        _known[content] = _stored(content) or _tested(content, path)
+        _known[content] = _stored(content) or _tested(content, path, access)
     return _known[content]
 
 
@@ -71,17 +77,17 @@ def _stored(content: str) -> Repeatability | None:
         return None
 
 
-def _tested(content: str, path: Path) -> Repeatability:
+def _tested(content: str, path: Path, access: Access) -> Repeatability:
     """Test the FMU in a process; the result is kept unless the process was stopped, which may have other reasons."""
     from orchestration.foundation.processes.child import Child
 
-    read_model(path)
+    read_model(path, access)
     result = Repeatability()
     for manner in MANNERS:
         shown: dict[str, bool] = {}
         with temporary_folder() as folder:
             module = subprocesses.Module.of(
-                "orchestration.components.fmi.repeatability_process", path.absolute(), manner
+                "orchestration.components.fmi.repeatability_process", path.absolute(), manner, str(access)
             )
             with Child(module, environment=subprocesses.environment(TMPDIR=str(folder)), limits=Limits()) as child:
                 ending = child.receive_all(shown.update, dict[str, bool])
@@ -99,27 +105,31 @@ _opened: set[str] = set()
 """Hashes of the FMUs that have had an instance in this process"""
 
 
-def open_instance(path: Path, instance_name: str) -> Instance:
+def open_instance(path: Path, instance_name: str, access: Access = USUAL) -> Instance:
     """An instance of the FMU at `path`, of FMI 2.0 or 3.0, that behaves as the first one of a process.
 
     A second one has a separate process if the FMU declares that a process can have one only, or if it has not been
     shown to behave as the first.
     """
-    content = content_hash(path)
-    if content in _opened and not repeatability_of(path).second_instance:
+    content = content_and(access, path)
+    if content in _opened and not repeatability_of(path, access).second_instance:
         from orchestration.components.fmi.isolated_instance import (
             IsolatedInstance,  # not before: loads what starts processes
         )
 
-        return IsolatedInstance(path, instance_name)
+        return IsolatedInstance(path, instance_name, access)
     _opened.add(content)
-    return open_here(path, instance_name)
+    return open_here(path, instance_name, access)
 
 
-def open_here(path: Path, instance_name: str) -> NativeInstance:
+def open_here(path: Path, instance_name: str, access: Access = USUAL) -> NativeInstance:
     """An instance in this process in any case."""
-    model = read_model(path)
+    model = read_model(path, access)
     if not model.is_own:  # it may limit the size of files, and half a file of bytecode would be kept
         sys.dont_write_bytecode = True
+    if model.interface != "co-simulation":
+        from orchestration.components.fmi.adapted import adapted  # not before: few FMUs are called so
+
+        return adapted(model)(path, instance_name, access)
     kind = Fmi3Instance if model.version == 3 else Fmi2Instance
-    return kind(path, instance_name)
+    return kind(path, instance_name, access)

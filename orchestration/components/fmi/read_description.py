@@ -7,11 +7,11 @@ import zipfile
 from collections import Counter
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import fmpy
 from fmpy.model_description import ModelDescription, ModelVariable
@@ -19,6 +19,7 @@ from fmpy.model_description import ModelDescription, ModelVariable
 from fmu_kit.archive import read_source_hash, read_wrapped
 from fmu_kit.units import BASE
 from orchestration.components.fmi import trust
+from orchestration.components.fmi.access import INTERFACES, USUAL, Access, Interface
 from orchestration.components.fmi.archive import (
     TOKENS,
     OtherVersionError,
@@ -98,6 +99,10 @@ class Model:
     """Its variables by name, arrays by their elements: causality, unit, start value, description."""
     initial_dependencies: Mapping[str, frozenset[str] | None]
     """Inputs that an output depends on at initialisation, by output; None: all of them."""
+    access: Access
+    """Way in which it is called."""
+    interface: Interface
+    """The interface by which it is called."""
 
     def __repr__(self) -> str:
         counts = Counter(v.causality for v in self.variables.values())
@@ -142,20 +147,29 @@ class Model:
         return int(self.description.fmiMajorVersion)
 
     @property
+    def capabilities(self) -> Any:
+        """What it declares of the interface by which it is called."""
+        return declared_of(self.description)[self.interface]
+
+    @property
+    def handles_events(self) -> bool:
+        """Whether it handles its events within its steps, although it could have the importer do so."""
+        return self.interface == "co-simulation" and "event-mode" in declared_of(self.description)
+
+    @property
     def varies_step(self) -> bool:
         """Whether it supports communication steps of any length."""
-        return bool(self.description.coSimulation.canHandleVariableCommunicationStepSize)
+        return bool(getattr(self.capabilities, "canHandleVariableCommunicationStepSize", True))
 
     @property
     def saves_state(self) -> bool:
         """Whether its state can be saved as bytes and restored."""
-        interface = self.description.coSimulation
-        return bool(interface.canGetAndSetFMUstate and interface.canSerializeFMUstate)
+        return bool(self.capabilities.canGetAndSetFMUstate and self.capabilities.canSerializeFMUstate)
 
     @property
     def once_per_process(self) -> bool:
         """Whether a process can have one instance only."""
-        return bool(self.description.coSimulation.canBeInstantiatedOnlyOncePerProcess)
+        return bool(self.capabilities.canBeInstantiatedOnlyOncePerProcess)
 
     @property
     def tolerance(self) -> float | None:
@@ -205,7 +219,7 @@ class Model:
 
 
 def read_description(path: Path) -> ModelDescription:
-    """The description of an FMU; raises `UsageError` for a file that is no FMU for co-simulation."""
+    """The description of an FMU; raises `UsageError` for a file that is no FMU that can be called."""
     if not zipfile.is_zipfile(path):
         raise UsageError(f"{path}: expected an FMU, which is a zip file")
     try:
@@ -218,15 +232,29 @@ def read_description(path: Path) -> ModelDescription:
     except Exception as error:  # fmpy passes on any exception of the readers of zip and XML
         _expect_version(path)
         raise UsageError(f"{path}: expected an FMU with a valid modelDescription.xml: {error}") from error
-    kinds = {"model exchange": description.modelExchange, "scheduled execution": description.scheduledExecution}
-    if description.fmiMajorVersion not in (2, 3) or description.coSimulation is None:
-        kind = "co-simulation" if description.coSimulation is not None else " and ".join(k for k in kinds if kinds[k])
-        raise UsageError(f"{path}: FMI {description.fmiVersion}, {kind}; expected FMI 2.0 or 3.0 for co-simulation")
+    if description.fmiMajorVersion not in (2, 3):
+        raise UsageError(f"{path}: FMI {description.fmiVersion}; expected FMI 2.0 or 3.0")
+    offered = declared_of(description)
+    if not offered:
+        kind = "scheduled execution" if description.scheduledExecution is not None else "no interface"
+        raise UsageError(f"{path}: offers {kind}; expected co-simulation or model exchange")
     token = TOKENS[description.fmiMajorVersion]
-    for name, value in ((token, description.guid), ("modelIdentifier", description.coSimulation.modelIdentifier)):
+    identifiers = [("modelIdentifier", interface.modelIdentifier) for interface in offered.values()]
+    for name, value in ((token, description.guid), *identifiers):
         if value is None:
             raise UsageError(f"{path}: its modelDescription.xml has no {name}")
     return description
+
+
+def declared_of(description: ModelDescription) -> dict[Interface, Any]:
+    """What an FMU declares of each interface that it offers, as fmpy reads it; the default one is the first."""
+    slave, model = description.coSimulation, description.modelExchange
+    found = {
+        "co-simulation": slave,
+        "event-mode": slave if slave is not None and slave.hasEventMode else None,
+        "model-exchange": model,
+    }
+    return {name: found[name] for name in INTERFACES if found[name] is not None}
 
 
 def _expect_version(path: Path) -> None:
@@ -238,16 +266,30 @@ def _expect_version(path: Path) -> None:
             raise UsageError(f"{path}: {str(error).partition(';')[0]}") from None
 
 
-def read_model(path: str | Path) -> Model:
-    """Read the model of a co-simulation FMU.
+def read_model(path: str | Path, access: Access = USUAL) -> Model:
+    """Read the model of an FMU that is called in a way.
 
-    It is read once in a process while the file stays the same. Raises `UsageError` for a file that is no FMU for
-    co-simulation of FMI 2.0 or 3.0.
+    It is read once in a process while the file stays the same. Raises `UsageError` for a file that is no FMU of FMI 2.0
+    or 3.0, or does not offer what is asked.
     """
     path = Path(path)
     with readable(path, "FMU"):
         about = path.stat()
-    return _read_model(path, about.st_mtime_ns, about.st_size)
+    return called(_read_model(path, about.st_mtime_ns, about.st_size), access)
+
+
+@functools.lru_cache(maxsize=64)
+def called(model: Model, access: Access) -> Model:
+    """The same model, called in a way; raises `UsageError` if it does not offer that."""
+    if model.access == access:
+        return model
+    offered = declared_of(model.description)
+    interface = access.interface or next(iter(offered))
+    if interface not in offered:
+        raise UsageError(f"interface = {interface}: {model.name} does not offer it; expected {' or '.join(offered)}")
+    if access.solver is not None and interface != "model-exchange":
+        raise UsageError(f"solver = {access.solver}: expected none with {interface}: {model.name} has its own")
+    return replace(model, access=access, interface=interface)
 
 
 @functools.lru_cache(maxsize=64)
@@ -270,6 +312,8 @@ def _read_model(path: Path, changed: int, size: int) -> Model:
         description=description,
         variables=variables,
         initial_dependencies=_dependencies(description, variables),
+        access=USUAL,
+        interface=next(iter(declared_of(description))),
     )
 
 

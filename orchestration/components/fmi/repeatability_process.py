@@ -1,8 +1,8 @@
 """The confined process that tests whether runs of an FMU repeat.
 
-`python -m orchestration.components.fmi.repeatability_process FMU MANNER` runs a fresh instance first, in `MANNER` (see
-`instances.MANNERS`), and then the same run after other ones, with other parameters, other inputs and longer. After
-each comparison it reports what it has shown.
+`python -m orchestration.components.fmi.repeatability_process FMU MANNER ACCESS` runs a fresh instance first, in
+`MANNER` (see `instances.MANNERS`), and then the same run after other ones, with other parameters, other inputs and
+longer. After each comparison it reports what it has shown.
 """
 
 import math
@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestration.components.fmi.access import Access
 from orchestration.components.fmi.instance import Value, start_number, within
 from orchestration.components.fmi.native_instance import NativeInstance
 from orchestration.components.fmi.opening import open_here
@@ -31,8 +32,8 @@ _FACTOR = 1.0 + 2.0**-10
 class _Runs:
     """The test runs of one FMU in one manner."""
 
-    def __init__(self, path: Path, manner: str) -> None:
-        self._path = path
+    def __init__(self, path: Path, manner: str, access: Access) -> None:
+        self._path, self._access = path, access
         self.fresh = self.open()
         model = self.model = self.fresh.model
         self._moves = manner == "moving"
@@ -42,7 +43,7 @@ class _Runs:
 
     def open(self) -> NativeInstance:
         """A new instance."""
-        return open_here(self._path, "repeated")
+        return open_here(self._path, "repeated", self._access)
 
     def reference_run(self, instance: NativeInstance, beside: Callable[[float, float], None] | None = None) -> bytes:
         """The run that must repeat: all values of all steps."""
@@ -85,11 +86,11 @@ class _Runs:
         return [_moving(v, k, phase + i) if moves else start_number(v) for i, v in enumerate(self._inputs)]
 
 
-def main(path: str, manner: str) -> None:
+def main(path: str, manner: str, access: str) -> None:
     """Run all tests, and report which runs are the same."""
     parent = Parent()
     restrict(Limits().size)
-    runs = _Runs(Path(path), manner)
+    runs = _Runs(Path(path), manner, Access.of(access))
     expected = runs.reference_run(runs.fresh)
     parent.send({"fresh": True})
     used = _used(runs)
@@ -160,7 +161,7 @@ def _further_is_same(runs: _Runs, expected: bytes) -> bool:
 
 
 def _default_step(instance: NativeInstance) -> float:
-    experiment, interface = instance.description.defaultExperiment, instance.description.coSimulation
+    experiment, interface = instance.description.defaultExperiment, instance.model.capabilities
     declared: Any = getattr(interface, "fixedInternalStepSize", None) or getattr(experiment, "stepSize", None)
     try:
         step = float(declared)

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from orchestration.components.fmi import opening, trust
+from orchestration.components.fmi.access import USUAL, Access
 from orchestration.components.fmi.instance import Instance
 from orchestration.components.fmi.opening import open_instance
 from orchestration.foundation.basics.errors import SimulatorError
@@ -21,31 +22,31 @@ class Instances:
     def __init__(self, *, foreign_apart: bool = False) -> None:
         """`foreign_apart`: an FMU that was not built here from this project's sources has a process of its own."""
         self._foreign_apart = foreign_apart
-        self._kept: dict[tuple[Path, str], Instance] = {}
+        self._kept: dict[tuple[Path, str, Access], Instance] = {}
         self.close = weakref.finalize(self, _free, self._kept)
         """Free all instances; called automatically when this object is garbage or the process ends."""
 
     @contextmanager
-    def load(self, path: Path, instance_name: str) -> Iterator[Instance]:
+    def load(self, path: Path, instance_name: str, access: Access = USUAL) -> Iterator[Instance]:
         """An instance of the FMU at `path` for one run."""
-        key = (path, instance_name)
+        key = (path, instance_name, access)
         instance = self._kept.pop(key, None)
         if instance is None or not _is_reset(instance):
-            instance = self._open(path, instance_name)
+            instance = self._open(*key)
         try:
             yield instance
         finally:
-            if instance.failed or instance.stopped or not opening.repeatability_of(path).reset:
+            if instance.failed or instance.stopped or not opening.repeatability_of(path, access).reset:
                 instance.close()
             else:
                 self._kept[key] = instance
 
-    def _open(self, path: Path, instance_name: str) -> Instance:
+    def _open(self, path: Path, instance_name: str, access: Access) -> Instance:
         if self._foreign_apart and not trust.is_own(path):
             from orchestration.components.fmi.isolated_instance import IsolatedInstance  # loads what starts processes
 
-            return IsolatedInstance(path, instance_name)
-        return open_instance(path, instance_name)
+            return IsolatedInstance(path, instance_name, access)
+        return open_instance(path, instance_name, access)
 
 
 def _is_reset(instance: Instance) -> bool:
@@ -58,6 +59,6 @@ def _is_reset(instance: Instance) -> bool:
     return True
 
 
-def _free(instances: dict[tuple[Path, str], Instance]) -> None:
+def _free(instances: dict[tuple[Path, str, Access], Instance]) -> None:
     while instances:
         instances.popitem()[1].close()

@@ -18,6 +18,7 @@ from fmpy import fmi2, fmi3
 from fmpy.fmi1 import printLogMessage
 
 from fmu_kit import loader
+from orchestration.components.fmi.access import Interface
 from orchestration.foundation.basics.errors import QuadcosimError
 
 ENTRY = "resources/slavemodule.txt"
@@ -205,10 +206,18 @@ class FMU2Slave(_CachedSignatures, fmi2.FMU2Slave):  # type: ignore[misc]  # fmp
     _signatures: ClassVar[dict[str, tuple[Any, Any, Any]]] = {}
 
 
-class FMU3Slave(_CachedSignatures, fmi3.FMU3Slave):  # type: ignore[misc]
-    """Of FMI 3.0."""
+class FMU2Model(_CachedSignatures, fmi2.FMU2Model):  # type: ignore[misc]
+    """Of FMI 2.0 for model exchange."""
 
     _signatures: ClassVar[dict[str, tuple[Any, Any, Any]]] = {}
+
+
+class _Texts3(_CachedSignatures):
+    """Texts of FMI 3.0."""
+
+    component: Any
+    instantiate: Any
+    fmi3GetString: Any  # noqa: N815
 
     def getString(self, vr: Sequence[int], nValues: int | None = None) -> list[bytes | None]:  # noqa: N802
         """The raw bytes, which may be missing or no valid text; fmpy's method decodes them."""
@@ -216,6 +225,18 @@ class FMU3Slave(_CachedSignatures, fmi3.FMU3Slave):  # type: ignore[misc]
         values = (ctypes.c_char_p * count)()
         self.fmi3GetString(self.component, (ctypes.c_uint * len(vr))(*vr), len(vr), values, count)
         return list(values)
+
+
+class FMU3Slave(_Texts3, fmi3.FMU3Slave):  # type: ignore[misc]
+    """Of FMI 3.0."""
+
+    _signatures: ClassVar[dict[str, tuple[Any, Any, Any]]] = {}
+
+
+class FMU3Model(_Texts3, fmi3.FMU3Model):  # type: ignore[misc]
+    """Of FMI 3.0 for model exchange."""
+
+    _signatures: ClassVar[dict[str, tuple[Any, Any, Any]]] = {}
 
 
 def binary_folders(files: Iterable[str]) -> list[str]:
@@ -232,20 +253,24 @@ def folder_here(version: int, folders: Sequence[str]) -> str:
     raise QuadcosimError(f"has no binary for {' or '.join(FOLDERS[version])}, only for {', '.join(folders) or 'none'}")
 
 
-def load_slave(version: int, folder: Path, *, token: str, identifier: str, name: str) -> Any:
+def load_slave(
+    version: int, folder: Path, *, token: str, identifier: str, name: str, interface: Interface = "co-simulation"
+) -> Any:
     """Load the library of an FMU that is unpacked in `folder`, for an instance `name`; `token` is its GUID."""
     arguments = {"guid": token, "unzipDirectory": str(folder), "modelIdentifier": identifier, "instanceName": name}
+    exchange = interface == "model-exchange"
     if version == 3:
-        return FMU3Slave(**arguments)
+        return (FMU3Model if exchange else FMU3Slave)(**arguments)
     here = folder_here(version, sorted(each.name for each in (folder / "binaries").iterdir()))
     library = folder / "binaries" / here / f"{identifier}{fmpy.sharedLibraryExtension}"
-    return FMU2Slave(**arguments, libraryPath=str(library))
+    return (FMU2Model if exchange else FMU2Slave)(**arguments, libraryPath=str(library))
 
 
-def instantiate(slave: Any, messages: list[Message]) -> None:
+def instantiate(slave: Any, messages: list[Message], interface: Interface = "co-simulation") -> None:
     """Make the instance, which logs to `messages`."""
-    if isinstance(slave, FMU3Slave):
-        slave.instantiate(loggingOn=True, logMessage=_logger_of_fmi3(messages))
+    if isinstance(slave, _Texts3):
+        used = {"eventModeUsed": True, "earlyReturnAllowed": True} if interface == "event-mode" else {}
+        slave.instantiate(loggingOn=True, logMessage=_logger_of_fmi3(messages), **used)
     else:
         callbacks = collecting_callbacks(messages, slave.instanceName, Path(slave.unzipDirectory))
         slave.instantiate(callbacks=callbacks, loggingOn=True)

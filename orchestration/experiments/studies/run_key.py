@@ -136,6 +136,9 @@ def _text_of_component(name: str, component: Component, hashes: Mapping[str, str
         "parameters": {key: v for key, v in component.parameters.items() if key not in starts or v != starts[key]},
         "sampling": None if component.sampling is None else _content(component.sampling, hashes),
     }
+    for later in ("interface", "solver"):  # rows that were stored before these keys are still found
+        if content[later] is None:
+            del content[later]
     return _json(content)
 
 

@@ -17,8 +17,6 @@ from fmu_kit.bundle import PackagingError
 from fmu_kit.compiler.pack.c_compiler import OPTIONS, compiled_here
 from fmu_kit.compiler.runtime import FOLDER
 from fmu_kit.libraries import cached_library
-from orchestration.components.fmi.fmi2 import Fmi2Instance
-from orchestration.components.fmi.fmi3 import Fmi3Instance
 from orchestration.components.fmi.native_instance import NativeInstance
 from orchestration.components.fmi.surroundings import ROUNDING
 from orchestration.foundation.basics.c_structures import address, declared, expect_same_sizes
@@ -71,7 +69,7 @@ def reason_unavailable(simulators: Mapping[str, Simulator], stop: int) -> str | 
     for name, simulator in simulators.items():
         if not isinstance(simulator, NativeInstance):
             return f"components.{name} is not called in this process"
-        if type(simulator) not in (Fmi2Instance, Fmi3Instance):
+        if "only_calls" not in vars(type(simulator)):
             return f"components.{name} does more than call its FMU"
     if stop >= _EXACT:
         return f"stop_time is longer than {seconds(_EXACT):.0f} s"

@@ -10,7 +10,7 @@ from fmu_kit.trajectory import Trajectory
 from orchestration.components.building import fmus
 from orchestration.components.fmi.instance import number_of
 from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD, TRAJECTORY
-from orchestration.components.fmi.read_description import NUMERIC, Model, read_model
+from orchestration.components.fmi.read_description import NUMERIC, Model, called, read_model
 from orchestration.foundation.basics.errors import UsageError, prefixed
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import Grid, exact_nanoseconds
@@ -94,8 +94,16 @@ def resolve(request: Request, announce: Announce | None = None) -> ResolvedReque
 def resolve_with_models(request: Request, models: Mapping[str, Model]) -> ResolvedRequest:
     """As `resolve`, with FMUs whose models have been read."""
     with errors_in_own_terms(request):
-        fits = check_against_fmus(request.as_system(), models)
+        system = request.as_system()
+        models = {name: _as_asked(name, system.components[name], model) for name, model in models.items()}
+        fits = check_against_fmus(system, models)
     return ResolvedRequest(request=request, models=models, **vars(fits))
+
+
+def _as_asked(name: str, component: Component, model: Model) -> Model:
+    """The FMU of a component, called in the way that it asks for."""
+    with prefixed(f"components.{name}."):
+        return called(model, component.access)
 
 
 def check_against_fmus(system: System, models: Mapping[str, Model]) -> CheckedSystem:

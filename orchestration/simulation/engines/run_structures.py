@@ -51,13 +51,13 @@ class RunStructures(SystemStructures):
 
     def _component(self, index: int) -> Any:
         running, instance, component = self._running, self.instances[index], self._running.component(index)
-        version, outputs = instance.model.version, running.outputs(self._wires.names[index])
+        outputs = running.outputs(self._wires.names[index])
         event, ends, early, reached = [ctypes.addressof(each) for each in instance.step_outputs] or [0, 0, 0, 0]
         return self.component(
             index,
             fmu=instance.handle,
-            step=instance.address(f"fmi{version}DoStep"),
-            version=version,
+            step=instance.address(instance.step_name),
+            version=3 if instance.step_outputs else 2,
             foreign=instance.guard is not None,
             messages_waiting=ctypes.addressof(instance.messages_waiting),
             read=self._transfer(index, component.read, outputs),

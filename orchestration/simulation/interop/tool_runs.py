@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fmu_kit.new_files import write_atomically
+from orchestration.components.fmi.access import USUAL, Access
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.instance import Instance
@@ -137,9 +138,9 @@ class ToolRuns:
 def _rows(system: System, loop: AssignedLoop, start: FirstInputs) -> Floats | str:
     """The time and the signals of a run here; or the reason why it ended early."""
 
-    def load(path: Path, instance_name: str) -> Instance:
+    def load(path: Path, instance_name: str, access: Access = USUAL) -> Instance:
         if not start:
-            return open_instance(path, instance_name)
+            return open_instance(path, instance_name, access)
         return _FixedFirstInputs(path, instance_name, loop.ports[instance_name].inputs, *start[instance_name])
 
     with prepared(system, load=load) as run:

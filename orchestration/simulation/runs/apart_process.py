@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from orchestration.components.fmi.access import USUAL, Access
 from orchestration.components.fmi.instance import Instance
 from orchestration.components.fmi.opening import open_instance
 from orchestration.foundation.processes.channel import Parent
@@ -53,10 +54,10 @@ class _Reporter(logging.Handler):
         return InMemory()
 
     @contextmanager
-    def load(self, path: Path, instance_name: str) -> Iterator[Instance]:
+    def load(self, path: Path, instance_name: str, access: Access = USUAL) -> Iterator[Instance]:
         """As `Loader`."""
         self.report("stage", "loading", [instance_name])
-        with open_instance(path, instance_name) as instance:
+        with open_instance(path, instance_name, access) as instance:
             yield instance
 
 

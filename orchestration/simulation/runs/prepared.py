@@ -143,7 +143,7 @@ def prepared(
     system, models, parameters = resolved.system, resolved.models, resolved.parameters
     streams = Streams(system.seed, system.streams)
     with deferred_interrupts() as interrupt, ExitStack() as stack:
-        instances = {name: stack.enter_context(load(path, name)) for name, path in resolved.paths.items()}
+        instances = {name: stack.enter_context(load(model.path, name, model.access)) for name, model in models.items()}
         with errors_in_own_terms(request):
             schedule = timetable(system, streams, fixed_steps(system, models))
             for name, component in system.components.items():

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestration.components.fmi.access import USUAL, Access
 from orchestration.components.fmi.instance import Instance
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import Named, UsageError
@@ -156,9 +157,9 @@ class Simulation:
         self._reports.put(error)
 
     @contextmanager
-    def _load(self, path: Path, instance_name: str) -> Iterator[Instance]:
+    def _load(self, path: Path, instance_name: str, access: Access = USUAL) -> Iterator[Instance]:
         """An instance of a component, or its substitute."""
-        with self._instances.load(path, instance_name) as instance:
+        with self._instances.load(path, instance_name, access) as instance:
             if instance_name == self.component:
                 self._substitute = Substitute(instance, self.measured, self.commanded, self._await_command)
                 yield self._substitute

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from orchestration.components.fmi.access import USUAL, Access
 from orchestration.components.fmi.instance import Instance
 from orchestration.components.fmi.read_description import read_model
 from orchestration.components.fmi.reuse import Instances
@@ -228,11 +229,11 @@ class Runner:
         ]
 
     @contextmanager
-    def _load(self, path: Path, instance_name: str) -> Iterator[Instance]:
+    def _load(self, path: Path, instance_name: str, access: Access = USUAL) -> Iterator[Instance]:
         """Load an FMU; its failure is one of the environment, since it does not depend on the run."""
         with ExitStack() as stack:
             try:
-                fmu = stack.enter_context(self._instances.load(path, instance_name))
+                fmu = stack.enter_context(self._instances.load(path, instance_name, access))
             except Exception as error:
                 raise WorkerEnvironmentError(str(error) or type(error).__name__) from error
             yield fmu

@@ -8,6 +8,7 @@ from dataclasses import field
 from fractions import Fraction
 from typing import Any
 
+from orchestration.components.fmi.access import USUAL, Access, Interface, Solver
 from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.foundation.basics.records import Scalar, record
 from orchestration.foundation.basics.times import exact_nanoseconds, is_at_least
@@ -126,11 +127,22 @@ class Component:
     computer."""
     tolerance: float | None = None
     """The relative tolerance of the FMU's solver; default: that of the experiment that the FMU declares, if any."""
+    interface: Interface | None = None
+    """The interface by which the FMU is called; default: co-simulation, or model exchange where it offers that only."""
+    solver: Solver | None = None
+    """The solver of an FMU for model exchange; default: dormand-prince. For a stiff one, cvode, in the Python loop."""
     align: Align = "exact"
     """The treatment of an instant between two points of a component that only takes its own fixed step: an error
     (exact), or it moves to the next point (next)."""
     record: tuple[str, ...] | None = None
     """The variables to record beside the exchanged ones; default: all outputs and local Reals."""
+
+    @property
+    def access(self) -> Access:
+        """How its FMU is called."""
+        if self.interface is None and self.solver is None:
+            return USUAL
+        return Access(interface=self.interface, solver=self.solver)
 
     def __post_init__(self) -> None:
         if self.tolerance is not None:

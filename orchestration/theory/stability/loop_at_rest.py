@@ -11,6 +11,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from orchestration.components.fmi.access import USUAL, Access
 from orchestration.components.fmi.instance import Instance, Loader
 from orchestration.components.fmi.read_description import Model
 from orchestration.components.fmi.reuse import Instances
@@ -225,8 +226,8 @@ def wrapping_loader(instances: Instances, wrapper: Callable[[Instance], object])
     """A loader of instances, each in a wrapper that has its attributes."""
 
     @contextmanager
-    def load(path: Path, instance_name: str) -> Iterator[Instance]:
-        with instances.load(path, instance_name) as fmu:
+    def load(path: Path, instance_name: str, access: Access = USUAL) -> Iterator[Instance]:
+        with instances.load(path, instance_name, access) as fmu:
             yield cast(Instance, wrapper(fmu))
 
     return load

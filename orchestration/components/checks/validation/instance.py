@@ -39,7 +39,7 @@ class CheckedInstance(NativeInstance):
         self._beat = beat
         self._transfers: dict[tuple[str, tuple[str, ...]], tuple[Floats, Transfer]] = {}
         beat()
-        super().__init__(model.path, name, folder)
+        super().__init__(model.path, name, unpacked=folder)
         beat()
 
     @property

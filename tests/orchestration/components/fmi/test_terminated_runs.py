@@ -119,7 +119,9 @@ def test_isolated_or_not_a_run_ends_the_same(tmp_path: Path) -> None:
 def test_an_instance_that_has_ended_a_run_is_for_no_other(
     load: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("orchestration.components.fmi.opening.repeatability_of", lambda path: Repeatability(reset=True))
+    monkeypatch.setattr(
+        "orchestration.components.fmi.opening.repeatability_of", lambda path, access: Repeatability(reset=True)
+    )
     monkeypatch.setattr("orchestration.components.fmi.reuse.open_instance", load)
     kept = Instances()
     used = []

@@ -19,6 +19,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from orchestration.components.fmi.access import USUAL, Access
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.components.fmi.instance import Instance
 from orchestration.components.fmi.native_instance import NativeInstance
@@ -72,7 +73,7 @@ class Kept:
         self._instances: dict[tuple[Path, str], NativeInstance] = {}
 
     @contextmanager
-    def load(self, path: Path, instance_name: str) -> Iterator[Instance]:
+    def load(self, path: Path, instance_name: str, access: Access = USUAL) -> Iterator[Instance]:
         key = path, instance_name
         if key not in self._instances or self._instances[key].failed:
             self._instances[key] = open_here(*key)

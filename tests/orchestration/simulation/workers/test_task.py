@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from orchestration.components.fmi.access import Access
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.simulation.workers.row import Results
@@ -25,7 +26,7 @@ def instantiated(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     names: list[str] = []
 
     class Counted(Fmi2Instance):
-        def __init__(self, path: Path, instance_name: str) -> None:
+        def __init__(self, path: Path, instance_name: str, access: Access) -> None:
             names.append(instance_name)
             super().__init__(path, instance_name)
 

@@ -1,0 +1,36 @@
+"""How an FMU is called: by which of its interfaces, and who solves its equations."""
+
+import json
+from dataclasses import asdict, dataclass
+from typing import Any, Literal, get_args
+
+from orchestration.foundation.processes.passable import passable
+
+Interface = Literal["co-simulation", "event-mode", "model-exchange"]
+"""Interfaces of FMUs; event-mode is co-simulation whose events the importer processes"""
+Solver = Literal["dormand-prince", "cvode"]
+INTERFACES: tuple[Interface, ...] = get_args(Interface)
+
+
+@passable
+@dataclass(frozen=True, kw_only=True)
+class Access:
+    """What a component says of how its FMU is called."""
+
+    interface: Interface | None = None
+    """None: co-simulation where it is offered, else model exchange"""
+    solver: Solver | None = None
+    """None: Dormand and Prince's, for model exchange"""
+
+    def __str__(self) -> str:
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def of(cls, text: str) -> "Access":
+        """The access that is written as `text`."""
+        known: dict[str, Any] = json.loads(text)
+        return cls(**known)
+
+
+USUAL = Access()
+"""Access of a component that says nothing"""

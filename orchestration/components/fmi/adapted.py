@@ -1,0 +1,221 @@
+"""Instances of FMUs for model exchange, and of those whose events the importer processes, by adapter.c."""
+
+import ctypes
+import functools
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fmu_kit.bundle import PackagingError
+from fmu_kit.compiler.pack.c_compiler import OPTIONS, compiled_here
+from fmu_kit.libraries import cached_library
+from orchestration.components.fmi.fmi2 import Fmi2Instance
+from orchestration.components.fmi.fmi3 import Fmi3Instance, StepsWithEnd
+from orchestration.components.fmi.read_description import Model
+from orchestration.components.fmi.slaves import WARNING
+from orchestration.foundation.basics.c_structures import address, constants, declared, expect_same_sizes
+from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError
+from orchestration.foundation.basics.simulator import Floats
+
+SOURCE = Path(__file__).with_name("adapter.c")
+TOLERANCE = 1e-6
+"""Relative tolerance of the solver where neither the component nor the FMU states one"""
+_STAGES = 7
+
+_EVENTS = {"enter_event": "EnterEventMode", "update": "UpdateDiscreteStates"}
+_STEP = {"leave_event": "EnterStepMode", "step": "DoStep"}
+_EXCHANGE = {
+    "leave_event": "EnterContinuousTimeMode", "set_time": "SetTime", "set_states": "SetContinuousStates",
+    "get_states": "GetContinuousStates", "derivatives": "GetContinuousStateDerivatives",
+    "indicators": "GetEventIndicators", "nominals": "GetNominalsOfContinuousStates",
+    "completed": "CompletedIntegratorStep",
+}  # fmt: skip
+_IN_FMI2 = {"UpdateDiscreteStates": "NewDiscreteStates", "GetContinuousStateDerivatives": "GetDerivatives"}
+_TYPES_OF_FMI2 = {"Float64": "Real", "Int32": "Integer", "Boolean2": "Boolean"}
+
+_PROBLEMS = {
+    "ENDLESS_UPDATES": "asks for another update of its discrete states 1000 times at {0:g} s; expected an end",
+    "ENDLESS_EVENTS": "has 10000 events in one step, the last at {0:.12g} s; expected fewer",
+    "NO_STEP": "no step of the solver, however short, is accurate at {0:.12g} s",
+    "ENDLESS_STEPS": "its solver has taken 10000000 steps, up to {0:.12g} s; expected fewer: a larger tolerance, or "
+    "solver = cvode for a stiff model",
+    "NO_ROOM": "no memory for its events",
+}
+
+
+@functools.cache
+def library() -> Any:
+    """The functions of adapter.c; raises `QuadcosimError` with the reason if they are not available."""
+    sources = {SOURCE.name: SOURCE.read_bytes()}
+    try:
+        path = cached_library("adapter", sources, OPTIONS, lambda: compiled_here(sources, SOURCE.name))
+        loaded = ctypes.CDLL(str(path))
+    except (PackagingError, OSError) as error:
+        raise QuadcosimError(str(error)) from error
+    expect_same_sizes(loaded, _types())
+    pointer, number = ctypes.c_void_p, ctypes.c_double
+    loaded.step.argtypes = (pointer, number, number, ctypes.c_bool, pointer, pointer, pointer, pointer)
+    for name in ("begin", "settle", "restored", "release"):
+        getattr(loaded, name).argtypes = (pointer,)
+    return loaded
+
+
+@functools.cache
+def _types() -> dict[str, Any]:
+    return declared(SOURCE.read_text(encoding="utf-8"))
+
+
+@functools.cache
+def _constants() -> dict[str, int]:
+    return constants(SOURCE.read_text(encoding="utf-8"))
+
+
+class AdaptedInstance(StepsWithEnd):
+    """An instance in event mode, or for model exchange, that is called as one for co-simulation."""
+
+    step_name: ClassVar[str] = "step"
+
+    def _expect_supported(self) -> None:
+        super()._expect_supported()
+        library()
+
+    def _called(self) -> tuple[Any, ctypes.c_void_p]:
+        self._adapter = a = _types()["Adapter"](fmu=self._fmu.component, version=self.version, next=math.inf)
+        exchange = self.model.interface == "model-exchange"
+        if exchange:
+            a.states, a.crossings = self._sizes()
+        for field, function in (_EVENTS | (_EXCHANGE if exchange else _STEP)).items():
+            if self._is_called(field):
+                setattr(a, field, self._address_of(function))
+        for name, place in self._accesses().items():
+            a.get[place], a.set[place] = self._address_of(f"Get{name}"), self._address_of(f"Set{name}")
+        self._memory = {
+            "x": np.zeros(a.states), "y": np.zeros(a.states), "k": np.zeros(_STAGES * a.states),
+            "nominal": np.ones(a.states), "z": np.zeros(a.crossings), "z_next": np.zeros(a.crossings),
+        }  # fmt: skip
+        for field, array in self._memory.items():
+            setattr(a, field, address(array))
+        self._load_step(library())
+        return library(), ctypes.c_void_p(ctypes.addressof(a))
+
+    def _sizes(self) -> tuple[int, int]:
+        """The numbers of its continuous states and event indicators."""
+        if self.version == 2:
+            return int(self.description.numberOfContinuousStates), int(self.description.numberOfEventIndicators)
+        return self._fmu.getNumberOfContinuousStates(), self._fmu.getNumberOfEventIndicators()
+
+    def _is_called(self, field: str) -> bool:
+        """Whether a function is one that the FMU needs."""
+        if field == "completed":
+            of = self.model.capabilities
+            needed = of.needsCompletedIntegratorStep if self.version == 3 else not of.completedIntegratorStepNotNeeded
+            return bool(needed)
+        of_states = ("set_states", "get_states", "derivatives", "nominals")
+        count = {**dict.fromkeys(of_states, self._adapter.states), "indicators": self._adapter.crossings}
+        return bool(count.get(field, 1) > 0)
+
+    def _accesses(self) -> Mapping[str, int]:
+        """The places of functions for values in the adapter, by type as in their names."""
+        numbers = _constants()
+        if self.version == 2:
+            return {name: numbers[place] for place, name in _TYPES_OF_FMI2.items()}
+        return {name: numbers[name] for name in self.stored if name in numbers}
+
+    def _address_of(self, function: str) -> int:
+        """The address of a function of the FMU, by its name in FMI 3.0 without the prefix."""
+        name = _IN_FMI2.get(function, function) if self.version == 2 else function
+        return ctypes.cast(self._fmu.dll[f"fmi{self.version}{name}"], ctypes.c_void_p).value or 0
+
+    # -- a run ---------------------------------------------------------------------------------------------------
+
+    def enter_initialization(self, start: float, stop: float) -> None:
+        """As `NativeInstance`."""
+        self._adapter.now = start
+        super().enter_initialization(start, stop)
+
+    def exit_initialization(self) -> None:
+        """As `NativeInstance`, and the first update of its discrete states."""
+        super().exit_initialization()
+        self._adapter.tolerance = self._tolerance or TOLERANCE
+        self._do("begin")
+
+    def reset(self) -> None:
+        """As `NativeInstance`."""
+        super().reset()
+        self._continue(now=0.0, next=math.inf, h=0.0, events=0, ends=0)
+        self._adapter.running = self._adapter.in_event = 0
+
+    def save(self) -> bytes:
+        """As `NativeInstance`: with its next event, the step of its solver, and the number of its events."""
+        self._do("settle")
+        a = self._adapter
+        own = np.array([a.now, a.next, a.h, a.events, a.ends])
+        return own.tobytes() + super().save()
+
+    def restore(self, state: bytes) -> None:
+        """As `NativeInstance`."""
+        size = 5 * np.dtype(np.float64).itemsize
+        super().restore(state[size:])
+        now, following, h, events, ends = np.frombuffer(state[:size]).tolist()
+        self._continue(now=now, next=following, h=h, events=int(events), ends=int(ends))
+        self._adapter.tolerance = self._tolerance or TOLERANCE
+        self._do("restored")
+
+    def take_events(self) -> Floats:
+        """The times of the events since the last call [s], and no longer keep them."""
+        a = self._adapter
+        times: Floats = np.array((ctypes.c_double * a.noted_count).from_address(a.noted or 0) if a.noted_count else [])
+        a.noted_count = 0
+        return times
+
+    def events_before(self) -> int:
+        """The number of events that have been taken, or not kept."""
+        return int(self._adapter.events - self._adapter.noted_count)
+
+    def close(self) -> None:
+        """As `NativeInstance`."""
+        super().close()
+        if hasattr(self, "_adapter"):
+            library().release(ctypes.byref(self._adapter))
+
+    def failure(self, function: str, status: int, otherwise: str | None = None) -> SimulatorError:
+        """As `NativeInstance`."""
+        numbers = {number: name for name, number in _constants().items() if name in _PROBLEMS}
+        if (name := numbers.get(self._adapter.problem)) is not None:
+            otherwise = _PROBLEMS[name].format(self._adapter.now)
+        return super().failure(function, status, otherwise)
+
+    def _continue(self, **fields: Any) -> None:
+        for name, value in fields.items():
+            setattr(self._adapter, name, value)
+        self._adapter.problem = self._adapter.noted_count = 0
+        self._adapter.fresh = 1
+
+    def _do(self, function: str) -> None:
+        """Call a function of the adapter that has no more arguments."""
+        self._expect_alive()
+        status = self.guarded(getattr(self._library, function))(self._component)
+        if status > WARNING:
+            raise self.failure(function, status)
+
+
+class Adapted2(AdaptedInstance, Fmi2Instance):
+    """One of FMI 2.0."""
+
+    only_calls = True
+    step_name = "step"
+
+
+class Adapted3(AdaptedInstance, Fmi3Instance):
+    """One of FMI 3.0."""
+
+    only_calls = True
+    step_name = "step"
+
+
+def adapted(model: Model) -> type[AdaptedInstance]:
+    """The class of the instances of an FMU."""
+    return Adapted2 if model.version == 2 else Adapted3

@@ -1,0 +1,100 @@
+"""FMUs for model exchange and in event mode, all of one C source, compiled once where the tests run."""
+
+import functools
+import subprocess
+import tempfile
+import zipfile
+from pathlib import Path
+
+import fmpy
+
+from tests.orchestration.components.fmi.small import COMPILER
+
+_SOURCE = Path(__file__).with_name("exchange.c")
+_STATES = {"integrator": 2, "ball": 2, "oscillator": 2, "restless": 2}
+_CROSSINGS = {"ball": 1, "restless": 1}
+
+_FMI3 = """<fmiModelDescription fmiVersion="3.0" modelName="{name}" instantiationToken="{guid}">
+  {interfaces}
+  <ModelVariables>
+    <Float64 name="time" valueReference="0" causality="independent"/>
+    <Float64 name="x1" valueReference="1" causality="output" initial="exact" start="{start}"/>
+    <Float64 name="x2" valueReference="2" causality="output" initial="exact" start="0"/>
+    <Float64 name="dx1" valueReference="3" derivative="1"/>
+    <Float64 name="dx2" valueReference="4" derivative="2"/>
+    <Float64 name="u" valueReference="5" causality="input" start="0"/>
+    <Float64 name="w" valueReference="6" causality="input" start="0"/>
+    <Float64 name="p" valueReference="7" causality="parameter" variability="tunable" start="{p}"/>
+    <Float64 name="q" valueReference="8" causality="parameter" variability="tunable" start="0"/>
+    <Float64 name="y" valueReference="9" causality="output"/>
+    <Int32 name="count" valueReference="20" causality="output"/>
+    <Int32 name="updates" valueReference="21" causality="output"/>
+  </ModelVariables>
+  <ModelStructure>
+    <Output valueReference="9"/>{states}
+    <InitialUnknown valueReference="9" dependencies="{feeds}"/>
+  </ModelStructure>
+</fmiModelDescription>"""
+
+_FMI2 = """<fmiModelDescription fmiVersion="2.0" modelName="{name}" guid="{guid}" numberOfEventIndicators="{crossings}">
+  {interfaces}
+  <ModelVariables>
+    <ScalarVariable name="x1" valueReference="1" causality="output" initial="exact"><Real start="{start}"/>
+    </ScalarVariable>
+    <ScalarVariable name="x2" valueReference="2" causality="output" initial="exact"><Real start="0"/></ScalarVariable>
+    <ScalarVariable name="dx1" valueReference="3"><Real derivative="1"/></ScalarVariable>
+    <ScalarVariable name="dx2" valueReference="4"><Real derivative="2"/></ScalarVariable>
+    <ScalarVariable name="u" valueReference="5" causality="input"><Real start="0"/></ScalarVariable>
+    <ScalarVariable name="w" valueReference="6" causality="input"><Real start="0"/></ScalarVariable>
+    <ScalarVariable name="p" valueReference="7" causality="parameter" variability="tunable"><Real start="{p}"/>
+    </ScalarVariable>
+    <ScalarVariable name="q" valueReference="8" causality="parameter" variability="tunable"><Real start="0"/>
+    </ScalarVariable>
+    <ScalarVariable name="y" valueReference="9" causality="output"><Real/></ScalarVariable>
+    <ScalarVariable name="count" valueReference="20" causality="output" variability="discrete"><Integer/>
+    </ScalarVariable>
+    <ScalarVariable name="updates" valueReference="21" causality="output" variability="discrete"><Integer/>
+    </ScalarVariable>
+  </ModelVariables>
+  <ModelStructure>
+    <Outputs><Unknown index="9"/></Outputs>{states}
+    <InitialUnknowns><Unknown index="9" dependencies="{feeds}"/></InitialUnknowns>
+  </ModelStructure>
+</fmiModelDescription>"""
+
+
+def exchange(folder: Path, kind: str, *, fmi: int = 3, event_mode: bool = False) -> Path:
+    """The FMU of a model of `exchange.c` in `folder`, for model exchange, or with `event_mode` for co-simulation."""
+    path = folder / f"{kind}{fmi}{'_events' if event_mode else ''}.fmu"
+    flags = "State" if fmi == 3 else "state"
+    saves = f'canGetAndSetFMU{flags}="true" canSerializeFMU{flags}="true"'
+    if event_mode:
+        more = 'canHandleVariableCommunicationStepSize="true" hasEventMode="true"'
+        interfaces = f'<CoSimulation modelIdentifier="{kind}" {saves} {more}/>'
+    else:
+        interfaces = f'<ModelExchange modelIdentifier="{kind}" {saves}/>'
+    crossings, has_states = _CROSSINGS.get(kind, 0), kind in _STATES
+    if fmi == 3:
+        states = '\n    <ContinuousStateDerivative valueReference="3"/><ContinuousStateDerivative valueReference="4"/>'
+        states = states * has_states + '<EventIndicator valueReference="1"/>' * crossings
+    else:
+        states = '<Derivatives><Unknown index="3"/><Unknown index="4"/></Derivatives>' * has_states
+    feeds = "5 6" if kind == "gain" else ""
+    text = (_FMI3 if fmi == 3 else _FMI2).format(
+        name=kind.capitalize(), guid=kind, interfaces=interfaces, states=states, crossings=crossings, feeds=feeds,
+        start=2 if kind == "oscillator" else 1, p=0.7 if kind == "ball" else 1,
+    )  # fmt: skip
+    place = fmpy.platform_tuple if fmi == 3 else fmpy.platform
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", text)
+        archive.writestr(f"binaries/{place}/{kind}{fmpy.sharedLibraryExtension}", _library())
+    return path
+
+
+@functools.cache
+def _library() -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        library = Path(folder) / "exchange"
+        options = ("-shared", "-fPIC", "-O1", "-w")
+        subprocess.run([str(COMPILER), *options, str(_SOURCE), "-o", str(library), "-lm"], check=True)
+        return library.read_bytes()
