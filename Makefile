@@ -1,4 +1,5 @@
-# make demo: build the FMUs, fly the paper's scenario, draw it. make test: lint and run all tests.
+# make demo: build the FMUs, fly the paper's scenario, draw it. make test: lint and run the tests.
+# make test-all: the same, with the whole of what make test has a sample of. Before a release.
 # make check: lint and the most informative fast tests, under a minute, for while you work.
 # make coverage: all tests, and which lines they run. make site: the documentation as a site, in site/.
 # make bench: time the loop. make figures, make findings, make interop: figures, tables and icons of docs/ and examples/.
@@ -26,7 +27,7 @@ IN_MEMORY = $(shell awk '$$2 == "/dev/shm" && $$4 !~ /noexec/ {found = 1} END {e
 	&& test -w /dev/shm && test "$$(df -Pk /dev/shm | awk 'END {print $$4}')" -gt 4000000 && echo "-p /dev/shm")
 IN_FOLDER = folder=$$(mktemp -d $(IN_MEMORY)) && trap 'rm -rf "$$folder"' EXIT && trap 'exit 130' INT TERM && TMPDIR=$$folder
 
-.PHONY: demo newcomer check test tests coverage lint bench faults figures findings interop release site clean
+.PHONY: demo newcomer check test test-all tests coverage lint bench faults figures findings interop release site clean
 
 demo: .venv/.base
 	$(BIN)/quadcosim build
@@ -40,11 +41,16 @@ QUICK := $(addprefix tests/,controller_fmu plant_fmu fmus/test_one_fmu.py fmu_ki
 	experiments/studies/test_axes.py experiments/studies/test_study_file.py systems/system simulation/requests/ssp/test_reading.py foundation/basics/test_statistics.py)
 
 check: lint
-	$(IN_FOLDER) $(BIN)/pytest --numprocesses 2 --dist load --hypothesis-profile quick --ignore-glob '*/test_flight.py' --ignore-glob '*/test_show.py' $(QUICK)
+	$(IN_FOLDER) $(BIN)/pytest --numprocesses 2 --dist load --ignore-glob '*/test_flight.py' --ignore-glob '*/test_show.py' $(QUICK)
 
 # Both in parallel: a failure of one does not stop the other.
 test: .venv/.test
 	+@$(MAKE) --no-print-directory --jobs 2 lint tests
+
+# What tests/extent.py tells them.
+test-all coverage: export TEST_ALL := 1
+
+test-all: test
 
 tests: .venv/.test
 	$(IN_FOLDER) $(BIN)/pytest --numprocesses $(WORKERS) --dist loadfile --no-loadscope-reorder

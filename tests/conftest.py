@@ -20,11 +20,11 @@ from orchestration.components.building import builder, fmus
 from orchestration.components.building.models import MODELS
 from orchestration.foundation.basics import terminal
 from tests.commands import Done, Main
+from tests.extent import count
 from tests.fmus.making import MAKINGS, Making
 
-hypothesis.settings.register_profile("ci", derandomize=True, deadline=None, max_examples=60)
+hypothesis.settings.register_profile("ci", derandomize=True, deadline=None, max_examples=count(60, sampled=20))
 hypothesis.settings.register_profile("local", deadline=None)
-hypothesis.settings.register_profile("quick", derandomize=True, deadline=None, max_examples=20)  # make check
 hypothesis.settings.load_profile("ci" if os.environ.get("CI") else "local")
 
 # Else the constants of all modules that happen to be loaded are read from their sources, and drawn among others: three

@@ -22,7 +22,7 @@ STEPS = [step for job in JOBS.values() for step in job["steps"]]
 RUN = " ".join(step.get("run", "") for step in STEPS)
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 ARCHITECTURE = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
-TARGETS = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M))
+TARGETS = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M))
 
 
 def test_the_version_is_cited_and_has_a_place_in_the_changelog() -> None:
@@ -35,7 +35,7 @@ def test_the_version_is_cited_and_has_a_place_in_the_changelog() -> None:
 
 @pytest.mark.parametrize(
     "named",
-    [re.findall(r"\bmake ([a-z]+)", RUN), re.findall(r"`make ([a-z]+)`", CONTRIBUTING)],
+    [re.findall(r"\bmake ([a-z-]+)", RUN), re.findall(r"`make ([a-z-]+)`", CONTRIBUTING)],
     ids=["workflow", "contributing"],
 )
 def test_every_make_target_that_is_named_exists(named: list[str]) -> None:

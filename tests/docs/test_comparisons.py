@@ -4,12 +4,14 @@ import math
 import random
 import re
 from collections.abc import Mapping
+from itertools import islice
 from pathlib import Path
 
 import pytest
 
 from docs import comparisons
 from orchestration.experiments.comparison.run import rerun_cells
+from tests.extent import WHOLE, sample
 
 DOCS = Path(comparisons.__file__).parent
 PAGES = (DOCS / "redesigns.md", *sorted((DOCS / "findings").glob("*.md")))
@@ -24,7 +26,8 @@ def test_every_comparison_of_the_pages_is_kept_and_said_how_to_fly() -> None:
 
 def test_every_picture_of_a_comparison_is_drawn_from_what_is_kept() -> None:
     shown = {path.stem for path in (Path(comparisons.__file__).parent / "figures").glob("comparison_*.png")}
-    assert {name for name, _ in comparisons.figures()} == shown
+    drawn = {name for name, _ in islice(comparisons.figures(), None if WHOLE else 2)}
+    assert drawn == shown if WHOLE else len(drawn & shown) == 2
 
 
 @pytest.mark.parametrize("name", FLOWN)
@@ -105,7 +108,7 @@ def test_settling_times_of_the_page_are_those_of_the_maps() -> None:
         assert f"| {row} | {medians} |" in text
 
 
-@pytest.mark.parametrize("name", FLOWN)
+@pytest.mark.parametrize("name", sample(FLOWN, 4))
 def test_one_cell_in_a_hundred_is_what_is_flown_again(name: str) -> None:
     """The runs of `quadcosim compare studies/comparisons/NAME.toml --cell K`, here in lanes."""
     kept = comparisons.read_data(name)["cells"]

@@ -21,6 +21,7 @@ from orchestration.foundation.recording.recording import InMemory
 from orchestration.quadrotor.flight.names import FIGURES as FLIGHT
 from quadcosim import Scenario, Timing, load_run, run, save_run
 from tests.commands import Done, Main
+from tests.extent import in_test_all
 from tests.native import native
 from tests.patience import PATIENCE
 from tests.places import EXAMPLES, ROOT
@@ -263,13 +264,20 @@ def test_plot_shows_that_it_is_at_work_before_it_looks_at_anything(
     assert begun == ["drawing"]
 
 
+@in_test_all
+def test_plot_draws_every_figure_unless_some_are_named(main: Main, here: Path) -> None:
+    save_run(run(native(stop_time=0.5)), here / "run", figures=False)
+    done = main("plot", "run", "--format", "png", "--size", "120x90")
+    assert {Path(line).name for line in done.stdout.splitlines()} == {f"{name}.png" for name in FLIGHT}
+
+
 def test_plot_zooms_on_a_window(main: Main, here: Path) -> None:
     save_run(run(native(stop_time=0.5)), here / "run", figures=False)
     small = ("--format", "png", "--size", "120x90")
     main("plot", "run", "--figure", "commands", *small)
     before = (here / "run" / "commands.png").read_bytes()
-    done = main("plot", "run", "--from", "0.1", "--to", "0.2", *small)
-    assert {Path(line).name for line in done.stdout.splitlines()} == {f"{name}.png" for name in FLIGHT}
+    done = main("plot", "run", "--figure", "commands", "--from", "0.1", "--to", "0.2", *small)
+    assert [Path(line).name for line in done.stdout.splitlines()] == ["commands.png"]
     assert (here / "run" / "commands.png").read_bytes() != before
     for start, end in (("0.2", "0.1"), ("50", "60"), ("0.5", "0.6"), ("-1", "0.1"), ("0.1", "inf"), ("nan", "0.1")):
         line = error_line(main("plot", "run", "--from", start, "--to", end, code=2))

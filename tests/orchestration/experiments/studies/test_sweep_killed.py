@@ -18,6 +18,7 @@ from orchestration.simulation.workers.pool import Pool
 from orchestration.simulation.workers.provenance import versions
 from quadcosim import QuadcosimError
 from tests.commands import Main
+from tests.extent import in_test_all
 from tests.orchestration.components.fmi.small import needs_compiler
 from tests.orchestration.experiments.studies.common import (
     NOISY,
@@ -106,6 +107,7 @@ def test_a_run_whose_worker_is_killed_from_outside_stops_the_sweep_and_has_no_ro
     assert main("sweep", "study.toml", "--engine", "compiled").stdout == f"{STORE}: 1 runs, 1 of them new\n"
 
 
+@in_test_all
 @pytest.mark.parametrize(("workers", "kills"), [(1, 1), (2, 3)])
 def test_whatever_is_killed_the_table_is_that_of_an_undisturbed_sweep(
     tmp_path: Path, reference: list[dict[str, Any]], workers: int, kills: int
