@@ -31,10 +31,7 @@ def path(runs: Sequence[DrawnRun], style: Style) -> Figure:
     figure, axes = stage(runs, style)
     if style.has_titles:
         figure.suptitle(title(runs))
-    spare = fill(figure, axes)
-    if style.height is None:
-        figure.set_figheight(figure.get_figheight() - spare / figure.dpi)
-        fill(figure, axes)
+    fill(figure, axes, crops=style.height is None)
     return figure
 
 
@@ -52,29 +49,40 @@ def stage(runs: Sequence[DrawnRun], style: Style) -> tuple[Figure, Any]:
     return figure, axes
 
 
-def fill(figure: Figure, axes: Any) -> float:
-    """Enlarge the axes to the room between title and legend; returns the height that is left over, in pixels.
+def fill(figure: Figure, axes: Any, *, crops: bool = False) -> None:
+    """Enlarge the axes to the room between title and legend; `crops`: reduce the height of the figure to what they need.
 
-    The labels of three-dimensional axes do not scale with them, so this iterates.
+    The labels of three-dimensional axes do not scale with them, so this iterates, with the axes alone: their lines, and
+    what else is in the figure, have no part in it.
     """
     width, height = (float(side) for side in figure.get_size_inches() * figure.dpi)
-    figure.draw_without_rendering()
     (legend,) = figure.legends
-    air = 0.5 * legend.get_window_extent().y0
-    bottom, top = legend.get_window_extent().y1 + air, height - air
+    low, high = (float(y) for y in legend.get_window_extent().intervaly)
+    air = 0.5 * low
+    bottom, top = high + air, height - air
     if figure.get_suptitle():
         top -= figure.texts[0].get_window_extent().height + 2.0 * air
-    room = np.array([width - 2.0 * air, top - bottom])
-    side, center = float(room.min()), np.array([0.5 * width, 0.5 * (top + bottom)])
-    middle = center
+    room, center = np.array([width - 2.0 * air, top - bottom]), np.array([0.5 * width, 0.5 * (top + bottom)])
+    side, middle = float(room.min()), center
+    hidden = [artist for artist in (*axes.get_lines(), *figure.legends, *figure.texts) if artist.get_visible()]
+    for artist in hidden:
+        artist.set_visible(False)
     for _ in range(ROUNDS):
         left, low = (middle - 0.5 * side).tolist()
         axes.set_position((left / width, low / height, side / width, side / height))
         figure.draw_without_rendering()
         seen = extent(axes)
         middle = middle + center - 0.5 * np.array([seen.x0 + seen.x1, seen.y0 + seen.y1])
-        side *= float((room / np.array([seen.width, seen.height])).min())
-    return float(room[1] - seen.height)
+        larger = float((room / np.array([seen.width, seen.height])).min())
+        side *= larger
+        if crops:
+            spare = np.array([0.0, room[1] - larger * seen.height])
+            room, center, middle, height = room - spare, center - 0.5 * spare, middle - 0.5 * spare, height - spare[1]
+            figure.set_figheight(height / figure.dpi)
+    left, low = (middle - 0.5 * side).tolist()
+    axes.set_position((left / width, low / height, side / width, side / height))
+    for artist in hidden:
+        artist.set_visible(True)
 
 
 def extent(axes: Any) -> Bbox:
