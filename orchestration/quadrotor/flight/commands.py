@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from orchestration.quadrotor.scenarios.measures import saturated
 from orchestration.quadrotor.scenarios.wiring import COMMAND
 from orchestration.simulation.figures.drawn_run import DrawnRun, Window, title
-from orchestration.simulation.figures.lines import TIME, clip_peaks, legend_of_runs, quantity, set_span
+from orchestration.simulation.figures.lines import TIME, clip_peaks, draw_line, legend_of_runs, quantity, set_span
 from orchestration.simulation.figures.palette import BLACK, GREEN, GREY, ORANGE, PURPLE, RED
 from orchestration.simulation.figures.style import Style
 
@@ -55,7 +55,9 @@ def _draw(panel: Axes, runs: Sequence[DrawnRun], name: str, span: Window, style:
     lines = []
     for run in runs:
         t, values = run.signals["time"], run.signals[f"plant.{name}"]
-        panel.plot(t, values, drawstyle="steps-post", color=run.color, linestyle=run.dashes)
+        first, last = np.searchsorted(t, span)
+        near = slice(max(int(first) - 1, 0), int(last) + 1)
+        draw_line(panel, t[near], values[near], drawstyle="steps-post", color=run.color, linestyle=run.dashes)
         inside = (t >= span[0]) & (t <= span[1])
         lines.append((t[inside], values[inside]) if inside.any() else (t, values))
     set_span(panel, span)

@@ -36,7 +36,7 @@ def errors(runs: Sequence[DrawnRun], style: Style) -> Figure:
             values = error.of(run)
             if values is not None:
                 norm = lines.positive(np.linalg.norm(values, axis=1))
-                panel.plot(run.time, norm, color=run.color, linestyle=run.dashes, label=run.name)
+                lines.draw_line(panel, run.time, norm, color=run.color, linestyle=run.dashes, label=run.name)
         lines.logarithmic(panel)
         panel.set_ylabel(lines.wrapped(lines.quantity(f"{error.name}, norm", error.unit)))
         panel.minorticks_off()
@@ -61,7 +61,7 @@ def draw_components(panel: Axes, run: DrawnRun, error: Error, style: Style, *, c
     values = error.of(run)
     assert values is not None
     for k, (axis, color, dashes) in enumerate(AXES):
-        panel.plot(run.time, values[:, k], color=color, linestyle=dashes, label=axis)
+        lines.draw_line(panel, run.time, values[:, k], color=color, linestyle=dashes, label=axis)
     panel.set_ylabel(lines.wrapped(lines.quantity(error.name, error.unit)))
     lines.set_time_axis(panel, [run])
     if clips:
@@ -77,7 +77,7 @@ def _overlaid(runs: Sequence[DrawnRun], style: Style) -> Figure:
         for k, panel in enumerate(row):
             drawn = [(run, values[:, k]) for run in runs if (values := error.of(run)) is not None]
             for run, values in drawn:
-                panel.plot(run.time, values, color=run.color, linestyle=run.dashes, label=run.name)
+                lines.draw_line(panel, run.time, values, color=run.color, linestyle=run.dashes, label=run.name)
             lines.set_time_axis(panel, runs)
             panel.set_ylabel(lines.wrapped(lines.quantity(f"{error.name} {'xyz'[k]}", error.unit), 18))
             if i == len(available) - 1:

@@ -50,7 +50,7 @@ def stage(runs: Sequence[DrawnRun], style: Style) -> tuple[Figure, Any]:
 
 
 def fill(figure: Figure, axes: Any, *, crops: bool = False) -> None:
-    """Enlarge the axes to the room between title and legend; `crops`: reduce the height of the figure to what they need.
+    """Enlarge the axes to the room between title and legend; `crops`: reduce the height of the figure to their need.
 
     The labels of three-dimensional axes do not scale with them, so this iterates, with the axes alone: their lines, and
     what else is in the figure, have no part in it.

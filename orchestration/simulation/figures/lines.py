@@ -2,9 +2,10 @@
 
 import textwrap
 from collections.abc import Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -20,6 +21,31 @@ Lines: TypeAlias = Sequence[tuple[Floats, Floats]]
 """Times [s] and values, shape (n,) each"""
 
 TIME = "time [s]"
+
+
+def draw_line(axes: Axes, t: Floats, values: Floats, **how: Any) -> None:
+    """Draw a line over time: of all rows that fall on one column of pixels the first, last, lowest and highest.
+
+    The picture is that of all rows, and the line of a long run has a tenth of the points.
+    """
+    shown = visible_rows(t, values, round(float(axes.get_figure(root=True).bbox.width)))  # type: ignore[union-attr]
+    axes.plot(t[shown], values[shown], **how)
+
+
+def visible_rows(t: Floats, values: Floats, columns: int) -> npt.NDArray[np.int64]:
+    """The rows of a line over increasing time [s] that can be seen where it is so many pixels wide."""
+    if len(t) <= 4 * columns:
+        return np.arange(len(t))
+    place = ((t - t[0]) * (columns / (t[-1] - t[0]))).astype(np.int64)
+    starts = np.flatnonzero(np.diff(place, prepend=-1))
+    ends = np.append(starts[1:], len(t)) - 1
+    column = np.repeat(np.arange(len(starts)), ends - starts + 1)
+    gaps = np.flatnonzero(np.diff(np.isnan(values)))
+    shown = [starts, ends, gaps, gaps + 1]
+    for extreme in (np.fmin, np.fmax):
+        rows = np.flatnonzero(values == extreme.reduceat(values, starts)[column])
+        shown.append(rows[np.diff(column[rows], prepend=-1) > 0])
+    return np.unique(np.concatenate(shown))
 
 
 def positive(values: Floats) -> Floats:
@@ -79,7 +105,7 @@ def wrapped(label: str, width: int = 24) -> str:
 def clip_peaks(axes: Axes, lines: Lines, unit: str, style: Style) -> bool:
     """Clip short peaks that would hide the rest of the signals, and show them in an inset with a note.
 
-    `lines` are those drawn on `axes`; returns whether anything was clipped.
+    `lines` are those drawn on `axes`, with all rows; returns whether anything was clipped.
     """
     inner = [_without_peaks(t, y) for t, y in lines if len(t) > 1 and np.isfinite(y).any()]
     if not inner:
@@ -113,8 +139,7 @@ def _inset(axes: Axes, lines: Lines, seen: tuple[float, float], unit: str, style
     width = max(float(np.ptp(outside)), 0.01 * span)
     inset = axes.inset_axes((0.42, 0.5, 0.56, 0.48), label="peak")
     start, end = max(outside.min() - 0.15 * width, axes.get_xlim()[0]), outside.max() + 0.4 * width
-    for drawn in axes.get_lines():
-        times, values = (np.asarray(data, float) for data in drawn.get_data())
+    for drawn, (times, values) in zip(axes.get_lines(), lines, strict=True):
         first, last = np.searchsorted(times, (start, end))
         near = slice(max(int(first) - 1, 0), int(last) + 1)
         inset.plot(

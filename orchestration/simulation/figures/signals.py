@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from orchestration.simulation.figures.drawn_run import DrawnRun
-from orchestration.simulation.figures.lines import TIME, abreast, name_runs, quantity, set_time_axis, wrapped
+from orchestration.simulation.figures.lines import TIME, abreast, draw_line, name_runs, quantity, set_time_axis, wrapped
 from orchestration.simulation.figures.palette import CYCLE, DASHES, MAX_LINES, MAX_PANELS
 from orchestration.simulation.figures.style import Style
 from orchestration.simulation.results import display_names as labels
@@ -73,8 +73,8 @@ def _draw(panel: Axes, run: DrawnRun, columns: Sequence[str], *, alone: bool) ->
         if column not in run:
             continue
         held = column in applied or system.components[component_of(column)].sampling is not None
-        panel.plot(
-            run.time, run[column], drawstyle="steps-post" if held else "default",
+        draw_line(
+            panel, run.time, run[column], drawstyle="steps-post" if held else "default",
             color=CYCLE[k % len(CYCLE)] if alone else run.color,
             linestyle="-" if alone else DASHES[k % len(DASHES)],
             label=labels.signal(column, run.described) if run.place == 0 else None,

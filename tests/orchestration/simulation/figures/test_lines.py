@@ -1,0 +1,28 @@
+"""Lines of long runs have few points, and the picture of all rows."""
+
+import numpy as np
+import pytest
+
+from orchestration.simulation.figures.lines import visible_rows
+
+COLUMNS, ROWS = 100, 20_000
+
+
+@pytest.mark.parametrize("holes", [False, True])
+def test_a_column_of_pixels_has_the_first_last_lowest_and_highest_of_its_rows_and_each_gap(holes: bool) -> None:
+    generator = np.random.default_rng(1)
+    t, values = np.sort(generator.random(ROWS)), generator.standard_normal(ROWS).round(2)
+    if holes:
+        values[(t > 0.3) & (t < 0.36) | (t > 0.5005) & (t < 0.501)] = np.nan
+    shown = visible_rows(t, values, COLUMNS)
+    assert len(shown) < 5 * COLUMNS
+    place = np.floor((t - t[0]) / (t[-1] - t[0]) * COLUMNS)
+    for one in np.unique(place):
+        rows, kept = np.flatnonzero(place == one), shown[place[shown] == one]
+        assert (kept[0], kept[-1]) == (rows[0], rows[-1])
+        assert np.array_equal(*([np.fmin.reduce(values[x]), np.fmax.reduce(values[x])] for x in (rows, kept)), True)
+    assert (np.isnan(values[shown]) != np.isnan(values[np.clip(shown - 1, 0, None)])).sum() == 4 * holes
+
+
+def test_a_short_line_has_all_its_rows() -> None:
+    assert visible_rows(np.arange(9.0), np.zeros(9), 3).tolist() == [*range(9)]
