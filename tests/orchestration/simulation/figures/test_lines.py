@@ -20,7 +20,8 @@ def test_a_column_of_pixels_has_the_first_last_lowest_and_highest_of_its_rows_an
     for one in np.unique(place):
         rows, kept = np.flatnonzero(place == one), shown[place[shown] == one]
         assert (kept[0], kept[-1]) == (rows[0], rows[-1])
-        assert np.array_equal(*([np.fmin.reduce(values[x]), np.fmax.reduce(values[x])] for x in (rows, kept)), True)
+        of_all, of_kept = ([np.fmin.reduce(values[x]), np.fmax.reduce(values[x])] for x in (rows, kept))
+        assert np.array_equal(of_all, of_kept, equal_nan=True)
     assert (np.isnan(values[shown]) != np.isnan(values[np.clip(shown - 1, 0, None)])).sum() == 4 * holes
 
 
