@@ -25,13 +25,15 @@ def groups(connections: Sequence[Connection], dependencies: Dependencies) -> tup
     return _components(before)
 
 
-def exchange(group: Sequence[int], pass_on: PassOn, runs: tuple[int, ...] = ()) -> Booleans:
+def exchange(
+    group: Sequence[int], pass_on: PassOn, runs: tuple[int, ...] = (), *, iterations: int = ITERATIONS
+) -> Booleans:
     """Carry out the connections of a group, repeatedly until the values converge if they form a loop.
 
     `runs` is the shape of the runs that are carried out together. Returns those that have not converged.
     """
     open_: Any = np.ones(runs, dtype=np.bool_)
-    for _ in range(ITERATIONS):
+    for _ in range(iterations):
         settled: Any = np.ones(runs, dtype=np.bool_)
         for index in group:
             before, after = pass_on(index, open_)

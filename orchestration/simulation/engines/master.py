@@ -11,10 +11,9 @@ from typing import Any, Literal, TypeAlias, cast, get_args
 import numpy as np
 
 from orchestration.foundation.basics import errors
-from orchestration.foundation.basics.simulator import Booleans, Floats
 from orchestration.foundation.basics.times import nanoseconds, seconds
 from orchestration.foundation.recording.recording import Chunk, Recorder
-from orchestration.simulation.engines import initial
+from orchestration.simulation.engines.algebraic_loops import AlgebraicLoop
 from orchestration.simulation.engines.compiled import CompiledLoop, reason_unavailable
 from orchestration.simulation.engines.instants import PythonLoop
 from orchestration.simulation.engines.memory import Allocator
@@ -153,7 +152,7 @@ class Master:
         for feed in running.feeds:
             feed.write(0.0)
         for group in self._first_exchange:
-            self._exchange(group)
+            AlgebraicLoop(running, group).close("initialisation")
         for name in running.wires.names:
             running.simulators[name].exit_initialization()
             running.readers[name]()
@@ -166,21 +165,6 @@ class Master:
             if first > 0.0:
                 running.simulators[name].step(0.0, ratio * first)
         running.check_divergence(0.0)
-
-    def _exchange(self, group: Sequence[int]) -> None:
-        running, connections = self.running, self.running.system.connections
-
-        def pass_on(index: int, open_: Booleans) -> tuple[Floats, Floats]:
-            running.readers[connections[index].sender]()
-            before = running.channels[index].received.copy()
-            running.channels[index].pass_on()
-            return before, running.channels[index].received
-
-        if initial.exchange(group, pass_on).any():
-            ends = "; ".join(f"{', '.join(connections[i].start)} -> {', '.join(connections[i].end)}" for i in group)
-            raise errors.SimulatorError(
-                f"initialisation: no values found around the loop {ends} after {initial.ITERATIONS} exchanges"
-            )
 
 
 _NOTES = logging.getLogger("quadcosim")

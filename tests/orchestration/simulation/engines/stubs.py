@@ -42,6 +42,18 @@ class Stub:
         self.values = eval(state)
 
 
+class Direct(Stub):
+    """One whose output y follows its input u at once, by a rule."""
+
+    def __init__(self, rule, **values):
+        super().__init__(**values)
+        self.rule = rule
+
+    def reader(self, names, into):
+        read = super().reader(names, into)
+        return lambda: (self.values.update(y=self.rule(self.values["u"])), read())
+
+
 def clock(values, t, h):
     """A component whose output is the time it has reached."""
     values["y"] = t + h

@@ -6,11 +6,13 @@ import pytest
 
 from orchestration.foundation.basics.errors import SimulatorError
 from orchestration.foundation.recording.recording import InMemory
+from orchestration.simulation.engines.algebraic_loops import secants
 from orchestration.simulation.engines.master import Master
 from orchestration.simulation.engines.running_system import RunningSystem
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from tests.orchestration.simulation.engines.stubs import (
+    Direct,
     Stub,
     clock,
     column,
@@ -109,31 +111,41 @@ def test_a_value_that_is_not_finite_is_passed_on_to_nobody():
     assert all(not math.isnan(values["x"]) for _, _, values in controller.steps)
 
 
-def test_values_around_a_loop_are_found_before_the_run_begins():
-    """a = 1 + b/2 and b = a/2, so that a = 4/3."""
-
-    class Loop(Stub):
-        def __init__(self, rule, **values):
-            super().__init__(**values)
-            self.rule = rule
-
-        def reader(self, names, into):
-            read = super().reader(names, into)
-            return lambda: (self.values.update(y=self.rule(self.values["u"])), read())
-
-    what = system({"a": continuous(), "b": continuous()}, [wire("a.y", "b.u"), wire("b.y", "a.u")], stop_time=0.1)
-    a, b = Loop(lambda u: 1.0 + 0.5 * u, u=0.0, y=0.0), Loop(lambda u: 0.5 * u, u=0.0, y=0.0)
-    master = run(what, {"a": a, "b": b}, first_exchange=((0, 1),))
-    assert column(master, "a.y")[0] == pytest.approx(4.0 / 3.0, abs=1e-11)
+RING = system({"a": continuous(), "b": continuous()}, [wire("a.y", "b.u"), wire("b.y", "a.u")], stop_time=0.1)
 
 
-def test_a_loop_without_a_fixed_point_is_an_error_that_names_it():
-    class Unstable(Stub):
-        def reader(self, names, into):
-            read = super().reader(names, into)
-            return lambda: (self.values.update(y=1.0 + 2.0 * self.values["u"]), read())
+@pytest.mark.parametrize(("d1", "d2"), [(0.5, 0.8), (-0.9, 1.0), (2.0, -3.0), (4.0, 2.0)])
+def test_values_around_a_loop_are_found_before_the_run_begins(d1: float, d2: float):
+    """a = 1 + d1 b and b = d2 a; exchanges converge for |d1 d2| < 1."""
+    stubs = {"a": Direct(lambda u: 1.0 + d1 * u, u=0.0, y=0.0), "b": Direct(lambda u: d2 * u, u=0.0, y=0.0)}
+    master = run(RING, stubs, first_exchange=((0, 1),))
+    assert column(master, "b.y")[0] == pytest.approx(d2 / (1.0 - d1 * d2), rel=1e-11)
 
-    what = system({"a": continuous(), "b": continuous()}, [wire("a.y", "b.u"), wire("b.y", "a.u")], stop_time=0.1)
-    stubs = {name: Unstable(u=0.0, y=0.0) for name in "ab"}
-    with pytest.raises(SimulatorError, match=r"loop a.y -> b.u; b.y -> a.u"):
-        run(what, stubs, first_exchange=((0, 1),))
+
+def test_the_secant_of_two_linear_equations_needs_three_exchanges():
+    asked = []
+
+    def around(values):
+        asked.append(values)
+        return [-3.0 * (2.0 * values[0] + 1.0)]
+
+    _, (found,) = secants(around, [0.0])
+    assert (found, len(asked)) == (pytest.approx(-3.0 / 7.0, abs=1e-12), 3)
+
+
+def test_secants_find_the_values_of_a_nonlinear_loop_of_vectors():
+    def around(values):
+        x, y, z = values
+        return [1.0 + 2.0 * y, math.sin(x) - z, 0.5 * x - 3.0 * math.tanh(y)]
+
+    before, found = secants(around, [0.1, 0.2, 0.3])
+    assert before is found
+    assert around(found) == pytest.approx(found, rel=1e-11)
+
+
+def test_a_loop_without_a_solution_is_an_error_that_names_it_and_what_was_found():
+    stubs = {name: Direct(lambda u: 1.0 + u, u=0.0, y=0.0) for name in "ab"}
+    with pytest.raises(
+        SimulatorError, match=r"loop a.y -> b.u; b.y -> a.u: .* exchanges .* b.u = \S+ becomes \S+; a.u"
+    ):
+        run(RING, stubs, first_exchange=((0, 1),))
