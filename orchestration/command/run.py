@@ -91,6 +91,8 @@ def run(
         exact.warn_if_means_are_infinite(result.request)
     if follows := result.provenance["follows"]:
         inform(f"follows {follows}")
+    for loop in result.provenance.get("loops", ()):
+        inform(f"loop {loop}")
     if fmu is not None:
         one_fmu.write(fmu, result)
     if out is not None:

@@ -1,5 +1,6 @@
 """The commands for system files: their schema, a proposal for FMUs, a description or diagram."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -83,8 +84,8 @@ def show(
     return CommandResult(document=tables_of(shown), lines=as_text(shown, *_from_fmus(shown)).splitlines())
 
 
-def _from_fmus(system: "System") -> tuple[dict[str, str], str]:
-    """The units of its objectives, and the references of its components.
+def _from_fmus(system: "System") -> tuple[dict[str, str], str, Sequence[str]]:
+    """The units of its objectives, the references of its components, and its algebraic loops.
 
     Empty if FMUs are missing or do not fit: nothing is built, so that no foreign module runs.
     """
@@ -97,8 +98,8 @@ def _from_fmus(system: "System") -> tuple[dict[str, str], str]:
         paths = {name: fmus.look_up(fmu, inform) for name, fmu in system.fmus.items()}
         models = {name: read_model(path) for name, path in paths.items() if path is not None}
         if models.keys() != paths.keys():
-            return {}, ""
+            return {}, "", ()
         found = check_against_fmus(system, models)
     except QuadcosimError:
-        return {}, ""
-    return found.units, found.follows
+        return {}, "", ()
+    return found.units, found.follows, found.loops

@@ -5,7 +5,7 @@ import itertools
 import math
 import zipfile
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import fmpy
-from fmpy.model_description import ModelDescription, ModelVariable
+from fmpy.model_description import ModelDescription, ModelVariable, Unknown
 
 from fmu_kit.archive import read_source_hash, read_wrapped
 from fmu_kit.units import BASE
@@ -213,6 +213,18 @@ class Model:
         """Variables of these causalities and types, in the order of the description."""
         return tuple(v.name for v in self.variables.values() if v.causality in causalities and v.kind in kinds)
 
+    def follows_at_once(self, output: str) -> frozenset[str] | None:
+        """The inputs that an output follows before the next step; None: all of them, or unknown."""
+        if self.interface == "co-simulation":
+            return frozenset()
+        declared = self._output_dependencies.get(output)
+        return self.depends_on(output) if declared is None else declared
+
+    @cached_property
+    def _output_dependencies(self) -> Mapping[str, frozenset[str] | None]:
+        """Inputs that an output depends on in steps, by output; None: not declared."""
+        return _dependencies(self.description.outputs, self.variables, None)
+
     def depends_on(self, output: str) -> frozenset[str] | None:
         """The inputs that an output depends on at initialisation; None: on all of them, or unknown."""
         return self.initial_dependencies.get(output)
@@ -311,7 +323,9 @@ def _read_model(path: Path, changed: int, size: int) -> Model:
         path=path,
         description=description,
         variables=variables,
-        initial_dependencies=_dependencies(description, variables),
+        initial_dependencies=_dependencies(
+            description.initialUnknowns, variables, frozenset() if description.initialUnknowns else None
+        ),
         access=USUAL,
         interface=next(iter(declared_of(description))),
     )
@@ -384,17 +398,15 @@ def _number(text: str | None) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _dependencies(description: ModelDescription, variables: Mapping[str, Variable]) -> dict[str, frozenset[str] | None]:
-    """Declared dependencies of outputs on inputs at initialisation; an output that is not listed depends on none."""
+def _dependencies(
+    unknowns: Sequence[Unknown], variables: Mapping[str, Variable], unlisted: frozenset[str] | None
+) -> dict[str, frozenset[str] | None]:
+    """Declared dependencies of outputs on inputs; `unlisted` are those of an output that is not listed."""
     names: dict[tuple[str, int], list[str]] = {}  # FMI 2.0 counts references by type
     for variable in variables.values():
         names.setdefault((variable.type, variable.reference), []).append(variable.name)
     inputs = {v.name for v in variables.values() if v.causality == "input"}
-    unknowns = description.initialUnknowns
-    nothing: frozenset[str] | None = frozenset() if unknowns else None
-    dependencies: dict[str, frozenset[str] | None] = {
-        v.name: nothing for v in variables.values() if v.causality == "output"
-    }
+    dependencies = {v.name: unlisted for v in variables.values() if v.causality == "output"}
     for unknown in unknowns:
         needed = unknown.dependencies
         which = (

@@ -1,17 +1,30 @@
 """Values around an algebraic loop, in which each value depends on all others at once: by exchanges, then by secants.
 
+So are instants closed: an output that follows its inputs at once is read again after these are set, and passed on. It
+is that of an FMU for model exchange or in event mode; plain co-simulation FMUs answer in their next step.
+
 Its numbers are the same on all machines: sums are those of Python, in one order.
 """
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from orchestration.foundation.basics.errors import SimulatorError
 from orchestration.foundation.basics.simulator import Booleans, Floats
 from orchestration.simulation.engines import initial
-from orchestration.simulation.engines.running_system import RunningSystem
-from orchestration.systems.system.connection import Connection
+from orchestration.simulation.engines.initial import Dependencies
+from orchestration.simulation.engines.wiring_by_index import Wires
+from orchestration.systems.schedule.plan import Plan
+from orchestration.systems.system.connection import Connection, variable_of
+from orchestration.systems.system.model import System
 
+if TYPE_CHECKING:
+    from orchestration.simulation.engines.running_system import RunningSystem
+
+EXCHANGES = 10
+"""The most exchanges at an instant before secants"""
 SECANTS = 50
 """The most exchanges with values of the secant method"""
 _LARGEST = 1e15
@@ -25,10 +38,59 @@ class _Leaves(Exception):
     """The values of exchanges leave all bounds."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Closing:
+    """What is done at the end of an instant, after all inputs are set."""
+
+    groups: tuple[tuple[int, ...], ...]
+    """Wires whose values follow inputs at once, those that others need first; several where they form a loop"""
+    read_again: tuple[int, ...]
+    """components with outputs that follow inputs at once"""
+
+    def operations(self, senders: Sequence[int]) -> list[int] | None:
+        """Its reads (i: of component i) and wires (~i: wire i) in turn; None with loops. `senders`: of each wire."""
+        if any(len(group) > 1 for group in self.groups):
+            return None
+        return [*(each for (i,) in self.groups for each in (senders[i], ~i)), *self.read_again]
+
+
+def closing_of(wires: Wires, at_once: Dependencies) -> Closing:
+    """The closing of the instants of a run; `at_once` are the inputs that an output follows before the next step."""
+    connections = wires.system.connections
+
+    def follows(component: str, output: str) -> bool:
+        return at_once(component, output) is None or bool(at_once(component, output))
+
+    passed = [
+        i for i in wires.plan.wires if any(follows(connections[i].sender, variable_of(s)) for s in connections[i].start)
+    ]
+    groups = initial.groups([connections[i] for i in passed], at_once)
+    return Closing(
+        groups=tuple(tuple(passed[k] for k in group) for group in groups),
+        read_again=tuple(
+            i for i in wires.continuous if any(follows(wires.names[i], o) for o in wires.board.outputs[wires.names[i]])
+        ),
+    )
+
+
+def describe_loops(system: System, depends: Dependencies, at_once: Dependencies) -> list[str]:
+    """A line for each loop of wires whose values depend on each other at once, with how it is closed in steps.
+
+    `depends` are the inputs that an output depends on at all, `at_once` those that it follows before the next step.
+    """
+    wires = [system.connections[i] for i in Plan(system).wires]
+    loops = [[wires[i] for i in group] for group in initial.groups(wires, depends) if len(group) > 1]
+    lag = [
+        any(at_once(x.sender, variable_of(start)) == frozenset() for x in loop for start in x.start) for loop in loops
+    ]
+    how = {True: "by the lag of a step: one of its FMUs answers in its next step", False: "at each instant"}
+    return [f"{in_words(loop)}: closed {how[lags]}" for loop, lags in zip(loops, lag)]
+
+
 class AlgebraicLoop:
     """Connections of a run that form a loop, or one that does not."""
 
-    def __init__(self, running: RunningSystem, group: Sequence[int], iterations: int = initial.ITERATIONS) -> None:
+    def __init__(self, running: "RunningSystem", group: Sequence[int], iterations: int = initial.ITERATIONS) -> None:
         self._running, self._group, self._iterations = running, group, iterations
         self._channels = [running.channels[i] for i in group]
 

@@ -7,7 +7,7 @@ C processes some instants at a time, so that interruptions are noticed in betwee
 import ctypes
 import functools
 import time as clock
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ from orchestration.components.fmi.native_instance import NativeInstance
 from orchestration.components.fmi.surroundings import ROUNDING
 from orchestration.foundation.basics.c_structures import address, declared, expect_same_sizes
 from orchestration.foundation.basics.errors import QuadcosimError
-from orchestration.foundation.basics.simulator import Floats, Integers, Simulator
+from orchestration.foundation.basics.simulator import Floats, Integers
 from orchestration.foundation.basics.times import seconds
 from orchestration.foundation.recording.recording import Recorder
 from orchestration.simulation.engines import condition
@@ -64,9 +64,18 @@ _EXACT = 2**53
 """Up to here a float represents every integer"""
 
 
-def reason_unavailable(simulators: Mapping[str, Simulator], stop: int) -> str | None:
-    """Why the compiled loop is not available for a run up to `stop` [ns], in a line; None: it is."""
-    for name, simulator in simulators.items():
+def operations_of(running: RunningSystem) -> list[int] | None:
+    """What ends an instant, for C; None where loops are to be closed then."""
+    wires = running.wires
+    return running.closing.operations([wires.names.index(x.sender) for x in wires.system.connections])
+
+
+def reason_unavailable(running: RunningSystem) -> str | None:
+    """Why the compiled loop is not available for a run, in a line; None: it is."""
+    if operations_of(running) is None:
+        return "its FMUs form a loop that is closed at each instant"
+    stop = running.stop
+    for name, simulator in running.simulators.items():
         if not isinstance(simulator, NativeInstance):
             return f"components.{name} is not called in this process"
         if "only_calls" not in vars(type(simulator)):
@@ -111,6 +120,7 @@ class CompiledLoop:
             track_count=1,
             alive=1,
             settles=running.settles,
+            closing=structures.indices(operations_of(running) or ()),
             look=_Look(self._look_for_c),
             stopped=_Stopped(self._stopped_for_c),
             collect=_Collect(lambda index: structures.instances[index].collect_warnings()),

@@ -452,14 +452,25 @@ static void settle(Loop *l, Rows *stepped, const Instant *now) {
     }
 }
 
+/* Read outputs that follow at once what has been set, and pass them on. */
+static void close_instant(Loop *l, const Instant *now) {
+    for (int64_t i = 0; i < l->closing.count && l->alive; i++) {
+        int64_t index = l->closing.items[i];
+        if (index < 0) pass_on(l, &l->channels[~index], l->alive, now);
+        else read_outputs(l, index, l->alive, now);
+    }
+}
+
 /* -- an instant: (1) to (5) of instants.py; (6) and (7) are those of each loop -------------------------------------- */
 
 static void pass(Loop *l, Instant *now) {
     Rows stepped = now->stepped;
+    Lanes closes = l->closing.count ? stepped.tracks : 0;
     step_continuous(l, &stepped, now); /* (1) */
     arrive(l, &now->arrivals, now);    /* (2), before messages sent now, which are delivered last if without delay */
     post(l, &now->posted, now);
     measure(l, &now->measured, now);               /* (3) */
     sample_each(l, &now->samples, now);            /* (4) */
     if (l->settles) settle(l, &now->stepped, now); /* (5) */
+    if (closes) close_instant(l, now);
 }

@@ -29,6 +29,7 @@ reached; a sampled one with the clock ratio r from t, to its next sample t_i⁺.
             u_i ← the line through its last two m, at t, where the hold is of first order      component.held
             u_i ← y_j⁺, over each other wire                                                   component.behind
             u_i ← w(t)                                                                         component.feeds
+        if there are any: y_j⁺ where it follows inputs at once, u_i ← y_j⁺ over each wire      _close
     (6) the row of t has u_i⁺ of components in continuous time, and y_i⁺ of all                _record
     (7) an FMU ended the run: it ends; Ctrl-C or a pause: it stops here
 
@@ -44,6 +45,7 @@ from typing import ClassVar
 from orchestration.foundation.basics.errors import SimulatorError
 from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.foundation.recording.recording import ARRIVED, LOST, SAMPLED, SENT, Recorder
+from orchestration.simulation.engines.algebraic_loops import EXCHANGES, AlgebraicLoop
 from orchestration.simulation.engines.backlog import Backlog, ListTables, events_of_a_chunk, rows_of_a_chunk
 from orchestration.simulation.engines.running_system import RunningSystem, SampledComponent, Terminated
 from orchestration.systems.schedule.instant_arrays import Message, SampleInstant
@@ -63,6 +65,8 @@ class PythonLoop:
         self._instants = running.cursor.instants()
         self._channels, self._continuous, self._sampled = running.channels, running.continuous, running.sampled
         self._read_ahead, self._stop = running.wires.plan.read_ahead, running.stop
+        self._loops = [AlgebraicLoop(running, group, EXCHANGES) for group in running.closing.groups]
+        self._closes = bool(running.closing.groups or running.closing.read_again)
         self._row = running.board.row.data.cast("B")
         self._chunk, self._most_events = rows_of_a_chunk(running) * running.board.row.nbytes, events_of_a_chunk()
 
@@ -89,6 +93,8 @@ class PythonLoop:
                     self._sample(due, time, due.next_time)
             if running.settles:  # (5)
                 self._settle(time, stepped)
+            if self._closes and stepped:
+                self._close(time)
             self._record(time)  # (6)
             if running.termination is not None:  # (7)
                 raise Terminated(running.termination)
@@ -218,6 +224,16 @@ class PythonLoop:
                 channel.pass_on()
             for feed in component.feeds:
                 feed.write(time / NANOSECONDS)
+
+    def _close(self, time: int) -> None:
+        """Read outputs that follow at once what has been set, and pass them on."""
+        t = time / NANOSECONDS
+        for loop in self._loops:
+            loop.close(f"t = {t:g} s")
+        for index in self._running.closing.read_again:
+            component = self._continuous[index]
+            component.read()
+            component.expect_finite(t)
 
     def _record(self, time: int) -> None:
         if self._arrived:

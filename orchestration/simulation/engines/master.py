@@ -189,7 +189,7 @@ def create_master(
     The compiled loop keeps what it has not handed over in memory of `allocate`; `others` are arguments of `Master`.
     Raises `QuadcosimError` with the reason if the compiled loop was requested and is not available.
     """
-    reason = None if engine == "python" else reason_unavailable(running.simulators, running.stop)
+    reason = None if engine == "python" else reason_unavailable(running)
     if reason:
         _NOTES.debug("no compiled loop: %s", reason)
     if engine == "python" or (engine is None and reason):

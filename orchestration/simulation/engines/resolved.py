@@ -15,6 +15,7 @@ from orchestration.foundation.basics.errors import UsageError, prefixed
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import Grid, exact_nanoseconds
 from orchestration.simulation.engines import sources
+from orchestration.simulation.engines.algebraic_loops import describe_loops
 from orchestration.simulation.results import objectives
 from orchestration.simulation.results.units import ColumnInfo, column_infos, units
 from orchestration.systems.expressions.over_run import job_terms
@@ -45,6 +46,8 @@ class CheckedSystem:
     """Units of the metrics that have one"""
     follows: str
     """Text of which component follows which reference; empty where none does"""
+    loops: Sequence[str]
+    """Text of each algebraic loop of wires, and how it is closed"""
     of_jobs: Mapping[str, float]
     """Numbers of the run that do not depend on signals: terms about jobs in expressions, by their text"""
 
@@ -119,8 +122,13 @@ def check_against_fmus(system: System, models: Mapping[str, Model]) -> CheckedSy
 
         of_jobs = job_numbers(system)
     system = objectives.with_available_objectives(system, signals_of(system, models), {*parameters, *of_jobs})
+    loops = describe_loops(
+        system,
+        lambda name, output: models[name].depends_on(output),
+        lambda name, output: models[name].follows_at_once(output),
+    )
     return CheckedSystem(
-        system=system, parameters=parameters, units=units(system, models), follows=words, of_jobs=of_jobs
+        system=system, parameters=parameters, units=units(system, models), follows=words, loops=loops, of_jobs=of_jobs
     )
 
 

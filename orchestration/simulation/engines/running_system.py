@@ -12,9 +12,11 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import SimulatorError, StoppedStepError
 from orchestration.foundation.basics.simulator import Floats, Simulator, Transfer
+from orchestration.simulation.engines.algebraic_loops import closing_of
 from orchestration.simulation.engines.condition import NEVER, Condition
 from orchestration.simulation.engines.connection_hold import Channel
 from orchestration.simulation.engines.feeds import Feed
+from orchestration.simulation.engines.initial import Dependencies
 from orchestration.simulation.engines.sources import SourceValues
 from orchestration.simulation.engines.wiring_by_index import Wires
 from orchestration.systems.schedule.instant_arrays import Cursor, Schedule
@@ -93,9 +95,12 @@ class RunningSystem:
         feeds: Sequence[Feed] = (),
         interrupted: Callable[[], bool] = lambda: False,
         condition: Condition = NEVER,
+        at_once: Dependencies = lambda component, output: (),
     ) -> None:
+        """`at_once`: the inputs that an output of a component follows before its next step."""
         self.system, self.simulators, self.stop = system, simulators, timetable.stop
         self.wires = wires = Wires(system, recorded)
+        self.closing = closing_of(wires, at_once)
         self.board = board = wires.board
         self.sources, self.feeds = list(sources), list(feeds)
         self.columns = (*board.columns, *(signal for signals, _ in sources for signal in signals))

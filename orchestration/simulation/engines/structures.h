@@ -172,6 +172,7 @@ typedef struct {
     Component *components;
     Channel *channels;
     List continuous, sampled; /* components in the order of an instant */
+    List closing; /* what ends it: i reads component i, ~i carries out wire i; of FMUs */
     int64_t some_by_themselves, settles;
     Track *tracks;
     int64_t track_count, channel_count;

@@ -87,7 +87,12 @@ def result_of(
         divergence=outcome.divergence,
         termination=outcome.termination,
         interrupted_at=outcome.interrupted_at,
-        provenance={**outcome.provenance, "follows": resolved.follows, "wall_time": wall_time},
+        provenance={
+            **outcome.provenance,
+            "follows": resolved.follows,
+            **({"loops": list(resolved.loops)} if resolved.loops else {}),
+            "wall_time": wall_time,
+        },
         warnings=(
             *resolved.request.warnings(resolved.parameters),
             *uneven_steps(resolved.system, resolved.models),

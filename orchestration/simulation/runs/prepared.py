@@ -164,6 +164,7 @@ def prepared(
                 condition=Condition(
                     text=system.criterion.diverged, sources=sources, signals_of=signals, numbers=parameters
                 ),
+                at_once=lambda name, output: models[name].follows_at_once(output),
             )
             master = create_master(
                 engine,

@@ -50,6 +50,8 @@ class Provenance(TypedDict, total=False):
     """The engine, `compiled` or `python`; the numbers are the same."""
     follows: str
     """Text of which component follows which reference; empty where none does."""
+    loops: list[str]
+    """Text of each algebraic loop, and how it is closed; absent without any."""
     wall_time: float
     """The duration of the run [s]."""
 

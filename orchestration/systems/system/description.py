@@ -18,10 +18,10 @@ MAX_NAMES_IN_CELL = 6
 """names in a cell; more are counted"""
 
 
-def as_text(system: System, units: Mapping[str, str] = {}, follows: str = "") -> str:
+def as_text(system: System, units: Mapping[str, str] = {}, follows: str = "", loops: Sequence[str] = ()) -> str:
     """Components, connections, sources, objectives with their `units`, and the criterion, a line each, in columns.
 
-    `follows` describes the references and the components that follow them.
+    `follows` describes the references and the components that follow them, `loops` the algebraic loops.
     """
     components = [(name, _fmu(c), describe_rate(c), _parameters(c)) for name, c in system.components.items()]
     connections = [
@@ -41,6 +41,7 @@ def as_text(system: System, units: Mapping[str, str] = {}, follows: str = "") ->
         ("computers", [_task(each) for each in placed_tasks(system.computers)]),
         ("networks", [_message(each) for each in placed_messages(system.networks)]),
         ("follows", [(follows,)] if follows else []),
+        ("loops", [(loop,) for loop in loops]),
         (
             "objectives",
             [(name, " ".join(text.split())) for name, text in zip(named, system.objectives.values())],

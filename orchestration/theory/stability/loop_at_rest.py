@@ -18,6 +18,7 @@ from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats, Transfer
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
+from orchestration.simulation.engines.algebraic_loops import in_words
 from orchestration.simulation.engines.resolved import resolve_with_models
 from orchestration.simulation.runs.prepared import PreparedRun, prepared
 from orchestration.systems.system.component import Component
@@ -134,6 +135,7 @@ def at_rest(
     resolved = None if models is None else resolve_with_models(calm, models)
     with prepared(calm, load=tracing_loader(instances), resolved=resolved) as simulation:
         _expect_states(simulation)
+        _expect_open_instants(simulation)
         _settle(simulation, begin, period)
         yield AtRest(
             simulation=simulation, saved_states={name: one.save() for name, one in simulation.instances.items()},
@@ -159,6 +161,13 @@ def _expect_states(simulation: PreparedRun) -> None:
     without = [name for name, instance in simulation.instances.items() if not instance.model.saves_state]
     if without:
         raise UsageError(f"the FMU of {', '.join(without)} cannot save its state")
+
+
+def _expect_open_instants(simulation: PreparedRun) -> None:
+    running = simulation.master.running
+    if groups := running.closing.groups:
+        wires = in_words([running.system.connections[i] for group in groups for i in group])
+        raise UsageError(f"outputs follow inputs at once, and are passed on within an instant: {wires}")
 
 
 def _settle(simulation: PreparedRun, begin: Fraction, period: Fraction) -> None:

@@ -1,0 +1,70 @@
+"""Instants of FMUs whose outputs follow inputs at once: values are passed on within an instant, also around a loop."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import tomli_w
+
+import quadcosim
+from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError
+from tests.commands import Main
+from tests.orchestration.components.fmi.exchange import exchange
+from tests.orchestration.components.fmi.small import needs_compiler
+
+pytestmark = needs_compiler
+
+
+def gains(
+    folder: Path, *connections: tuple[str, str], fmi: int = 3, ramp: Any = None, **factors: float
+) -> dict[str, Any]:
+    """Components y = p u + w with these factors p; `w` of the first is 1, or follows a table."""
+    fmu = str(exchange(folder, "gain", fmi=fmi))
+    first = next(iter(factors))
+    components = {name: {"fmu": fmu, "step": 0.1, "parameters": {"p": p, "q": 1.0}} for name, p in factors.items()}
+    source = {"constant": 1.0, "to": [f"{first}.w"]} if ramp is None else {"file": str(ramp), "to": [f"{first}.w"]}
+    wires = [{"from": [start], "to": [end]} for start, end in connections]
+    return {"stop_time": 0.3, "components": components, "connections": wires, "sources": {"one": source}}
+
+
+RING = (("a.y", "b.u"), ("b.y", "a.u"))
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize(("d1", "d2"), [(0.5, 0.8), (2.0, -3.0)])
+def test_a_loop_is_closed_at_each_instant(fmi: int, d1: float, d2: float, tmp_path: Path) -> None:
+    ramp = tmp_path / "w.csv"
+    ramp.write_text("time,w\n0,1\n0.3,4\n")
+    rows = quadcosim.run(gains(tmp_path, *RING, fmi=fmi, ramp=ramp, a=d1, b=d2), in_process=True).signals
+    w = 1.0 + 10.0 * rows["time"]
+    assert rows["b.y"] == pytest.approx(w * d2 / (1.0 - d1 * d2), rel=1e-11)
+    assert rows["a.y"] == pytest.approx(w / (1.0 - d1 * d2), rel=1e-11)
+
+
+def test_a_loop_that_has_no_values_is_named_with_what_was_found(tmp_path: Path) -> None:
+    found = r"loop a.y -> b.u; b.y -> a.u: after 100 exchanges and 50 with secants, b.u = \S+ becomes \S+; a.u"
+    with pytest.raises(SimulatorError, match=found):
+        quadcosim.run(gains(tmp_path, *RING, a=2.0, b=0.5), in_process=True)
+
+
+def test_a_chain_has_no_lag_and_both_engines_give_its_rows(tmp_path: Path) -> None:
+    ramp = tmp_path / "w.csv"
+    ramp.write_text("time,w\n0,1\n0.3,4\n")
+    chain = gains(tmp_path, ("b.y", "c.u"), ("a.y", "b.u"), ramp=ramp, a=1.0, b=2.0, c=3.0)
+    rows = {engine: quadcosim.run(chain, engine=engine, in_process=True) for engine in ("python", "compiled")}
+    assert rows["python"].signals["c.y"] == pytest.approx(6.0 * (1.0 + 10.0 * rows["python"].signals["time"]))
+    assert rows["python"].rows.tobytes() == rows["compiled"].rows.tobytes()
+    with pytest.raises(QuadcosimError, match="a loop that is closed at each instant"):
+        quadcosim.run(gains(tmp_path, *RING, a=0.5, b=0.5), engine="compiled", in_process=True)
+
+
+def test_show_and_run_say_how_a_loop_is_closed(main: Main, tmp_path: Path) -> None:
+    file, system = tmp_path / "system.toml", gains(tmp_path, *RING, a=0.5, b=0.8)
+    file.write_text(tomli_w.dumps(system))
+    at_once = "a.y -> b.u; b.y -> a.u: closed at each instant"
+    assert at_once in main("show", file).stdout
+    assert f"loop {at_once}" in main("run", file, "--in-process").stderr
+    for component in system["components"].values():
+        component["fmu"] = str(exchange(tmp_path, "gain", event_mode=True))
+    file.write_text(tomli_w.dumps(system))
+    assert "a.y -> b.u; b.y -> a.u: closed by the lag of a step" in main("show", file).stdout
