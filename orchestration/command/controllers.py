@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from orchestration.command import verdicts
 from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, build_option, option_group, result_of_files
@@ -79,6 +80,7 @@ def _all_cells(comparison: "Comparison", compared: "Compared", again: str) -> Co
     content = as_json(comparison, compared.outcome, compared.bandwidths)
     return CommandResult(
         document={**content, "follows": summary.follows, "files": compared.written},
+        verdict=verdicts.of_comparison(comparison, compared.outcome),
         lines=list(comparison_text.lines(comparison, compared.outcome)),
         good=not summary.failed,
     )
@@ -93,7 +95,8 @@ def _cell(comparison: "Comparison", rerun: "CellSummary", stored: "CellSummary |
     lines = list(comparison_text.cell_lines(comparison, rerun))
     if same is not None:
         lines.append(f"{'in the store':<22}  {'the same' if same else 'a different result'}")
-    return CommandResult(document={**rerun.row("value"), "same_as_stored": same}, lines=lines)
+    document = {**rerun.row("value"), "same_as_stored": same}
+    return CommandResult(document=document, verdict=verdicts.of_cell(rerun), lines=lines)
 
 
 @build_option
@@ -110,4 +113,5 @@ def tune(
 
     command = f"quadcosim tune {tuning} --out {out}" + (f" --engine {engine}" if engine != "auto" else "")
     tuned = search_all(load_tuning(tuning), out=out, workers=workers, engine=engine_choice(engine), command=command)
-    return result_of_files(tuned.written)
+    written = result_of_files(tuned.written)
+    return dataclasses.replace(written, verdict=verdicts.of_tuning(tuned))

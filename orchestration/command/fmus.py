@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
+from orchestration.command import verdicts
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, expect_positive, option_group, result_of_files
 from orchestration.command.variant_flags import VariantFlags
@@ -143,4 +144,5 @@ def doctor(
     from orchestration.components.checks.doctor.report import as_tables, examine
 
     report = examine(fmu or [fmus.locate(name, inform) for name in MODELS], limits.limits)
-    return CommandResult(document=as_tables(report), lines=as_text(report).splitlines(), good=report.good)
+    lines = as_text(report).splitlines()
+    return CommandResult(document=as_tables(report), verdict=verdicts.of_doctor(report), lines=lines, good=report.good)

@@ -5,10 +5,11 @@ from typing import Annotated
 
 import typer
 
+from orchestration.command import verdicts
 from orchestration.command.flags import FlightFlags, ScenarioFile, Timing, flight_options, request_from
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
-from orchestration.foundation.basics.terminal import inform
+from orchestration.foundation.basics.terminal import inform, inform_in_passing
 
 
 @flight_options
@@ -69,7 +70,7 @@ def limit(
     request = request_from(scenario, flags, timing)
     found = limits.find(
         request, of, first=first, last=last, tolerance=tolerance, scan=scan, confidence=confidence,
-        continuous=continuous, workers=workers, engine=how or "auto", announce=inform,
+        continuous=continuous, workers=workers, engine=how or "auto", announce=inform_in_passing,
     )  # fmt: skip
     where = out or (None if scenario is None else scenario.parent)
     if figures and where is not None:
@@ -77,6 +78,5 @@ def limit(
 
         for written in draw_limit(request, found, where):
             inform(str(written))
-    return CommandResult(
-        document=found, lines=[f"{name:<19}  {value}" for name, value in limits.as_text(found).items()]
-    )
+    lines = [f"{name:<19}  {value}" for name, value in limits.as_text(found).items()]
+    return CommandResult(document=found, verdict=verdicts.of_limit(found), lines=lines)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from orchestration.command import verdicts
 from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
@@ -78,7 +79,8 @@ def _certified(request: "Request", of: str, out: Path | None) -> CommandResult:
         "states": found.states,
         "certificate": written or "-",
     }
-    return CommandResult(document=document, lines=[f"{name:<17}  {value}" for name, value in shown.items()])
+    lines = [f"{name:<17}  {value}" for name, value in shown.items()]
+    return CommandResult(document=document, verdict=verdicts.of_margin(found), lines=lines)
 
 
 def _region(request: "Request", of: str, and_of: str, out: Path | None) -> CommandResult:
@@ -92,7 +94,7 @@ def _region(request: "Request", of: str, and_of: str, out: Path | None) -> Comma
     lines = [f"{of} and {and_of}", f"searched           {found.searched}"]
     lines += [f"certified          {a:.6g} s and {b:.6g} s" for a, b in found.certified]
     lines += [f"breaking           {a:.6g} s and {b:.6g} s" for a, b in found.breaking]
-    return CommandResult(document=document, lines=lines)
+    return CommandResult(document=document, verdict=verdicts.of_region(found), lines=lines)
 
 
 def _checked(path: Path, request: "Request | None") -> CommandResult:
@@ -105,13 +107,13 @@ def _checked(path: Path, request: "Request | None") -> CommandResult:
         values = " and ".join(f"{low:.9g} to {high:.9g} s" for low, high in ranges)
         often = "any number of times in a row" if run is None else f"at most {run} times in a row"
         lines.append(f"{name:<17}  {', '.join(filter(None, [values, often]))}")
-    lines.append(f"{'proved':<17}  no sequence of these makes the {found.states} numbers of the loop grow")
     lines.append(f"{'radius':<17}  {found.radius:g} of the measured one")
     of = " and ".join(found.of)
     if found.up_to is not None:
         lines.append(f"{'so it holds for':<17}  {of} from 0 to {found.up_to:.9g} s")
-    lines.append(f"{'loop':<17}  {of + ' of this system' if of else 'the matrices in the file; no system was given'}")
-    return CommandResult(document=found, lines=lines)
+    if not of:
+        lines.append(f"{'loop':<17}  the matrices in the file; no system was given")
+    return CommandResult(document=found, verdict=verdicts.of_check(found), lines=lines)
 
 
 def _of_hover(request: "Request") -> CommandResult:
@@ -124,12 +126,12 @@ def _of_hover(request: "Request") -> CommandResult:
 
     if not isinstance(request, Scenario):
         raise UsageError("margin: expected a scenario of the quadrotor, or --of PATH")
-    found = dataclasses.asdict(isolated_call(files_of(system_of(request)).fmus.values(), margin_of, request))
-    lines = []
-    for name, value in found.items():
+    found = isolated_call(files_of(system_of(request)).fmus.values(), margin_of, request)
+    document, lines = dataclasses.asdict(found), []
+    for name, value in document.items():
         shown = " ".join(f"{share:g}" for share in value) if isinstance(value, tuple) else value
         lines.append(f"{name:<17}  {f'{value:.6g} s' if isinstance(value, float) else '-' if value is None else shown}")
-    return CommandResult(document=found, lines=lines)
+    return CommandResult(document=document, verdict=verdicts.of_hover_margin(found), lines=lines)
 
 
 def _number(value: float | None, unit: str) -> str:
@@ -158,7 +160,8 @@ def linearise(
     loop = linearised_loop(request_from(scenario, flags, timing), component)
     halves = {loop.name: loop.component, "rest": loop.rest}
     document = {"name": loop.name, "component": _matrices(loop.component), "rest": _matrices(loop.rest)}
-    return CommandResult(document=document, lines=[f"{name:<17}  {_summary(half)}" for name, half in halves.items()])
+    lines = [f"{name:<17}  {_summary(half)}" for name, half in halves.items()]
+    return CommandResult(document=document, verdict=verdicts.of_linearised(loop), lines=lines)
 
 
 def _matrices(system: "StateSpace") -> dict[str, object]:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from orchestration.command import completion
+from orchestration.command import completion, verdicts
 from orchestration.command.flags import FlightFlags, ScenarioFile, Timing, flight_options, request_from
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, option_group, result_of_files
@@ -111,7 +111,6 @@ def interop(
         for path in draw(found, out):
             inform(str(path))
     far = [agreement.tool.name for agreement in found if not table.agrees(agreement)]
-    if far:
-        inform(f"farther than {table.TOLERANCE:g} from this project's master: {'; '.join(far)}")
     document = [table.as_dict(agreement) for agreement in found]
-    return CommandResult(document=document, lines=table.text(found).splitlines(), good=not far)
+    verdict = verdicts.of_agreements(far, len(found), table.TOLERANCE)
+    return CommandResult(document=document, verdict=verdict, lines=table.text(found).splitlines(), good=not far)

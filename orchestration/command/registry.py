@@ -22,18 +22,28 @@ from orchestration.foundation.basics.errors import UsageError
 
 @dataclass(frozen=True, kw_only=True)
 class CommandResult:
-    """Printed to standard output: with `--json` the document, else the lines."""
+    """Printed to standard output: with `--json` the document with the verdict, else the verdict and the lines."""
 
     document: object
     """Numbers, texts, booleans, lists, mappings, paths and dataclasses of them"""
     lines: Sequence[str]
+    verdict: str | None = None
+    """Answer of the command in a sentence (`verdicts.py`); None: it has only lines, as paths of files"""
     good: bool = True
     """false: exit code 1"""
 
     @property
     def as_json(self) -> str:
         """The document as JSON; numbers that JSON lacks, such as infinity, are null."""
-        return json.dumps(plain(self.document), indent=2)
+        document = plain(self.document)
+        if self.verdict is not None and isinstance(document, dict):
+            document = {"verdict": self.verdict, **document}
+        return json.dumps(document, indent=2)
+
+    @property
+    def as_text(self) -> str:
+        """The verdict, and the lines below it."""
+        return "\n".join([*([] if self.verdict is None else [self.verdict]), *self.lines])
 
 
 def result_of_files(paths: Iterable[PurePath]) -> CommandResult:
@@ -132,7 +142,7 @@ def _printing(command: Callable[..., CommandResult]) -> Callable[..., None]:
 
 def print_result(result: CommandResult) -> None:
     """Print the result of a command in the form of the flags."""
-    text = result.as_json if output_options.as_json else "\n".join(result.lines)
+    text = result.as_json if output_options.as_json else result.as_text
     if text:
         print(text)
         terminal.note(text)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from orchestration.command import exact, registry
+from orchestration.command import exact, registry, verdicts
 from orchestration.command.flags import EngineFlag, FlightFlags, ScenarioFile, Timing, flight_options, request_from
 from orchestration.command.one_fmu import OneFmuFlags
 from orchestration.command.options import option
@@ -133,18 +133,11 @@ def _resumed(paused_in: Path, out: Path | None, figures: bool, how: Any) -> "Res
 
 
 def _metrics(result: "Result") -> CommandResult:
-    from orchestration.simulation.results.objectives import unmet
-
     found = {**result.metrics, "wall_time": result.provenance["wall_time"], "engine": result.provenance["engine"]}
-    width, units = max(map(len, found)), {**result.units, "wall_time": "s"}
+    shown = {name: value for name, value in found.items() if value is not None or not result.metrics["diverged"]}
+    width, units = max(map(len, shown)), {**result.units, "wall_time": "s"}
     lines = []
-    for name, value in found.items():
-        shown = f"{value:.6g}" if isinstance(value, float) else "-" if value is None else str(value)
-        lines.append(f"{name:<{width}}  {shown}{'' if value is None else after(units.get(name))}")
-    if result.divergence is not None:
-        lines.append(f"diverged: {result.divergence}")
-    if (missed := unmet(result.system, result.metrics, result.units)) is not None:
-        inform(f"not good: {missed}")
-    if result.termination is not None:
-        lines.append(f"terminated: {result.termination}")
-    return CommandResult(document=found, lines=lines)
+    for name, value in shown.items():
+        text = f"{value:.6g}" if isinstance(value, float) else "-" if value is None else str(value)
+        lines.append(f"{name:<{width}}  {text}{'' if value is None else after(units.get(name))}")
+    return CommandResult(document=found, verdict=verdicts.of_run(result), lines=lines)

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from orchestration.command import verdicts
 from orchestration.command.flags import assigned
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.number_text import quantity
 from orchestration.foundation.basics.terminal import in_columns, inform
 from orchestration.simulation.figures.names import expect_figure
 
@@ -56,7 +58,7 @@ def schedule(
         "messages": {name: asdict(each) for name, each in found.messages.items()},
         "busy": found.busy,
     }
-    return CommandResult(document=document, lines=list(_lines(found)))
+    return CommandResult(document=document, verdict=verdicts.of_schedule(found), lines=list(_lines(found)))
 
 
 def _draw(found: "Scheduled", out: Path, start: float | None, end: float | None) -> Path:
@@ -92,10 +94,8 @@ def _lines(found: "Scheduled") -> Iterator[str]:
 
 
 def _row(of: "Responses") -> Sequence[str]:
-    from orchestration.systems.system.description import time_text
-
     def text_of(time: float | None) -> str:
-        return "-" if time is None else time_text(float(f"{time:.4g}"))
+        return "-" if time is None else quantity(time, "s")
 
     response, latency = of.response, of.latency
     times = (None,) * 4 if response is None else (response.min, response.mean, response.p99, response.max)

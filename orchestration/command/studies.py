@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from orchestration.command import exact
+from orchestration.command import exact, verdicts
 from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, build_option, option_group, result_of_files
@@ -45,6 +45,7 @@ def sweep(
     )  # fmt: skip
     failed = f", {summary.failed} failed (quadcosim export shows why; --retry-failed)" if summary.failed else ""
     lines = [f"{summary.path}: {summary.total} runs, {summary.flown} of them new{failed}"]
+    verdict = verdicts.of_counts(summary.outcomes, summary.total)
     if summary.agreement is not None:
         lines.append(f"engine {summary.engine}: {summary.agreement}")
     if note := note_on_engines(summary.engines):
@@ -53,7 +54,7 @@ def sweep(
         inform(f"follows {each}")
     keys = ("total", "flown", "failed", "path", "engine", "engines", "agreement", "follows")
     document = {name: getattr(summary, name) for name in keys}
-    return CommandResult(document=document, lines=lines, good=not summary.failed)
+    return CommandResult(document=document, verdict=verdict, lines=lines, good=not summary.failed)
 
 
 def _warn_if_means_are_infinite(study: "Study") -> None:
@@ -79,7 +80,7 @@ def status(study: StudyFile, out: Out = None) -> CommandResult:
     path = store_path(loaded.name, out)
     with open_for_reading(path) as opened:
         expect_current(opened, loaded)
-        about, counts, engines = opened.about(), opened.counts(), opened.engines()
+        about, counts, engines, outcomes = opened.about(), opened.counts(), opened.engines(), opened.outcomes()
         total = int(about.get(TOTAL, "0"))
     done, failed = counts.get("done", 0), counts.get("failed", 0)
     missing = total - done - failed
@@ -89,8 +90,9 @@ def status(study: StudyFile, out: Out = None) -> CommandResult:
         lines.append(f"engine {about[ENGINE]}: {agreement}")
     if note := note_on_engines(engines):
         lines.append(note)
-    numbers = {"total": total, "done": done, "failed": failed, "missing": missing}
-    return CommandResult(document={"path": path, **numbers, "engines": engines, "agreement": agreement}, lines=lines)
+    document = {"path": path, "total": total, "done": done, "failed": failed, "missing": missing}
+    document |= {"engines": engines, "agreement": agreement}
+    return CommandResult(document=document, verdict=verdicts.of_counts(outcomes, total), lines=lines)
 
 
 def export(

@@ -10,6 +10,7 @@ from orchestration.experiments.limits.limit_result import ContinuousRun, Limit
 from orchestration.foundation.basics.bisection import Bracket, Range, bisected, first_failure
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
+from orchestration.foundation.basics.number_text import quantity
 from orchestration.foundation.basics.progress import ShareProgress, share_reporter
 from orchestration.foundation.basics.terminal import inform
 from orchestration.simulation.engines.master import Engine
@@ -145,14 +146,24 @@ def _mean_square(varied: Varied, span: Range, files: Files, local: LinearLimit) 
 
 _ALWAYS = ("local_limit", "large_signal_limit")
 """Fields that are shown also where they have no value"""
+_IN_ITS_UNIT = (
+    *_ALWAYS, "local_limit_outside", "local_accuracy", "mean_square_limit", "refuted_limit", "tolerance", "scan",
+)  # fmt: skip
+"""Fields in the unit of the quantity"""
+_OF_UNITS = ("unit", "judged_unit")
+DIGITS = 6
 
 
 def as_text(limit: Limit) -> dict[str, str]:
     """The applicable fields of a limit as text; of the evaluated values, those whose share of seeds is known."""
+    units = {**dict.fromkeys(_IN_ITS_UNIT, limit.unit), "judged_bound": limit.judged_unit, "horizon": "s"}
     known = {name: value for name, value in vars(limit).items() if value not in (None, "", ())}
-    texts = {name: str(known[name]) if name in known else "-" for name in vars(limit) if name in (*known, *_ALWAYS)}
+    texts = dict.fromkeys((name for name in vars(limit) if name in (*known, *_ALWAYS) and name not in _OF_UNITS), "-")
+    for name in texts.keys() & known.keys():
+        value = known[name]
+        texts[name] = quantity(value, units.get(name), DIGITS) if isinstance(value, float) else str(value)
     if limit.flies_above:
-        texts["flies_above"] = ", ".join(f"{value:.6g}" for value in limit.flies_above)
+        texts["flies_above"] = ", ".join(quantity(value, limit.unit, DIGITS) for value in limit.flies_above)
     if (ideal := limit.continuous) is not None:
         settles = "" if ideal.settling_time is None else f", within 5 cm from {ideal.settling_time:.6g} s on"
         texts["continuous"] = f"{ideal.outcome} at a period of {ideal.period:g} s{settles}"

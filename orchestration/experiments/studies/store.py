@@ -95,6 +95,10 @@ class Store:
             "SELECT engine, count(*) FROM design JOIN runs USING (key) WHERE engine IS NOT NULL GROUP BY engine"
         )
 
+    def outcomes(self) -> dict[str | None, int]:
+        """The number of points of the design by the outcome of their rows; None: that of runs that have failed."""
+        return self._pairs("SELECT outcome, count(*) FROM design JOIN runs USING (key) GROUP BY outcome")
+
     def _pairs(self, query: str) -> dict[Any, Any]:
         """The two columns of a query over a store that is whole, the second by the first."""
         self.expect_whole()

@@ -1,6 +1,5 @@
 """The result of a sweep."""
 
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -46,15 +45,20 @@ class Swept:
     def __repr__(self) -> str:
         return f"<Swept: {self._counts()}, in {self.path}>"
 
+    @property
+    def outcomes(self) -> dict[str | None, int]:
+        """The number of runs in the store by their outcome; None: runs that have failed, or have no criterion."""
+        with open_for_reading(self.path) as opened:
+            return opened.outcomes()
+
     def _counts(self) -> str:
         failed = f", {self.failed} failed" if self.failed else ""
         return f"{self.total} runs, {self.flown} of them new{failed}"
 
     def _repr_html_(self) -> str:
         """The form that notebooks show: the number of runs by outcome."""
-        with open_for_reading(self.path) as opened:
-            outcomes = Counter(str(outcome or "failed") for block in opened.blocks() for outcome in block["outcome"])
-        rows = [(outcome, str(count), "runs") for outcome, count in outcomes.most_common()]
+        counts = sorted(((count, outcome or "failed") for outcome, count in self.outcomes.items()), reverse=True)
+        rows = [(outcome, str(count), "runs") for count, outcome in counts]
         return html.card("A study", None, None, self._counts(), rows)
 
     @explains_missing

@@ -64,6 +64,19 @@ def inform(text: str) -> None:
     _MESSAGES.info("%s", text)
 
 
+_BARS: list[Callable[[str], None]] = []
+"""Functions that set the text of the bars that are drawn, the innermost last"""
+
+
+def inform_in_passing(text: str) -> None:
+    """Print one line about the progress of work, which beside a bar replaces the one before, and goes with it."""
+    if _BARS:
+        _BARS[-1](text)
+        detail(text)
+    else:
+        inform(text)
+
+
 def warn(text: str) -> None:
     """Print one line about a likely mistake."""
     _MESSAGES.warning("warning: %s", text)
@@ -110,7 +123,11 @@ def progress_bar(what: str) -> Iterator[Share]:
 
     with Progress(console=_console(), transient=True) as bar:
         task = bar.add_task(what, total=1.0)
-        yield lambda share: bar.update(task, completed=share)
+        _BARS.append(lambda text: bar.update(task, description=text))
+        try:
+            yield lambda share: bar.update(task, completed=share)
+        finally:
+            _BARS.pop()
 
 
 @contextmanager

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from orchestration.foundation.basics.errors import listed
+from orchestration.foundation.basics.number_text import time_text
 from orchestration.foundation.basics.terminal import in_columns
 from orchestration.foundation.basics.unit_algebra import in_brackets
 from orchestration.systems.system.component import Component, Sampling, SamplingOnArrival, TaskSampling
@@ -16,6 +17,8 @@ from orchestration.systems.system.source import Source
 
 MAX_NAMES_IN_CELL = 6
 """names in a cell; more are counted"""
+MAX_RATES = 3
+"""rates in a sentence; more are counted"""
 
 
 def as_text(system: System, units: Mapping[str, str] = {}, follows: str = "", loops: Sequence[str] = ()) -> str:
@@ -66,6 +69,15 @@ def describe_rate(component: Component) -> str:
     if isinstance(component.sampling, SamplingOnArrival):
         return f"on {component.sampling.on}"
     return describe_sampling(component.sampling)
+
+
+def describe_clock(system: System) -> str:
+    """When the digital components of a system are sampled, with their names where there are several."""
+    sampled = {name: each for name, each in system.components.items() if each.sampling is not None}
+    if not sampled:
+        return "nothing is sampled"
+    rates = [f"{name} {describe_rate(each)}" for name, each in sampled.items()]
+    return f"sampled {describe_rate(*sampled.values()) if len(sampled) == 1 else listed(rates, MAX_RATES)}"
 
 
 def _task(of: PlacedTask) -> tuple[str, ...]:
@@ -167,14 +179,6 @@ def describe_varying(of: Varying, formatted: Callable[[float], str] | None = Non
 
 def _largest(jitter: Varying, spread: str) -> str:
     return describe_varying(jitter) if isinstance(jitter, Distribution) else f"{time_text(jitter)} {spread}"
-
-
-def time_text(value: float) -> str:
-    """A time with a readable unit."""
-    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
-        if value >= size or value == 0.0:
-            return f"{value / size:.9g} {unit}"
-    return f"{value / 1e-9:.9g} ns"
 
 
 def _fmu(component: Component) -> str:

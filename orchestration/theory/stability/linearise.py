@@ -34,6 +34,9 @@ class Linearised:
     rest: StateSpace
     """The rest of the loop, from sample to sample: inputs are the commands, outputs the measurements at the next
     sample, with holds, delays and the other components in between."""
+    radius: float
+    """The spectral radius of the whole loop, closed, over a period, with what its halves leave out: below 1 small
+    deviations decay."""
 
 
 def linearise(request: RequestLike, component: str | None = None) -> Linearised:
@@ -80,4 +83,5 @@ def _cut_open(loop: AtRest, name: str) -> Linearised:
         rest=StateSpace(
             A=A, B=B, C=C, D=np.array(whole[size:, size:]), dt=dt, inputs=port.outputs, outputs=port.inputs
         ),
+        radius=float(np.abs(np.linalg.eigvals(period_map(loop))).max(initial=0.0)),
     )  # fmt: skip

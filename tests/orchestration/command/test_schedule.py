@@ -73,7 +73,8 @@ def test_the_document_has_each_task_and_message_by_the_names_that_are_fixed(main
 
 
 def test_the_table_has_a_row_for_each_and_marks_unknown_values(main: Main, file: Path) -> None:
-    lines = main("schedule", str(file), "--until", "0.1").stdout.splitlines()
+    answer, *lines = main("schedule", str(file), "--until", "0.1").stdout.splitlines()
+    assert answer == "deadlines missed in 100 ms: cpu.telemetry 100 %; cpu busy 100 %"
     cells = lines[0].split()
     assert cells[0] == "task"
     assert "bound" in cells

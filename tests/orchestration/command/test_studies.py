@@ -57,10 +57,11 @@ def flown(swept: tuple[Path, Done], folder: Path) -> Path:
 
 
 def test_a_study_is_run_inspected_and_exported(flown: Path, swept: tuple[Path, Done], main: Main) -> None:
-    assert swept[1].stdout == f"{STORE}: 6 runs, 6 of them new\n"
+    answer = "6 bounded of 6 runs"
+    assert swept[1].stdout == f"{answer}\n{STORE}: 6 runs, 6 of them new\n"
     told = [line for line in swept[1].stderr.splitlines() if " of 6 runs" not in line]  # or how far, if slow
     assert told == ["follows the trajectory that UnifiedController has built in"]
-    assert main("status", "study.toml").stdout == f"{STORE}: 6 of 6 runs, 0 failed, 0 missing\n"
+    assert main("status", "study.toml").stdout == f"{answer}\n{STORE}: 6 of 6 runs, 0 failed, 0 missing\n"
     exported = main("export", "study.toml").stdout.splitlines()
     assert exported == [str(STORE.parent / "runs.parquet"), str(STORE.parent / "runs.csv")]
     parquet = pd.read_parquet(flown / exported[0])
@@ -87,7 +88,7 @@ def test_status_tells_how_far_a_sweep_in_another_process_is(folder: Path, main: 
         told = main("status", "study.toml").stdout
         assert running.poll() is None
         kill(running.pid)
-    found = re.fullmatch(rf"{STORE}: (\d+) of {RUNS} runs, 0 failed, (\d+) missing\n", told)
+    found = re.fullmatch(rf"\d+ bounded of {RUNS} runs\n{STORE}: (\d+) of {RUNS} runs, 0 failed, (\d+) missing\n", told)
     assert found is not None, told
     done, missing = map(int, found.groups())
     assert 1 <= done < RUNS
@@ -214,14 +215,20 @@ def test_limit_prints_both_figures_notes_that_they_differ_and_draws_them_on_requ
     assert done.stderr.splitlines()[-4:] == [*map(str, pictures)]
     for picture in pictures:
         assert (tmp_path / picture).read_bytes().startswith((b"\x89PNG", b"<?xml"))
-    lines = done.stdout.splitlines()
+    answer, *lines = done.stdout.splitlines()
+    assert re.fullmatch(
+        r"period not good even at \S+ ms, where the scan begins: bounded, ultimate_bound = \S+ m, expected < 0\.05 m "
+        r"\(scan 5 ms, tolerance \S+ ms\)",
+        answer,
+    )
     found = {line.split()[0]: line.split(maxsplit=1)[1] for line in lines}
-    assert float(found["local_limit"]) == pytest.approx(0.080, abs=0.0005)
+    local, unit = found["local_limit"].split()
+    assert (float(local), unit) == (pytest.approx(80.0, abs=0.5), "ms")
     assert found["large_signal_limit"] == "-"
     assert not {"continuous", "flies_above", "refuted_limit", "confidence"} & found.keys()
-    assert (float(found["horizon"]), float(found["scan"]), found["tried"]) == (0.05, 0.005, "5 values")
+    assert (found["horizon"], found["scan"], found["tried"]) == ("50 ms", "5 ms", "5 values")
     assert "the first value of the range (fails, bounded: ultimate_bound = " in found["note"]
-    assert found["note"].endswith(f"; the local limit is {float(found['local_limit']):.6g} s")
+    assert found["note"].endswith(f"; the local limit is {float(local) / 1e3:.6g} s")
 
 
 @pytest.mark.parametrize(

@@ -106,7 +106,10 @@ def test_nothing_is_run_twice_and_the_result_stays(table: str, folder: Path, mai
     before = (folder / "out" / "cells.csv").read_bytes()
     done = main("compare", folder / "small.toml", "--native", "--out", folder / "out", "--no-figures", "--json")
     assert "48 runs, 0 of them new" in done.stderr
-    assert len(json.loads(done.stdout)["cells"]) == CELLS
+    document = json.loads(done.stdout)
+    assert len(document["cells"]) == CELLS
+    assert document["verdict"].startswith("half of the runs survive over period: coupled to ")
+    assert document["verdict"].endswith("; base, nominal (1 more below)")
     assert (folder / "out" / "cells.csv").read_bytes() == before
 
 
@@ -115,6 +118,7 @@ def test_a_rerun_of_one_cell_is_what_is_in_the_store(table: str, folder: Path, m
     found = json.loads(main(*command).stdout)
     assert (found["controller"], found["condition"], found["value"]) == ("uncoupled", "noise", 0.02)
     assert found["same_as_stored"] is True
+    assert found["verdict"] == f"{found['survives']} of 6 runs survive, {found['settles']} settle"
 
 
 def test_a_cell_with_another_count_or_median_is_not_the_same() -> None:

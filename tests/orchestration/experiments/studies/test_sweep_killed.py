@@ -62,7 +62,7 @@ def test_a_killed_sweep_leaves_no_workers_runs_only_what_is_missing_and_ends_wit
         before = {found["design_index"]: found["duration"] for found in store.rows()}
     monkeypatch.chdir(folder)
     done = main("sweep", "study.toml", "--engine", "compiled")
-    assert done.stdout == f"{STORE}: {RUNS} runs, {RUNS - there} of them new\n"
+    assert done.stdout.splitlines()[1:] == [f"{STORE}: {RUNS} runs, {RUNS - there} of them new"]
     assert bits(folder / STORE) == reference
     with open_for_reading(folder / STORE) as store:
         after = {found["design_index"]: found["duration"] for found in store.rows()}
@@ -104,7 +104,7 @@ def test_a_run_whose_worker_is_killed_from_outside_stops_the_sweep_and_has_no_ro
     assert rows_in(tmp_path / STORE) == 0
     monkeypatch.delenv(WAIT)
     monkeypatch.chdir(tmp_path)
-    assert main("sweep", "study.toml", "--engine", "compiled").stdout == f"{STORE}: 1 runs, 1 of them new\n"
+    assert f"{STORE}: 1 runs, 1 of them new\n" in main("sweep", "study.toml", "--engine", "compiled").stdout
 
 
 @in_test_all

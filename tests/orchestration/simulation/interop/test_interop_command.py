@@ -74,7 +74,8 @@ def test_a_tool_by_name_is_run_alone_and_its_row_printed(tmp_path: Path) -> None
     for model in MODELS:
         fmus.locate(model)  # a build would be announced
     done = quadcosim("interop", *SHORT, "--tool", "fmucontainer -sequential", cwd=tmp_path)
-    rows = done.stdout.splitlines()
+    answer, *rows = done.stdout.splitlines()
+    assert answer == "1 tool agrees with this project's master, within 1e-09"
     assert len(rows) == 3
     assert rows[2].startswith("| fmucontainer -sequential | gauss-seidel | exchanged")
     assert messages_of(done) == []

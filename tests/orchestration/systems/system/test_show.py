@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from orchestration.foundation.basics.number_text import time_text
 from orchestration.simulation.figures import diagram
-from orchestration.systems.system.description import as_text, time_text
+from orchestration.systems.system.description import as_text
 from orchestration.systems.system.file import load_system
 from tests.commands import Main
 from tests.pictures import expect_picture

@@ -2,6 +2,7 @@
 
 import functools
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -220,6 +221,11 @@ def test_the_command_writes_what_it_checks(
     document = json.loads(output_of(capsys, "margin", file, *slow, "--of", COMMAND, "--out", path, "--json"))
     assert document["certified"] == pytest.approx(0.95 * document["breaking"], rel=1e-6)
     assert document["certificate"] == str(path)
+    assert re.fullmatch(
+        rf"{re.escape(COMMAND)}: every sequence up to \S+ ms is stable, "
+        r"one of \S+ ms breaks the loop \(small deviations\)",
+        document["verdict"],
+    )
     text = output_of(capsys, "margin", "--check", path, file, *slow)
     assert f"late               0 to {document['certified']:.9g} s, any number of times in a row" in text
     assert "connections.command.delay_jitter of this system" in text

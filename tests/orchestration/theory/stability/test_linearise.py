@@ -152,5 +152,7 @@ def test_the_command_writes_the_matrices_that_python_has(main: Main) -> None:
         written = document[half]
         assert {name: written[name] for name in "ABCD"} == {name: getattr(found, name).tolist() for name in "ABCD"}
         assert (written["dt"], written["inputs"], written["outputs"]) == (found.dt, [*found.inputs], [*found.outputs])
+    assert loop.radius == pytest.approx(np.abs(np.linalg.eigvals(closed(loop))).max(), rel=1e-9)
     lines = main("linearise", file).stdout.splitlines()
-    assert lines[1].endswith(f"{len(loop.rest.A)} states, every {loop.rest.dt:g} s")
+    assert lines[0].startswith(f"stable: spectral radius {loop.radius:.4g}, sampled every ")
+    assert lines[2].endswith(f"{len(loop.rest.A)} states, every {loop.rest.dt:g} s")

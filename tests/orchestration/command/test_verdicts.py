@@ -1,0 +1,98 @@
+"""The sentences that commands begin with: their units, and what they say of an answer that is less than it seems."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from orchestration.command import verdicts
+from orchestration.experiments.limits.evaluation import Evaluation
+from orchestration.experiments.limits.limit_result import Limit
+from orchestration.foundation.basics import terminal
+from orchestration.foundation.basics.number_text import quantity
+
+GOOD = Evaluation(value=0.035250000000000004, outcome="settled", divergence_time=None, flew=1, runs=1, share=None)
+BAD = replace(GOOD, value=0.0355, outcome="diverged", divergence_time=3.0, flew=0)
+LIMIT = Limit(
+    of="period", unit="s", local_limit=None, local_limit_outside=None, large_signal_limit=GOOD.value,
+    refuted_limit=None, horizon=30.0, tolerance=0.0005, scan=0.005, confidence=None, seeds=1, flies_above=(),
+    continuous=None, tried=(GOOD, BAD), note="",
+)  # fmt: skip
+RESOLUTION = "(scan 5 ms, tolerance 0.5 ms)"
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "expected"),
+    [
+        (0.035250000000000004, "s", "35.25 ms"),
+        (0.99999, "s", "1 s"),
+        (0.0, "m", "0 m"),
+        (-0.0012, "m", "-1.2 mm"),
+        (1e-12, "s", "0.001 ns"),
+        (1234.56, "N.m", "1235 N.m"),
+        (0.25, "1", "0.25"),
+        (0.25, None, "0.25"),
+    ],
+)
+def test_a_number_has_few_digits_and_a_prefix_where_its_unit_takes_one(
+    value: float, unit: str | None, expected: str
+) -> None:
+    assert quantity(value, unit) == expected
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({}, f"period good up to 35.25 ms; diverges at 35.5 ms {RESOLUTION}"),
+        (
+            {"flies_above": (0.04,)},
+            f"period good up to 35.25 ms; diverges at 35.5 ms; good again at 40 ms {RESOLUTION}",
+        ),
+        (
+            {"tried": (GOOD, replace(BAD, outcome="bounded", unmet="ultimate_bound = 0.06 m, expected < 0.05 m"))},
+            "period good up to 35.25 ms; not at 35.5 ms: bounded, ultimate_bound = 0.06 m, expected < 0.05 m "
+            f"{RESOLUTION}",
+        ),
+        (
+            {"large_signal_limit": None, "tried": (GOOD,)},
+            f"period good throughout the scan, up to 35.25 ms {RESOLUTION}",
+        ),
+        (
+            {"large_signal_limit": None, "tried": (replace(BAD, value=0.001),)},
+            f"period not good even at 1 ms, where the scan begins: diverged {RESOLUTION}",
+        ),
+        ({"seeds": 29}, f"period good up to 35.25 ms, all of 29 seeds; diverges at 35.5 ms {RESOLUTION}"),
+    ],
+)
+def test_a_limit_states_the_last_good_value_the_first_bad_one_and_its_resolution(
+    changes: dict[str, Any], expected: str
+) -> None:
+    assert verdicts.of_limit(replace(LIMIT, **changes)) == expected
+
+
+def test_a_radius_that_rounding_may_put_on_either_side_of_one_decides_nothing() -> None:
+    half = SimpleNamespace(A=[0.0], dt=0.01)
+
+    def sentence(radius: float) -> str:
+        loop = SimpleNamespace(name="law", component=half, rest=half, radius=radius)
+        return verdicts.of_linearised(cast("Any", loop))
+
+    assert sentence(0.9).startswith("stable: spectral radius 0.9, sampled every 10 ms: law with 1 state,")
+    assert sentence(1.1).startswith("unstable: spectral radius 1.1")
+    assert sentence(1.0 - 1e-9).startswith("not decidably stable: ")
+
+
+def test_means_that_are_infinite_are_the_answer() -> None:
+    found = SimpleNamespace(objectives={"J": None}, mean_square_radius=1.2, period=0.1, horizon=None)
+    assert verdicts.of_expected(cast("Any", found)) == "no mean of squares is finite: mean-square radius 1.2 in 100 ms"
+
+
+def test_progress_beside_a_bar_replaces_its_text_and_goes_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    printed: list[str] = []
+    monkeypatch.setattr(terminal, "inform", printed.append)
+    monkeypatch.setattr(terminal, "_draws", lambda: True)
+    with terminal.progress_bar("searching"):
+        terminal.inform_in_passing("period 0.01 s: settled")
+    terminal.inform_in_passing("period 0.02 s: settled")
+    assert printed == ["period 0.02 s: settled"]
