@@ -21,6 +21,8 @@ class Access:
     """None: co-simulation where it is offered, else model exchange"""
     solver: Solver | None = None
     """None: Dormand and Prince's, for model exchange"""
+    clock: str | None = None
+    """The periodic input clock that ticks at every sample, for event mode; None: the fastest, if there is any"""
 
     def __str__(self) -> str:
         return json.dumps(asdict(self))

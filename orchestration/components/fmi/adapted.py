@@ -4,6 +4,8 @@ import ctypes
 import functools
 import math
 from collections.abc import Mapping
+from fractions import Fraction
+from io import BytesIO
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -14,16 +16,19 @@ from fmu_kit.compiler.pack.c_compiler import OPTIONS, compiled_here
 from fmu_kit.libraries import cached_library
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.components.fmi.fmi3 import Fmi3Instance, StepsWithEnd
+from orchestration.components.fmi.instance import start_number
 from orchestration.components.fmi.read_description import Model
 from orchestration.components.fmi.slaves import WARNING
+from orchestration.components.fmi.transfers import Numbers
 from orchestration.foundation.basics.c_structures import address, constants, declared, expect_same_sizes
-from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError
+from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
 
 SOURCE = Path(__file__).with_name("adapter.c")
 TOLERANCE = 1e-6
 """Relative tolerance of the solver where neither the component nor the FMU states one"""
-_STAGES = 7
+_STAGES, _MOST_CLOCKS = 7, 64
 
 _EVENTS = {"enter_event": "EnterEventMode", "update": "UpdateDiscreteStates"}
 _STEP = {"leave_event": "EnterStepMode", "step": "DoStep"}
@@ -58,8 +63,11 @@ def library() -> Any:
     expect_same_sizes(loaded, _types())
     pointer, number = ctypes.c_void_p, ctypes.c_double
     loaded.step.argtypes = (pointer, number, number, ctypes.c_bool, pointer, pointer, pointer, pointer)
-    for name in ("begin", "settle", "restored", "release"):
+    for name in ("begin", "settle", "restored", "empty", "release"):
         getattr(loaded, name).argtypes = (pointer,)
+    size = ctypes.c_size_t
+    loaded.keep_values.argtypes = (pointer, ctypes.c_int, ctypes.c_char_p, size, ctypes.c_char_p, size)
+    loaded.size_of.restype = size
     return loaded
 
 
@@ -77,12 +85,15 @@ class AdaptedInstance(StepsWithEnd):
     """An instance in event mode, or for model exchange, that is called as one for co-simulation."""
 
     step_name: ClassVar[str] = "step"
+    _intervals: tuple[float, float] | None = None
+    """period and offset of the clock of every sample [s]; None: those that the FMU states"""
 
     def _expect_supported(self) -> None:
         super()._expect_supported()
         library()
 
     def _called(self) -> tuple[Any, ctypes.c_void_p]:
+        self._clocked: list[tuple[Numbers, Numbers]] = []  # start values, and the values of the last tick
         self._adapter = a = _types()["Adapter"](fmu=self._fmu.component, version=self.version, next=math.inf)
         exchange = self.model.interface == "model-exchange"
         if exchange:
@@ -98,8 +109,49 @@ class AdaptedInstance(StepsWithEnd):
         }  # fmt: skip
         for field, array in self._memory.items():
             setattr(a, field, address(array))
+        if self.model.ticking:
+            self._make_clocks_tick()
         self._load_step(library())
         return library(), ctypes.c_void_p(ctypes.addressof(a))
+
+    def _make_clocks_tick(self) -> None:
+        a, ticking = self._adapter, self.model.ticking
+        if len(ticking) > _MOST_CLOCKS:
+            raise UsageError(f"{self.path}: has {len(ticking)} clocks: expected at most {_MOST_CLOCKS}")
+        a.set_clock, a.clocks = self._address_of("SetClock"), len(ticking)
+        for i, clock in enumerate(ticking):
+            a.clock[i], a.ratio[i] = clock.reference, 1  # until the samples are known
+        bits = {clock.reference: 1 << i for i, clock in enumerate(ticking)}
+        numbers, kinds = _constants(), self._accesses()
+        table = []
+        for variable in self.description.modelVariables:
+            clocks = sum(bits[clock.valueReference] for clock in variable.clocks or ())
+            kind = self.enumerations if variable.type == "Enumeration" else variable.type
+            if not clocks or variable.causality not in ("output", "local") or kind not in kinds:
+                continue
+            elements = [v for v in self.variables.values() if v.whole == variable.name]
+            starts = np.array([start_number(v) for v in elements]).astype(self.stored[variable.type])
+            self._clocked.append((starts, starts.copy()))
+            table.append((numbers[kind], variable.valueReference, len(starts), clocks, address(self._clocked[-1][1])))
+        self._table = (_types()["Clocked"] * len(table))(*table)
+        a.clocked, a.clocked_count = ctypes.addressof(self._table), len(table)
+
+    def set_clock(self, period: float, offset: float, *, late: bool) -> None:
+        """As `Instance`."""
+        a, ticking = self._adapter, self.model.ticking
+        base, first = _exact(period, ticking[0].interval), _exact(offset, ticking[0].shift)
+        for i, clock in enumerate(ticking):
+            interval = base if i == 0 or clock.interval is None else clock.interval * NANOSECONDS
+            shift = first if i == 0 or clock.interval is None else clock.shift * NANOSECONDS
+            ratio, after = interval / base, (shift - first) / base
+            if ratio.denominator != 1 or after.denominator != 1 or after < 0:
+                raise UsageError(
+                    f"{self.name}: its clock {clock.name} ticks every {float(clock.interval or 0):g} s from "
+                    f"{float(clock.shift):g} s; expected multiples of the period of {ticking[0].name}, {period:g} s"
+                )
+            a.ratio[i], a.shift[i] = int(ratio), int(after)
+        a.starts_late = int(late)
+        self._intervals = (period, offset)
 
     def _sizes(self) -> tuple[int, int]:
         """The numbers of its continuous states and event indicators."""
@@ -135,6 +187,11 @@ class AdaptedInstance(StepsWithEnd):
         """As `NativeInstance`."""
         self._adapter.now = start
         super().enter_initialization(start, stop)
+        base = self.model.ticking[:1]
+        if self._intervals is not None and base[0].variability != "constant":
+            reference, period, offset = (ctypes.c_uint32 * 1)(base[0].reference), *self._intervals
+            self._call("setIntervalDecimal", reference, (ctypes.c_double * 1)(period))
+            self._call("fmi3SetShiftDecimal", self._fmu.component, reference, 1, (ctypes.c_double * 1)(offset))
 
     def exit_initialization(self) -> None:
         """As `NativeInstance`, and the first update of its discrete states."""
@@ -145,35 +202,56 @@ class AdaptedInstance(StepsWithEnd):
     def reset(self) -> None:
         """As `NativeInstance`."""
         super().reset()
-        self._continue(now=0.0, next=math.inf, h=0.0, events=0, ends=0)
+        self._continue(now=0.0, next=math.inf, h=0.0, events=0, ends=0, samples=0)
         self._adapter.running = self._adapter.in_event = 0
+        for starts, values in self._clocked:
+            values[:] = starts
 
     def save(self) -> bytes:
         """As `NativeInstance`: with its next event, the step of its solver, and the number of its events."""
         self._do("settle")
         a = self._adapter
-        own = np.array([a.now, a.next, a.h, a.events, a.ends])
-        return own.tobytes() + super().save()
+        own = np.array([a.now, a.next, a.h, a.events, a.ends, a.samples, a.starts_late, a.waiting_count])
+        waiting = (_types()["Waiting"] * a.waiting_count).from_address(a.waiting) if a.waiting_count else ()
+        parts = [own.tobytes(), *(values.tobytes() for _, values in self._clocked)]
+        for each in waiting:
+            sizes = 4 * each.references_count, self._size_of(each.type) * each.count
+            parts.append(np.array([each.type, each.references_count, each.count]).tobytes())
+            parts += [ctypes.string_at(place, n) for place, n in zip((each.references, each.values), sizes)]
+        return b"".join([*parts, super().save()])
 
     def restore(self, state: bytes) -> None:
         """As `NativeInstance`."""
-        size = 5 * np.dtype(np.float64).itemsize
-        super().restore(state[size:])
-        now, following, h, events, ends = np.frombuffer(state[:size]).tolist()
-        self._continue(now=now, next=following, h=h, events=int(events), ends=int(ends))
+        reader = BytesIO(state)
+        now, following, h, *counts = np.frombuffer(reader.read(8 * 8)).tolist()
+        events, ends, samples, late, waiting = map(int, counts)
+        self._continue(now=now, next=following, h=h, events=events, ends=ends, samples=samples, starts_late=late)
+        for _, values in self._clocked:
+            values[:] = np.frombuffer(reader.read(values.nbytes), dtype=values.dtype)
+        library().empty(self._component)
+        kept = []
+        for _ in range(waiting):
+            kind, references, count = np.frombuffer(reader.read(3 * 8), dtype=np.int64).tolist()
+            of, content = reader.read(4 * references), reader.read(self._size_of(kind) * count)
+            kept.append((kind, of, references, content, count))
+        super().restore(reader.read())
         self._adapter.tolerance = self._tolerance or TOLERANCE
         self._do("restored")
+        for values_of_one in kept:
+            library().keep_values(self._component, *values_of_one)
 
     def take_events(self) -> Floats:
-        """The times of the events since the last call [s], and no longer keep them."""
+        """As `Instance`."""
         a = self._adapter
-        times: Floats = np.array((ctypes.c_double * a.noted_count).from_address(a.noted or 0) if a.noted_count else [])
+        times = (ctypes.c_double * a.noted_count).from_address(a.noted) if a.noted_count else ()
+        taken: Floats = np.array([a.events - a.noted_count, *times])
         a.noted_count = 0
-        return times
+        return taken
 
-    def events_before(self) -> int:
-        """The number of events that have been taken, or not kept."""
-        return int(self._adapter.events - self._adapter.noted_count)
+    @staticmethod
+    def _size_of(kind: int) -> int:
+        """The bytes of a value of a type of the adapter."""
+        return int(library().size_of(kind))
 
     def close(self) -> None:
         """As `NativeInstance`."""
@@ -200,6 +278,11 @@ class AdaptedInstance(StepsWithEnd):
         status = self.guarded(getattr(self._library, function))(self._component)
         if status > WARNING:
             raise self.failure(function, status)
+
+
+def _exact(time: float, declared: Fraction | None) -> Fraction:
+    """A time [s] in nanoseconds: as the FMU declares it, if that is the same float."""
+    return exact_nanoseconds(time) if declared is None or float(declared) != time else declared * NANOSECONDS
 
 
 class Adapted2(AdaptedInstance, Fmi2Instance):

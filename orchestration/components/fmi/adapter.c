@@ -29,6 +29,16 @@ enum { Float64, Float32, Int8, UInt8, Int16, UInt16, Int32, UInt32, Int64, UInt6
 #define MOST_EVENTS 10000 /* in one step */
 #define MOST_STEPS 10000000
 
+typedef struct { /* a variable that has a value while its clocks tick; its value is that of their last tick */
+    int64_t type, reference, count, clocks; /* clocks: a bit for each */
+    void *values;
+} Clocked;
+
+typedef struct { /* values that are set when the next sample begins */
+    int64_t type, references_count, count;
+    void *references, *values;
+} Waiting;
+
 typedef struct {
     void *fmu; /* the instance */
     int64_t version;
@@ -49,6 +59,14 @@ typedef struct {
     int64_t evaluations;
     void *buffer;
     size_t buffer_size;
+    /* periodic input clocks: each step begins with a sample, but for one that leads to the first sample */
+    void *set_clock;
+    int64_t clocks, clock[64], ratio[64], shift[64]; /* one ticks at samples k ≡ shift modulo ratio */
+    int64_t samples, starts_late;
+    Clocked *clocked;
+    int64_t clocked_count;
+    Waiting *waiting;
+    int64_t waiting_count, waiting_room;
 } Adapter;
 
 typedef struct {
@@ -56,7 +74,8 @@ typedef struct {
     int64_t size;
 } Size;
 
-EXPORT const Size sizes[] = {{"Adapter", sizeof(Adapter)}, {"Size", sizeof(Size)}, {0}};
+#define SIZE_OF(structure) {#structure, sizeof(structure)}
+EXPORT const Size sizes[] = {SIZE_OF(Adapter), SIZE_OF(Clocked), SIZE_OF(Waiting), SIZE_OF(Size), {0}};
 
 typedef int Call(void *);
 typedef int SetNumber(void *, double);
@@ -67,6 +86,7 @@ typedef int Access3(void *, const uint32_t *, size_t, void *, size_t);
 typedef int Step(void *, double, double, bool, bool *, bool *, bool *, double *);
 typedef int Update2(void *, void *);
 typedef int Update3(void *, bool *, bool *, bool *, bool *, bool *, double *);
+typedef int SetClock(void *, const uint32_t *, size_t, const bool *);
 typedef int Completed2(void *, int, int *, int *);
 typedef int Completed3(void *, bool, bool *, bool *);
 
@@ -157,6 +177,102 @@ static int handle_time_events(Adapter *a, int64_t most) {
         if (status > WARNING || (status = handle_event(a)) > WARNING) return status;
     }
     return OK;
+}
+
+/* -- values ------------------------------------------------------------------------------------------------------- */
+
+static const size_t bytes[] = {8, 4, 1, 1, 2, 2, 4, 4, 8, 8, sizeof(bool), sizeof(int)};
+
+static int call(Adapter *a, void *function, const uint32_t *references, size_t n, void *values, size_t count) {
+    if (a->version == 3) return ((Access3 *)function)(a->fmu, references, n, values, count);
+    return ((Access2 *)function)(a->fmu, references, n, values);
+}
+
+static Clocked *clocked_of(Adapter *a, int type, uint32_t reference) {
+    for (Clocked *c = a->clocked; c < a->clocked + a->clocked_count; c++)
+        if (c->type == type && c->reference == reference) return c;
+    return NULL;
+}
+
+static int get(Adapter *a, int type, const uint32_t *references, size_t n, void *values, size_t count) {
+    int status = conclude(a);
+    bool some = false;
+    for (size_t i = 0; i < n && a->clocked_count; i++) some |= clocked_of(a, type, references[i]) != NULL;
+    if (status > WARNING || !some) return status > WARNING ? status : call(a, a->get[type], references, n, values, count);
+    size_t each = count / n;
+    for (size_t i = 0; i < n; i++) {
+        void *into = (char *)values + i * each * bytes[type];
+        Clocked *c = clocked_of(a, type, references[i]);
+        if (c) memcpy(into, c->values, each * bytes[type]);
+        else if ((status = call(a, a->get[type], references + i, 1, into, each)) > WARNING) return status;
+    }
+    return status;
+}
+
+/* Keep values for the next sample, in place of earlier ones of the same variables. */
+static int keep(Adapter *a, int type, const uint32_t *references, size_t n, const void *values, size_t count) {
+    Waiting *w = a->waiting, *end = w + a->waiting_count;
+    size_t size = n * sizeof *references;
+    while (w < end && (w->type != type || w->references_count != (int64_t)n || memcmp(w->references, references, size))) w++;
+    if (w == end) {
+        if (a->waiting_count == a->waiting_room) {
+            int64_t room = 2 * a->waiting_room + 8;
+            Waiting *more = realloc(a->waiting, (size_t)room * sizeof *w);
+            if (!more) return fail(a, NO_ROOM);
+            a->waiting = more, a->waiting_room = room;
+        }
+        w = a->waiting + a->waiting_count;
+        *w = (Waiting){type, (int64_t)n, (int64_t)count, malloc(size), malloc(count * bytes[type])};
+        if (!w->references || !w->values) return fail(a, NO_ROOM);
+        memcpy(w->references, references, size);
+        a->waiting_count++;
+    }
+    memcpy(w->values, values, count * bytes[type]);
+    return OK;
+}
+
+static void forget(Adapter *a) {
+    for (Waiting *w = a->waiting; w < a->waiting + a->waiting_count; w++) free(w->references), free(w->values);
+    a->waiting_count = 0;
+}
+
+static int set(Adapter *a, int type, const uint32_t *references, size_t n, void *values, size_t count) {
+    if (a->running && a->clocks) return keep(a, type, references, n, values, count);
+    if (a->running) {
+        size_t size = count * bytes[type];
+        if (size > a->buffer_size) {
+            void *buffer = realloc(a->buffer, size);
+            if (!buffer) return fail(a, NO_ROOM);
+            a->buffer = buffer, a->buffer_size = size;
+        }
+        int status = call(a, a->get[type], references, n, a->buffer, count);
+        if (status > WARNING || !memcmp(a->buffer, values, size) || a->ends) return status;
+        if ((status = enter_event(a)) > WARNING) return status;
+    }
+    return call(a, a->set[type], references, n, values, count);
+}
+
+/* A sample: clocks tick, inputs are set, and what has a value while they tick is read, all before the update. */
+static int sample(Adapter *a) {
+    uint32_t ticking[64];
+    bool on[64];
+    int64_t ticks = 0, which = 0;
+    int status = enter_event(a);
+    for (int64_t i = 0; i < a->clocks; i++)
+        if (a->samples >= a->shift[i] && (a->samples - a->shift[i]) % a->ratio[i] == 0) {
+            ticking[ticks] = (uint32_t)a->clock[i], on[ticks++] = true;
+            which |= (int64_t)1 << i;
+        }
+    a->samples++;
+    if (status <= WARNING && ticks) status = ((SetClock *)a->set_clock)(a->fmu, ticking, (size_t)ticks, on);
+    for (Waiting *w = a->waiting; status <= WARNING && w < a->waiting + a->waiting_count; w++)
+        status = call(a, a->set[w->type], w->references, (size_t)w->references_count, w->values, (size_t)w->count);
+    forget(a);
+    for (Clocked *c = a->clocked; status <= WARNING && c < a->clocked + a->clocked_count; c++) {
+        uint32_t reference = (uint32_t)c->reference;
+        if (c->clocks & which) status = call(a, a->get[c->type], &reference, 1, c->values, (size_t)c->count);
+    }
+    return status > WARNING ? status : conclude(a);
 }
 
 /* -- model exchange ------------------------------------------------------------------------------------------------ */
@@ -334,6 +450,8 @@ step(Adapter *a, double t, double h, bool unused, bool *event, bool *ends, bool 
     int idle = 0, status = conclude(a);
     *event = *early = *ends = false, *reached = end;
     if (!same(a->now, t)) a->now = t, a->fresh = 1;
+    if (a->starts_late) a->starts_late = 0;
+    else if (a->clocks && !a->ends && status <= WARNING) status = sample(a);
     for (int64_t i = 0; status <= WARNING; i++) {
         if ((status = handle_time_events(a, most)) > WARNING || a->ends || a->now >= end) break;
         double until = same(a->next, end) ? fmax(a->next, end) : fmin(a->next, end);
@@ -345,34 +463,7 @@ step(Adapter *a, double t, double h, bool unused, bool *event, bool *ends, bool 
     return status;
 }
 
-/* -- values -------------------------------------------------------------------------------------------------------- */
-
-static const size_t bytes[] = {8, 4, 1, 1, 2, 2, 4, 4, 8, 8, sizeof(bool), sizeof(int)};
-
-static int call(Adapter *a, void *function, const uint32_t *references, size_t n, void *values, size_t count) {
-    if (a->version == 3) return ((Access3 *)function)(a->fmu, references, n, values, count);
-    return ((Access2 *)function)(a->fmu, references, n, values);
-}
-
-static int get(Adapter *a, int type, const uint32_t *references, size_t n, void *values, size_t count) {
-    int status = conclude(a);
-    return status > WARNING ? status : call(a, a->get[type], references, n, values, count);
-}
-
-static int set(Adapter *a, int type, const uint32_t *references, size_t n, void *values, size_t count) {
-    if (a->running) {
-        size_t size = count * bytes[type];
-        if (size > a->buffer_size) {
-            void *buffer = realloc(a->buffer, size);
-            if (!buffer) return fail(a, NO_ROOM);
-            a->buffer = buffer, a->buffer_size = size;
-        }
-        int status = call(a, a->get[type], references, n, a->buffer, count);
-        if (status > WARNING || !memcmp(a->buffer, values, size) || a->ends) return status;
-        if ((status = enter_event(a)) > WARNING) return status;
-    }
-    return call(a, a->set[type], references, n, values, count);
-}
+/* -- the functions for values --------------------------------------------------------------------------------------- */
 
 #define OF_FMI3(type, c) \
     EXPORT int fmi3Get##type(Adapter *a, const uint32_t *r, size_t n, c *v, size_t m) { return get(a, type, r, n, v, m); } \
@@ -418,7 +509,16 @@ EXPORT int restored(Adapter *a) {
     return status > WARNING || a->step ? status : read_states(a);
 }
 
+/* Values that wait for a sample, when a state is restored, and what one of them takes. */
+EXPORT void empty(Adapter *a) { forget(a); }
+EXPORT int keep_values(Adapter *a, int type, const void *references, size_t n, const void *values, size_t count) {
+    return keep(a, type, references, n, values, count);
+}
+EXPORT size_t size_of(int type) { return bytes[type]; }
+
 EXPORT void release(Adapter *a) {
-    free(a->noted), free(a->buffer);
-    a->noted = NULL, a->buffer = NULL, a->noted_count = a->noted_room = 0, a->buffer_size = 0;
+    forget(a);
+    free(a->noted), free(a->buffer), free(a->waiting);
+    a->noted = NULL, a->buffer = NULL, a->waiting = NULL;
+    a->noted_count = a->noted_room = a->waiting_room = 0, a->buffer_size = 0;
 }

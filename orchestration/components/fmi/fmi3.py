@@ -1,4 +1,4 @@
-"""An instance of an FMI 3.0 FMU for co-simulation: scalars and arrays of numbers; no clocks, no event mode."""
+"""An instance of an FMI 3.0 FMU for co-simulation: scalars and arrays of numbers."""
 
 import ctypes
 from typing import Any, ClassVar
@@ -58,7 +58,7 @@ class Fmi3Instance(StepsWithEnd):
 
     def _expect_supported(self) -> None:
         super()._expect_supported()
-        self.model.expect_no_clocks()
+        self.model.expect_clocks_that_tick()
 
     def _enter(self, start: float, stop: float | None) -> None:
         self._call("enterInitializationMode", tolerance=self._tolerance, startTime=start, stopTime=stop)

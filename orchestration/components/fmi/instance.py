@@ -155,6 +155,22 @@ class Instance(Simulator, Protocol):
     def get(self, name: str) -> Value:
         """The value of one variable: a Boolean as one, a String as a text, any other as a float."""
 
+    def set_clock(self, period: float, offset: float, *, late: bool) -> None:
+        """Have its clocks tick at its samples, before initialisation: the first every `period` from `offset` on [s].
+
+        `late`: its first step leads to its first sample. Raises `UsageError` if other clocks do not fit.
+        """
+        raise UsageError(f"{self.name}: has no clock")
+
+    @property
+    def has_events(self) -> bool:
+        """Whether events within its FMU are noted."""
+        return self.model.interface != "co-simulation"
+
+    def take_events(self) -> Floats:
+        """The number of events within the FMU that were taken before, and the times of those since [s]."""
+        return np.zeros(1)
+
     def reset(self) -> None:
         """Return to the state after instantiation, with all parameters at their defaults, as far as the FMU does so."""
 

@@ -37,6 +37,14 @@ class _Server:
             result = (local or getattr(self.instance, name))(*arguments)
         return result
 
+    def _set_clock(self, period: float, offset: float, late: bool) -> None:
+        assert self.instance is not None
+        self.instance.set_clock(period, offset, late=late)
+
+    def _take_events(self) -> bytes:
+        assert self.instance is not None
+        return self.instance.take_events().tobytes()
+
     def _reader(self, names: tuple[str, ...]) -> None:
         assert self.instance is not None
         values: Floats = np.zeros(len(names))

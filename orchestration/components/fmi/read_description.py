@@ -87,6 +87,21 @@ class Variable:
         return self.variability == "constant" and self.causality == "local" and self.start is not None
 
 
+@dataclass(frozen=True, kw_only=True)
+class InputClock:
+    """A periodic input clock, which the importer makes tick."""
+
+    name: str
+    reference: int
+    variability: str
+    """constant, fixed or tunable: the importer may set an interval that is not constant"""
+    interval: Fraction | None
+    """Time between ticks [s]; None: it is not stated"""
+    shift: Fraction
+    """Time of its first tick [s]"""
+    priority: int
+
+
 @dataclass(frozen=True, kw_only=True, repr=False, eq=False)
 class Model:
     """An FMU file and its description; it is read once and compared by identity."""
@@ -128,7 +143,7 @@ class Model:
     @property
     def waits(self) -> bool:
         """Whether the time of its first sample is set by a parameter, and it does not sample in steps before."""
-        return self.follows_kit and self.has_clock and SAMPLE_OFFSET in self.variables
+        return bool(self.ticking) or (self.follows_kit and self.has_clock and SAMPLE_OFFSET in self.variables)
 
     @property
     def has_clock(self) -> bool:
@@ -203,11 +218,51 @@ class Model:
         parsed = {unit: named(unit, self.base_units(unit)) for unit in dict.fromkeys(declared.values())}
         return {name: parsed[unit] for name, unit in declared.items()}
 
-    def expect_no_clocks(self) -> None:
-        """Raise `UsageError` for an FMU with clocks, which tick in event mode only."""
+    @cached_property
+    def clocks(self) -> tuple[InputClock, ...]:
+        """Its periodic input clocks, by priority.
+
+        Raises `UsageError` for a clock of another kind: its ticks would be instants of their own.
+        """
+        if not any(variable.kind == "Clock" for variable in self.variables.values()):
+            return ()
+        root = read_root(read_archive(self.path, math.inf))  # fmpy does not read their intervals
+        types = {each.get("name"): each.attrib for each in root.iterfind("TypeDefinitions/ClockType")}
+        found = []
+        for element in root.iterfind("ModelVariables/Clock"):
+            declared = {**types.get(element.get("declaredType"), {}), **element.attrib}
+            causality, kind = declared.get("causality", "local"), declared.get("intervalVariability", "")
+            if causality != "input" or kind not in PERIODIC:
+                raise UsageError(
+                    f"{self.path}: {declared['name']} is a clock of causality {causality} and interval {kind}, whose "
+                    "ticks would be instants of their own; expected periodic input clocks: constant, fixed or tunable"
+                )
+            found.append(_input_clock(declared))
+        return tuple(sorted(found, key=lambda clock: clock.priority))
+
+    @cached_property
+    def ticking(self) -> tuple[InputClock, ...]:
+        """The clocks that tick as it is called, that of every sample first."""
+        if self.interface != "event-mode" or not self.clocks:
+            return ()
+        base = self._base_clock()
+        return (base, *(clock for clock in self.clocks if clock is not base))
+
+    def _base_clock(self) -> InputClock:
+        if self.access.clock is not None:
+            return next(clock for clock in self.clocks if clock.name == self.access.clock)
+        return min(self.clocks, key=lambda clock: clock.interval or math.inf)
+
+    def expect_clocks_that_tick(self) -> None:
+        """Raise `UsageError` for an FMU with clocks that do not tick as it is called."""
         clocks = [v.name for v in self.variables.values() if v.kind == "Clock"]
-        if clocks:
-            raise UsageError(f"{self.path}: has clocks, which are not supported: {', '.join(clocks)}; expected none")
+        if clocks and not self.ticking:
+            if "event-mode" not in declared_of(self.description):
+                raise UsageError(f"{self.path}: has clocks, but no event mode, in which they tick: {', '.join(clocks)}")
+            raise UsageError(
+                f"{self.path}: its clocks {', '.join(clocks)} do not tick: expected sampling = {{ fmu_clock = "
+                f'"{clocks[0]}" }}'
+            )
 
     def names(self, *causalities: str, kinds: tuple[Kind, ...] = NUMERIC) -> tuple[str, ...]:
         """Variables of these causalities and types, in the order of the description."""
@@ -299,6 +354,9 @@ def called(model: Model, access: Access) -> Model:
     interface = access.interface or next(iter(offered))
     if interface not in offered:
         raise UsageError(f"interface = {interface}: {model.name} does not offer it; expected {' or '.join(offered)}")
+    if access.clock is not None and access.clock not in [clock.name for clock in model.clocks]:
+        clocks = ", ".join(clock.name for clock in model.clocks) or "no clocks"
+        raise UsageError(f"sampling.fmu_clock = {access.clock}: {model.name} has {clocks}; expected one of its clocks")
     if access.solver is not None and interface != "model-exchange":
         raise UsageError(f"solver = {access.solver}: expected none with {interface}: {model.name} has its own")
     return replace(model, access=access, interface=interface)
@@ -329,6 +387,25 @@ def _read_model(path: Path, changed: int, size: int) -> Model:
         access=USUAL,
         interface=next(iter(declared_of(description))),
     )
+
+
+PERIODIC = ("constant", "fixed", "tunable")
+"""Interval variabilities of periodic clocks"""
+
+
+def _input_clock(declared: Mapping[str, str]) -> InputClock:
+    if "resolution" in declared and "intervalCounter" in declared:
+        unit = Fraction(1, int(declared["resolution"]))
+        interval: Fraction | None = int(declared["intervalCounter"]) * unit
+        shift = int(declared.get("shiftCounter", "0")) * unit
+    else:
+        interval = Fraction(declared["intervalDecimal"]) if "intervalDecimal" in declared else None
+        shift = Fraction(declared.get("shiftDecimal", "0"))
+    return InputClock(
+        name=declared["name"], reference=int(declared["valueReference"]),
+        variability=declared["intervalVariability"], interval=interval, shift=shift,
+        priority=int(declared.get("priority", "0")),
+    )  # fmt: skip
 
 
 _KINDS: dict[str, Kind] = {

@@ -136,9 +136,6 @@ def _text_of_component(name: str, component: Component, hashes: Mapping[str, str
         "parameters": {key: v for key, v in component.parameters.items() if key not in starts or v != starts[key]},
         "sampling": None if component.sampling is None else _content(component.sampling, hashes),
     }
-    for later in ("interface", "solver"):  # rows that were stored before these keys are still found
-        if content[later] is None:
-            del content[later]
     return _json(content)
 
 
@@ -154,7 +151,12 @@ def _shared_of(part: str, shared: Mapping[str, Any], hashes: Mapping[str, str]) 
 
 
 def _values_of(of: Any) -> dict[str, Any]:
-    return {field.name: getattr(of, field.name) for field in dataclasses.fields(of)}
+    values = {field.name: getattr(of, field.name) for field in dataclasses.fields(of)}
+    return {name: value for name, value in values.items() if name not in _LATER or value is not None}
+
+
+_LATER = ("interface", "solver", "fmu_clock")
+"""Keys without which rows were stored before there were any; those rows are still found"""
 
 
 def _content(of: Any, hashes: Mapping[str, str]) -> dict[str, Any]:

@@ -19,25 +19,27 @@ BYTES = 2**27
 
 
 class Event(NamedTuple):
-    """An event of one message, or of one job of a task."""
+    """An event of one message, of one job of a task, or within an FMU."""
 
     time: int
     """Time [ns]"""
     kind: str
     """One of `KINDS`"""
     what: str
-    """The name of the connection; COMPUTER.TASK for a job, NETWORK.MESSAGE for a frame"""
+    """The name of the connection; COMPUTER.TASK for a job, NETWORK.MESSAGE for a frame, the component for an event of
+    its FMU"""
     sample: int
-    """The index of the message, or of the job or frame"""
+    """The index of the message, of the job or frame, or of the event"""
 
 
 KINDS = (
     "sampled", "sent", "arrived", "lost",
     "released", "started", "preempted", "resumed", "finished", "missed", "skipped", "aborted",
-    "queued", "transmitted", "retransmitted",
+    "queued", "transmitted", "retransmitted", "event",
 )  # fmt: skip
-"""Kinds of events: of messages of connections, of jobs of tasks, and of frames of messages over networks"""
+"""Kinds of events: of messages, of jobs of tasks, of frames of messages over networks, and within FMUs"""
 SAMPLED, SENT, ARRIVED, LOST = range(4)
+EVENT = KINDS.index("event")
 
 
 @passable
@@ -46,9 +48,9 @@ class Events(Sequence[Event]):
     """Events in order, as columns: one object for all of them, as there may be millions."""
 
     names: tuple[str, ...]
-    """connections, tasks and messages that have events"""
+    """connections, tasks, messages and components that have events"""
     table: Integers
-    """shape (n, 4): time [ns], index in `KINDS`, index in `names`, index of the message, job or frame"""
+    """shape (n, 4): time [ns], index in `KINDS`, index in `names`, index of the message, job, frame or event"""
 
     @classmethod
     def of(cls, events: Iterable[Event]) -> "Events":

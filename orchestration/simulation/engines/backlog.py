@@ -1,15 +1,16 @@
 """Recorded rows and events of a run that have not been handed over, until a chunk of them is complete.
 
-Events of messages come from the engine, those of tasks and frames from the scheduler.
+Events of messages come from the engine, those of tasks and frames from the scheduler, those within FMUs from them.
 """
 
-from typing import Protocol
+from collections.abc import Sequence
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from orchestration.foundation.basics.simulator import Floats, Integers
 from orchestration.foundation.basics.times import nanoseconds, seconds
-from orchestration.foundation.recording.recording import BYTES, EVENTS, ROWS, Chunk, Events, Recorder
+from orchestration.foundation.recording.recording import BYTES, EVENT, EVENTS, ROWS, Chunk, Events, Recorder
 from orchestration.simulation.engines.running_system import RunningSystem
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.system.model import System
@@ -42,17 +43,19 @@ class _OnComputers:
 class RunEvents:
     """The events of a run that are not handed over yet."""
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, fmus: Sequence[str] = ()) -> None:
+        """`fmus` are the components whose FMUs have events."""
         connections = tuple(x.name for x in system.connections)
         self._on_computers = _OnComputers(system) if system.computers or system.networks else None
         self._first = len(connections)
         self._names = connections if self._on_computers is None else (*connections, *self._on_computers.names)
+        self.first_fmu, self._names = len(self._names), (*self._names, *fmus)
         self._kept: Integers = np.zeros((0, 4), dtype=np.int64)
 
     def with_messages(self, events: Integers, time: int) -> Events:
-        """Events of tasks and frames up to `time` [ns] and `events` of messages, as a table of `Events`, in order.
+        """Events of tasks and frames up to `time` [ns] and other `events`, as a table of `Events`, in order.
 
-        At one instant computers and networks come first.
+        At one instant computers and networks come first, then messages.
         """
         if self._on_computers is not None:
             found = self._on_computers.up_to(time)
@@ -76,6 +79,17 @@ def _in_order(events: Integers) -> Integers:
     if (events[1:, 0] >= events[:-1, 0]).all():
         return np.array(events)
     return events[np.argsort(events[:, 0], kind="stable")]
+
+
+@runtime_checkable
+class _HasEvents(Protocol):
+    """A simulator that may have events within its steps."""
+
+    has_events: bool
+    """whether it has any"""
+
+    def take_events(self) -> Floats:
+        """The number of events that were taken before, and the times of those since [s]."""
 
 
 class Tables(Protocol):
@@ -141,24 +155,29 @@ class Backlog:
 
     def __init__(self, running: RunningSystem, tables: Tables, recorder: Recorder) -> None:
         self._running, self.tables, self._recorder = running, tables, recorder
-        self._run_events = RunEvents(running.system)
+        self._fmus = {
+            name: one for name, one in running.simulators.items() if isinstance(one, _HasEvents) and one.has_events
+        }
+        self._run_events = RunEvents(running.system, tuple(self._fmus))
+        self._of_fmus: Integers = np.zeros((0, 4), dtype=np.int64)
         self.handed_over: int | None = None
         """up to this time [ns]; None: nothing has been handed over"""
         recorder.begin(running.columns)
 
     def pending(self) -> Chunk:
         """What was recorded since the last chunk was handed over, without messages that are sent later."""
-        events, _ = self._past_and_later()
+        events, of_fmus = self._past_and_later()[0], self._past(self._taken_events())[0]
         return Chunk(
             columns=self._running.columns,
             rows=self.tables.rows_with_sources(),
-            events=self._run_events.with_messages(events, self._running.now),
+            events=self._run_events.with_messages(np.concatenate([events, of_fmus]), self._running.now),
         )
 
     def hand_over(self) -> None:
         """Hand the pending chunk over to the recorder."""
         self._recorder.take(self.pending())
         self.tables.replace_events(self._past_and_later()[1])
+        self._of_fmus = self._past(self._of_fmus)[1]
         self.tables.replace_rows(b"")
         self.handed_over = self._running.now
         self._run_events.discard_until(self._running.now)
@@ -169,8 +188,12 @@ class Backlog:
             self.hand_over()
 
     def drop_later_events(self) -> None:
-        """Drop the events of messages that would be sent after the end: in Jacobi order they are noted before."""
+        """Drop the events of messages that would be sent after the end: in Jacobi order they are noted before.
+
+        A sampled component may have reached its next sample, so FMUs have later events too.
+        """
         self.tables.replace_events(self._past_and_later()[0])
+        self._of_fmus = self._past(self._taken_events())[0]
 
     def has_row(self) -> bool:
         """Whether a row was recorded, be it handed over or not."""
@@ -182,19 +205,39 @@ class Backlog:
             self._running.board.row[0] = seconds(self._running.now)
             self.tables.replace_rows(self._running.board.row.tobytes())
 
+    def events(self) -> Integers:
+        """All events that have not been handed over, as a table."""
+        return np.concatenate([self.tables.events(), self._taken_events()])
+
     def restore(self, rows: bytes, events: Integers, *, handed_over: int | None) -> None:
-        """Continue with the rows and events of a paused run."""
+        """Continue with the rows and `events` of a paused run."""
         self.tables.replace_rows(rows)
-        self.tables.replace_events(events)
+        within = events[:, 1] == EVENT
+        self.tables.replace_events(events[~within])
+        self._of_fmus = events[within]
         self.handed_over = handed_over
         if handed_over is not None:
             self._run_events.discard_until(handed_over)
 
     def _past_and_later(self) -> tuple[Integers, Integers]:
-        """The events up to now, and those of messages that are sent later."""
-        table = self.tables.events()
+        """The events of messages up to now, and of those that are sent later."""
+        return self._past(self.tables.events())
+
+    def _past(self, table: Integers) -> tuple[Integers, Integers]:
+        """The events of a table up to now, and the later ones."""
         past = table[:, 0] <= self._running.now
         return (table, table[:0]) if past.all() else (table[past], table[~past])
+
+    def _taken_events(self) -> Integers:
+        """The events within FMUs, after those that have happened by now were taken from them."""
+        for place, (name, fmu) in enumerate(self._fmus.items(), self._run_events.first_fmu):
+            first, *times = fmu.take_events().tolist()
+            sampling = self._running.system.components[name].sampling
+            ratio = 1.0 if sampling is None else sampling.clock_ratio
+            found = [(nanoseconds(t / ratio), EVENT, place, int(first) + k) for k, t in enumerate(times)]
+            if found:
+                self._of_fmus = np.concatenate([self._of_fmus, np.array(found, dtype=np.int64)])
+        return self._of_fmus
 
 
 def rows_of_a_chunk(running: RunningSystem) -> int:

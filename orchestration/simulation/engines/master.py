@@ -104,7 +104,7 @@ class Master:
             "row": self.board.row.tolist(),
             "handed_over": self.backlog.handed_over,
             "channels": [channel.state() for channel in self.running.channels],
-            "events": self.backlog.tables.events().ravel().tolist(),
+            "events": self.backlog.events().ravel().tolist(),
         }
 
     def saved(self) -> dict[str, bytes]:

@@ -4,13 +4,12 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from pathlib import Path
 
 from fmu_kit.trajectory import Trajectory
 from orchestration.components.building import fmus
 from orchestration.components.fmi.instance import number_of
 from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD, TRAJECTORY
-from orchestration.components.fmi.read_description import NUMERIC, Model, called, read_model
+from orchestration.components.fmi.read_description import NUMERIC, InputClock, Model, called, read_model
 from orchestration.foundation.basics.errors import UsageError, prefixed
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import Grid, exact_nanoseconds
@@ -23,7 +22,7 @@ from orchestration.systems.schedule.fixed_step import FixedStep
 from orchestration.systems.schedule.streams import VALUE, Streams
 from orchestration.systems.signals.library import make_signal
 from orchestration.systems.system.check import check, connect_references, describe_references, recorded_variables
-from orchestration.systems.system.component import Component, SamplingOnArrival, has_scheduled_instants
+from orchestration.systems.system.component import Component, Sampling, SamplingOnArrival, has_scheduled_instants
 from orchestration.systems.system.connection import variable_of
 from orchestration.systems.system.model import System, expressions
 from orchestration.systems.system.request import Request, errors_in_own_terms
@@ -60,11 +59,6 @@ class ResolvedRequest(CheckedSystem):
     """Request as the user wrote it"""
     models: Mapping[str, Model]
     """Models of the FMUs, by component"""
-
-    @property
-    def paths(self) -> dict[str, Path]:
-        """The paths of the FMUs, by component."""
-        return {name: model.path for name, model in self.models.items()}
 
     @property
     def foreign(self) -> list[str]:
@@ -143,6 +137,8 @@ def columns_of(system: System) -> tuple[str, ...]:
 def _expect_clock(name: str, component: Component, model: Model) -> None:
     """Raise `UsageError` for a clock that the FMU does not have, or for parameters of it that the master sets."""
     sampling = component.sampling
+    if model.ticking:
+        _expect_ticks(name, sampling, model.ticking[0])
     if sampling is None or not model.has_clock:
         if sampling is not None and sampling.clock == "fmu":
             raise UsageError(f"components.{name}.sampling.clock = fmu: expected an FMU with {SAMPLE_PERIOD}")
@@ -153,6 +149,24 @@ def _expect_clock(name: str, component: Component, model: Model) -> None:
                 f"components.{name}.parameters.{parameter}: expected sampling instead; the master sets it, to 0 "
                 "with clock master (the master decides when to sample) and to that of sampling with clock fmu"
             )
+
+
+def _expect_ticks(name: str, sampling: Sampling | None, clock: InputClock) -> None:
+    """Raise `UsageError` for samples at which a clock of an FMU cannot tick."""
+    place = f"components.{name}.sampling"
+    if sampling is None:
+        raise UsageError(
+            f'{place}: expected {{ fmu_clock = "{clock.name}" }}: the FMU has clocks, which tick at samples'
+        )
+    if clock.variability == "constant" and not has_scheduled_instants(sampling):
+        for key, value, fixed in (
+            ("period", sampling.period, clock.interval),
+            ("offset", sampling.offset, clock.shift),
+        ):
+            if fixed is not None and value != float(fixed):
+                raise UsageError(
+                    f"{place}.{key} = {value:g}: expected {float(fixed):g}, that of the constant {clock.name}"
+                )
 
 
 def _parameters(system: System, models: Mapping[str, Model]) -> dict[str, float]:

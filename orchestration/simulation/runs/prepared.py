@@ -223,6 +223,8 @@ def set_parameters(instance: Instance, component: Component) -> None:
 def _set_clock(instance: Instance, component: Component, model: Model, first: int) -> None:
     """Have a component built on `fmu_kit` sample at every step from its `first` sample [ns] on, or by its own clock."""
     sampling = component.sampling
+    if sampling is not None and model.ticking:
+        instance.set_clock(sampling.period, sampling.offset, late=first > 0)
     if sampling is None or not model.has_clock:
         return
     if sampling.clock == "fmu":

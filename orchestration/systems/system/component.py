@@ -43,6 +43,9 @@ class Sampling:
     clock: Clock = "master"
     """The clock by which it samples: that of the master, or of the FMU, by its parameters sample_period and
     sample_offset."""
+    fmu_clock: str | None = None
+    """The periodic input clock of an FMU of FMI 3.0 that ticks at each sample; in a file period and offset are then by
+    default its interval and shift."""
 
     def __post_init__(self) -> None:
         require_positive(self, "period", "clock_ratio")
@@ -54,6 +57,7 @@ class Sampling:
             self.expect_jitter_within_period()
         if self.clock == "fmu":
             require_own_clock(self)
+            require(self.fmu_clock is None, "fmu_clock", self.fmu_clock, "none beside clock = fmu")
 
     @property
     def true_period(self) -> Fraction:
@@ -140,9 +144,10 @@ class Component:
     @property
     def access(self) -> Access:
         """How its FMU is called."""
-        if self.interface is None and self.solver is None:
+        clock = None if self.sampling is None else self.sampling.fmu_clock
+        if self.interface is None and self.solver is None and clock is None:
             return USUAL
-        return Access(interface=self.interface, solver=self.solver)
+        return Access(interface=self.interface or ("event-mode" if clock else None), solver=self.solver, clock=clock)
 
     def __post_init__(self) -> None:
         if self.tolerance is not None:
@@ -152,6 +157,8 @@ class Component:
             require(is_at_least(self.step, 1.0), "step", self.step, "at least a nanosecond")
         if self.sampling is not None:
             require(self.step is None, "step", self.step, "none beside sampling, whose period it follows")
+            if self.sampling.fmu_clock is not None and self.interface is not None:
+                require(self.interface == "event-mode", "interface", self.interface, "event-mode beside fmu_clock")
 
 
 Values = Mapping[str, Parameter]

@@ -5,8 +5,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from orchestration.components.building.models import PATHS
+from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.basics.documents import read_toml
-from orchestration.foundation.basics.errors import UsageError, prefixed
+from orchestration.foundation.basics.errors import UsageError, expected_name, prefixed
 from orchestration.foundation.basics.typed_tables import fields_of, parsed, schema_of, table_of
 from orchestration.systems.system.choices import Order
 from orchestration.systems.system.component import Component, Sampling, SamplingOnArrival, flattened, parameters_in
@@ -25,7 +26,11 @@ DistributionTable = table_of(Distribution, file=(str | None, None))
 """The path of a trace is text, as written"""
 
 
-class SamplingTable(table_of(Sampling, within=[DistributionTable], period=(float | None, None))):  # type: ignore[misc]
+_OFTEN = {"period": (float | None, None), "offset": (float | None, None)}
+"""Keys that may follow from a message, or from a clock of the FMU"""
+
+
+class SamplingTable(table_of(Sampling, within=[DistributionTable], **_OFTEN)):  # type: ignore[misc]
     """When a digital task runs: every period, or whenever a message arrives."""
 
     on: str | None = None
@@ -119,16 +124,30 @@ def _component(name: str, table: Any, folder: Path) -> Component:
     keys["fmu"] = str(folder / table.fmu) if table.fmu.endswith(PATHS) else table.fmu
     keys["parameters"] = parameters_in(table.parameters, f"{place}.parameters")
     if table.sampling is not None:
-        keys["sampling"] = _sampling(f"{place}.sampling", table.sampling, folder)
+        keys["sampling"] = _sampling(f"{place}.sampling", table.sampling, folder, keys["fmu"])
     return _part(place, Component, keys)
 
 
-def _sampling(place: str, table: Any, folder: Path) -> Sampling:
+def _sampling(place: str, table: Any, folder: Path, fmu: str) -> Sampling:
     keys = {key: value for key, value in with_distributions(f"{place}.", table, folder).items() if value is not None}
+    if table.fmu_clock is not None and table.on is None:
+        keys = {**_of_clock(place, table.fmu_clock, fmu), **keys, "fmu_clock": table.fmu_clock}
     if table.on is None:
         return _part(place, Sampling, keys)
     require(table.period is None, f"{place}.period", table.period, "none beside on: messages say when it runs")
     return _part(place, SamplingOnArrival, keys)
+
+
+def _of_clock(place: str, clock: str, fmu: str) -> dict[str, float]:
+    """Period and offset of an FMU's clock [s], as far as the FMU states them."""
+    if not Path(fmu).is_file():
+        return {}
+    with prefixed(f"{place}.fmu_clock = {clock}: "):
+        known = {each.name: each for each in read_model(fmu).clocks}
+    if clock not in known:
+        raise UsageError(f"{place}.fmu_clock = {clock}: {expected_name(clock, list(known))}")
+    interval = known[clock].interval
+    return {} if interval is None else {"period": float(interval), "offset": float(known[clock].shift)}
 
 
 def _computer(name: str, table: Any, folder: Path) -> Computer:

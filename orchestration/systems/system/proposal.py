@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.components.building.models import PATHS
-from orchestration.components.fmi.read_description import Model
+from orchestration.components.fmi.access import Access
+from orchestration.components.fmi.read_description import Model, called, declared_of
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.systems.system.connection import component_of
 from orchestration.systems.system.matching import Match, match
@@ -59,17 +60,17 @@ def propose(fmus: Sequence[tuple[str, Model]], folder: Path, resources: Proposed
     Each FMU is given by the path or name that the user wrote, with its model description.
 
     An FMU whose outputs are all discrete is proposed as sampled, and so is the controller of a loop; any other in
-    continuous time. Raises `UsageError` without any FMU, and for one with clocks.
+    continuous time. Raises `UsageError` without any FMU, and for one whose clocks cannot tick.
     """
     resources = resources or ProposedResources()
     if not (fmus or resources.tables):
         raise UsageError("expected at least one FMU")
+    fmus = [(text, _whose_clocks_tick(model)) for text, model in fmus]
     models = [model for _, model in fmus]
-    for model in models:
-        model.expect_no_clocks()
     named = dict(zip(component_names(models), models))
     matches = match(named)
     sampled = {name: "all its outputs are discrete" for name, model in named.items() if _is_discrete(model)}
+    sampled |= {name: "its clock ticks then" for name, model in named.items() if model.ticking}
     guessed = _controllers(named, matches.matches, sampled)
     sampled |= guessed
     stop = max((experiment(model, "stopTime") or 0.0 for model in models), default=0.0) or STOP
@@ -100,6 +101,14 @@ def propose(fmus: Sequence[tuple[str, Model]], folder: Path, resources: Proposed
         ),
         undecided=undecided,
     )
+
+
+def _whose_clocks_tick(model: Model) -> Model:
+    """The FMU, in event mode if it has clocks; raises `UsageError` for one whose clocks cannot tick."""
+    if model.clocks and "event-mode" in declared_of(model.description):
+        return called(model, Access(interface="event-mode"))
+    model.expect_clocks_that_tick()
+    return model
 
 
 def _resources(tables: Mapping[str, Any]) -> list[list[str]]:
@@ -168,7 +177,11 @@ def _component(name: str, fmu: str, model: Model, folder: Path, sampled: str | N
     place = _relative(Path(fmu), folder) if fmu.endswith(PATHS) else fmu
     lines = [f"[components.{name}]", f"fmu = {_text(place)}"]
     step = experiment(model, "stepSize")
-    if sampled is not None:
+    if model.ticking:
+        clock = model.ticking[0]
+        stated = "" if clock.interval is not None else f", period = {step or PERIOD!r}"
+        lines.append(f"sampling = {{ fmu_clock = {_text(clock.name)}{stated} }}")
+    elif sampled is not None:
         note = "" if step else "; its FMU does not say how often"
         lines.append(f"sampling = {{ period = {step or PERIOD!r} }}    # sampled, as {sampled}{note}")
     else:

@@ -9,18 +9,20 @@
 #include <string.h>
 
 /* Value references: time is 0, X and DX two each, Y is p·u + q·w + x, C counts. */
-enum { T, X1, X2, DX1, DX2, U, W, P, Q, Y, COUNT = 20, UPDATES };
+enum { T, X1, X2, DX1, DX2, U, W, P, Q, Y, START, PERIOD, COUNT = 20, UPDATES, MISUSED, TICKS, CLOCK = 30 };
 
 typedef struct {
-    double v[10];
+    double v[11];
+    int ticking[2], ticks[2], misused; /* of the clocked law: its clocks, how often they ticked, accesses without them */
+    double period;
     int count, updates, kind, mode; /* mode 0: before the end of initialisation, 1: event mode, 2: between events */
     double next;
 } Model;
 
-static const char *kinds[] = {"integrator", "ball", "stair", "oscillator", "gain", "restless", "busy", NULL};
-enum { INTEGRATOR, BALL, STAIR, OSCILLATOR, GAIN, RESTLESS, BUSY };
+static const char *kinds[] = {"integrator", "ball", "stair", "oscillator", "gain", "restless", "busy", "law", NULL};
+enum { INTEGRATOR, BALL, STAIR, OSCILLATOR, GAIN, RESTLESS, BUSY, LAW };
 
-static int states_of(const Model *m) { return m->kind == STAIR || m->kind == GAIN || m->kind == BUSY ? 0 : 2; }
+static int states_of(const Model *m) { return m->kind == STAIR || m->kind == GAIN || m->kind >= BUSY ? 0 : 2; }
 static int crossings_of(const Model *m) { return m->kind == BALL || m->kind == RESTLESS; }
 
 static void *make(const char *guid) {
@@ -28,8 +30,9 @@ static void *make(const char *guid) {
         if (!strcmp(kinds[i], guid)) {
             Model *m = calloc(1, sizeof *m);
             m->kind = i, m->count = 1, m->next = INFINITY;
-            m->v[X1] = i == OSCILLATOR ? 2 : 1;
-            m->v[P] = i == BALL ? .7 : 1;
+            m->v[START] = i == OSCILLATOR ? 2 : 1;
+            m->v[P] = i == BALL ? .7 : i == LAW ? -1 : 1;
+            m->v[Q] = i == LAW ? -1 : 0;
             return m;
         }
     return NULL;
@@ -37,7 +40,8 @@ static void *make(const char *guid) {
 
 static void evaluate(Model *m) {
     double *v = m->v;
-    v[Y] = v[P] * v[U] + v[Q] * v[W] + (m->kind == GAIN ? 0 : v[X1]);
+    if (!m->mode) v[X1] = v[START];
+    v[Y] = v[P] * v[U] + v[Q] * v[W] + (m->kind == GAIN || m->kind == LAW ? 0 : v[X1]);
     v[DX1] = v[X2];
     if (m->kind == BALL) v[DX2] = v[X2] == 0 && v[X1] <= DBL_MIN ? 0 : -9.81;
     else if (m->kind == OSCILLATOR) v[DX2] = v[P] * (1 - v[X1] * v[X1]) * v[X2] - v[X1];
@@ -48,6 +52,7 @@ static void update(Model *m, bool *again, bool *ends, bool *has_next, double *ne
     double *v = m->v;
     *again = *ends = false;
     m->updates++;
+    for (int i = 0; i < 2; i++) m->ticks[i] += m->ticking[i], m->ticking[i] = 0;
     if (m->kind == STAIR) {
         while (v[T] + 1e-15 * (1 + v[T]) >= m->count) m->count++;
         m->next = m->count;
@@ -67,16 +72,23 @@ static void update(Model *m, bool *again, bool *ends, bool *has_next, double *ne
 
 static int get(Model *m, const uint32_t *r, size_t n, double *out) {
     evaluate(m);
-    for (size_t i = 0; i < n; i++) out[i] = m->v[r[i]];
+    for (size_t i = 0; i < n; i++) {
+        if (m->kind == LAW && r[i] == Y && !m->ticking[0]) m->misused++;
+        out[i] = r[i] == PERIOD ? m->period : m->v[r[i]];
+    }
     return 0;
 }
 static int set(Model *m, const uint32_t *r, size_t n, const double *in) {
     if (m->mode == 2) return 3; /* between events nothing is set here */
-    for (size_t i = 0; i < n; i++) m->v[r[i]] = in[i];
+    for (size_t i = 0; i < n; i++) {
+        if (m->kind == LAW && m->mode && (r[i] == U || r[i] == W) && !m->ticking[0]) m->misused++;
+        m->v[r[i]] = in[i];
+    }
     return 0;
 }
 static int get_whole(Model *m, const uint32_t *r, size_t n, int32_t *out) {
-    for (size_t i = 0; i < n; i++) out[i] = r[i] == COUNT ? m->count : m->updates;
+    for (size_t i = 0; i < n; i++)
+        out[i] = r[i] == COUNT ? m->count : r[i] == UPDATES ? m->updates : r[i] == MISUSED ? m->misused : m->ticks[r[i] - TICKS];
     return 0;
 }
 static int enter(Model *m, int from, int to) {
@@ -106,7 +118,7 @@ int fmi3EnterInitializationMode(Model *m, bool d, double tolerance, double start
     m->v[T] = start;
     return 0;
 }
-int fmi3ExitInitializationMode(Model *m) { return enter(m, 0, 1); }
+int fmi3ExitInitializationMode(Model *m) { evaluate(m); return enter(m, 0, 1); }
 int fmi3EnterEventMode(Model *m) { return enter(m, 2, 1); }
 int fmi3EnterContinuousTimeMode(Model *m) { return enter(m, 1, 2); }
 int fmi3EnterStepMode(Model *m) { return enter(m, 1, 2); }
@@ -159,6 +171,17 @@ int fmi3DeserializeFMUState(Model *m, const uint8_t *from, size_t n, void **s) {
     return 0;
 }
 
+int fmi3SetClock(Model *m, const uint32_t *r, size_t n, const bool *on) {
+    if (m->mode != 1) return 3;
+    for (size_t i = 0; i < n; i++) m->ticking[r[i] - CLOCK] = on[i];
+    return 0;
+}
+int fmi3SetIntervalDecimal(Model *m, const uint32_t *r, size_t n, const double *interval) {
+    m->period = *interval;
+    return m->mode ? 3 : 0;
+}
+int fmi3SetShiftDecimal(Model *m, const uint32_t *r, size_t n, const double *shift) { return m->mode ? 3 : 0; }
+
 /* -- FMI 2.0 ------------------------------------------------------------------------------------------------------- */
 
 typedef struct {
@@ -178,7 +201,7 @@ int fmi2SetupExperiment(Model *m, int d, double tolerance, double start, int has
     return 0;
 }
 int fmi2EnterInitializationMode(Model *m) { return 0; }
-int fmi2ExitInitializationMode(Model *m) { return enter(m, 0, 1); }
+int fmi2ExitInitializationMode(Model *m) { return fmi3ExitInitializationMode(m); }
 int fmi2EnterEventMode(Model *m) { return enter(m, 2, 1); }
 int fmi2EnterContinuousTimeMode(Model *m) { return enter(m, 1, 2); }
 int fmi2Terminate(Model *m) { return 0; }
@@ -247,15 +270,12 @@ UNUSED(fmi3GetVariableDependencies)
 UNUSED(fmi3InstantiateScheduledExecution)
 UNUSED(fmi3SetBinary)
 UNUSED(fmi3SetBoolean)
-UNUSED(fmi3SetClock)
 UNUSED(fmi3SetFloat32)
 UNUSED(fmi3SetInt16)
 UNUSED(fmi3SetInt32)
 UNUSED(fmi3SetInt64)
 UNUSED(fmi3SetInt8)
-UNUSED(fmi3SetIntervalDecimal)
 UNUSED(fmi3SetIntervalFraction)
-UNUSED(fmi3SetShiftDecimal)
 UNUSED(fmi3SetShiftFraction)
 UNUSED(fmi3SetString)
 UNUSED(fmi3SetUInt16)

@@ -8,8 +8,15 @@ import pytest
 
 import quadcosim
 from orchestration.components.fmi.access import Access
+from orchestration.components.fmi.isolated_instance import IsolatedInstance
 from orchestration.components.fmi.opening import open_here
+from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import SimulatorError, UsageError
+from orchestration.simulation.requests.request import request_of
+from orchestration.simulation.runs.pause import resume, run_until
+from orchestration.simulation.runs.prepared import prepared
+from orchestration.systems.system.paths import changed
+from orchestration.theory.stability.period_map import growth_of_loop
 from tests.orchestration.components.fmi.exchange import exchange
 from tests.orchestration.components.fmi.small import needs_compiler
 
@@ -26,7 +33,10 @@ def ran(path: Path, stop: float, step: float, engine: Any = "compiled", **keys: 
 
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_the_ball_bounces_when_it_must(fmi: int, tmp_path: Path) -> None:
-    rows = ran(exchange(tmp_path, "ball", fmi=fmi), 4.0, 0.1, "python").signals
+    result = ran(exchange(tmp_path, "ball", fmi=fmi), 4.0, 0.1, "python")
+    assert [(x.kind, x.what, x.sample) for x in result.events] == [("event", "it", k) for k in range(11)]
+    assert [x.time * 1e-9 for x in result.events[:4]] == pytest.approx(BOUNCES, abs=1e-9)
+    rows = result.signals
     assert rows["it.count"][-1] == 12
     t, bounces = 1.3, BOUNCES[1]
     since = t - bounces
@@ -42,6 +52,7 @@ def test_a_row_has_the_values_just_after_a_time_event_at_its_instant(
     keys = {"interface": "event-mode"} if event_mode else {}
     result = ran(exchange(tmp_path, "stair", fmi=fmi, event_mode=event_mode), 7.7, 0.7, **keys)
     assert result.signals["it.count"].tolist() == [1, 1, 2, 3, 3, 4, 5, 5, 6, 7, 8, 8]
+    assert [x.time for x in result.events] == [k * 10**9 for k in range(1, 8)]
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
@@ -54,10 +65,64 @@ def test_an_oscillator_is_as_accurate_as_is_asked(fmi: int, tmp_path: Path) -> N
 
 def test_both_engines_and_a_process_give_the_same_rows(tmp_path: Path) -> None:
     fmu = exchange(tmp_path, "ball")
-    expected = ran(fmu, 2.0, 0.1, "python").rows.tobytes()
-    assert ran(fmu, 2.0, 0.1, "compiled").rows.tobytes() == expected
+    expected, compiled = (ran(fmu, 2.0, 0.1, engine) for engine in ("python", "compiled"))
     system = {"stop_time": 2.0, "components": {"it": {"fmu": str(fmu), "step": 0.1}}}
-    assert quadcosim.run(system).rows.tobytes() == expected
+    with prepared(request_of(system), load=IsolatedInstance) as simulation:
+        simulation.master.initialise()
+        simulation.master.run()
+        isolated = simulation.result()
+    for each in (compiled, quadcosim.run(system), isolated):
+        assert each.rows.tobytes() == expected.rows.tobytes()
+        assert list(each.events) == list(expected.events)
+
+
+@pytest.mark.parametrize(("kind", "at"), [("ball", 1.3), ("oscillator", 0.77)])
+def test_a_run_that_was_paused_has_the_same_bits_and_events(kind: str, at: float, tmp_path: Path) -> None:
+    request = {"stop_time": 2.0, "components": {"it": {"fmu": str(exchange(tmp_path, kind)), "step": 0.11}}}
+    whole = quadcosim.run(request, in_process=True)
+    assert run_until(request, at, tmp_path / "paused", in_process=True) is None
+    resumed = resume(tmp_path / "paused", in_process=True)
+    assert resumed.rows.tobytes() == whole.rows.tobytes()
+    assert list(resumed.events) == list(whole.events)
+
+
+def loop(folder: Path, period: float, delay: float = 0.0, fmi: int = 3) -> dict[str, Any]:
+    """The double integrator from (1, 0) under u = -x - v, sampled."""
+    plant, law = exchange(folder, "integrator", fmi=fmi), exchange(folder, "gain", fmi=fmi)
+    return {
+        "stop_time": 20.0,
+        "components": {
+            "plant": {"fmu": str(plant), "step": 0.1},
+            "law": {"fmu": str(law), "sampling": {"period": period}, "parameters": {"p": -1.0, "q": -1.0}},
+        },
+        "connections": [
+            {"name": "state", "from": ["plant.x1", "plant.x2"], "to": ["law.u", "law.w"]},
+            {"name": "command", "from": ["law.y"], "to": ["plant.u"], "delay": delay},
+        ],
+    }
+
+
+def test_a_sampled_loop_is_that_of_the_exact_hold(tmp_path: Path) -> None:
+    for fmi in (2, 3):
+        result = quadcosim.run(loop(tmp_path, 0.5, fmi=fmi), in_process=True, engine="compiled")
+        assert result.signals["plant.x1"][-1] == pytest.approx(1.950051405e-5, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("path", "others", "below", "above"),
+    [
+        ("components.law.sampling.period", {}, 1.999, 2.001),
+        ("connections.command.delay", {"components.law.sampling.period": 0.05}, 0.68612, 0.68616),
+        ("connections.command.delay", {"components.law.sampling.period": 0.5}, 0.46957, 0.46958),
+    ],
+)
+def test_the_state_that_is_saved_is_whole_so_that_limits_are_right(
+    path: str, others: dict[str, float], below: float, above: float, tmp_path: Path
+) -> None:
+    rest = changed(request_of(loop(tmp_path, 1.0)).as_system(), {"components.plant.parameters.start": 0.0, **others})
+    instances = Instances()
+    assert growth_of_loop(changed(rest, {path: below}), instances) < 0.0
+    assert growth_of_loop(changed(rest, {path: above}), instances) > 0.0
 
 
 def test_a_value_that_is_set_is_seen_by_the_outputs_at_once(tmp_path: Path) -> None:

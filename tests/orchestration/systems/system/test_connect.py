@@ -41,7 +41,7 @@ def only(system: System) -> Connection:
 
 def test_nothing_is_proposed_for_an_fmu_that_no_run_takes(tmp_path: Path) -> None:
     path = small(tmp_path, fmi=3, more=CLOCK)
-    with pytest.raises(UsageError, match=r"has clocks, which are not supported: tick"):
+    with pytest.raises(UsageError, match=r"has clocks, but no event mode, in which they tick: tick"):
         propose([(str(path), read_model(path))], tmp_path)
 
 
