@@ -11,11 +11,13 @@ typedef void DoStep(double *, const uint64_t *, const double *, const double *, 
     DoStep c##_do_step; \
     void c##_begin(double *); \
     int c##_places(void); \
-    void c##_initialise(double *, const uint64_t *, const double *, int32_t *);
-#define COMPONENT(c) c##_do_step, c##_begin, c##_initialise, c##_places
+    void c##_initialise(double *, const uint64_t *, const double *, int32_t *); \
+    __attribute__((weak)) Steps c##_do_steps;
+#define COMPONENT(c) c##_do_step, c##_do_steps, c##_begin, c##_initialise, c##_places
 
 typedef struct {
     DoStep *step;
+    Steps *steps; /* NULL: it has no function for several */
     void (*begin)(double *);
     void (*initialise)(double *, const uint64_t *, const double *, int32_t *);
     int (*places)(void);
@@ -164,7 +166,7 @@ EXPORT void set_up(void) {
         const ComponentTable *of = &component_table[i];
         components[i] = (Component){
             .rank = of->rank, .held = of->held, .ahead = of->ahead, .behind = of->behind, .ratio = ratios[i],
-            .by_itself = of->by_itself, .step = (void *)of->step, .connected = of->connected, .places = of->outputs,
+            .by_itself = of->by_itself, .step = (void *)of->step, .steps = (void *)of->steps, .connected = of->connected, .places = of->outputs,
             .memory = aligned_numbers(of->places()), .wanted = wanted[i], .fed = of->fed, .fed_count = of->fed_count};
         memcpy(wanted[i], of->read, (size_t)of->variables);
         settles |= of->held.count || of->behind.count || of->fed_count, ahead |= of->ahead.count;

@@ -16,7 +16,7 @@ from orchestration.systems.schedule.compiled_timetable import FILES as TIMETABLE
 
 _HERE = Path(__file__).parent
 _FUNCTIONS = "lane_functions.h"
-_OF_COMPONENTS = ("lanes", "places", "variables", "divergence", "begin", "initialise", "do_step", "line")
+_OF_COMPONENTS = ("lanes", "places", "variables", "divergence", "begin", "initialise", "do_step", "do_steps", "line")
 
 
 def units_of(tables: SystemTables, lanes: int) -> list[Unit]:
@@ -47,7 +47,9 @@ def _component(i: int, tables: SystemTables, defined: tuple[str, ...]) -> Unit:
         raise UsageError(f"components.{name}: a user's own C, compiled for this machine, does not run in a page")
     sources[_FUNCTIONS] = _specialised(sources[_FUNCTIONS].decode(), _fixed(name, tables)).encode()
     renamed = tuple(f"-Dquadcosim_{each}=c{i}_{each}" for each in _OF_COMPONENTS)
-    return Unit(sources=sources, main=MAIN, options=(*defined, *renamed))
+    is_alone = tables.shape.lanes == 1 and list(tables.shape.wires.continuous) == [i]
+    several = ("-DQUADCOSIM_SEVERAL",) if is_alone else ()
+    return Unit(sources=sources, main=MAIN, options=(*defined, *several, *renamed))
 
 
 def _fixed(component: str, tables: SystemTables) -> dict[str, float]:
@@ -62,7 +64,12 @@ def _fixed(component: str, tables: SystemTables) -> dict[str, float]:
 
 
 def _specialised(code: str, fixed: Mapping[str, float]) -> str:
-    """The code with fixed parameters as constants where they are read: what they do not choose is left out."""
+    """The code with fixed parameters as constants where they are read: what they do not choose is left out.
+
+    Beside a straight line, the functions for all other steps are small rather than fast.
+    """
+    if "#define STRAIGHT_STEP " in code:
+        code = re.sub(r"^static q_mask (?=model_)", "static __attribute__((minsize)) q_mask ", code, flags=re.MULTILINE)
     for name, value in fixed.items():
         place = f"v[AT_{re.sub(r'[^A-Z0-9]', '_', name.upper())}]"
         is_set = f"{place} =" in code and f"{name}_index" not in fixed
