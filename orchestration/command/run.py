@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class ProcessFlags:
-    """The limits of a run; raises `UsageError` for values that are not positive."""
+    """The limits and the pace of a run; raises `UsageError` for values that are not positive."""
 
     in_process: Annotated[
         bool, option("--in-process", "Load foreign FMUs into this process: if one crashes, everything ends.")
@@ -33,8 +33,12 @@ class ProcessFlags:
     memory_limit: Annotated[
         float, option("--memory-limit", "Memory of a run's process and its children (Linux).", "MB")
     ] = Limits.memory
+    pace: Annotated[
+        float | None, option("--pace", "Wait for each instant: 1 in real time, 2 twice as fast; never skips.", "R")
+    ] = None
 
     def __post_init__(self) -> None:
+        expect_positive("--pace", self.pace, "seconds in a second")
         expect_positive("--time-limit", self.time_limit, "seconds")
         expect_positive("--memory-limit", self.memory_limit, "MB")
 
@@ -133,9 +137,12 @@ def _resumed(paused_in: Path, out: Path | None, figures: bool, how: Any) -> "Res
 
 
 def _metrics(result: "Result") -> CommandResult:
-    found = {**result.metrics, "wall_time": result.provenance["wall_time"], "engine": result.provenance["engine"]}
+    from orchestration.simulation.results.objectives import PRINTED
+
+    of_run: Any = result.provenance
+    found = {**result.metrics, **{key: of_run[key] for key in PRINTED if key in of_run}}
     shown = {name: value for name, value in found.items() if value is not None or not result.metrics["diverged"]}
-    width, units = max(map(len, shown)), {**result.units, "wall_time": "s"}
+    width, units = max(map(len, shown)), {**result.units, "wall_time": "s", "largest_lateness": "s"}
     lines = []
     for name, value in shown.items():
         text = f"{value:.6g}" if isinstance(value, float) else "-" if value is None else str(value)

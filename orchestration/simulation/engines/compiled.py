@@ -96,7 +96,7 @@ class CompiledLoop:
 
     def __init__(self, running: RunningSystem, recorder: Recorder, *, allocate: Allocator) -> None:
         self._running = running
-        self._pace = 4  # instants of a slice
+        self._slice_length = 4  # instants of a slice
         self._shared: list[_MessagesInFlight] = []
         self._run = library()
         self._failure: BaseException | None = None
@@ -163,12 +163,15 @@ class CompiledLoop:
         return None
 
     def _slice(self, schedule: Schedule) -> int:
-        """Have C process instants for about `SLICE`; returns the code of why it has returned."""
-        running, loop, begin = self._running, self._loop, clock.perf_counter()
-        self._track.count = min(len(schedule), self._track.at + self._pace)
+        """Have C process instants for about `SLICE`, or one at its pace; returns the code of why it has returned."""
+        running, loop = self._running, self._loop
+        if running.pace is not None:
+            running.pace.wait(int(schedule.times[self._track.at]), running.interrupted)
+        begin = clock.perf_counter()
+        self._track.count = min(len(schedule), self._track.at + (self._slice_length if running.pace is None else 1))
         code = int(self._run(ctypes.addressof(loop)))
         share = SLICE / max(clock.perf_counter() - begin, 1e-9)
-        self._pace = min(max(1, int(self._pace * min(share, 8.0))), len(schedule))
+        self._slice_length = min(max(1, int(self._slice_length * min(share, 8.0))), len(schedule))
         running.now, running.steps, running.cursor.at = loop.now, loop.steps[0], self._track.at
         self._collect_rounding_changes()
         return code

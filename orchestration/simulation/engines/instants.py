@@ -75,8 +75,10 @@ class PythonLoop:
 
         Raises `Diverged`, `Terminated` or `SimulatorError` if the run ends before.
         """
-        running, stop = self._running, self._stop
+        running, stop, pace = self._running, self._stop, self._running.pace
         for count, (time, next_time, stepped, arrivals, posted, measured, samples) in enumerate(self._instants, 1):
+            if pace is not None:
+                pace.wait(time, running.interrupted)
             running.now = time
             if stepped:  # (1)
                 self._step_continuous(time, stepped)

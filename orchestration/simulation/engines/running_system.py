@@ -17,6 +17,7 @@ from orchestration.simulation.engines.condition import NEVER, Condition
 from orchestration.simulation.engines.connection_hold import Channel
 from orchestration.simulation.engines.feeds import Feed
 from orchestration.simulation.engines.initial import Dependencies
+from orchestration.simulation.engines.pace import Pace
 from orchestration.simulation.engines.sources import SourceValues
 from orchestration.simulation.engines.wiring_by_index import Wires
 from orchestration.systems.schedule.instant_arrays import Cursor, Schedule
@@ -107,6 +108,8 @@ class RunningSystem:
         """Columns of every row: those of the board, then the signals of the sources"""
         self.cursor, self.first_samples = Cursor(timetable), timetable.first_samples
         self.interrupted = interrupted
+        self.pace: Pace | None = None
+        """Pace that the loop keeps; None: as fast as it can"""
         self.interrupted_at: int | None = None
         self.termination: str | None = None
         self.steps = 0

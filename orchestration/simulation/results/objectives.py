@@ -22,8 +22,8 @@ GOOD = "criterion.good"
 OUTCOME = "outcome"
 FIXED = (OUTCOME, "good", "horizon", "diverged", "divergence_time", "steps")
 """Metrics that every run has beside its objectives."""
-PRINTED = ("wall_time", "engine")
-"""Names that `run` prints beside them"""
+PRINTED = ("wall_time", "largest_lateness", "engine")
+"""Names that `run` prints beside them, where there are any"""
 
 
 def compute(

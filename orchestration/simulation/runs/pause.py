@@ -39,6 +39,7 @@ def run_until(
     in_process: bool = False,
     time_limit: float | None = None,
     memory_limit: float = Limits.memory,
+    pace: float | None = None,
 ) -> Result | None:
     """Run to the first communication point from `pause_at` [s] on, and write the state into `folder`, a new one.
 
@@ -54,6 +55,7 @@ def run_until(
         result = simulate(
             loaded, partial(_until, pause_at, recorder.folder.absolute()), recorder=recorder, progress=progress,
             announce=announce, engine=engine, in_process=in_process, time_limit=time_limit, memory_limit=memory_limit,
+            pace=pace,
         )  # fmt: skip
         if result is None:
             recorder.finish()
@@ -83,6 +85,7 @@ def resume(
     in_process: bool = False,
     time_limit: float | None = None,
     memory_limit: float = Limits.memory,
+    pace: float | None = None,
 ) -> Result:
     """Resume the run paused in `folder` and run it to the end; `out`, which may be `folder`, receives its directory.
 
@@ -99,7 +102,7 @@ def resume(
     def simulate_rest(recorder: Recorder) -> Result:
         result = simulate(
             request, partial(_rest, folder), recorder=recorder, progress=progress, announce=announce, engine=engine,
-            in_process=in_process, time_limit=time_limit, memory_limit=memory_limit,
+            in_process=in_process, time_limit=time_limit, memory_limit=memory_limit, pace=pace,
         )  # fmt: skip
         assert result is not None
         return result

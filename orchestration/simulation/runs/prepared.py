@@ -99,9 +99,15 @@ class PreparedRun:
             termination=running.termination,
             failure=master.failure,
             interrupted_at=_seconds(running.interrupted_at),
-            provenance={**provenance(self.instances), "engine": master.engine},
+            provenance=self._provenance(),
             warnings=tuple(warning for instance in self.instances.values() for warning in instance.warnings),
         )
+
+    def _provenance(self) -> Provenance:
+        found: Provenance = {**provenance(self.instances), "engine": self.master.engine}
+        if (pace := self.master.running.pace) is not None:
+            found["largest_lateness"] = pace.largest_lateness
+        return found
 
     def result(self) -> Result:
         """The result so far, with its metrics; raises `RunInterrupted` or a failure as `result_of`."""

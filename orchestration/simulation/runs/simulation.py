@@ -1,12 +1,14 @@
 """Runs a system or a scenario from start to end, in this process or in a separate one."""
 
 import time
+from functools import partial
 from typing import TYPE_CHECKING, Any, overload
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.processes.resource_limits import Limits
 from orchestration.foundation.recording.recording import InMemory, Recorder
 from orchestration.simulation.engines.master import Engine
+from orchestration.simulation.engines.pace import Pace
 from orchestration.simulation.engines.resolved import Announce, resolve
 from orchestration.simulation.runs.outcome import Course, Progress
 from orchestration.simulation.runs.prepared import PreparedRun, prepared
@@ -21,6 +23,12 @@ def run_to_end(simulation: PreparedRun, progress: Progress | None) -> bool:
     """The course of a run from start to end."""
     simulation.master.initialise()
     return simulation.master.run(progress=progress)
+
+
+def paced(rate: float, course: Course, simulation: PreparedRun, progress: Progress | None) -> bool:
+    """Follow a course that keeps a pace of `rate` seconds in a second."""
+    simulation.master.running.pace = Pace(rate)
+    return course(simulation, progress)
 
 
 @overload
@@ -94,8 +102,14 @@ def simulate(
     in_process: bool = False,
     time_limit: float | None = None,
     memory_limit: float = Limits.memory,
+    pace: float | None = None,
 ) -> Result | None:
-    """Run along a `course`; the result, or None if the run is not over then. Else as `run`."""
+    """Run along a `course`; the result, or None if the run is not over then. Else as `run`.
+
+    No instant begins before its time at a `pace`, in seconds of the run in a second.
+    """
+    if pace is not None:
+        course = partial(paced, pace, course)
     if in_process and time_limit is not None:
         raise UsageError("--time-limit: expected without --in-process; it is a process that is limited")
     started = time.perf_counter()
