@@ -10,7 +10,7 @@ from orchestration.command import verdicts
 from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, build_option, option_group, result_of_files
-from orchestration.command.study_flags import Out, StudyEngineFlag, TimeLimit, Workers
+from orchestration.command.study_flags import Dask, Out, StudyEngineFlag, TimeLimit, Workers
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import inform
 
@@ -26,6 +26,7 @@ def compare(
     comparison: Annotated[Path, typer.Argument(help="Comparison file.", metavar="COMPARISON.toml")],
     out: Out = None,
     workers: Workers = 1,
+    dask: Dask = None,
     native: Annotated[
         bool, option("--native", "Use the native twins of this project's FMUs, built if need be.")
     ] = False,
@@ -33,17 +34,26 @@ def compare(
     time_limit: TimeLimit = None,
     cell: Annotated[int | None, option("--cell", "Run only this cell again.", "K")] = None,
     start: Annotated[int | None, option("--start", "One run of that cell, kept in --out DIR.", "I")] = None,
+    table: Annotated[
+        str | None,
+        option("--table", "Print the cells with their intervals as a table of that format.", "csv|markdown|latex"),
+    ] = None,
     figures: Annotated[bool, typer.Option(help="Draw the pictures beside the tables.")] = True,
     *,
     look: FigureFlags,
 ) -> CommandResult:
     """Compare controllers from the same initial conditions: survival, settling, limits, error and effort."""
+    from orchestration.command.comparison_table import expect_format
     from orchestration.experiments.comparison import run
     from orchestration.experiments.comparison.file import load_comparison
     from orchestration.simulation.workers.choice import engine_choice
 
     how = engine_choice(engine)
+    if table is not None:
+        expect_format(table)
     loaded = dataclasses.replace(load_comparison(comparison), native=native)
+    if table is not None and cell is not None:
+        raise UsageError("--table: expected no --cell; the table has all cells")
     if time_limit is not None and (cell is not None or start is not None):
         raise UsageError("--time-limit: expected no --cell; the limit is for whole comparisons")
     if start is not None:
@@ -57,15 +67,15 @@ def compare(
         return _cell(loaded, rerun, run.stored_cell(loaded, cell, out))
     style = look.figure_style if figures else None
     compared = run.compare(
-        loaded, folder=out, workers=workers, engine=how, time_limit=time_limit, figures=figures, style=style
+        loaded, folder=out, workers=workers, dask=dask, engine=how, time_limit=time_limit, figures=figures, style=style
     )
     flags = (" --native" if native else "") + (f" --engine {engine}" if engine != "auto" else "")
-    return _all_cells(loaded, compared, again=f"quadcosim compare {comparison}{flags} --cell K")
+    return _all_cells(loaded, compared, again=f"quadcosim compare {comparison}{flags} --cell K", table=table)
 
 
-def _all_cells(comparison: "Comparison", compared: "Compared", again: str) -> CommandResult:
-    """The results of all cells; `again` is the command for one of them."""
-    from orchestration.command import comparison_text
+def _all_cells(comparison: "Comparison", compared: "Compared", again: str, table: str | None) -> CommandResult:
+    """The results of all cells, as text or in the format of a `table`; `again` is the command for one of them."""
+    from orchestration.command import comparison_table, comparison_text
     from orchestration.experiments.comparison.outcome import as_json
 
     summary = compared.summary
@@ -78,12 +88,14 @@ def _all_cells(comparison: "Comparison", compared: "Compared", again: str) -> Co
     if summary.failed:
         inform(f"{summary.failed} runs failed: runs.csv shows why")
     content = as_json(comparison, compared.outcome, compared.bandwidths)
-    return CommandResult(
-        document={**content, "follows": summary.follows, "files": compared.written},
-        verdict=verdicts.of_comparison(comparison, compared.outcome),
-        lines=list(comparison_text.lines(comparison, compared.outcome)),
-        good=not summary.failed,
-    )
+    document = {**content, "follows": summary.follows, "files": compared.written}
+    verdict = verdicts.of_comparison(comparison, compared.outcome)
+    if table is None:
+        lines = list(comparison_text.lines(comparison, compared.outcome))
+        return CommandResult(document=document, verdict=verdict, lines=lines, good=not summary.failed)
+    inform(verdict)  # standard output is the table alone, for a file
+    lines = list(comparison_table.lines(comparison, compared.outcome, table))
+    return CommandResult(document={"verdict": verdict, **document}, lines=lines, good=not summary.failed)
 
 
 def _cell(comparison: "Comparison", rerun: "CellSummary", stored: "CellSummary | None") -> CommandResult:
@@ -95,7 +107,7 @@ def _cell(comparison: "Comparison", rerun: "CellSummary", stored: "CellSummary |
     lines = list(comparison_text.cell_lines(comparison, rerun))
     if same is not None:
         lines.append(f"{'in the store':<22}  {'the same' if same else 'a different result'}")
-    document = {**rerun.row("value"), "same_as_stored": same}
+    document = {**rerun.as_json(), "same_as_stored": same}
     return CommandResult(document=document, verdict=verdicts.of_cell(rerun), lines=lines)
 
 
@@ -104,6 +116,7 @@ def tune(
     tuning: Annotated[Path, typer.Argument(help="Tuning file.", metavar="TUNING.toml")],
     out: Annotated[Path, option("--out", "Folder for the files of tuned parameters.", "DIR")],
     workers: Workers = 1,
+    dask: Dask = None,
     engine: StudyEngineFlag = "auto",
 ) -> CommandResult:
     """Tune a controller on some initial conditions and evaluate it on others; it resumes where it was stopped."""
@@ -112,6 +125,8 @@ def tune(
     from orchestration.simulation.workers.choice import engine_choice
 
     command = f"quadcosim tune {tuning} --out {out}" + (f" --engine {engine}" if engine != "auto" else "")
-    tuned = search_all(load_tuning(tuning), out=out, workers=workers, engine=engine_choice(engine), command=command)
+    tuned = search_all(
+        load_tuning(tuning), out=out, workers=workers, dask=dask, engine=engine_choice(engine), command=command
+    )
     written = result_of_files(tuned.written)
     return dataclasses.replace(written, verdict=verdicts.of_tuning(tuned))

@@ -9,7 +9,7 @@ from orchestration.command import exact, verdicts
 from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, build_option, option_group, result_of_files
-from orchestration.command.study_flags import Out, StudyEngineFlag, TimeLimit, Workers
+from orchestration.command.study_flags import Dask, Out, StudyEngineFlag, TimeLimit, Workers
 from orchestration.foundation.basics.terminal import inform, progress_bar, warn
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def sweep(
     study: StudyFile,
     out: Out = None,
     workers: Workers = 1,
-    dask: Annotated[str | None, option("--dask", "A dask scheduler instead, e.g. tcp://host:8786.", "URL")] = None,
+    dask: Dask = None,
     retry_failed: Annotated[bool, option("--retry-failed", "Repeat failed runs.")] = False,
     engine: StudyEngineFlag = "auto",
     time_limit: TimeLimit = None,

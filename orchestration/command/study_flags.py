@@ -9,6 +9,8 @@ Out = Annotated[Path | None, option("--out", "Folder of the store; default: resu
 
 Workers = Annotated[int, option("--workers", "Processes on this machine.", "N")]
 
+Dask = Annotated[str | None, option("--dask", "A dask scheduler instead, e.g. tcp://host:8786.", "URL")]
+
 StudyEngineFlag = Annotated[
     str,
     option(

@@ -1,8 +1,8 @@
 """Summaries of the cells of a comparison: survival, settling, error and effort, with confidence intervals."""
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from orchestration.experiments.comparison.design import START, Case, Comparison
@@ -74,12 +74,22 @@ class CellSummary(Case):
     medians: dict[str, Median]
     """Medians over the runs that survive, by objective; `settling_time` over those that settle, `residual` the final
     error"""
+    values: Mapping[str, Value] = field(default_factory=dict)
+    """Values by axis"""
 
-    def row(self, axis: str) -> dict[str, Any]:
-        """The row of the table, also used in JSON."""
+    def row(self) -> dict[str, Any]:
+        """The row of the table: a column for each axis."""
+        return self._row(dict(self.values))
+
+    def as_json(self) -> dict[str, Any]:
+        """The same in JSON types: `values` by axis, and `value` where there is one axis."""
+        one = {"value": self.value} if len(self.values) < 2 else {}
+        return self._row({**one, "values": dict(self.values)})
+
+    def _row(self, values_of_axes: Mapping[str, Any]) -> dict[str, Any]:
         values: dict[str, Any] = {
             "cell": self.cell, "vehicle": self.vehicle, "condition": self.condition, "controller": self.controller,
-            axis: self.value, "count": self.count,
+            **values_of_axes, "count": self.count,
         }  # fmt: skip
         for name, share in (("survives", self.survives), ("settles", self.settles)):
             values |= {name: share.count, f"{name}.share": share.value, f"{name}.low": share.low}
@@ -112,6 +122,7 @@ def cell_summaries(comparison: Comparison, table: "pd.DataFrame") -> list[CellSu
                 condition=cell.condition,
                 controller=cell.controller,
                 value=cell.value,
+                values=cell.values,
                 count=len(rows),
                 survives=Share.of(len(alive), len(rows)),
                 settles=Share.of(len(settling), len(rows)),

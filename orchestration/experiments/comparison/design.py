@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 from orchestration.components.building import fmus
 from orchestration.experiments.studies.axes import Axis, Value
@@ -14,6 +15,7 @@ from orchestration.simulation.results.quantities import is_in_seconds
 from orchestration.systems.system.component import Values
 from orchestration.systems.system.paths import value_at
 from orchestration.systems.system.request import ControlLoop
+from orchestration.systems.system.requirements import is_number
 from orchestration.systems.system.starts import InitialConditions, Starts
 from orchestration.systems.system.vehicle import Vehicle
 
@@ -54,6 +56,16 @@ class Condition:
     """Factors by path, applied to the value after all other settings."""
 
 
+@record()
+class OnSecondAxis:
+    """A condition of a file at one value of a second axis."""
+
+    condition: str
+    """The name of the condition in the file."""
+    value: Value
+    """The value of the second axis."""
+
+
 @record("front.")
 class Front:
     """Two objectives with a trade-off, both to be minimised."""
@@ -79,6 +91,8 @@ class Cell(Case):
 
     index: int
     value: Value
+    values: Mapping[str, Value]
+    """values by axis"""
 
 
 @record()
@@ -101,6 +115,10 @@ class Comparison:
     """The initial conditions, the same for every controller."""
     front: Front = field(default_factory=Front)
     """The two objectives of the trade-off."""
+    second: Axis | None = None
+    """A second axis, whose values are among the conditions, as by `over_second_axis`."""
+    on_second: Mapping[str, OnSecondAxis] = field(default_factory=dict)
+    """The value of the second axis by the name of a condition."""
     native: bool = False
     """Whether it is run with the native twins of its FMUs."""
 
@@ -115,8 +133,9 @@ class Comparison:
             raise UsageError(
                 f"axis {self.axis.name}: expected increasing values; limits are values up to which runs survive"
             )
-        if self.axis.name in (VEHICLE, CONDITION, CONTROLLER, START):
-            raise UsageError(f"axis {self.axis.name}: expected another name")
+        for axis in filter(None, (self.axis, self.second)):
+            if axis.name in (VEHICLE, CONDITION, CONTROLLER, START):
+                raise UsageError(f"axis {axis.name}: expected another name")
         objectives = self.study.origin.objectives
         for key in ("error", "effort"):
             if getattr(self.front, key) not in objectives:
@@ -186,6 +205,11 @@ class Comparison:
     def _start_settings(self, index: int, start: InitialConditions) -> dict[str, Value]:
         return {**start.values, "seed": self.base.seed + self.starts.first + index}
 
+    def values_of(self, condition: str, value: Value) -> dict[str, Value]:
+        """The values by axis at a condition and a value of the first axis."""
+        second = {} if self.second is None else {self.second.name: self.on_second[condition].value}
+        return {self.axis.name: value, **second}
+
     def cells(self) -> Iterator[Cell]:
         """All cells in the order of their indices."""
         grid = (
@@ -202,6 +226,7 @@ class Comparison:
                 condition=condition.name,
                 controller=controller.name,
                 value=value,
+                values=self.values_of(condition.name, value),
             )
 
     def cell(self, index: int) -> Cell:
@@ -222,6 +247,32 @@ class Comparison:
         values = {target: value_at(system, path) for target in targets for path in self.base.paths_of(target)[:1]}
         fmus = {f"{name}.fmu": fmu for name, fmu in system.fmus.items()}
         return self.base.with_values({**{target: v for target, v in values.items() if v is not None}, **fmus})
+
+
+def over_second_axis(
+    conditions: Sequence[Condition], axis: Axis
+) -> tuple[tuple[Condition, ...], dict[str, OnSecondAxis]]:
+    """Each condition at each value of a second axis, and what each of them stands for, by name.
+
+    Raises `UsageError` for an axis without values.
+    """
+    if axis.values is None:
+        raise UsageError(f"axis {axis.name}: expected values, or start, stop and number")
+    expanded: list[Condition] = []
+    stands_for: dict[str, OnSecondAxis] = {}
+    for condition in conditions:
+        for value in axis.values:
+            here = f"{axis.name} {value:g}" if is_number(value) else f"{axis.name} {value}"
+            name = here if len(conditions) == 1 else f"{condition.name}, {here}"
+            changes: dict[str, Any] = dict.fromkeys(axis.targets, value)
+            if axis.multiplies:
+                factors = {target: factor * condition.multiplies.get(target, 1.0) for target, factor in changes.items()}
+                one = Condition(name=name, sets=condition.sets, multiplies={**condition.multiplies, **factors})
+            else:
+                one = Condition(name=name, sets={**condition.sets, **changes}, multiplies=condition.multiplies)
+            expanded.append(one)
+            stands_for[name] = OnSecondAxis(condition=condition.name, value=value)
+    return tuple(expanded), stands_for
 
 
 def _named(name: str, ones: Sequence[Controller] | Sequence[VehicleEntry] | Sequence[Condition]) -> Axis:

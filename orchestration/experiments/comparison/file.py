@@ -7,8 +7,16 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.components.building.models import PATHS
-from orchestration.experiments.comparison.design import FMU, Comparison, Condition, Controller, Front, VehicleEntry
-from orchestration.experiments.studies.axes import Value
+from orchestration.experiments.comparison.design import (
+    FMU,
+    Comparison,
+    Condition,
+    Controller,
+    Front,
+    VehicleEntry,
+    over_second_axis,
+)
+from orchestration.experiments.studies.axes import Axis, Value
 from orchestration.experiments.studies.linked_settings import Key
 from orchestration.experiments.studies.study_file import AxisTable, axis_of, control_loop_of, load
 from orchestration.foundation.basics.documents import read_toml
@@ -67,8 +75,10 @@ class ComparisonFile:
 
     controllers: list[ControllerTable]
     """The controllers; each is paired with the first."""
-    axis: AxisTable
+    axis: AxisTable | None = None
     """The quantity that is varied: one axis of increasing numbers."""
+    axes: list[AxisTable] = field(default_factory=list)
+    """Instead of `axis`, one or two: limits are along the first, at each value of the second; maps show both."""
     vehicles: list[VehicleTable] = field(default_factory=list)
     """The vehicles; default: that of the base."""
     conditions: list[ConditionTable] = field(default_factory=lambda: [ConditionTable(name="nominal")])
@@ -96,19 +106,33 @@ def load_comparison(path: str | Path) -> Comparison:
 def _comparison(file: ComparisonFile, path: Path) -> Comparison:
     folder = path.parent
     base = control_loop_of(file, folder)
-    axis = axis_of(file.axis, folder)
+    axis, second = _axes(file, folder)
     vehicles = _vehicles(file.vehicles, base, folder)
     keys = [(entry.name, value) for entry in vehicles for value in axis.values or ()]
+    conditions = tuple(_condition(table) for table in file.conditions)
+    of_second: dict[str, Any] = {}
+    if second is not None:
+        conditions, stands_for = over_second_axis(conditions, second)
+        of_second = {"second": second, "on_second": stands_for}
     return Comparison(
         name=file.name or path.stem,
         base=base.without_vehicle(),
         controllers=tuple(_controller(table, axis.name, keys, folder) for table in file.controllers),
         vehicles=vehicles,
-        conditions=tuple(_condition(table) for table in file.conditions),
+        conditions=conditions,
         axis=axis,
         starts=file.starts,
         front=file.front,
+        **of_second,
     )
+
+
+def _axes(file: ComparisonFile, folder: Path) -> tuple[Axis, Axis | None]:
+    tables = ([] if file.axis is None else [file.axis]) + file.axes
+    if not 1 <= len(tables) <= 2 or (file.axis is not None and file.axes):
+        raise UsageError("axis: expected [axis], or one or two [[axes]]")
+    axes = [axis_of(table, folder) for table in tables]
+    return axes[0], axes[1] if len(axes) == 2 else None
 
 
 def _vehicles(tables: list[VehicleTable], base: ControlLoop, folder: Path) -> tuple[VehicleEntry, ...]:

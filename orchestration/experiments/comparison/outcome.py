@@ -50,13 +50,14 @@ def as_json(comparison: Comparison, outcome: Outcome, bandwidths: Bandwidths) ->
     content = {
         "name": comparison.name,
         "axis": comparison.axis.name,
+        "axes": [axis.name for axis in (comparison.axis, comparison.second) if axis is not None],
         "starts": len(comparison.initial_conditions),
         "bandwidths": [
             {"controller": controller, "vehicle": vehicle, "value": value, "bandwidth": bandwidth}
             for (controller, vehicle, value), bandwidth in bandwidths.items()
         ],
         **vars(outcome),
-        "cells": [cell.row("value") for cell in outcome.cells],
+        "cells": [cell.as_json() for cell in outcome.cells],
     }
     document: dict[str, Any] = plain(content)
     return document
@@ -66,7 +67,7 @@ def write(comparison: Comparison, outcome: Outcome, bandwidths: Bandwidths, fold
     """Write the cells as Parquet and CSV, and everything as JSON; the paths."""
     import pandas as pd
 
-    table = pd.DataFrame([cell.row(comparison.axis.name) for cell in outcome.cells])
+    table = pd.DataFrame([cell.row() for cell in outcome.cells])
     medians = [name for cell in outcome.cells[:1] for name in cell.medians]
     table = table.astype({f"{name}{end}": float for name in medians for end in ("", ".low", ".high")})
     written = [folder / f"{CELLS}.parquet", folder / f"{CELLS}.csv", folder / OUTCOME]

@@ -2,7 +2,7 @@
 
 import itertools
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,8 +17,11 @@ from orchestration.experiments.comparison.fronts import Point
 from orchestration.experiments.comparison.limits import GridLimit
 from orchestration.experiments.comparison.outcome import Outcome
 from orchestration.experiments.comparison.survival import FATES
+from orchestration.experiments.studies.axes import Axis
 from orchestration.experiments.studies.axis_labels import quantity_of
+from orchestration.experiments.studies.cell_figures import cell_maps
 from orchestration.experiments.studies.figures import save
+from orchestration.experiments.studies.shares import GOOD
 from orchestration.experiments.studies.table import note_in
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.figures.style import SCREEN, Style
@@ -42,11 +45,14 @@ def draw(
     """Draw all pictures into a folder; their paths. `units` are those of the store, by name of axis and metric."""
     axis = quantity_of(comparison.axis, units)
     done, keep = table[table["status"] == "done"], partial(save, style=style, note=note_in(table))
-    written = [
-        path
-        for (vehicle, condition), rows in done.groupby([VEHICLE, CONDITION], sort=False)
-        for path in _of_one(comparison, units, outcome, rows, (vehicle, condition), folder, keep)
-    ]
+    if comparison.second is not None:
+        written = [*_maps(comparison, comparison.second, done, units, folder, keep)]
+    else:
+        written = [
+            path
+            for (vehicle, condition), rows in done.groupby([VEHICLE, CONDITION], sort=False)
+            for path in _of_one(comparison, units, outcome, rows, (vehicle, condition), folder, keep)
+        ]
     if outcome.limits:
         reaches, in_seconds = reaches_of(comparison, outcome.limits), comparison.is_in_seconds
         written += keep(partial(limits_of, reaches, axis, in_seconds), folder / "limits")
@@ -66,7 +72,7 @@ def _of_one(
     axis, colors = quantity_of(comparison.axis, units), colors_of([one.name for one in comparison.controllers])
     summaries = [cell for cell in outcome.cells if (cell.vehicle, cell.condition) == of]
     points = [point for point in outcome.fronts if (point.vehicle, point.condition) == of and _is_known(point)]
-    title, end = ", ".join(of), "_".join(re.sub(r"[^\w.-]+", "_", name) for name in of)
+    title, end = ", ".join(of), _file_name(of)
     for fate in FATES:
         by_size = {
             name: (comparison.values, _by_size(comparison, group, fate))
@@ -81,6 +87,43 @@ def _of_one(
         front = comparison.front
         names = tuple(labels.metric_with_unit(metric, units.get(metric)) for metric in (front.effort, front.error))
         yield from keep(partial(fronts_of, points, shown, axis, names, colors, title), folder / f"front_{end}")
+
+
+def _maps(
+    comparison: Comparison,
+    second: Axis,
+    done: "pd.DataFrame",
+    units: Mapping[str, str],
+    folder: Path,
+    keep: Callable[[Callable[[Style], Figure], Path], list[Path]],
+) -> Iterator[Path]:
+    """The share that survives, and that settles, over both axes, for each vehicle under each condition of the file."""
+    stands_for = {name: one.condition for name, one in comparison.on_second.items()}
+    values = {name: one.value for name, one in comparison.on_second.items()}
+    table = done.assign(**{second.name: done[CONDITION].map(values), CONDITION: done[CONDITION].map(stands_for)})
+    laws = Axis(name=CONTROLLER, targets=(), values=tuple(one.name for one in comparison.controllers))
+    for (vehicle, condition), rows in table.groupby([VEHICLE, CONDITION], sort=False):
+        for fate, has in FATES.items():
+            draw = partial(_map, rows.assign(good=has(rows)), (comparison.axis, second), laws, _WORDS[fate], units)
+            yield from keep(draw, folder / f"map_{fate}_{_file_name((vehicle, condition))}")
+
+
+_WORDS = {"survive": ("not diverged", "diverged"), "settle": ("settled", "not settled")}
+
+
+def _map(
+    table: "pd.DataFrame",
+    axes: tuple[Axis, Axis],
+    laws: Axis,
+    words: tuple[str, str],
+    units: Mapping[str, str],
+    style: Style,
+) -> Figure:
+    return cell_maps(table, axes, laws, GOOD, words, units=units, style=style)
+
+
+def _file_name(names: Iterable[str]) -> str:
+    return "_".join(re.sub(r"[^\w.-]+", "_", name) for name in names)
 
 
 def reaches_of(comparison: Comparison, limits: Sequence[GridLimit]) -> list[Reach]:

@@ -41,7 +41,7 @@ class Compared:
     """The result of a comparison."""
 
     axis: str
-    """The name of its axis."""
+    """The name of its axis; of two, that of the first."""
     summary: Swept
     """The summary of the sweep of its runs, with the path of the store."""
     table: "pd.DataFrame"
@@ -80,7 +80,7 @@ class Compared:
         if what == "runs":
             return self.table
         listed = self.outcome.limits if what == "limits" else self.outcome.cells
-        return pd.DataFrame([one.row(self.axis) if isinstance(one, CellSummary) else vars(one) for one in listed])
+        return pd.DataFrame([one.row() if isinstance(one, CellSummary) else vars(one) for one in listed])
 
 
 @needs("filelock", "pandas")
@@ -89,6 +89,7 @@ def compare(
     *,
     folder: str | Path | None = None,
     workers: int = 1,
+    dask: str | None = None,
     engine: EngineChoice = "auto",
     time_limit: float | None = None,
     figures: bool = True,
@@ -98,12 +99,12 @@ def compare(
 ) -> Compared:
     """Run what is missing of a comparison, and write its tables and pictures beside its store.
 
-    `folder`, `workers`, `engine`, `time_limit`, `progress` and `announce` are those of `sweep`, which raises what this
-    does. Pictures are drawn unless `figures` is false, in a `style`, by default for a screen.
+    `folder`, `workers`, `dask`, `engine`, `time_limit`, `progress` and `announce` are those of `sweep`, which raises
+    what this does. Pictures are drawn unless `figures` is false, in a `style`, by default for a screen.
     """
     summary = sweep(
-        comparison.study, folder=folder, workers=workers, engine=engine, time_limit=time_limit, progress=progress,
-        announce=announce,
+        comparison.study, folder=folder, workers=workers, dask=dask, engine=engine, time_limit=time_limit,
+        progress=progress, announce=announce,
     )  # fmt: skip
     comparison = replace(comparison, native=summary.study.native)
     known = bandwidths(comparison)  # after the check of the design, which names an invalid run

@@ -84,6 +84,7 @@ def tune(
     out: str | Path,
     folder: str | Path | None = None,
     workers: int = 1,
+    dask: str | None = None,
     engine: EngineChoice = "auto",
     command: str = "quadcosim.tune",
     progress: ShareProgress = "bar",
@@ -91,8 +92,9 @@ def tune(
 ) -> Tuned:
     """Tune the parameters of a controller, by runs or by exact expectations.
 
-    A `Tuning` runs an ensemble of initial conditions and is judged on others, by `workers` processes and an engine as
-    in `sweep`. An `ExactTuning` needs no runs; it linearises native FMUs if available.
+    A `Tuning` runs an ensemble of initial conditions and is judged on others, by `workers` processes or those of a
+    `dask` scheduler, and an engine, as in `sweep`. An `ExactTuning` needs no runs; it linearises native FMUs if
+    available.
 
     Writes a file of parameters into `out` for each period; it names `command` as its origin. Costs and results are
     kept in `folder`, default `results/NAME`: called again after an interruption, it loses the generation of points that
@@ -104,9 +106,9 @@ def tune(
     folder, announce = Path(folder or Path("results") / tuning.name), announce or (lambda line: None)
     done: Sequence[SearchResult]
     if isinstance(tuning, Tuning):
-        done = _search_by_runs(tuning, folder, workers, engine, progress, announce)
-    elif workers != 1 or engine != "auto":
-        raise UsageError("--workers and --engine: expected none; a tuning by expect makes no runs")
+        done = _search_by_runs(tuning, folder, workers, dask, engine, progress, announce)
+    elif workers != 1 or engine != "auto" or dask is not None:
+        raise UsageError("--workers, --dask and --engine: expected none; a tuning by expect makes no runs")
     else:
         exact = dataclasses.replace(tuning, base=single_run_execution(tuning.base, "auto")[0])
         with share_reporter(progress, "searching") as report:
@@ -121,6 +123,7 @@ def _search_by_runs(
     tuning: Tuning,
     folder: Path,
     workers: int,
+    dask: str | None,
     engine: EngineChoice,
     progress: ShareProgress,
     announce: Callable[[str], None],
@@ -136,7 +139,8 @@ def _search_by_runs(
         execution.tell(announce)
     if follows := describe_references(tuning.origin, files.models_of(tuning.origin)):
         announce(f"follows {follows}")
-    with share_reporter(progress, "searching") as report, RunEvaluator(files, workers, execution.engine) as pool:
+    evaluator = RunEvaluator(files, workers, execution.engine, dask=dask)
+    with share_reporter(progress, "searching") as report, evaluator as pool:
         run = functools.partial(pool.run_all, in_lanes=execution.in_lanes)
 
         def find(

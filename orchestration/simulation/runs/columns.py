@@ -28,7 +28,7 @@ class Columns:
     given: Mapping[str, Any]
     """The arrays by target, as they were given"""
     shape: tuple[int, ...]
-    """That to which they broadcast: runs are counted in the order of C"""
+    """The shape to which they broadcast: runs are counted in the order of C"""
     parameters: Mapping[str, Floats]
     """Real ones, as COMPONENT.NAME, shape (count,)"""
     seeds: Sequence[int] | None

@@ -22,7 +22,7 @@ class Flights(Mapping[str, Any]):
     """Arrays by name: of an output the shape that the given values have together, NaN where it has no value; `time` and
     what was recorded have one axis more, of the rows, NaN after the last row of a run that has fewer."""
     given: Mapping[str, Any]
-    """What was given, by path, as arrays that broadcast to that shape"""
+    """The values that were given, by path, as arrays that broadcast to that shape"""
     recorded: tuple[str, ...]
     """The names of the arrays with rows"""
     shape: tuple[int, ...]

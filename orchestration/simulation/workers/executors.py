@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 from typing import Any
@@ -41,20 +42,32 @@ _ADDRESS = re.compile(r"(?:(?:tcp|tls|ws|wss)://)?(\[[0-9a-fA-F:.]+\]|[^\s:/\[\]
 
 
 class RunEvaluator:
-    """Evaluates a few runs at a time for searches that choose the next runs by the metrics."""
+    """Evaluates a few runs at a time for searches that choose the next runs by the metrics.
 
-    def __init__(self, files: Files, workers: int, engine: Engine | None = None) -> None:
+    They run in `workers` processes of this machine, or in those of the `dask` scheduler at this address.
+    """
+
+    def __init__(self, files: Files, workers: int, engine: Engine | None = None, *, dask: str | None = None) -> None:
         if workers < 1:
             raise UsageError(f"--workers {workers}: expected at least 1")
-        self._files, self._workers, self._engine = files, workers, engine
+        if dask is not None:
+            expect_scheduler(dask)
+        self._files, self._workers, self._engine, self._dask = files, workers, engine, dask
         self._stack = ExitStack()
+        self._check: Callable[[], None] = lambda: None
 
     def __enter__(self) -> "RunEvaluator":
-        self._submit = _local_submit(self._stack, Inputs.of(self._files), self._workers)
+        inputs = Inputs.of(self._files)
+        if self._dask is None:
+            self._submit = _local_submit(self._stack, inputs, self._workers)
+        else:
+            self._stack.enter_context(_losses_named(self._dask))
+            reached = _cluster(self._stack, inputs, self._dask)
+            self._submit, self._check, self._workers = reached.submit, reached.check, reached.threads
         return self
 
-    def __exit__(self, *exception: object) -> None:
-        self._stack.close()
+    def __exit__(self, *exception: Any) -> None:
+        self._stack.__exit__(*exception)
 
     def run_all(self, systems: Sequence[System], *, in_lanes: bool = False) -> list[Any]:
         """The metrics of all runs in their order; `in_lanes`: with native FMUs, many at once.
@@ -67,7 +80,7 @@ class RunEvaluator:
         metrics: list[Any] = [None] * len(systems)
         parts = [*chunks(batched(tasks), len(systems), self._workers)]
         for part, future in zip(parts, [self._submit(part) for part in parts]):
-            results = future.result()
+            results = self._result(future)
             for place, index in enumerate(part.index):
                 metrics[index] = _metrics(results, place)
         return metrics
@@ -84,7 +97,7 @@ class RunEvaluator:
         metrics: list[Any] = []
         try:
             for future in futures:
-                metrics.append(_metrics(future.result(), 0))
+                metrics.append(_metrics(self._result(future), 0))
                 report(len(metrics))
                 if stop(metrics[-1]):
                     break
@@ -92,6 +105,12 @@ class RunEvaluator:
             for future in futures:
                 future.cancel()
         return metrics
+
+    def _result(self, future: "Future[Results]") -> Results:
+        """The results of a task, however long it takes; raises `QuadcosimError` if a scheduler no longer answers."""
+        while not concurrent.futures.wait([future], timeout=_POLL).done:
+            self._check()
+        return future.result()
 
     def _task(self, index: int, system: System) -> RunTask:
         return RunTask(index=index, key="", system=system, engine=self._engine)
@@ -126,48 +145,72 @@ def cluster(inputs: Inputs, address: str) -> Iterator[TaskRunner]:
     Raises `QuadcosimError` if the scheduler cannot be reached, has no workers or no longer answers, and for failures
     not caused by a run.
     """
+    with ExitStack() as stack, _losses_named(address):
+        reached = _cluster(stack, inputs, address)
+        yield partial(_drain, submit=reached.submit, most=2 * reached.threads, waiting_for=reached.check)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Cluster:
+    """A dask scheduler that has the files of the runs."""
+
+    submit: Submit
+    check: Callable[[], None]
+    """raises `QuadcosimError` if it has not answered for long"""
+    threads: int
+
+
+def _cluster(stack: ExitStack, inputs: Inputs, address: str) -> _Cluster:
+    """The scheduler at an address, left with `stack`; raises `QuadcosimError` if it is not reached."""
     import asyncio
 
     import distributed
 
     # The TimeoutErrors are distinct before Python 3.11.
     unreachable = (OSError, TimeoutError, asyncio.TimeoutError, ValueError)
-    with ExitStack() as stack:
-        stack.enter_context(_silent("distributed", "tornado", "asyncio"))
-        try:
-            client: Any = distributed.Client(address, timeout=_PATIENCE, set_as_default=False)
-        except unreachable as error:
-            raise _unreachable(address, error) from error
-        stack.callback(_close, client)
+    stack.enter_context(_silent("distributed", "tornado", "asyncio"))
+    try:
+        client: Any = distributed.Client(address, timeout=_PATIENCE, set_as_default=False)
+    except unreachable as error:
+        raise _unreachable(address, error) from error
+    stack.callback(_close, client)
 
-        async def begin() -> Any:
-            await client.wait_for_workers(1, timeout=_WORKERS_PATIENCE)
-            # Files are sent once, identified by the hash of their content.
-            return await client.scatter(inputs, broadcast=True, hash=True), await client.scheduler.ncores()
+    async def begin() -> Any:
+        await client.wait_for_workers(1, timeout=_WORKERS_PATIENCE)
+        # Files are sent once, identified by the hash of their content.
+        return await client.scatter(inputs, broadcast=True, hash=True), await client.scheduler.ncores()
 
-        def ask(question: Callable[[], Any]) -> "Future[Any]":
-            return asyncio.run_coroutine_threadsafe(question(), client.loop.asyncio_loop)
+    def ask(question: Callable[[], Any]) -> "Future[Any]":
+        return asyncio.run_coroutine_threadsafe(question(), client.loop.asyncio_loop)
 
-        heartbeat = Heartbeat(address, lambda: ask(client.scheduler.ncores))
-        begun = ask(begin)
-        try:
-            while not concurrent.futures.wait([begun], timeout=_POLL).done:
-                heartbeat.check()
-            scattered, threads = begun.result()
-        except unreachable as error:
-            raise _unreachable(address, error) from error
-        executor = client.get_executor(pure=False)
-        stack.callback(executor.shutdown, wait=False)
+    heartbeat = Heartbeat(address, lambda: ask(client.scheduler.ncores))
+    begun = ask(begin)
+    try:
+        while not concurrent.futures.wait([begun], timeout=_POLL).done:
+            heartbeat.check()
+        scattered, threads = begun.result()
+    except unreachable as error:
+        raise _unreachable(address, error) from error
+    executor = client.get_executor(pure=False)
+    stack.callback(executor.shutdown, wait=False)
 
-        def submit(task: RunTask | TaskBatch) -> "Future[Results]":
-            return executor.submit(run_on_cluster, task, scattered)  # type: ignore[no-any-return]
+    def submit(task: RunTask | TaskBatch) -> "Future[Results]":
+        return executor.submit(run_on_cluster, task, scattered)  # type: ignore[no-any-return]
 
-        try:
-            yield partial(_drain, submit=submit, most=2 * max(1, sum(threads.values())), waiting_for=heartbeat.check)
-        except (concurrent.futures.CancelledError, OSError, distributed.KilledWorker) as error:
-            raise QuadcosimError(
-                f"--dask {address}: the scheduler or its workers were lost ({type(error).__name__}); {_KEPT}"
-            ) from error
+    return _Cluster(submit=submit, check=heartbeat.check, threads=max(1, sum(threads.values())))
+
+
+@contextmanager
+def _losses_named(address: str) -> Iterator[None]:
+    """Raise `QuadcosimError` for a scheduler or workers that are lost."""
+    import distributed
+
+    try:
+        yield
+    except (concurrent.futures.CancelledError, OSError, distributed.KilledWorker) as error:
+        raise QuadcosimError(
+            f"--dask {address}: the scheduler or its workers were lost ({type(error).__name__}); {_KEPT}"
+        ) from error
 
 
 class Heartbeat:

@@ -223,3 +223,67 @@ def test_a_run_that_takes_longer_than_the_time_limit_is_a_failed_row_with_the_re
     assert runs["message"][1] == "it was ended: it takes more than the time limit of 1 s"
     done = main(*limited, "0", code=2)
     assert done.stderr == "quadcosim: --time-limit 0: expected a positive number of seconds\n"
+
+
+TWO_AXES = (
+    FILE.partition("[[conditions]]")[0].replace('name = "small"', 'name = "two"')
+    + """
+[[axes]]
+name = "period"
+sets = ["timing.period"]
+values = [0.02, 0.1]
+[[axes]]
+name = "loss"
+sets = ["timing.command_loss"]
+values = [0.0, 0.3]
+[starts]
+count = 2
+position = 1.0
+"""
+)
+
+
+def test_two_axes_make_cells_over_both_and_a_map_of_the_two_laws(
+    tmp_path: Path, main: Main, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("two.toml").write_text(TWO_AXES)
+    done = json.loads(main("compare", "two.toml", "--native", "--format", "png", "--json").stdout)
+    assert done["axes"] == ["period", "loss"]
+    cells = {(cell["controller"], *cell["values"].values()): cell for cell in done["cells"]}
+    assert len(cells) == 8
+    assert all("value" not in cell for cell in cells.values())
+    assert {Path(file).name for file in done["files"] if file.endswith("png")} == {
+        "limits.png", "map_survive_base_nominal.png", "map_settle_base_nominal.png",
+    }  # fmt: skip
+    Path("one.toml").write_text(TWO_AXES.replace("values = [0.0, 0.3]", "values = [0.3]").replace('"two"', '"one"'))
+    again = json.loads(main("compare", "one.toml", "--native", "--no-figures", "--json").stdout)
+    for cell in again["cells"]:  # the same runs as of a comparison without the other loss
+        key = (cell["controller"], *cell["values"].values())
+        ignored = {"cell": None}
+        assert {**cell, **ignored} == {**cells[key], **ignored}
+
+
+@pytest.mark.parametrize(
+    ("form", "first", "fourth"),
+    [
+        ("markdown", "| controller | period | loss | survives |", "| coupled | 0.1 | 0 | 0.00 [0.00, 0.66] |"),
+        ("latex", r"\begin{tabular}{lllllll}", r"\midrule"),
+        ("csv", "cell,vehicle,condition,controller,period,loss,count,", "2,base,loss 0,uncoupled,0.02,0.0,2,"),
+    ],
+)
+def test_a_comparison_is_printed_as_a_table(
+    form: str, first: str, fourth: str, folder: Path, main: Main, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(folder)
+    Path("two.toml").write_text(TWO_AXES)
+    lines = main("compare", "two.toml", "--native", "--no-figures", "--table", form).stdout.splitlines()
+    assert lines[0].startswith(first)
+    assert lines[3].startswith(fourth)
+
+
+def test_an_unknown_table_or_a_third_axis_is_refused(folder: Path, main: Main) -> None:
+    done = main("compare", folder / "small.toml", "--table", "html", code=2)
+    assert done.stderr.endswith("--table html: expected csv, markdown or latex\n")
+    (folder / "three.toml").write_text(TWO_AXES + '[axis]\nname = "timing.delay"\nvalues = [0.0]\n')
+    assert "axis: expected [axis], or one or two [[axes]]" in main("compare", folder / "three.toml", code=2).stderr

@@ -14,8 +14,9 @@ from orchestration.experiments.studies.axes import Axis
 from orchestration.experiments.studies.store import open_for_reading
 from orchestration.experiments.studies.study import Study
 from orchestration.simulation.workers import executors
-from orchestration.simulation.workers.executors import SILENCE, TOLD_AFTER, Heartbeat
+from orchestration.simulation.workers.executors import SILENCE, TOLD_AFTER, Heartbeat, RunEvaluator
 from orchestration.systems.system.component import Component
+from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
 from quadcosim import QuadcosimError
 from tests.commands import Main
@@ -29,6 +30,7 @@ from tests.orchestration.experiments.studies.common import (
     bits,
     one_line,
     rows_in,
+    short,
     start,
     study,
     sweep,
@@ -77,6 +79,17 @@ def test_fmus_run_in_children_of_dask_workers_and_send_no_pickle(tmp_path: Path,
     told = {int(file.name.removeprefix("pid")) for file in tmp_path.glob("pid*")}
     assert told
     assert not told & {os.getpid(), cluster.scheduler.pid, *(worker.pid for worker in cluster.workers)}
+
+
+def test_searches_evaluate_their_runs_on_a_cluster_too(cluster: Cluster) -> None:
+    """As `tune` and a `cell` of `compare` do."""
+    systems = [short(period=period).as_system() for period in (0.01, 0.02)]
+    files = files_of(systems[0])
+    found = []
+    for dask in (None, cluster.address):
+        with RunEvaluator(files, 1, dask=dask) as pool:
+            found.append(pool.run_all(systems))
+    assert found[0] == found[1]
 
 
 def test_the_death_of_a_dask_worker_loses_nothing(

@@ -1,0 +1,84 @@
+"""The cells of a comparison as a table of CSV, Markdown or LaTeX, with intervals at 95 %."""
+
+import csv
+import io
+from collections.abc import Iterator, Sequence
+
+from orchestration.experiments.comparison.cells import CellSummary, Median, Share
+from orchestration.experiments.comparison.design import Comparison
+from orchestration.experiments.comparison.outcome import Outcome
+from orchestration.foundation.basics.errors import UsageError
+
+FORMATS = ("csv", "markdown", "latex")
+_UNITS = {"settling_time": "s", "residual": "m"}
+
+
+def expect_format(table: str) -> None:
+    """Raise `UsageError` for an unknown format."""
+    if table not in FORMATS:
+        raise UsageError(f"--table {table}: expected {', '.join(FORMATS[:-1])} or {FORMATS[-1]}")
+
+
+def lines(comparison: Comparison, outcome: Outcome, table: str) -> Iterator[str]:
+    """A row for each cell; columns that are the same in all cells are left out.
+
+    CSV has the numbers of the cells as in `cells.csv`; Markdown and LaTeX (with the package booktabs) the shares that
+    survive and settle, the median settling time [s] and residual [m], with their intervals.
+    """
+    if table == "csv":
+        yield from _csv(outcome)
+        return
+    heads, rows = _columns(comparison, outcome.cells)
+    if table == "markdown":
+        yield from ("| " + " | ".join(row) + " |" for row in (heads, ["---"] * len(heads), *rows))
+        return
+    yield r"\begin{tabular}{" + "l" * len(heads) + "}"
+    yield r"\toprule"
+    yield _latex(heads)
+    yield r"\midrule"
+    yield from map(_latex, rows)
+    yield r"\bottomrule"
+    yield r"\end{tabular}"
+
+
+def _csv(outcome: Outcome) -> Iterator[str]:
+    text = io.StringIO()
+    rows = [cell.row() for cell in outcome.cells]
+    writer = csv.DictWriter(text, fieldnames=[*rows[0]] if rows else [], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    yield from text.getvalue().splitlines()
+
+
+def _columns(comparison: Comparison, cells: Sequence[CellSummary]) -> tuple[list[str], list[list[str]]]:
+    columns = {key: [getattr(cell, key) for cell in cells] for key in ("vehicle", "condition", "controller")}
+    if comparison.second is not None:
+        columns["condition"] = [comparison.on_second[cell.condition].condition for cell in cells]
+    columns = {key: values for key, values in columns.items() if len({*values}) > 1}
+    for name in comparison.values_of(comparison.conditions[0].name, comparison.values[0]):
+        columns[name] = [f"{cell.values[name]:g}" for cell in cells]
+    columns |= {
+        "survives": [_share(cell.survives) for cell in cells],
+        "settles": [_share(cell.settles) for cell in cells],
+        **{
+            f"{name.replace('_', ' ')} [{unit}]": [_median(c.medians[name]) for c in cells]
+            for name, unit in _UNITS.items()
+        },
+    }
+    return [*columns], [list(row) for row in zip(*columns.values())]
+
+
+def _latex(row: Sequence[str]) -> str:
+    escaped = (cell.replace("_", r"\_").replace("%", r"\%").replace("&", r"\&").replace("#", r"\#") for cell in row)
+    return " & ".join(escaped) + r" \\"
+
+
+def _share(share: Share) -> str:
+    return f"{share.value:.2f} [{share.low:.2f}, {share.high:.2f}]"
+
+
+def _median(median: Median) -> str:
+    if median.value is None:
+        return "-"
+    low, high = ("?" if end is None else f"{end:.3g}" for end in (median.low, median.high))
+    return f"{median.value:.3g} [{low}, {high}]"
