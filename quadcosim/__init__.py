@@ -33,6 +33,7 @@ All times are in seconds, all values in the units that the FMUs declare. All err
 """
 
 import ast
+import sys
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -189,6 +190,10 @@ def _homes() -> dict[str, tuple[str, str]]:
     tree = ast.parse(Path(__file__).read_text(encoding="utf-8"))
     imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
     return {alias.asname or alias.name: (node.module or "", alias.name) for node in imports for alias in node.names}
+
+
+if "gymnasium" in sys.modules:  # from 1.0 on it looks for no plugins: who has imported it finds the environment
+    import_module("quadcosim.gym")
 
 
 def __dir__() -> list[str]:

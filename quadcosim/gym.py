@@ -1,26 +1,111 @@
-"""A run as an environment of Gymnasium; it needs `pip install 'quadcosim[gym]'`.
+"""Runs as environments of Gymnasium; it needs `pip install 'quadcosim[gym]'`.
 
-For example one that rewards being near the paper's path::
+Importing this registers `quadcosim/Quadrotor-v0`, the paper's flight with your policy as its controller::
+
+    import gymnasium
+    import quadcosim.gym
+
+    environment = gymnasium.make("quadcosim/Quadrotor-v0")
+    many = gymnasium.make_vec("quadcosim/Quadrotor-v0", num_envs=1024)  # in SIMD lanes
+
+| | of `quadcosim/Quadrotor-v0` |
+|---|---|
+| observation | position [m], velocity [m/s], attitude as a quaternion x, y, z, w, angular velocity [rad/s], and the \
+reference's position [m] now: 16 numbers. Positions and velocities are in the inertial frame (north, east, down), \
+angular velocity is in the body frame (front, right, down); the quaternion rotates from body to inertial frame |
+| action | thrust [N], along the body's axis that points up, from 0 to 30; torque about the body's axes [N.m], from -5 \
+to 5: 4 numbers, held over a period |
+| reward | 1 / (1 + d²), with the distance d from the reference [m] after the step |
+| episode | the paper's flight of 30 s, a step each 10 ms; terminated 100 m from the reference, or at 1000 rad/s |
+
+`make` and `make_vec` take `scenario`, the flight with its timing, and all that `Environment` takes, as `reward`, `low`,
+`high`, `starts`. Without lanes (no C compiler), `make_vec` needs `vectorization_mode="sync"`.
+
+An environment of anything else, as one that rewards little torque::
 
     from quadcosim import Scenario
     from quadcosim.gym import Environment
 
     def reward(now):
-        return -sum((now[f"plant.position.{a}"] - now[f"reference.position.{a}"]) ** 2 for a in "xyz")
+        return -sum(now[f"plant.torque.{a}"] ** 2 for a in "xyz")
 
     environment = Environment(Scenario(), reward, low=[0, -5, -5, -5], high=[30, 5, 5, 5])
-    observation, info = environment.reset(seed=0)
-    observation, reward, terminated, truncated, info = environment.step([9.81, 0, 0, 0])
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.basics.extras import explains_missing
 
 if TYPE_CHECKING:
-    from orchestration.simulation.runs.environment import Environment
-else:
-    Environment = explains_missing(import_module)("orchestration.simulation.runs.environment").Environment
+    from orchestration.quadrotor.scenarios.scenario import Scenario
+    from orchestration.simulation.runs.environment import Environment, VectorEnvironment
 
-__all__ = ["Environment"]
+__all__ = ["Environment", "VectorEnvironment", "register"]
+
+NAME = "quadcosim/Quadrotor-v0"
+
+
+def nearness(now: Any) -> Any:
+    """The default reward of `quadcosim/Quadrotor-v0`: 1 / (1 + d²), d [m] from the reference; also of arrays."""
+    return 1.0 / (1.0 + sum((now[f"plant.position.{axis}"] - now[f"reference.position.{axis}"]) ** 2 for axis in "xyz"))
+
+
+def quadrotor(**settings: Any) -> "Environment":
+    """What `gymnasium.make` makes of `quadcosim/Quadrotor-v0`."""
+    environment: Environment = __getattr__("Environment")(**_flight(settings))
+    return environment
+
+
+def quadrotor_vector(num_envs: int = 1, **settings: Any) -> "VectorEnvironment":
+    """What `gymnasium.make_vec` makes of `quadcosim/Quadrotor-v0`."""
+    many: VectorEnvironment = __getattr__("VectorEnvironment")(num_envs=num_envs, **_flight(settings))
+    return many
+
+
+@explains_missing
+def register() -> None:
+    """Register `quadcosim/Quadrotor-v0`, if it is not yet."""
+    import gymnasium
+
+    if NAME not in gymnasium.registry:
+        gymnasium.register(NAME, "quadcosim.gym:quadrotor", vector_entry_point="quadcosim.gym:quadrotor_vector")
+
+
+def _flight(settings: dict[str, Any]) -> dict[str, Any]:
+    """The arguments of an environment of the flight: the defaults that are not given."""
+    from orchestration.quadrotor.scenarios.scenario import Scenario
+
+    flight = {
+        "request": _fastest(settings.pop("scenario", None) or Scenario()),
+        "reward": nearness,
+        "low": [0.0, -5.0, -5.0, -5.0],
+        "high": [30.0, 5.0, 5.0, 5.0],
+        "observe": [f"reference.position.{axis}" for axis in "xyz"],
+    }
+    return {**flight, **settings}
+
+
+def _fastest(scenario: "Scenario") -> "Scenario":
+    """The scenario with native twins of its FMUs, where they can be built."""
+    from orchestration.components.building import fmus
+
+    try:
+        twins = fmus.native_twins(scenario)
+        fmus.of_components(twins.as_system().fmus)
+    except QuadcosimError:
+        return scenario
+    return twins
+
+
+@explains_missing
+def __getattr__(name: str) -> Any:
+    """Load Gymnasium's classes where they are used: registering needs none of them."""
+    if name not in ("Environment", "VectorEnvironment"):
+        raise AttributeError(f"module {__name__} has no attribute {name}")
+    from orchestration.simulation.runs import environment
+
+    return getattr(environment, name)
+
+
+register()

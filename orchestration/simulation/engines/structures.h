@@ -12,7 +12,7 @@
 typedef uint64_t Lanes; /* SIMD lanes of a vector register, or tracks: a bit for each */
 
 /* How a run has ended, or why C returns from one that has not. */
-enum { RUNNING, FAILED, REFUSED, STOPPED, OVER, NOT_FINITE, DIVERGED, AT_END, FULL, PAUSED, NEXT_WINDOW, NO_MEMORY };
+enum { RUNNING, FAILED, REFUSED, STOPPED, OVER, NOT_FINITE, DIVERGED, AT_END, FULL, PAUSED, NEXT_WINDOW, NO_MEMORY, AWAITS };
 
 /* The types of an FMU's buffer, and the kinds of a kernel's inputs. */
 enum { FLOAT64, FLOAT32, INT8, UINT8, INT16, UINT16, INT32, UINT32, INT64, UINT64, BOOL, BOOLEAN32 };
@@ -213,6 +213,8 @@ typedef struct {
     const double **recorded;
     double *records[L];
     int64_t record_counts[L];
+    void *suspended; /* a run that waits for outputs which its caller computes; NULL: there was none yet */
+    Lanes awaiting;  /* in which it does */
 } Loop;
 
 /* -- sizes, which Python compares ---------------------------------------------------------------------------------- */

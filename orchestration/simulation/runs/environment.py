@@ -1,18 +1,21 @@
-"""A simulation as an environment of Gymnasium, which the extra `gym` installs."""
+"""Simulations as environments of Gymnasium, which the extra `gym` installs: one run, or many in SIMD lanes."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode
 
 from orchestration.foundation.basics.errors import UsageError, shown
-from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.simulator import Booleans, Floats
 from orchestration.simulation.requests.request import RequestLike
+from orchestration.simulation.runs.stepped_runs import SteppedRuns
 from orchestration.simulation.runs.stepping import Simulation
 
-Reward = Callable[[Mapping[str, float]], float]
-"""Computed from the values of all columns after a step, by name: `Simulation.values`"""
+Reward = Callable[[Mapping[str, Any]], Any]
+"""Computed from the values of all columns after a step, by name: numbers, or arrays of those of many runs"""
 InitialValues = Callable[[np.random.Generator], Mapping[str, Any]]
 """Draws the values by path that an episode begins with"""
 
@@ -35,39 +38,30 @@ class Environment(gymnasium.Env[Floats, Floats]):  # type: ignore[misc]
         high: Any,
         component: str | None = None,
         starts: InitialValues | None = None,
+        observe: Sequence[str] = (),
     ) -> None:
         """`low` and `high` bound each number of an action, in the units of the component's outputs.
 
         `reward` computes a number from the values of all columns after a step; those of the last instant for a run that
         has ended early. `starts` draws the values that an episode begins with, by path as axes of studies name them.
-        `component` is the one that is replaced; default: the only sampled one. Raises `UsageError` as `Simulation`.
+        `component` is the one that is replaced; default: the only sampled one. `observe` are columns or signals of
+        sources whose present values follow the measurement. Raises `UsageError` as `Simulation`.
         """
         self.simulation = Simulation(request, component)
         """The simulation that it steps: names of observations and actions, and the result of a finished episode."""
-        self._reward, self._starts = reward, starts
-        count = len(self.simulation.commanded)
-        try:
-            lowest, highest = (np.broadcast_to(np.asarray(x, dtype=np.float64), (count,)) for x in (low, high))
-            fits = bool((lowest < highest).all())
-        except (TypeError, ValueError):
-            fits = False
-        if not fits:
-            names = ", ".join(self.simulation.commanded)
-            raise UsageError(f"low, high: expected a number, or {count} of them, each low below its high: {names}")
-        self.action_space = gymnasium.spaces.Box(lowest, highest, dtype=np.float64)
-        shape = (len(self.simulation.measured),)
-        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, shape, dtype=np.float64)
+        self._reward, self._starts, self._observe = reward, starts, tuple(observe)
+        self.action_space = _actions(self.simulation.commanded, low, high)
+        self.observation_space = _observations(self.simulation.measured, self._observe)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
         """Begin an episode; `options` are values by path on top of those that `starts` draws."""
         super().reset(seed=seed)
-        values = {} if self._starts is None else dict(self._starts(self.np_random))
-        seed_of_episode = int(self.np_random.integers(2**63 - 1))
-        return self.simulation.reset(seed_of_episode, {**values, **(options or {})}), {}
+        values, seed_of_episode = _episode(self.np_random, self._starts)
+        return self._with_others(self.simulation.reset(seed_of_episode, {**values, **(options or {})})), {}
 
     def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
         """Go on to the next sample; returns observation, reward, whether terminated or truncated, and `info`."""
-        observation = self.simulation.step(action)
+        observation = self._with_others(self.simulation.step(action))
         value, info = self._reward(self.simulation.values), {}
         try:
             reward = float(value)
@@ -83,3 +77,130 @@ class Environment(gymnasium.Env[Floats, Floats]):  # type: ignore[misc]
     def close(self) -> None:
         """Free the FMUs."""
         self.simulation.close()
+
+    def _with_others(self, measurement: Floats) -> Floats:
+        if not self._observe:
+            return measurement
+        values = self.simulation.values
+        return np.concatenate([measurement, [values[name] for name in self._observe]])
+
+
+class VectorEnvironment(gymnasium.vector.VectorEnv[Floats, Floats, Any]):  # type: ignore[misc]
+    """Many environments in SIMD lanes: each has the episodes of an `Environment` of its seed, to the bit.
+
+    Where one is over, the next step begins its next episode: it ignores the action and returns the first observation
+    with a reward of 0 (`AutoresetMode.NEXT_STEP`). There are no metrics.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
+
+    def __init__(
+        self,
+        request: RequestLike,
+        reward: Reward,
+        *,
+        num_envs: int,
+        low: Any,
+        high: Any,
+        component: str | None = None,
+        starts: InitialValues | None = None,
+        observe: Sequence[str] = (),
+    ) -> None:
+        """As `Environment`, for `num_envs` of them; `reward` gets arrays with a value for each, and returns one.
+
+        Raises `UsageError` also for FMUs that cannot run in lanes of this process, in a line.
+        """
+        if isinstance(num_envs, bool) or not isinstance(num_envs, int) or num_envs < 1:
+            raise UsageError(f"num_envs = {shown(num_envs)}: expected a positive whole number")
+        self.runs = SteppedRuns(request, component, num_envs)
+        """The runs that it steps: names of observations and actions."""
+        self.num_envs = num_envs
+        self._reward, self._starts, self._observe = reward, starts, tuple(observe)
+        self.single_action_space = _actions(self.runs.commanded, low, high)
+        self.single_observation_space = _observations(self.runs.measured, self._observe)
+        batched = gymnasium.vector.utils.batch_space
+        self.action_space = batched(self.single_action_space, num_envs)
+        self.observation_space = batched(self.single_observation_space, num_envs)
+        self._random: list[np.random.Generator] = []
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Floats, dict[str, Any]]:
+        """Begin an episode in each; a number as `seed` is that of the first, one more for each that follows.
+
+        `options` are values by path on top of those that `starts` draws: one for all, or an array with one for each.
+        """
+        seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int) else seed or [None] * self.num_envs
+        if not self._random:
+            self._random = [seeding.np_random(None)[0] for _ in seeds]
+        for i, own in enumerate(seeds):
+            if own is not None:
+                self._random[i] = seeding.np_random(own)[0]
+        self._begin(np.arange(self.num_envs), options or {})
+        return self._observation(), {}
+
+    def step(self, actions: Floats) -> tuple[Floats, Floats, Booleans, Booleans, dict[str, Any]]:
+        """Go on to the next samples; raises `UsageError` for actions that are not finite, and before `reset`."""
+        if not self._random:
+            raise UsageError("step: no run is under way; expected reset before it")
+        actions = np.asarray(actions, dtype=np.float64)
+        if actions.shape != self.action_space.shape or not np.isfinite(actions).all():
+            raise UsageError(f"actions: expected finite numbers, shape {self.action_space.shape}")
+        fresh = self.runs.over.copy()
+        self.runs.step(actions)
+        if fresh.any():
+            self._begin(np.flatnonzero(fresh), {})
+        rewards = np.asarray(self._reward(_Values(self.runs)), dtype=np.float64)
+        if rewards.shape != (self.num_envs,):
+            raise UsageError(f"reward: returned shape {rewards.shape}; expected a number for each of {self.num_envs}")
+        terminated = self.runs.diverged.copy()
+        return self._observation(), np.where(fresh, 0.0, rewards), terminated, self.runs.over & ~terminated, {}
+
+    def _begin(self, places: Any, options: Mapping[str, Any]) -> None:
+        drawn, seeds = zip(*(_episode(self._random[place], self._starts) for place in places.tolist()))
+        values = {path: np.array([each[path] for each in drawn]) for path in drawn[0]}
+        self.runs.begin(places, seeds, {**values, **options})
+
+    def _observation(self) -> Floats:
+        others = [self.runs.value(name) for name in self._observe]
+        return np.column_stack([self.runs.measurement, *others])
+
+
+class _Values(Mapping[str, Any]):
+    """The values of columns now by name, arrays with one for each run."""
+
+    def __init__(self, runs: SteppedRuns) -> None:
+        self._runs = runs
+
+    def __getitem__(self, name: str) -> Floats:
+        return self._runs.value(name)
+
+    def __iter__(self) -> Any:
+        return iter(self._runs.names)
+
+    def __len__(self) -> int:
+        return len(self._runs.names)
+
+
+def _episode(random: np.random.Generator, starts: InitialValues | None) -> tuple[Mapping[str, Any], int]:
+    """The values that an episode begins with, and its seed."""
+    values = {} if starts is None else dict(starts(random))
+    return values, int(random.integers(2**63 - 1))
+
+
+def _actions(commanded: Sequence[str], low: Any, high: Any) -> Any:
+    """The space of commands; raises `UsageError` for bounds that are none."""
+    count = len(commanded)
+    try:
+        lowest, highest = (np.broadcast_to(np.asarray(x, dtype=np.float64), (count,)) for x in (low, high))
+        fits = bool((lowest < highest).all())
+    except (TypeError, ValueError):
+        fits = False
+    if not fits:
+        names = ", ".join(commanded)
+        raise UsageError(f"low, high: expected a number, or {count} of them, each low below its high: {names}")
+    return gymnasium.spaces.Box(lowest, highest, dtype=np.float64)
+
+
+def _observations(measured: Sequence[str], observe: Sequence[str]) -> Any:
+    return gymnasium.spaces.Box(-np.inf, np.inf, (len(measured) + len(observe),), dtype=np.float64)

@@ -11,6 +11,11 @@
 
 #include "instants.h"
 
+/* With the C library of GNU, a run has a stack of its own, on which it waits for outputs that the caller computes. */
+#ifdef __GLIBC__
+#include <ucontext.h>
+#endif
+
 EXPORT const Size sizes[] = {SIZES, {0}};
 
 static int make_room_to_keep(Kept *kept) {
@@ -79,10 +84,15 @@ static Lanes failed_in_step(Loop *l, const Component *c, Lanes lanes, q_real beg
 }
 
 static void step_from_put_off(Loop *l, Track *track, int64_t index, Lanes lanes, const Instant *now);
+static void await_outputs(Loop *l, Lanes lanes);
 
 static void step(Loop *l, int64_t index, Lanes lanes, q_real begin, q_real length, int64_t until, const Instant *now) {
     if (l->tracks->put_off && index == l->continuous.items[0]) {
         step_from_put_off(l, l->tracks, index, lanes, now);
+        return;
+    }
+    if (!l->components[index].step) {
+        await_outputs(l, lanes);
         return;
     }
     Lanes failed = failed_in_step(l, &l->components[index], lanes, begin, length);
@@ -416,6 +426,59 @@ EXPORT int run(Loop *l) {
     }
 }
 
+/* -- runs of which the caller computes the outputs of a component --------------------------------------------------- */
+
+#ifdef __GLIBC__
+
+enum { STACK = 1 << 20 }; /* bytes, of which the system provides those that are used */
+
+typedef struct {
+    ucontext_t caller, own;
+    Loop *loop;
+    int code;
+    char stack[STACK] __attribute__((aligned(64)));
+} Suspended;
+
+static void await_outputs(Loop *l, Lanes lanes) {
+    Suspended *s = l->suspended;
+    l->awaiting = lanes, s->code = AWAITS;
+    swapcontext(&s->own, &s->caller);
+    s->code = RUNNING;
+}
+
+static void run_suspended(unsigned high, unsigned low) { /* makecontext passes numbers of 32 bits */
+    Suspended *s = (Suspended *)((uintptr_t)high << 32 | low);
+    s->code = run(s->loop);
+}
+
+/* As `run`, and it also returns AWAITS, where a component without a `step` is to be stepped: then its outputs are to be
+   in its memory when it is called again. */
+EXPORT int proceed(Loop *l) {
+    Suspended *s = l->suspended;
+    if (!s) {
+        s = l->suspended = aligned_alloc(64, (sizeof *s + 63) / 64 * 64);
+        if (!s) return NO_MEMORY;
+        s->loop = l, s->code = RUNNING;
+    }
+    if (s->code != AWAITS) {
+        getcontext(&s->own);
+        s->own.uc_stack.ss_sp = s->stack, s->own.uc_stack.ss_size = STACK, s->own.uc_link = &s->caller;
+        makecontext(
+            &s->own, (void (*)(void))run_suspended, 2, (unsigned)((uintptr_t)s >> 32), (unsigned)(uintptr_t)s);
+    }
+    swapcontext(&s->caller, &s->own);
+    return s->code;
+}
+
+static void abandon(Loop *l) {
+    if (l->suspended) ((Suspended *)l->suspended)->code = RUNNING; /* it holds nothing but its stack */
+}
+
+#else
+static void await_outputs(Loop *l, Lanes lanes) {}
+static void abandon(Loop *l) {}
+#endif
+
 /* The values of the reductions at the end of the runs. */
 EXPORT void values_of_reductions(const Loop *l, double *values) { reductions(l, values); }
 
@@ -430,15 +493,17 @@ EXPORT void grown(const Loop *l, int64_t number, const double *floor, double *gr
     AT(grown_steps, 0) = count;
 }
 
-/* Discard messages on their way and kept values; their memory stays allocated. */
+/* Discard messages on their way, kept values and a run that waits; their memory stays allocated. */
 EXPORT void clear(Loop *l) {
+    abandon(l);
     for (int64_t i = 0; i < KEPT; i++) l->kept[i].count = 0;
     for (int64_t i = 0; i < l->channel_count; i++)
         for (int lane = 0; lane < L; lane++) l->channels[i].first[lane] = l->channels[i].last[lane] = 0;
 }
 
-/* Free the memory of messages and kept values. */
+/* Free the memory of messages, of kept values and of a run that waits. */
 EXPORT void free_all(Loop *l) {
+    free(l->suspended);
     for (int64_t i = 0; i < KEPT; i++) free(l->kept[i].values);
     for (int64_t i = 0; i < l->channel_count; i++) free(l->channels[i].flight);
 }

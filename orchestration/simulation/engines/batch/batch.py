@@ -2,7 +2,7 @@
 
 import ctypes
 from collections import OrderedDict
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -107,6 +107,8 @@ class Batch:
         self._read = [wanted.copy() for wanted in self.arrays.wanted]
         self._source_values: OrderedDict[Hashable, _SourceTables] = OrderedDict()
         self._rows: Floats | None = None
+        self._runs: Sequence[LaneRun] = ()
+        self._tracks: Sequence[Track] = ()
 
     def __del__(self) -> None:
         if hasattr(self, "_address"):
@@ -124,6 +126,13 @@ class Batch:
         return result
 
     def _run_once(self, group: Group, known: Mapping[Call, Floats], record: Sequence[str] | None) -> BatchResult:
+        self._set_out(group, known)
+        recorded = self._record(record, len(group.systems))
+        self._call(self._library.run)
+        return self._result(group.systems, recorded)
+
+    def _set_out(self, group: Group, known: Mapping[Call, Floats]) -> None:
+        """Set everything to the start of a group of runs; `known` are reductions of a pass before."""
         systems, timings = group.systems, group.timings
         loop, count = self._loop, len(systems)
         runs = [self._run(lane, system) for lane, system in enumerate(systems)]
@@ -138,10 +147,13 @@ class Batch:
         for lane in np.flatnonzero(wrong[:count]).tolist():
             loop.outcome[lane] = self._c.REFUSED
             loop.alive &= ~(1 << lane)
-        tracks = self._tracks_of(runs, timings, schedules)
-        recorded = self._record(record, count)
-        self._pass(group, runs, tracks)
-        return self._result(systems, recorded)
+        self._runs, self._tracks = runs, self._tracks_of(runs, timings, schedules)
+        loop.track_count = len(self._tracks)
+        for i, track in enumerate(self._tracks):
+            into = self._structures.tracks[i]
+            into.now, into.lanes = address(track.now), sum(1 << lane for lane in track.lanes)
+            into.stop, into.one_for_all = nanoseconds(systems[track.lanes[0]].stop_time), track.same_sources
+            self._next_span(i)
 
     def _clear(self) -> None:
         """Reset the state to that before the first instant."""
@@ -151,18 +163,13 @@ class Batch:
         for name in ("outcome", "outcome_component", "outcome_time", "steps", "record_counts"):
             getattr(self._loop, name)[:] = [0] * self._shape.lanes
 
-    def _pass(self, group: Group, runs: Sequence[LaneRun], tracks: Sequence[Track]) -> None:
-        loop = self._loop
-        loop.track_count = len(tracks)
-        for i, track in enumerate(tracks):
-            into = self._structures.tracks[i]
-            into.now, into.lanes = address(track.now), sum(1 << lane for lane in track.lanes)
-            into.stop, into.one_for_all = nanoseconds(group.systems[track.lanes[0]].stop_time), track.same_sources
-            self._next_span(i, track, runs)
-        while (code := self._library.run(self._address)) == self._c.NEXT_WINDOW:
-            self._next_span(loop.track, tracks[loop.track], runs)
+    def _call(self, run: Callable[[int], int]) -> int:
+        """What C returns, once it needs no more spans."""
+        while (code := run(self._address)) == self._c.NEXT_WINDOW:
+            self._next_span(self._loop.track)
         if code == self._c.NO_MEMORY:
             raise QuadcosimError("a batch of runs: expected memory for the messages that are on their way")
+        return code
 
     def _result(self, systems: Sequence[System], recorded: Sequence[Floats]) -> BatchResult:
         loop, count, table = self._loop, len(systems), self.arrays.reductions
@@ -221,9 +228,9 @@ class Batch:
             ))  # fmt: skip
         return tracks
 
-    def _next_span(self, number: int, track: Track, runs: Sequence[LaneRun]) -> None:
+    def _next_span(self, number: int) -> None:
         """Hand the next span of a track to C."""
-        into = self._structures.tracks[number]
+        track, runs, into = self._tracks[number], self._runs, self._structures.tracks[number]
         span = track.span = track.ahead
         into.count, into.more = 0, 0
         track.ahead = None if span is None else next(track.spans, None)

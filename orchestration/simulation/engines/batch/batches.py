@@ -84,7 +84,7 @@ class Batches:
                 i: timing.with_seed(seed_of[i]) if i in seed_of else timing
                 for i, (_, timing) in ((i, known[id(systems[i])]) for i in places)
             }
-            for group in _groups(places, timings, self._lanes):
+            for group in groups(places, timings, self._lanes):
                 own = (connected[id(systems[i])] for i in group)
                 runs = Group(
                     systems=[replaced(x, seed=seed_of[i]) if i in seed_of else x for i, x in zip(group, own)],
@@ -103,7 +103,7 @@ class Batches:
         return self._shapes[key]
 
 
-def _groups(indices: Sequence[int], timings: Mapping[int, Hashable], lanes: int) -> Iterator[list[int]]:
+def groups(indices: Sequence[int], timings: Mapping[int, Hashable], lanes: int) -> Iterator[list[int]]:
     """Runs that are simulated together, of one timing as far as possible."""
     alike: dict[Hashable, list[int]] = {}
     for index in indices:

@@ -94,19 +94,21 @@ class Initialisation:
             x = shape.system.connections[i]
             sender, receiver = shape.names.index(x.sender), shape.names.index(x.receiver)
             wrong[:] |= self._compute(sender)
-            before, after = received[i].copy(), self._sent_values(i, memories[sender])
+            before, after = received[i].copy(), self.sent_values(i, memories[sender])
             received[i][:, open_] = after[:, open_]
-            taken = self._received_values(i, after)[:, open_]
+            taken = self.received_values(i, after)[:, open_]
             memories[receiver][shape.ends[i].end[:, None], np.flatnonzero(open_)] = taken
             return before, received[i]
 
         return wrong | initial.exchange(group, pass_on, (shape.lanes,))
 
-    def _sent_values(self, i: int, sender: Floats) -> Floats:
+    def sent_values(self, i: int, sender: Floats) -> Floats:
+        """What a connection sends, from the memory of its sender."""
         values, arrays = sender[self._shape.ends[i].start], self._arrays.channels[i]
         return values * arrays.scale + arrays.offset if self._structures.channels[i].converts else values
 
-    def _received_values(self, i: int, values: Floats) -> Floats:
+    def received_values(self, i: int, values: Floats) -> Floats:
+        """What its receiver makes of that."""
         c, kinds = self._structures.types, self._shape.ends[i].kinds[:, None]
         return np.where(kinds == c.TRUTH, values != 0.0, np.where(kinds == c.WHOLE, np.rint(values), values))
 

@@ -72,8 +72,9 @@ def batch(sizes: str, expressions: str, lanes: int) -> Any:
     compile_ = lambda: compiled_here(sources, "batch.c", options=options)  # noqa: E731
     library = ctypes.CDLL(str(_cached_library("batch", sources, (OPTIONS, options), compile_)))
     expect_same_sizes(library, shared(lanes))
-    for name in ("run", "clear", "free_all"):
-        getattr(library, name).argtypes = (ctypes.c_void_p,)
+    for name in ("run", "proceed", "clear", "free_all"):
+        if hasattr(library, name):
+            getattr(library, name).argtypes = (ctypes.c_void_p,)
     library.values_of_reductions.argtypes = (ctypes.c_void_p, ctypes.c_void_p)
     library.grown.argtypes = (ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)
     return library

@@ -1,6 +1,7 @@
-"""An environment that Gymnasium's own checker passes, whose episodes are runs."""
+"""Environments that Gymnasium's own checker passes, whose episodes are runs."""
 
 import importlib
+import subprocess
 import sys
 from collections.abc import Iterator
 from typing import Any
@@ -8,21 +9,27 @@ from typing import Any
 import numpy as np
 import pytest
 
+import quadcosim
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from tests.native import NATIVE
+from tests.orchestration.components.fmi.small import needs_compiler
+from tests.orchestration.simulation.runs.test_stepping import law
+from tests.places import ROOT
 
+gymnasium = pytest.importorskip("gymnasium")
 env_checker = pytest.importorskip("gymnasium.utils.env_checker")  # it sets what others would see as a change
 SHORT = NATIVE.with_changes(stop_time=0.2, timing={"period": 0.02, "plant_interval": 0.01, "noise": {"position": 0.01}})
 gym: Any = importlib.import_module("quadcosim.gym")
 LOW, HIGH = [0.0, -5.0, -5.0, -5.0], [20.0, 5.0, 5.0, 5.0]
+X = "plant.initial.position.x"
 
 
-def reward(now: Any) -> float:
+def reward(now: Any) -> Any:
     return -sum((now[f"plant.position.{a}"] - now[f"reference.position.{a}"]) ** 2 for a in "xyz")
 
 
 def starts(random: np.random.Generator) -> dict[str, float]:
-    return {"plant.initial.position.x": random.uniform(-1.0, 1.0)}
+    return {X: random.uniform(-1.0, 1.0)}
 
 
 @pytest.fixture
@@ -32,9 +39,11 @@ def environment() -> Iterator[Any]:
     environment.close()
 
 
-@pytest.mark.filterwarnings("ignore:.*Box (observation|action) space", "ignore:.*not having a spec")
-def test_gymnasiums_checker_passes_it(environment: Any) -> None:
-    env_checker.check_env(environment, skip_render_check=True)
+@pytest.mark.filterwarnings("ignore:.*Box (observation|action) space")
+def test_gymnasiums_checker_passes_it() -> None:
+    environment = gymnasium.make("quadcosim/Quadrotor-v0", scenario=SHORT).unwrapped
+    env_checker.check_env(environment)
+    environment.close()
 
 
 def test_an_episode_is_a_run_of_its_seed_and_start(environment: Any) -> None:
@@ -75,3 +84,75 @@ def test_without_gymnasium_one_line_names_the_extra(monkeypatch: pytest.MonkeyPa
         monkeypatch.delitem(sys.modules, name, raising=False)
     with pytest.raises(QuadcosimError, match=r"^gymnasium is not installed; this needs: pip install 'quadcosim\[gym\]"):
         importlib.import_module("quadcosim.gym")
+
+
+@needs_compiler
+def test_environments_in_lanes_have_the_episodes_of_each_alone() -> None:
+    timing = {"timing.period": 0.02, "timing.delay": 0.01, "timing.jitter": 0.002, "timing.loss": 0.1}
+    settings = {"scenario": SHORT.with_values({**timing, "stop_time": 0.1}), "starts": far, "reward": reward}
+    many = gymnasium.make_vec("quadcosim/Quadrotor-v0", num_envs=6, **settings)
+    each = gymnasium.make_vec("quadcosim/Quadrotor-v0", num_envs=6, vectorization_mode="sync", **settings)
+    assert isinstance(many, gym.VectorEnvironment)
+    assert many.observation_space == each.observation_space
+    assert many.metadata["autoreset_mode"] == each.metadata["autoreset_mode"]
+    np.testing.assert_array_equal(many.reset(seed=3)[0], each.reset(seed=3)[0])
+    actions, ends = np.random.default_rng(0), []
+    for _ in range(14):
+        action = actions.uniform(LOW, HIGH, (6, 4))
+        (observed, got, *over, _), (expected, rewards, *ended, _) = many.step(action), each.step(action)
+        np.testing.assert_array_equal(observed, expected)
+        np.testing.assert_allclose(got, rewards, rtol=1e-12)
+        np.testing.assert_array_equal(over, ended)
+        ends.append(over)
+    terminated, truncated = np.sum(ends, axis=0)
+    assert terminated.any()
+    assert (truncated > 1).any()
+    many.close()
+    each.close()
+
+
+def far(random: np.random.Generator) -> dict[str, float]:
+    """Starts of which some diverge before the end."""
+    return {X: random.uniform(80.0, 98.0), "plant.initial.velocity.x": 100.0}
+
+
+@needs_compiler
+def test_the_projects_controller_as_a_policy_flies_as_fly_has_it() -> None:
+    starts = np.array([-1.0, 0.0, 1.0])
+    scenario = SHORT.with_values({"timing.noise.position": 0.0})
+    flown = quadcosim.fly(scenario, {X: starts}, outputs=["steps"], record=["plant.position.x", "plant.thrust"])
+    many = gym.VectorEnvironment(scenario, reward, num_envs=3, low=LOW, high=HIGH)
+    observed, _ = many.reset(seed=0, options={X: starts})
+    for step in range(10):
+        (time,) = set(many.runs.value("time"))
+        assert time == pytest.approx(0.02 * step)
+        observed, _, terminated, truncated, _ = many.step(np.array([law(time, each) for each in observed]))
+    assert truncated.all()
+    assert not terminated.any()
+    assert many.runs.value("plant.position.x").tobytes() == flown["plant.position.x"][:, -1].tobytes()
+    assert many.runs.value("plant.thrust").tobytes() == flown["plant.thrust"][:, -1].tobytes()
+
+
+@needs_compiler
+def test_what_cannot_be_is_refused_in_a_line_in_lanes_too() -> None:
+    with pytest.raises(UsageError, match=r"^num_envs = 0: expected a positive whole number$"):
+        gym.VectorEnvironment(SHORT, reward, num_envs=0, low=LOW, high=HIGH)
+    many = gym.VectorEnvironment(SHORT, lambda now: 1.0, num_envs=2, low=LOW, high=HIGH)
+    with pytest.raises(UsageError, match=r"^step: no run is under way; expected reset before it$"):
+        many.step(np.zeros((2, 4)))
+    many.reset(seed=0)
+    for wrong in (np.zeros(4), np.full((2, 4), np.nan)):
+        with pytest.raises(UsageError, match=r"^actions: expected finite numbers, shape \(2, 4\)$"):
+            many.step(wrong)
+    with pytest.raises(UsageError, match=r"^reward: returned shape \(\); expected a number for each of 2$"):
+        many.step(np.zeros((2, 4)))
+    with pytest.raises(UsageError, match=r"^there is no plant.mas"):
+        many.runs.value("plant.mas")
+    with pytest.raises(UsageError, match=r"plant.initial.position.w: QuadrotorPlant has no such variable"):
+        many.reset(options={"plant.initial.position.w": 1.0})
+
+
+def test_who_imports_gymnasium_finds_it() -> None:
+    code = "import gymnasium, quadcosim; print(gymnasium.spec('quadcosim/Quadrotor-v0').id)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert done.stdout == "quadcosim/Quadrotor-v0\n"
