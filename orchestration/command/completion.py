@@ -13,11 +13,11 @@ def among(*names: str) -> Complete:
 
 
 def controllers(incomplete: str) -> list[str]:
-    """This project's controllers, and FMUs by their paths."""
-    from orchestration.components.building.models import MODELS
+    """This project's controllers, and FMUs and files of controllers in C by their paths."""
+    from orchestration.components.building.models import MODELS, PATHS
     from orchestration.quadrotor.scenarios.wiring import DEFAULT_PLANT
 
-    return starting(incomplete, [name for name in MODELS if name != DEFAULT_PLANT]) + _files(incomplete, ".fmu")
+    return starting(incomplete, [name for name in MODELS if name != DEFAULT_PLANT]) + _files(incomplete, *PATHS)
 
 
 def plants(incomplete: str) -> list[str]:
@@ -46,11 +46,11 @@ def starting(incomplete: str, names: Iterable[str]) -> list[str]:
     return [name for name in names if name.startswith(incomplete)]
 
 
-def _files(incomplete: str, ending: str) -> list[str]:
-    """Files with this ending, and folders, that begin with the incomplete path."""
+def _files(incomplete: str, *endings: str) -> list[str]:
+    """Files with one of these endings, and folders, that begin with the incomplete path."""
     folder = Path(incomplete) if incomplete.endswith("/") else Path(incomplete).parent
     typed = incomplete.rpartition("/")
     entries = sorted(folder.iterdir()) if folder.is_dir() else []
-    fitting = [each for each in entries if each.is_dir() or each.suffix == ending]
+    fitting = [each for each in entries if each.is_dir() or each.suffix in endings]
     kept = [f"{each.name}/" if each.is_dir() else each.name for each in fitting]
     return [f"{typed[0]}{typed[1]}{name}" for name in kept if name.startswith(typed[2]) and not name.startswith(".")]

@@ -156,7 +156,7 @@ class BuildFlag:
 
     build: Annotated[
         bool,
-        option("--build", "Allow building FMUs from foreign modules beside a system file (it runs them); remembered."),
+        option("--build", "Allow building FMUs from foreign code beside a system file (it runs it); remembered."),
     ] = False
 
 

@@ -116,8 +116,10 @@ template <class T> struct quadcosim_kind<T &> : quadcosim_kind<T> {};
 extern "C" void quadcosim_init(void);
 extern "C" void quadcosim_after_parameters(void);
 extern "C" void quadcosim_step(void);
-extern "C" void quadcosim_set(unsigned, double);
-extern "C" double quadcosim_get(unsigned);
+extern "C" void quadcosim_set_inputs(const double *, unsigned);
+extern "C" void quadcosim_set_parameters(const double *, unsigned);
+extern "C" void quadcosim_get_outputs(double *, unsigned);
+extern "C" void quadcosim_get_all(double *, unsigned);
 extern "C" void __cxa_pure_virtual(void) { __builtin_trap(); } /* the runtime library's would take more of it */
 """
 
@@ -131,13 +133,11 @@ def user_code(code: UserCode) -> str:
     lines += _function(code, "quadcosim_init", code.init)
     lines += _function(code, "quadcosim_after_parameters", code.after_parameters)
     lines += _step(code)
-    given = [(i, place) for i, place in enumerate(code.places) if place.causality != "output"]
-    lines += ["void quadcosim_set(unsigned quadcosim_variable, double quadcosim_x) {", "(void)quadcosim_x;"]
-    lines += ["switch (quadcosim_variable) {"]
-    lines += _cases(code, given, "QUADCOSIM_SET({});", "break;")
-    lines += ["}", "}", "double quadcosim_get(unsigned quadcosim_variable) {", "switch (quadcosim_variable) {"]
-    lines += _cases(code, [*enumerate(code.places)], "return (double)({});", "")
-    return "\n".join([*lines, "}", "return 0.0;", "}", ""])
+    for name, causality in (("set_inputs", "input"), ("set_parameters", "parameter")):
+        lines += _each(code, name, "const ", code.having(causality), _TO_CODE)
+    lines += _each(code, "get_outputs", "", code.having("output"), _FROM_CODE)
+    lines += _each(code, "get_all", "", code.places, _FROM_CODE)
+    return "\n".join([*lines, ""])
 
 
 def places(code: UserCode, starts: Sequence[float], state_bytes: int) -> str:
@@ -190,10 +190,18 @@ def _function(code: UserCode, name: str, body: Code | None) -> list[str]:
     return [f"void {name}(void) {{", *([] if body is None else _at(code, body)), "}"]
 
 
-def _cases(code: UserCode, places: Sequence[tuple[int, Place]], form: str, after: str) -> Iterator[str]:
-    for number, place in places:
-        yield f"case {number}:"
-        yield from _at(code, place.lvalue, f"{form.format(place.lvalue.text)} {after}")
+_TO_CODE = "{{ const double quadcosim_x = {value}; QUADCOSIM_SET({lvalue}); }}"
+_FROM_CODE = "{value} = (double)({lvalue});"
+
+
+def _each(code: UserCode, name: str, qualifier: str, places: Sequence[Place], form: str) -> Iterator[str]:
+    """A function that passes each of some variables to the code or from it."""
+    yield f"void quadcosim_{name}({qualifier}double *quadcosim_values, unsigned quadcosim_apart) {{"
+    yield "(void)quadcosim_values; (void)quadcosim_apart;"
+    for number, place in enumerate(places):
+        value = f"quadcosim_values[{number} * quadcosim_apart]"
+        yield from _at(code, place.lvalue, form.format(value=value, lvalue=place.lvalue.text))
+    yield "}"
 
 
 def _at(code: UserCode, part: Code, text: str | None = None) -> list[str]:

@@ -49,8 +49,6 @@ OPTIMISED = """
 #pragma GCC pop_options
 #endif
 """
-_OF_LIBRARY = ("-O1",)
-"""Compiles faster than -O2, and steps are as fast: the generated code is already simple."""
 _NEEDS = FOLDER / "needs.html"
 _PYTHON = "python"
 """The folder of the documentation with the Python from which the C was generated."""
@@ -103,8 +101,12 @@ def build(
 
 def library(sources: dict[str, bytes], main: str, mathematics: c_compiler.Mathematics = "own") -> bytes:
     """The library of a slave for this machine, from the sources of its FMU or from the cache."""
-    compile_ = functools.partial(c_compiler.compiled_here, sources, main, mathematics=mathematics, options=_OF_LIBRARY)
-    return libraries.cached_content("native", sources, (c_compiler.OPTIONS, _OF_LIBRARY, main, mathematics), compile_)
+    compile_ = functools.partial(
+        c_compiler.compiled_here, sources, main, mathematics=mathematics, options=c_compiler.OF_LIBRARY
+    )
+    return libraries.cached_content(
+        "native", sources, (c_compiler.OPTIONS, c_compiler.OF_LIBRARY, main, mathematics), compile_
+    )
 
 
 def c_sources(program: Program, guid: str, standard: Standard) -> dict[str, bytes]:

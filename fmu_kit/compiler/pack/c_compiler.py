@@ -21,6 +21,8 @@ OPTIONS = (
     *("-std=gnu11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno"),
     "-s",
 )
+OF_LIBRARY = ("-O1",)
+"""Compiles faster than -O2, and steps are as fast: generated code is already simple."""
 FOR_THIS_PROCESSOR = ("-mcpu=native",) if platform.machine() in ("aarch64", "arm64") else ("-march=native",)
 """Not for a library that is distributed."""
 _LINUX = ("-Wl,--build-id=none",)  # nothing that differs between builds

@@ -42,14 +42,17 @@ REFUSED = 2
 _LONGEST = 60.0
 """The most seconds that the code's initialisation may take"""
 _BESIDE = ("instance.h", "integers.h", "lanes.h", "mathematics.h", "text.h", "wrapped.h")
+_OF_LANES = ("integers.h", "lanes.h", "mathematics.h", "places.h", "wrapped.h")
 _PROBE = """
 #include <stdio.h>
-#include "places.h"
-#include "wrapped.h"
+void quadcosim_init(void);
+void quadcosim_get_all(double *values, unsigned apart);
 int main(void) {
+    double values[VARIABLES];
     quadcosim_init();
+    quadcosim_get_all(values, 1);
     for (unsigned i = 0; i < VARIABLES; i++)
-        printf("%a\\n", quadcosim_get(i));
+        printf("%a\\n", values[i]);
     return 0;
 }
 """
@@ -78,8 +81,6 @@ def build(code: UserCode, out: Path, version: int = 2, systems: Sequence[str] = 
         user = folder / f"user_code{'.cpp' if code.is_cxx else '.c'}"
         (folder / user.name).write_text(user_code(code), encoding="utf-8")
         objects = build_objects(code, user, folder)
-        for name, text in _probe(code, objects).items():
-            (folder / name).write_text(text, encoding="utf-8")
         starts = _starts(code, objects, folder)
         slave = _slave(code, starts)
         whole = objects.is_pure and not systems
@@ -109,23 +110,15 @@ def build(code: UserCode, out: Path, version: int = 2, systems: Sequence[str] = 
 
 
 def _library(code: UserCode, sources: Mapping[str, bytes], main: str) -> bytes:
-    options = ["-Wl,-Bsymbolic", "-Wl,-z,defs", "code.o", *libraries(code)]
+    options = [*c_compiler.OF_LIBRARY, "-Wl,-Bsymbolic", "-Wl,-z,defs", "code.o", *libraries(code)]
     return c_compiler.compiled_here(sources, main, options=options)
-
-
-def _probe(code: UserCode, objects: Objects) -> dict[str, str]:
-    """The files of a program that prints the values of the variables after initialisation."""
-    return {
-        "places.h": places(code, [0.0] * len(code.places), objects.state_bytes),
-        "probe.c": _PROBE,
-        "wrapped.h": (FOLDER / "wrapped.h").read_text(encoding="utf-8"),
-    }
 
 
 def _starts(code: UserCode, objects: Objects, folder: Path) -> list[float]:
     """The values of the variables after the code's initialisation, which runs here."""
-    c_compiler.output_of([c_compiler.compiler(), "-std=gnu11", "-w", "-c", "-fPIC", "probe.c", "-o", "probe.o"], folder)
-    whole = [c_compiler.compiler(), "probe.o", str(objects.path), *libraries(code), "-o", "probe"]
+    (folder / "probe.c").write_text(_PROBE, encoding="utf-8")
+    options = ["-std=gnu11", "-w", f"-DVARIABLES={len(code.places)}"]
+    whole = [c_compiler.compiler(), *options, "probe.c", str(objects.path), *libraries(code), "-o", "probe"]
     c_compiler.output_of(whole, folder)
     where = f"{code.file}:{code.init.line}: init" if code.init is not None else f"{code.file}: init"
     try:
@@ -211,9 +204,8 @@ def _record(code: UserCode, objects: Objects) -> dict[str, bytes]:
 
 def _lanes(texts_: Mapping[str, str], objects: Objects) -> dict[str, bytes]:
     """What the lanes of many runs at once are compiled from."""
-    needed = {"places.h": texts_["places.h"], "wrapped.h": texts_["wrapped.h"]}
-    files = {name: text.encode() for name, text in needed.items()} | {"code.o": objects.path.read_bytes()}
-    files[MAIN] = (FOLDER / "wrapped_lanes.c").read_bytes()
+    files = {name: texts_[name].encode() for name in _OF_LANES} | {"code.o": objects.path.read_bytes()}
+    files |= {MAIN: (FOLDER / MAIN).read_bytes(), "lane_functions.h": (FOLDER / "wrapped_lanes.h").read_bytes()}
     return {f"{archive.LANES_FOLDER}{name}": content for name, content in files.items()}
 
 

@@ -8,17 +8,19 @@
 #include <stddef.h>
 #include <string.h>
 
+/* Variables are `apart` places apart, of which the first is given. */
 void quadcosim_init(void);
 void quadcosim_after_parameters(void);
 void quadcosim_step(void);
-void quadcosim_set(unsigned variable, double x);
-double quadcosim_get(unsigned variable);
+void quadcosim_set_inputs(const double *values, unsigned apart);
+void quadcosim_set_parameters(const double *values, unsigned apart);
+void quadcosim_get_outputs(double *values, unsigned apart);
 
 #if STATE_BYTES > 0
 extern char __start_quadcosim_state[], __stop_quadcosim_state[];
 
-static void put_state(const double *memory) { memcpy(__start_quadcosim_state, memory + KEPT_STATE, STATE_BYTES); }
-static void take_state(double *memory) { memcpy(memory + KEPT_STATE, __start_quadcosim_state, STATE_BYTES); }
+static void put_state(const double *state) { memcpy(__start_quadcosim_state, state, STATE_BYTES); }
+static void take_state(double *state) { memcpy(state, __start_quadcosim_state, STATE_BYTES); }
 
 /* The state before the first call of a process: every instance begins with it. */
 static void put_first_state(void)
@@ -29,51 +31,47 @@ static void put_first_state(void)
     known = 1;
 }
 #else
-static void put_state(const double *memory) { (void)memory; }
-static void take_state(double *memory) { (void)memory; }
+static void put_state(const double *state) { (void)state; }
+static void take_state(double *state) { (void)state; }
 static void put_first_state(void) {}
 #endif
 
 /* Read the outputs; the number of the first that is not finite, or VARIABLES. */
-static unsigned read_outputs(double *memory)
+static unsigned read_outputs(double *values, unsigned apart, double *state)
 {
-    unsigned bad = VARIABLES;
-    for (unsigned i = FIRST_OUTPUT; i < FIRST_PARAMETER; i++) {
-        memory[i] = quadcosim_get(i);
-        if (bad == VARIABLES && !(memory[i] - memory[i] == 0.0))
-            bad = i;
-    }
-    take_state(memory);
-    return bad;
+    quadcosim_get_outputs(values + FIRST_OUTPUT * apart, apart);
+    take_state(state);
+    for (unsigned i = FIRST_OUTPUT; i < FIRST_PARAMETER; i++)
+        if (!(values[i * apart] - values[i * apart] == 0.0))
+            return i;
+    return VARIABLES;
 }
 
 /* The number of the first parameter out of its bounds, or VARIABLES. */
-static unsigned parameter_out_of_bounds(const double *memory)
+static unsigned parameter_out_of_bounds(const double *values, unsigned apart)
 {
-    unsigned i = FIRST_PARAMETER;
-    while (i < VARIABLES && memory[i] >= lowest[i - FIRST_PARAMETER] && memory[i] <= highest[i - FIRST_PARAMETER])
-        i++;
-    return i;
+    for (unsigned i = FIRST_PARAMETER; i < VARIABLES; i++)
+        if (!(values[i * apart] >= lowest[i - FIRST_PARAMETER] && values[i * apart] <= highest[i - FIRST_PARAMETER]))
+            return i;
+    return VARIABLES;
 }
 
 /* The outputs are as the code's initialisation leaves them: no step is made. */
-static unsigned begin_code(double *memory)
+static unsigned begin_code(double *values, unsigned apart, double *state)
 {
     put_first_state();
     quadcosim_init();
-    for (unsigned i = FIRST_PARAMETER; i < VARIABLES; i++)
-        quadcosim_set(i, memory[i]);
+    quadcosim_set_parameters(values + FIRST_PARAMETER * apart, apart);
     quadcosim_after_parameters();
-    memory[KEPT_STALE] = 0.0;
-    return read_outputs(memory);
+    values[KEPT_STALE * apart] = 0.0;
+    return read_outputs(values, apart, state);
 }
 
 /* The code runs once a step, whatever its length: whoever steps it is its timer. */
-static unsigned step_code(double *memory)
+static unsigned step_code(double *values, unsigned apart, double *state)
 {
-    put_state(memory);
-    for (unsigned i = 0; i < FIRST_OUTPUT; i++)
-        quadcosim_set(i, memory[i]);
+    put_state(state);
+    quadcosim_set_inputs(values, apart);
     quadcosim_step();
-    return read_outputs(memory);
+    return read_outputs(values, apart, state);
 }

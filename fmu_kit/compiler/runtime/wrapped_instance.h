@@ -16,13 +16,14 @@ static int expect_finite(Instance *m, unsigned variable)
 
 static int model_enter_stepping(Instance *m)
 {
-    const unsigned bad = parameter_out_of_bounds(m->state.memory);
+    double *const memory = m->state.memory;
+    const unsigned bad = parameter_out_of_bounds(memory, 1);
     if (bad == VARIABLES)
-        return expect_finite(m, begin_code(m->state.memory));
+        return expect_finite(m, begin_code(memory, 1, memory + KEPT_STATE));
     text_begin(m);
     text_add(m, names[bad]);
     text_add(m, " = ");
-    text_real(m, m->state.memory[bad]);
+    text_real(m, memory[bad]);
     text_add(m, ": expected ");
     text_add(m, bounds[bad - FIRST_PARAMETER]);
     return fail(m, OUT_OF_BOUNDS);
@@ -30,8 +31,9 @@ static int model_enter_stepping(Instance *m)
 
 static int model_do_step(Instance *m, double t, double h)
 {
+    double *const memory = m->state.memory;
     if (h > 0.0 && q_isfinite(t + h))
-        return expect_finite(m, step_code(m->state.memory));
+        return expect_finite(m, step_code(memory, 1, memory + KEPT_STATE));
     text_begin(m);
     text_add(m, q_isfinite(t) ? "communicationStepSize = " : "currentCommunicationPoint = ");
     text_real(m, q_isfinite(t) ? h : t);

@@ -1,7 +1,7 @@
-"""Consent to building FMUs of modules that are not of this project, which runs these modules.
+"""Consent to building FMUs of code that is not of this project, which runs that code: modules of Python, sources in C.
 
-A program that calls this package consents by the call. The command line asks once for each folder, whose modules may
-then be built whenever they have changed.
+A program that calls this package consents by the call. The command line asks once for each folder, whose FMUs may
+then be built whenever their code has changed.
 """
 
 import hashlib
@@ -56,10 +56,10 @@ def agree(folder: Path) -> None:
 
 
 def expect(fmu: Path, folder: Path) -> None:
-    """Raise `UsageError` if an FMU may not be built of the modules in `folder`; consent is recorded."""
+    """Raise `UsageError` if an FMU may not be built of the code in `folder`; consent is recorded."""
     if _policy is None or is_of_this_project(folder) or _place(folder).is_file():
         return
-    what = f"building it runs the modules in {folder.resolve()}, which are not of this project"
+    what = f"building it runs the code in {folder.resolve()}, which is not of this project"
     if not (_policy.allowed or _policy.ask(f"{fmu} is missing or out of date; {what}. Build it?")):
         raise UsageError(f"fmu = {fmu}: is missing or out of date; {what}: expected --build, once for this folder")
     agree(folder)

@@ -79,7 +79,7 @@ def test_what_would_build_says_what_it_would_run(
     command: tuple[str, ...], system: Path, mark: Path, main: Main
 ) -> None:
     done = main(command[0], system, *command[1:], code=2)
-    assert f"building it runs the modules in {system.parent}, which are not of this project" in done.stderr
+    assert f"building it runs the code in {system.parent}, which is not of this project" in done.stderr
     assert done.stderr.endswith("expected --build, once for this folder\n")
     assert not mark.exists()
 
