@@ -209,7 +209,7 @@ def build(path: Path, out: Path, *, version: int = 2, systems: str | None = None
     Raises `UsageError` for code that cannot be wrapped as it is, naming line and symbol, and `QuadcosimError` for what
     is missing here.
     """
-    content = json.dumps(_description(path))
+    content = json.dumps(description_of(path))
     done = subprocess.run(
         subprocesses.command("fmu_kit.compiler.pack.wrapping", out.resolve(), version, systems or ""),
         input=content, capture_output=True, text=True, errors="replace", env=subprocesses.environment(), check=False,
@@ -258,7 +258,7 @@ def _task(value: Any) -> Any:
         return WrappedTask(**value)
 
 
-def _description(path: Path) -> dict[str, Any]:
+def description_of(path: Path) -> dict[str, Any]:
     """What the packer needs to know, with the lines of what is C."""
     text = read_text(path, WHAT)
     file, lines = _parsed(path, text), text.splitlines()
