@@ -17,6 +17,7 @@ from orchestration.components.building import builder
 from orchestration.components.building.models import CONTROLLERS, MODELS
 from orchestration.components.scaffold.folder import write
 from orchestration.experiments.studies.sweep import sweep
+from orchestration.foundation.basics.documents import read_toml
 from orchestration.simulation.runs.simulation import run
 from quadcosim import FmuChoice, Scenario, changed, load_study, load_system
 from tests.commands import Main
@@ -39,10 +40,20 @@ def integrator(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_its_local_limit_on_the_double_integrator_is_that_of_the_law(integrator: Path, main: Main) -> None:
     period = "components.controller.sampling.period"
-    asked = ("--of", period, "--from", "1.9", "--to", "2.1", "--scan", "0.1", "--json", "--build")
-    found = main("limit", integrator, *asked, "--out", integrator.parent / "limit")
+    asked = ("--of", period, "--from", "1.9", "--to", "2.1", "--scan", "0.1", "--json", "--build", "--no-figures")
+    found = main("limit", integrator, *asked)
     assert json.loads(found.stdout)["local_limit"] == pytest.approx(2.0, abs=1e-3)
     assert "its code believes 0.05 s; at other periods this is the limit of that code" in found.stdout
+
+
+def test_theory_asks_its_fmu_for_what_it_computes(integrator: Path, main: Main) -> None:
+    text = integrator.read_text().replace('"controller.v"]', '"controller.v"]\nnoise = 0.01')
+    noisy = integrator.with_name("noisy.toml")
+    noisy.write_text(text.replace("[criterion]", 'rms = "rms(plant.x)"\n[criterion]'))
+    expected = json.loads(main("expect", noisy, "--json", "--build").stdout)
+    assert expected["mean_square_radius"] == pytest.approx(1.0 - 0.05 + 0.05**2 / 2.0, abs=1e-9)  # the determinant
+    asked = ("--of", "connections.command.delay_jitter", "--json", "--build", "--out", integrator.parent / "proof.json")
+    assert json.loads(main("margin", integrator, *asked).stdout)["certified"] == pytest.approx(0.05)
 
 
 def test_a_run_at_another_period_warns_and_at_its_own_does_not(integrator: Path) -> None:
@@ -82,9 +93,16 @@ values = [0.5, 1.0, 1.5]
     assert bits(lanes.path) == bits(singly.path)
 
 
-def wrapped_export(name: str, folder: Path) -> Path:
+@pytest.fixture(scope="module")
+def exported(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of all laws as `export-c` writes them."""
+    folder = tmp_path_factory.mktemp("exported")
+    builder.export_c([Target.parse(MODELS[name]) for name in CONTROLLERS], folder)
+    return folder
+
+
+def wrapped(name: str, folder: Path) -> Path:
     """A law that `export-c` has written, wrapped again: its variables are those that its header names."""
-    builder.export_c([Target.parse(MODELS[name])], folder)
     tables: dict[str, list[str]] = {"in": [], "out": [], "par": []}
     table = None
     for line in (folder / f"{name}.h").read_text().splitlines():
@@ -114,10 +132,10 @@ def wrapped_export(name: str, folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("name", CONTROLLERS)
-def test_a_law_exported_to_c_and_wrapped_again_flies_the_same_bits(name: str, tmp_path: Path) -> None:
+def test_a_law_exported_to_c_and_wrapped_again_flies_the_same_bits(name: str, exported: Path) -> None:
     flight = Scenario(stop_time=0.5, plant=FmuChoice(fmu="native/QuadrotorPlant"))
     one = run(flight.with_changes(controller=FmuChoice(fmu=f"native/{name}")))
-    other = run(flight.with_changes(controller=FmuChoice(fmu=str(wrapped_export(name, tmp_path)))))
+    other = run(flight.with_changes(controller=FmuChoice(fmu=str(wrapped(name, exported)))))
     exchanged = [column for column in one.columns if column.startswith("plant.") or column == "time"]
     assert len(exchanged) > 15
     differing = [  # before its first step it has what start leaves
@@ -140,13 +158,55 @@ def test_a_crash_in_the_c_is_one_line_with_its_signal(integrator: Path, main: Ma
     assert "SIGSEGV" in line
 
 
-def test_what_new_writes_in_c_passes_its_tests_and_flies_a_vehicle(tmp_path: Path) -> None:
-    write("controller", "hover_c", tmp_path, author='A "quoted" name', license="MIT", in_c=True)
+@pytest.fixture(scope="module")
+def hover(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The file of the controller that `new --c` writes."""
+    folder = tmp_path_factory.mktemp("new")
+    write("controller", "hover_c", folder, author='A "quoted" name', license="MIT", in_c=True)
+    return folder / "hover_c" / "hover_c.toml"
+
+
+def test_what_new_writes_in_c_passes_its_tests_and_flies_a_vehicle(hover: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "hover_c"],
-        cwd=tmp_path, capture_output=True, text=True, check=False,
+        cwd=hover.parents[1], capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
-    mine = FmuChoice(fmu=str(tmp_path / "hover_c" / "hover_c.toml"))
+    mine = FmuChoice(fmu=str(hover))
     result = run(Scenario(stop_time=0.3, controller=mine, plant=FmuChoice(fmu="native/QuadrotorPlant")))
     assert not result.metrics["diverged"]
+
+
+def test_its_delay_limit_by_theory_comes_from_the_process_of_its_fmu(hover: Path, main: Main) -> None:
+    flight = ("--controller", hover, "--reference", "hover", "--stop-time", "0.5", "--build")
+    asked = ("--of", "delay", "--from", "0", "--to", "0.1", "--scan", "0.1", "--tolerance", "0.1", "--no-figures")
+    found = json.loads(main("limit", *flight, *asked, "--json").stdout)
+    assert found["local_limit"] == pytest.approx(0.0635, abs=2e-4)
+
+
+BASE = """
+[base]
+stop_time = 0.5
+controller = { fmu = "hover_c/hover_c.toml" }
+plant = { fmu = "native/QuadrotorPlant" }
+"""
+
+
+def test_it_is_compared_and_tuned_in_lanes_over_its_parameters(hover: Path, main: Main) -> None:
+    folder = hover.parents[1]
+    names = "".join(f'[[controllers]]\nname = "{k}"\nparameters = {{ k_p = {k} }}\n' for k in (2.0, 4.0))
+    axis = '[axis]\nname = "delay"\nsets = ["timing.delay"]\nvalues = [0.0, 0.05]\n'
+    (folder / "both.toml").write_text(f'name = "both"\n{BASE}\n{names}{axis}[starts]\ncount = 2\n')
+    told = main("compare", folder / "both.toml", "--out", folder / "both", "--no-figures", "--build")
+    assert "engine batch" in told.stderr
+    assert "8 runs, 8 of them new" in told.stderr
+    tuned = "".join(
+        f'[[parameters]]\nname = "{name}"\nsets = ["controller.{name}"]\nstart = 1.0\nstop = 8.0\n'
+        for name in ("k_p", "k_d")
+    )
+    search = '[cost]\nof = "position_rmse"\nbad = 10.0\n[search]\nperiods = [0.01]\nevaluations = 2\nseeds = [1]\n'
+    starts = "[starts]\ncount = 2\njudged = 2\n"
+    (folder / "mine.toml").write_text(f'name = "mine"\n{BASE}\n{search}{starts}{tuned}')
+    assert "engine batch" in main("tune", folder / "mine.toml", "--out", folder, "--build").stderr
+    gains = read_toml(folder / "mine_10ms.toml", "gains")["controller"]
+    assert all(1.0 <= gains[name] <= 8.0 for name in ("k_p", "k_d"))
