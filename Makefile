@@ -75,6 +75,7 @@ bench: .venv/.test
 	$(BIN)/python -m benchmarks.native
 	$(BIN)/python -m benchmarks.engines
 	$(BIN)/python -m benchmarks.batch
+	$(BIN)/python -m benchmarks.wrapped
 	$(BIN)/python -m benchmarks.floor
 	$(BIN)/python -m benchmarks.cold
 	$(BIN)/python -m benchmarks.stores
