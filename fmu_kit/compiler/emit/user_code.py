@@ -133,8 +133,8 @@ def user_code(code: UserCode) -> str:
     lines += _function(code, "quadcosim_init", code.init)
     lines += _function(code, "quadcosim_after_parameters", code.after_parameters)
     lines += _step(code)
-    for name, causality in (("set_inputs", "input"), ("set_parameters", "parameter")):
-        lines += _each(code, name, "const ", code.having(causality), _TO_CODE)
+    lines += _each(code, "set_inputs", "const ", code.having("input"), _TO_CODE)
+    lines += _each(code, "set_parameters", "const ", code.having("parameter"), _TO_CODE)
     lines += _each(code, "get_outputs", "", code.having("output"), _FROM_CODE)
     lines += _each(code, "get_all", "", code.places, _FROM_CODE)
     return "\n".join([*lines, ""])
