@@ -6,7 +6,7 @@ one run, the smallest CPU time of several repetitions.
 
 import argparse
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,9 @@ from orchestration.foundation.basics.simulator import Floats, Transfer
 from orchestration.foundation.recording.recording import InMemory
 from orchestration.simulation.engines.master import Master
 from orchestration.simulation.engines.running_system import RunningSystem
-from orchestration.simulation.figures.palette import GREY
+from orchestration.simulation.figures.palette import GREY, MARKS
+from orchestration.simulation.figures.style import DOCS, save
+from orchestration.simulation.figures.ticks import plain
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.component import Component, Sampling
@@ -113,22 +115,30 @@ def main() -> None:
     parser.add_argument("--figure", type=Path, help="where to draw it")
     file = parser.parse_args().figure
     made = {"components, in loops of two": loops, "connections between two components": messages}
-    figure = Figure(figsize=(6.0, 4.0), layout="constrained", dpi=200)
-    axes = figure.subplots()
-    for what, make in made.items():
+    with DOCS.applied():
+        figure = _measured(made)
+    if file is not None:
+        save({file.stem: figure}, file.parent, DOCS)
+
+
+def _measured(made: Mapping[str, Callable[[int], System]]) -> Figure:
+    """The costs, printed and drawn."""
+    figure = DOCS.figure(25.0)
+    axes = figure.add_subplot()
+    for (what, make), mark in zip(made.items(), MARKS):
         found = costs([make(size) for size in SIZES])
         slope, constant = np.polyfit(SIZES, found, 1, w=1.0 / np.array(found))
         exponent = np.polyfit(np.log(SIZES[2:]), np.log(found[2:]), 1)[0]
         print(f"{what}: {slope:.2f} µs each and {constant:.1f} µs; from 10 to 200 as the power {exponent:.2f}")
         for size, value in zip(SIZES, found, strict=True):
             print(f"{size:>6} {value:10.1f} µs an instant {value / size:8.2f} µs each")
-        axes.loglog(SIZES, found, "o", label=f"{what}: {slope:.2f} µs each")
-        axes.loglog(SIZES, slope * np.array(SIZES) + constant, color=GREY, linewidth=1.0)
+        axes.loglog(SIZES, slope * np.array(SIZES) + constant, color=GREY, linewidth=1.0, zorder=1)
+        axes.loglog(SIZES, found, mark, label=f"{what}: {slope:.2f} µs each")
     axes.set(xlabel="how many", ylabel="the master's cost of an instant [µs]")
-    axes.grid(True, alpha=0.3)
     axes.legend()
-    if file is not None:
-        figure.savefig(file)
+    plain(axes.xaxis)
+    plain(axes.yaxis)
+    return figure
 
 
 if __name__ == "__main__":

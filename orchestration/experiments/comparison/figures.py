@@ -132,34 +132,58 @@ def fronts_of(
 ) -> Figure:
     """Error against effort at values of the axis; the line joins the Pareto front.
 
+    Each panel has its own axes. A point far beyond the others is told in words; controllers that survive too few of the
+    starts at one of the values are counted in its title.
+
     `metrics` are the labels of effort and error, `colors` those of the controllers.
     """
-    figure, panels = _panels(len(values), 20.0, style)
+    figure, panels = _panels(len(values), 22.0, style, sharex=False, sharey=False)
     marks = dict(zip(colors, itertools.cycle(MARKS)))
+    shown = {point.controller for point in points}
     for panel, value in zip(panels, values):
         here = [point for point in points if point.value == value]
-        for point in here:
+        near = [point for point in here if not _is_far(point, here)]
+        for point in near:
             effort, error = _sides(point.effort), _sides(point.error)
             panel.errorbar(
                 *effort[0], *error[0], xerr=effort[1], yerr=error[1], fmt=marks[point.controller],
                 mfc=colors[point.controller] if point.on_front else "none", color=colors[point.controller],
                 markersize=5, elinewidth=0.8,
             )  # fmt: skip
-        line = sorted((p.effort.value or 0.0, p.error.value or 0.0) for p in here if p.on_front)
+        line = sorted((p.effort.value or 0.0, p.error.value or 0.0) for p in near if p.on_front)
         panel.plot(*np.transpose(line), color=GREY, linewidth=0.8, zorder=0)
-        panel.set_title(f"{axis.text_of(float(value))}, {here[0].starts} starts")
+        beyond = [f"{p.controller}: {p.effort.value:,.3g}, {p.error.value:.2g}" for p in here if p not in near]
+        if beyond:
+            panel.text(
+                0.98, 0.98, "\n".join(["beyond these axes", *beyond]), transform=panel.transAxes, ha="right", va="top",
+                fontsize="small",
+            )  # fmt: skip
+        left_out = f" of {len(shown)}" if len(here) < len(shown) else ""
+        panel.set_title(f"{axis.text_of(float(value))}, {here[0].starts} starts,\n{len(here)}{left_out} controllers")
         panel.set(xscale="log", yscale="log")
-    for panel in panels:  # after all are drawn: they share their axes
         plain(panel.xaxis)
         plain(panel.yaxis)
-    for name, color in colors.items():
-        if any(point.controller == name for point in points):
-            panels[0].plot([], [], marks[name], color=color, label=name)
-    figure.legend(loc="outside right center")
+    handles = [Line2D([], [], linestyle="", marker=marks[n], color=c, label=n) for n, c in colors.items() if n in shown]
+    figure.legend(handles=handles, loc="outside right center")
     figure.supxlabel(metrics[0])
     figure.supylabel(metrics[1])
-    figure.suptitle(f"{title}: medians over the starts that all survive; filled: on the front")
+    count = len({point.value for point in points})
+    some = f"{len(values)} of {count} values; " if len(values) < count else ""
+    figure.suptitle(f"{title}: {some}medians over the starts that all survive; filled: on the front")
     return figure
+
+
+FAR = 20.0
+"""Ratio to the median of a panel beyond which a point is told in words"""
+
+
+def _is_far(point: Point, here: Sequence[Point]) -> bool:
+    """Whether error or effort of a point would flatten those of the others."""
+    for side in ("error", "effort"):
+        values = [getattr(one, side).value for one in here]
+        if getattr(point, side).value > FAR * float(np.median(values)) and len(here) > 2:
+            return True
+    return False
 
 
 def colors_of(names: Sequence[str]) -> dict[str, str]:
@@ -224,13 +248,13 @@ def _sides(median: Median) -> tuple[list[float], list[list[float]]]:
 
 
 def _panels(
-    count: int, height: float, style: Style, *, sharex: bool = True
+    count: int, height: float, style: Style, *, sharex: bool = True, sharey: bool = True
 ) -> tuple[Figure, "np.ndarray[tuple[int], np.dtype[np.object_]]"]:
     """A figure with `count` panels, each `height` lines high, at most three in a row, with shared axes."""
     columns = min(3 if style.is_wide else 1, count)
     rows = math.ceil(count / columns)
     figure = style.figure(height * rows + 6.0)
-    panels = figure.subplots(rows, columns, sharex=sharex, sharey=True, squeeze=False).ravel()
+    panels = figure.subplots(rows, columns, sharex=sharex, sharey=sharey, squeeze=False).ravel()
     for panel in panels[count:]:
         panel.set_visible(False)
     for panel in panels[max(count - columns, 0) : count]:

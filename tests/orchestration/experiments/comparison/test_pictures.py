@@ -4,8 +4,9 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
-from orchestration.experiments.comparison.cells import CellSummary, Share
-from orchestration.experiments.comparison.figures import Reach, colors_of, limits_of, shares
+from orchestration.experiments.comparison.cells import CellSummary, Median, Share
+from orchestration.experiments.comparison.figures import Reach, colors_of, fronts_of, limits_of, shares
+from orchestration.experiments.comparison.fronts import Point
 from orchestration.experiments.comparison.limits import GridLimit
 from orchestration.simulation.figures.style import SCREEN
 from orchestration.simulation.results.quantities import Quantity
@@ -58,3 +59,29 @@ def test_no_label_of_the_limits_is_cut_off() -> None:
     for panel in figure.axes:
         label = panel.xaxis.label.get_window_extent()
         assert (label.x0, label.x1) == (max(label.x0, 0.0), min(label.x1, figure.bbox.width)), panel.get_xlabel()
+
+
+def test_a_point_far_beyond_the_others_is_told_in_words_and_those_left_out_are_counted() -> None:
+    points = [
+        Point(
+            vehicle="v", condition="c", value=value, controller=name, starts=9, error=at(error), effort=at(effort),
+            on_front=name == "good",
+        )
+        for value, name, effort, error in (
+            (0.01, "good", 100.0, 0.1), (0.01, "fair", 200.0, 0.2), (0.01, "poor", 300.0, 0.2),
+            (0.02, "good", 100.0, 0.1), (0.02, "fair", 200.0, 0.2), (0.02, "wild", 1.2e6, 5.7),
+            (0.03, "good", 100.0, 0.1),
+        )
+    ]  # fmt: skip
+    colors = colors_of(["good", "fair", "poor", "wild"])
+    figure = fronts_of(points, (0.01, 0.02), Quantity(name="period", unit="s"), ("effort", "error"), colors, "body")
+    calm, wild = figure.axes
+    assert not calm.texts
+    assert [text.get_text() for text in wild.texts] == ["beyond these axes\nwild: 1.2e+06, 5.7"]
+    assert max(wild.get_ylim()) < 1.0
+    assert calm.get_title().endswith("9 starts,\n3 of 4 controllers")
+    assert "2 of 3 values" in figure.get_suptitle()
+
+
+def at(value: float) -> Median:
+    return Median(value=value, low=0.9 * value, high=1.1 * value)
