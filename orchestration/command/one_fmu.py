@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 from orchestration.command.flags import FlightFlags, assigned
 from orchestration.command.options import option
 from orchestration.command.registry import expect_positive
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.components.fmi.access import INTERFACES, Interface
+from orchestration.foundation.basics.errors import UsageError, expected_name
 
 if TYPE_CHECKING:
     from orchestration.simulation.runs.result import Result
@@ -31,6 +32,10 @@ class OneFmuFlags:
         list[str] | None, _of_fmu("--record", "A variable to write; may be repeated; default: all outputs.", "NAME")
     ] = None
 
+    interface: Annotated[
+        str | None, _of_fmu("--interface", "By which it is called; default: co-simulation.", "|".join(INTERFACES))
+    ] = None
+
     def __post_init__(self) -> None:
         expect_positive("--output-interval", self.output_interval, "seconds")
         expect_positive("--tolerance", self.tolerance, "relative error")
@@ -48,8 +53,15 @@ class OneFmuFlags:
         system = alone(
             path, stop_time=flags.stop_time, interval=self.output_interval, tolerance=self.tolerance,
             inputs=self.inputs, record=self.record or (), parameters=assigned("set", flags.set),
+            interface=self._interface(),
         )  # fmt: skip
         return replace(flags, stop_time=None, set=None).applied_to_system(system)
+
+    def _interface(self) -> Interface | None:
+        known = {name: name for name in INTERFACES}
+        if self.interface is not None and self.interface not in known:
+            raise UsageError(f"--interface {self.interface}: {expected_name(self.interface, list(known))}")
+        return None if self.interface is None else known[self.interface]
 
     def write(self, path: Path, result: "Result") -> None:
         """Write the file of `--output`, of a run of the FMU at `path`."""

@@ -6,8 +6,9 @@ from pathlib import Path
 
 from fmpy.util import auto_interval
 
-from orchestration.components.fmi.read_description import Model, read_model
-from orchestration.foundation.basics.errors import UsageError, did_you_mean, listed
+from orchestration.components.fmi.access import Access, Interface
+from orchestration.components.fmi.read_description import Model, called, read_model
+from orchestration.foundation.basics.errors import UsageError, did_you_mean, listed, prefixed
 from orchestration.systems.signals.table_file import TIME, header_of
 from orchestration.systems.system.component import Component, Parameter
 from orchestration.systems.system.model import System
@@ -27,13 +28,15 @@ def alone(
     inputs: Path | None = None,
     record: Sequence[str] = (),
     parameters: Mapping[str, Parameter] | None = None,
+    interface: Interface | None = None,
 ) -> System:
     """The FMU at `path` as the only component, in continuous time; what is not given follows its default experiment.
 
     `interval` [s] is that of the communication points, `inputs` a CSV file with a column for each input that it feeds.
     Raises `UsageError` for a file that is no FMU, and for an experiment that does not begin at 0.
     """
-    model = read_model(path)
+    with prefixed(f"{path}: "):
+        model = called(read_model(path), Access(interface=interface))
     begin = experiment(model, "startTime")
     if begin is not None:
         raise UsageError(f"{path}: its default experiment begins at {begin:g} s; expected 0, where runs begin here")
@@ -48,6 +51,7 @@ def alone(
         tolerance=tolerance,
         record=_recorded(model, record),
         parameters=dict(parameters or {}),
+        interface=interface,
     )
     sources = {} if inputs is None else _sources(model, name, inputs)
     return System(stop_time=end, components={name: component}, sources=sources)

@@ -1,6 +1,7 @@
 """`quadcosim run MODEL.fmu`: what `fmpy simulate` does, to the bit where its times are those of a clock."""
 
 from pathlib import Path
+from typing import Any
 
 import fmpy
 import pytest
@@ -9,6 +10,7 @@ from fmpy.util import read_csv, write_csv
 from orchestration.simulation.requests.request import load_request
 from quadcosim import UsageError
 from tests.commands import Main
+from tests.orchestration.components.fmi.exchange import exchange
 from tests.orchestration.components.fmi.small import known, needs_compiler, small
 
 JUMPING = """"time","thrust","torque.x"
@@ -75,6 +77,26 @@ def test_flags_of_one_fmu_are_refused_for_a_system_and_those_of_a_loop_for_one(m
     Path("wrong.csv").write_text("time,v\n0,1\n1,1\n")
     refused = main("run", here / "small.fmu", "--inputs", "wrong.csv", code=2).stderr
     assert "Small has no input v; its inputs are u, on" in refused
+
+
+@needs_compiler
+def test_a_model_of_differential_equations_is_solved_as_near_to_fmpy_as_is_asked(main: Main, here: Path) -> None:
+    fmu = exchange(here, "oscillator")
+    flags = ("--stop-time", "2", "--output-interval", "0.125", "--tolerance", "1e-10", "--set", "p=1.5")
+    chosen = ("--record", "x1", "--record", "x2")
+    main("run", fmu, "--in-process", "--interface", "model-exchange", "--output", "out.csv", *flags, *chosen)
+    how: dict[str, Any] = {
+        "stop_time": 2.0,
+        "output_interval": 0.125,
+        "relative_tolerance": 1e-10,
+        "start_values": {"p": 1.5},
+    }
+    by_fmpy(fmu, output=["x1", "x2"], record_events=False, **how)
+    one, other = (read_csv(name) for name in ("out.csv", "by_fmpy.csv"))
+    for name in ("time", "x1", "x2"):
+        assert one[name] == pytest.approx(other[name], abs=1e-6)
+    refused = main("run", fmu, "--interface", "co-simulation", code=2).stderr
+    assert "interface = co-simulation: Oscillator does not offer it; expected model-exchange" in refused
 
 
 @needs_compiler
