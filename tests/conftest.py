@@ -20,10 +20,10 @@ from orchestration.components.building import builder, fmus
 from orchestration.components.building.models import MODELS
 from orchestration.foundation.basics import terminal
 from tests.commands import Done, Main
-from tests.extent import count
+from tests.extent import tries
 from tests.fmus.making import MAKINGS, Making
 
-hypothesis.settings.register_profile("ci", derandomize=True, deadline=None, max_examples=count(60, sampled=20))
+hypothesis.settings.register_profile("ci", derandomize=True, deadline=None, max_examples=tries(60, sampled=20))
 hypothesis.settings.register_profile("local", deadline=None)
 hypothesis.settings.load_profile("ci" if os.environ.get("CI") else "local")
 

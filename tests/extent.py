@@ -20,6 +20,6 @@ def sample(cases: Sequence[T], size: int) -> Sequence[T]:
     return cases if WHOLE or len(cases) <= size else [cases[len(cases) * k // size] for k in range(size)]
 
 
-def count(whole: int, *, sampled: int) -> int:
+def tries(whole: int, *, sampled: int) -> int:
     """How many random cases are tried."""
     return whole if WHOLE else sampled

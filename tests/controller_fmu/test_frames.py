@@ -21,6 +21,7 @@ from fmu_kit.trajectory import Trajectory
 from orchestration.components.building.models import MODELS
 from plant_fmu.slave import QuadrotorPlant
 from tests.controller_fmu.wired import Rows, flight
+from tests.extent import sample
 
 CONTROLLERS = (UnifiedController, GeometricController, CascadedController)
 PATH = Trajectory(amplitude_x=2.0, amplitude_y=1.5, frequency=0.8, start_z=-1.0, rate_z=0.2, yaw=0.4, yaw_rate=0.5)
@@ -36,7 +37,7 @@ def assert_same_flight(one: Rows, other: Rows) -> None:
         assert differing == {}
 
 
-@pytest.mark.parametrize("controller", CONTROLLERS)
+@pytest.mark.parametrize("controller", sample([*CONTROLLERS], 1))
 def test_a_flight_in_other_axes_is_the_same_if_whatever_has_axes_is_turned(controller: type[Slave]) -> None:
     gains: dict[type[Slave], dict[str, Any]] = {
         UnifiedController: {"k_t": Vec3(1.5, 2.5, 2.0)},
@@ -46,7 +47,7 @@ def test_a_flight_in_other_axes_is_the_same_if_whatever_has_axes_is_turned(contr
     assert_same_flight(one, other)
 
 
-@pytest.mark.parametrize("controller", CONTROLLERS)
+@pytest.mark.parametrize("controller", sample([*CONTROLLERS], 1))
 def test_the_built_in_trajectory_is_along_the_axes_that_are_chosen(controller: type[Slave]) -> None:
     path = {f"trajectory_{name}": getattr(PATH, name) for name in PATH.__slots__}
     turned = flight(controller, Frame.NED, lambda t: PATH.at(t).turned(True))

@@ -26,6 +26,7 @@ from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.quadrotor.scenarios.wiring import COMMAND, MEASUREMENT
 from orchestration.simulation.requests.ssp import writing
 from quadcosim import run
+from tests.extent import in_test_all
 from tests.fmus.expected import law_command
 from tests.fmus.making import PAIR
 from tests.native import NATIVE
@@ -142,6 +143,7 @@ def test_the_fmpy_guide_flies_the_papers_scenario(folder: Path, environment: dic
     assert (folder / "flight.png").is_file()
 
 
+@in_test_all
 def test_the_ssp_guide_flies_the_same_file_in_three_tools_and_the_container(
     native_folder: Path, environment: dict[str, str]
 ) -> None:

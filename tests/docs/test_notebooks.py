@@ -8,11 +8,13 @@ import nbformat
 import pytest
 from nbclient import NotebookClient
 
+from tests.extent import WHOLE
 from tests.patience import PATIENCE
 from tests.places import ROOT
 
 FOLDER = ROOT / "docs" / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
+RUN = NOTEBOOKS if WHOLE else [FOLDER / "flight.ipynb"]
 
 
 def test_there_are_a_flight_a_limit_a_controller_of_ones_own_and_arrays() -> None:
@@ -25,7 +27,7 @@ def executed(tmp_path_factory: pytest.TempPathFactory) -> dict[Path, list[Any]]:
 
     Each begins in an empty folder and with none of the names of the one before.
     """
-    cells = {path: nbformat.read(path, as_version=4).cells for path in NOTEBOOKS}
+    cells = {path: nbformat.read(path, as_version=4).cells for path in RUN}
     all_cells = []
     for path, own in cells.items():
         folder = tmp_path_factory.mktemp(path.stem)
@@ -38,7 +40,7 @@ def executed(tmp_path_factory: pytest.TempPathFactory) -> dict[Path, list[Any]]:
     return cells
 
 
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", RUN, ids=lambda path: path.stem)
 def test_a_notebook_runs_from_top_to_bottom_and_shows_its_results(path: Path, executed: dict[Path, list[Any]]) -> None:
     shown = [output for cell in executed[path] for output in cell.get("outputs", ())]
     kinds = {kind for output in shown for kind in output.get("data", ())}

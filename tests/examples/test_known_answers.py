@@ -20,6 +20,7 @@ from orchestration.systems.system.paths import changed
 from orchestration.theory.exact.expect import expect, expected_of
 from orchestration.theory.exact.loops import Loops
 from tests.examples.common import native_example as example
+from tests.extent import sample
 
 PERIOD = "components.controller.sampling.period"
 COMMAND_DELAY = "connections.command.delay"
@@ -33,7 +34,7 @@ def limits(system: System, of: str, near: float, **options: Any) -> tuple[float,
     return found.large_signal_limit, found.local_limit
 
 
-@pytest.mark.parametrize("k_d", [1.0, 1.4])
+@pytest.mark.parametrize("k_d", sample([1.0, 1.4], 1))
 def test_double_integrator_has_the_largest_period_of_theory(k_d: float) -> None:
     """min(2/k_d, 2 k_d/k_p): by runs within 0.5 %, as 240 s must show it; the local limit within 1e-5."""
     system = example("double_integrator", {"components.controller.parameters.k_d": k_d})
@@ -127,7 +128,7 @@ def test_lqg_costs_what_its_riccati_equations_say(delay: float) -> None:
     assert found == pytest.approx(lqg.lqg(delay).cost, rel=1e-9)
 
 
-@pytest.mark.parametrize("delay", [0.0, 0.05])
+@pytest.mark.parametrize("delay", sample([0.0, 0.05], 1))
 def test_any_other_gain_or_filter_than_that_of_lqg_costs_more(delay: float) -> None:
     """One part in a hundred away along each of them, up and down: more by the second order of that alone."""
     best = lqg.at(delay, gain_knows=True, filter_knows=True)

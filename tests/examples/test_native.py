@@ -11,6 +11,7 @@ from orchestration.simulation.runs.result import Result
 from orchestration.simulation.runs.simulation import run
 from orchestration.systems.system.model import System
 from tests.examples.common import NAMES, example
+from tests.extent import sample
 from tests.native import assert_near, assert_the_same, natives
 
 SHORTER = {
@@ -37,7 +38,7 @@ def on_native(name: str, folder: Path, mathematics: Mathematics) -> Result:
     return run(replace(asked, components=components))
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", sample([*NAMES], 2))
 def test_an_example_on_the_same_libm_is_the_same_to_the_byte_without_python_inside(name: str, tmp_path: Path) -> None:
     found = on_native(name, tmp_path, "libm")
     assert len(found.rows) > 100

@@ -13,6 +13,7 @@ from fmu_kit.failure import Failure
 from fmu_kit.saved_state import DEEPEST, deserialise, serialise
 from fmu_kit.slave import Slave
 from plant_fmu.slave import QuadrotorPlant
+from tests.extent import sample, tries
 from tests.slaves import assert_fails
 
 MODELS: tuple[type[Slave], ...] = (QuadrotorPlant, UnifiedController)
@@ -56,7 +57,7 @@ def test_nesting_that_is_allowed_is_read() -> None:
     assert deserialise(nested(DEEPEST - 1)) != {}
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", sample([*MODELS], 1))
 def test_a_flipped_bit_of_the_bytes_is_refused_or_changes_nothing(model: type[Slave]) -> None:
     state, refused = saved(model), 0
     content = serialise(state)
@@ -138,7 +139,7 @@ SAVED = {model: saved(model) for model in MODELS}
 PLACES = {model: [path for path in places(SAVED[model]) if path] for model in MODELS}
 
 
-@settings(max_examples=300)
+@settings(max_examples=tries(300, sampled=75))
 @given(st.data())
 def test_a_state_damaged_anywhere_is_refused_or_gives_values_that_can_be_read(data: st.DataObject) -> None:
     model = data.draw(st.sampled_from(MODELS))

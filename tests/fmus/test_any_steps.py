@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 from hypothesis.stateful import run_state_machine_as_test as run_machine
 
+from tests.extent import tries
 from tests.fmus.expected import COMMAND, MEASUREMENT, law_command
 from tests.fmus.instance import Instance
 
@@ -217,7 +218,7 @@ class AnyMaster(RuleBasedStateMachine):
 
 def test_any_sequence_of_steps_samples_at_the_due_times(controller: Instance) -> None:
     machine: Any = partial(AnyMaster, controller)
-    run_machine(machine, settings=hypothesis.settings(max_examples=60, stateful_step_count=40))
+    run_machine(machine, settings=hypothesis.settings(max_examples=tries(60, sampled=15), stateful_step_count=40))
 
 
 T = 0.1

@@ -14,6 +14,7 @@ from orchestration.components.checks.doctor.fmu import inspected
 from orchestration.components.checks.doctor.machine import this_machine
 from orchestration.components.checks.doctor.pythons import BY_LOADER, THIS_PYTHON, PythonLibrary
 from orchestration.components.checks.doctor.verdict import INSTALL_LIBPYTHON, other_host, satisfies
+from tests.extent import sample
 from tests.fmus.archive import without_loader
 from tests.fmus.expected import COMMAND, MEASUREMENT, law_command
 from tests.fmus.instance import Instance
@@ -251,7 +252,9 @@ def test_a_c_program_is_told_why_a_call_failed(
     assert f"{call}: status 4" in done.stderr
 
 
-@pytest.mark.parametrize("order", [("QuadrotorPlant", "UnifiedController"), ("UnifiedController", "QuadrotorPlant")])
+@pytest.mark.parametrize(
+    "order", sample([("QuadrotorPlant", "UnifiedController"), ("UnifiedController", "QuadrotorPlant")], 1)
+)
 def test_fmus_step_in_threads_of_a_c_program_and_survive_that_the_first_is_unloaded(
     order: tuple[str, ...],
     threads: Path,

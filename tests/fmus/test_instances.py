@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.extent import sample
 from tests.fmus.expected import law_command
 from tests.fmus.instance import Instance
 from tests.fmus.making import PAIR, Making
@@ -12,7 +13,7 @@ from tests.fmus.process import run_script
 from tests.fmus.source_tree import build, copy_sources, replace
 
 
-@pytest.mark.parametrize("unpacked", ["shared", "apart"])
+@pytest.mark.parametrize("unpacked", sample(["shared", "apart"], 1))
 def test_two_instances_of_both_fmus_at_once_fly_as_if_alone(
     unpacked: str, built: dict[str, Path], alone: dict[str, list[list[str]]]
 ) -> None:
@@ -23,7 +24,7 @@ def test_two_instances_of_both_fmus_at_once_fly_as_if_alone(
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="memory is read from /proc, which is Linux's")
-@pytest.mark.parametrize("model", PAIR)
+@pytest.mark.parametrize("model", sample([*PAIR], 1))
 def test_instances_one_after_another_leave_path_and_memory_as_they_were(
     model: str, making: Making, built: dict[str, Path]
 ) -> None:
@@ -68,7 +69,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.usefixtures("python_inside")
-@pytest.mark.parametrize("imported", ["before", "after"])
+@pytest.mark.parametrize("imported", sample(["before", "after"], 1))
 def test_each_version_runs_its_own_law(imported: str, versions: dict[float, Path], installed: Path) -> None:
     order = (3.0, 2.0, 1.0, 2.0)
     result = run_script("two_versions", installed, imported, *(versions[factor] for factor in order))

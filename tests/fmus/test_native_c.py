@@ -11,6 +11,7 @@ from fmu_kit.bundle import Target
 from orchestration.components.building import fmus
 from orchestration.components.building.models import MODELS
 from orchestration.components.checks.validation.validator import validate
+from tests.extent import in_test_all, sample
 from tests.fmus.expected import COMMAND, MEASUREMENT, law_command
 from tests.fmus.making import PAIR
 from tests.fmus.process import run
@@ -24,7 +25,7 @@ OF_LIBC |= {"strcmp", "strcpy", "strlen"}
 """All that a native FMU asks of another library."""
 
 
-@pytest.fixture(params=MODELS)
+@pytest.fixture(params=sample([*MODELS], 2))
 def fmu(request: pytest.FixtureRequest) -> Path:
     """Each of this project's native FMUs."""
     return fmus.locate(f"native/{request.param}")
@@ -54,13 +55,14 @@ def life(sources: Path, *options: str) -> Path:
     return program
 
 
-@pytest.mark.parametrize("fmu", PAIR, indirect=True)
+@pytest.mark.parametrize("fmu", sample([*PAIR], 1), indirect=True)
 def test_the_whole_life_of_an_instance_is_silent_under_sanitizers(sources: Path) -> None:
     """States, bytes that were damaged, failures, resets and two threads; and no step asks for memory."""
     done = run(str(life(sources, "-fsanitize=address,undefined", "-fno-sanitize-recover=all")))
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@in_test_all
 @pytest.mark.parametrize("fmu", ["QuadrotorPlant"], indirect=True)
 def test_the_whole_life_of_an_instance_is_silent_under_valgrind(sources: Path) -> None:
     valgrind = (tool("valgrind"), "-q", "--error-exitcode=9", "--leak-check=full", "--show-leak-kinds=all")
@@ -99,6 +101,7 @@ def test_its_sources_are_plain_c_of_1999_without_a_warning(fmu: Path, sources: P
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@in_test_all
 def test_two_builds_in_two_folders_have_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     built = []
     for name in ("one", "another folder"):

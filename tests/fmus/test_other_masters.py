@@ -9,7 +9,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import fmi2False
 
-from tests.extent import count
+from tests.extent import tries
 from tests.fmus.expected import COMMAND, MEASUREMENT, law_command
 from tests.fmus.flights import STEPS, Flight
 from tests.fmus.instance import Instance
@@ -339,8 +339,8 @@ def test_an_instance_may_be_freed_in_any_phase_without_terminate(model: str, bui
 @pytest.mark.parametrize("model", PAIR)
 def test_no_order_of_calls_brings_the_process_down(model: str, built: dict[str, Path]) -> None:
     result = run_script("any_calls", built[model], str(1 + [*PAIR].index(model)))
-    assert result["failures"] > count(500, sampled=150)  # or too little was out of order
-    assert result["revived"] > count(50, sampled=15)
+    assert result["failures"] > tries(500, sampled=150)  # or too little was out of order
+    assert result["revived"] > tries(50, sampled=15)
 
 
 def test_fmus_fly_on_while_others_are_unloaded_and_their_files_deleted(

@@ -18,6 +18,7 @@ from orchestration.components.building import builder
 from orchestration.components.building.models import MODELS
 from orchestration.components.checks.doctor import binaries
 from orchestration.foundation.basics.errors import QuadcosimError
+from tests.extent import in_test_all, sample
 from tests.fmus.archive import files_of
 from tests.fmus.instance import Instance
 from tests.fmus.process import run
@@ -70,6 +71,7 @@ def test_building_again_in_another_folder_gives_the_same_bytes(built: dict[str, 
         assert path.read_bytes() == built[path.stem].read_bytes()
 
 
+@in_test_all
 @pytest.mark.usefixtures("nothing_kept")
 def test_building_again_in_the_same_folder_gives_the_same_bytes(tmp_path: Path) -> None:
     (path,) = builder.build(["QuadrotorPlant"], tmp_path)
@@ -80,6 +82,7 @@ def test_building_again_in_the_same_folder_gives_the_same_bytes(tmp_path: Path) 
     assert again.read_bytes() == first
 
 
+@in_test_all
 def test_a_copied_source_tree_gives_the_same_bytes(built: dict[str, Path], sources: Path, tmp_path: Path) -> None:
     assert try_to_build(sources, tmp_path, *MODELS).returncode == 0
     for model in MODELS:
@@ -196,7 +199,7 @@ def test_the_archive_has_a_binary_named_after_the_model_for_linux_and_windows(
     assert {f"binaries/linux64/{model}.so", f"binaries/win64/{model}.dll"} <= binaries
 
 
-@pytest.mark.parametrize("compiler", ["none", "one that fails"])
+@pytest.mark.parametrize("compiler", sample(["none", "one that fails"], 1))
 def test_without_a_compiler_an_fmu_is_packed_without_a_loader_and_says_so(
     compiler: str, built: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -321,7 +324,10 @@ def test_the_source_hash_changes_with_a_source(before: dict[str, str], sources: 
 
 @pytest.mark.parametrize(
     "file",
-    ["packaging.py", "bundle.py", "documentation.py", "page.html", "loader.py", "loader.c", "LICENSE", "slave.py"],
+    sample(
+        ["packaging.py", "bundle.py", "documentation.py", "page.html", "loader.py", "loader.c", "LICENSE", "slave.py"],
+        2,
+    ),
 )
 def test_the_source_hash_changes_with_what_both_fmus_stand_on(file: str, before: dict[str, str], sources: Path) -> None:
     with (sources / "fmu_kit" / file).open("a", encoding="utf-8") as source:
@@ -330,7 +336,7 @@ def test_the_source_hash_changes_with_what_both_fmus_stand_on(file: str, before:
     assert all(after[model] != before[model] for model in MODELS)
 
 
-@pytest.mark.parametrize("file", ["QuadrotorPlant.html", "QuadrotorPlant.png"])
+@pytest.mark.parametrize("file", sample(["QuadrotorPlant.html", "QuadrotorPlant.png"], 1))
 def test_the_source_hash_changes_with_the_files_beside_the_slave(
     file: str, before: dict[str, str], sources: Path
 ) -> None:

@@ -28,6 +28,7 @@ from orchestration.components.fmi.read_description import attribute, scalars_of
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.processes.child import Child, Ending
 from orchestration.foundation.processes.resource_limits import Limits
+from tests.extent import in_test_all, sample
 from tests.fmus.archive import files_of, view_of
 from tests.fmus.damage import Damage, description, root, source, without, write_fmu
 from tests.fmus.foreign import lag, needs_compiler
@@ -37,7 +38,7 @@ from tests.places import ROOT
 # -- sound FMUs -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", sample([*MODELS], 1))
 def test_nothing_is_wrong_with_the_fmus_and_their_files_stay_as_they_are(model: str, built: dict[str, Path]) -> None:
     before = built[model].read_bytes()
     assert validate(str(built[model])) == []
@@ -138,6 +139,7 @@ def test_a_start_may_be_off_by_what_15_digits_leave_open(start: str, found: list
     assert summary(path) == found
 
 
+@in_test_all
 @needs_compiler
 def test_a_slow_fmu_is_checked_with_fewer_steps(tmp_path: Path) -> None:
     assert summary(lag(tmp_path / "lag.fmu", "SLOW=5000"), time=8.0) == [("runs", True)]

@@ -20,6 +20,7 @@ from orchestration.simulation.requests.ssp import writing
 from orchestration.simulation.runs.pause import read_state
 from orchestration.systems.signals.table_file import read_table
 from quadcosim import Scenario, UsageError, fly_until, load_run, load_scenario, save_run
+from tests.extent import tries
 
 resource = pytest.importorskip("resource")  # and signals with a time, neither of which Windows has
 
@@ -209,7 +210,10 @@ def is_read_or_refused(read: Callable[[], object]) -> None:
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - peak < MEGABYTES * 1024
 
 
-fuzz = settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
+fuzz = settings(
+    max_examples=tries(150, sampled=37),
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
 
 
 @fuzz
@@ -251,7 +255,7 @@ def ssp(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "SystemStructure.ssd"
 
 
-@settings(fuzz, max_examples=100)
+@settings(fuzz, max_examples=tries(100, sampled=25))
 @given(CUTS.map(lambda cuts: damaged(TIMING.encode(), cuts)) | with_another_value(TIMING))
 @example(TIMING.encode())
 @example(b"components = 3")
@@ -285,7 +289,7 @@ def run_files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-@settings(fuzz, max_examples=60)
+@settings(fuzz, max_examples=tries(60, sampled=15))
 @given(st.sampled_from(RUN_FILES), CUTS)
 def test_a_directory_of_a_run(tmp_path: Path, run_files: dict[str, bytes], name: str, cuts: list[Cut]) -> None:
     for other, content in run_files.items():

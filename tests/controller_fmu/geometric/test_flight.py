@@ -1,9 +1,11 @@
 """Flights of the geometric controller's FMU: the same written out as C, and with redesigns of its law."""
 
 import quadcosim
+from tests.extent import in_test_all
 from tests.native import assert_near
 
 
+@in_test_all
 def test_the_flight_of_its_c_is_that_of_its_python() -> None:
     """To rounding, as their elementary functions are not the same."""
     values: dict[str, float | str] = {"controller.heading": 0.4, "controller.inertia.zz": 1.5}

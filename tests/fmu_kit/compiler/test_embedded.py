@@ -14,6 +14,7 @@ from fmu_kit.compiler.pack.embedded_files import write
 from orchestration.components.building import builder, fmus
 from orchestration.components.building.models import MODELS
 from tests.commands import Main
+from tests.extent import sample
 from tests.fmu_kit.compiler.embedded import (
     ARM,
     M4F,
@@ -94,7 +95,7 @@ RUNS = {
 FLAGS = (f"-DSTEPS={STEPS}", f"-DH={H}")
 
 
-@pytest.mark.parametrize("where", RUNS)
+@pytest.mark.parametrize("where", sample([*RUNS], 2))
 def test_in_double_precision_every_variable_is_that_of_the_native_fmu_to_the_bit(
     where: str, exported: dict[str, Path], simulated: dict[str, list[float]], tmp_path: Path
 ) -> None:

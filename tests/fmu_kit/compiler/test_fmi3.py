@@ -22,6 +22,7 @@ from orchestration.components.building import fmus
 from orchestration.components.building.models import MODELS
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from tests.commands import Main
+from tests.extent import sample
 from tests.fmu_kit.compiler.compiled import compiled
 from tests.fmus.archive import files_of
 from tests.fmus.expected import COMMAND, MEASUREMENT
@@ -75,7 +76,7 @@ def controller(tmp_path: Path) -> Iterator[Instance]:
     instance.fmu.freeInstance()
 
 
-@pytest.mark.parametrize("name", PAIR)
+@pytest.mark.parametrize("name", sample([*PAIR], 1))
 def test_an_fmu_of_fmi_3_has_the_variables_of_that_of_fmi_2(name: str) -> None:
     two, three = read(f"native/{name}"), read(f"native/fmi3/{name}")
     common = (

@@ -21,6 +21,7 @@ from fmu_kit.compiler.trace.tracing import trace
 from fmu_kit.declared_names import PYTHONFMU_NAMES
 from fmu_kit.packaging import slave_class
 from fmu_kit.slave import Slave
+from tests.extent import in_test_all
 from tests.fmu_kit.compiler.compiled import compiler
 from tests.fmu_kit.compiler.embedded import _succeeds, assert_its_header_is_kept
 from tests.fmu_kit.compiler.probes import Kept
@@ -123,6 +124,7 @@ def test_a_slave_may_call_its_own_what_it_likes(target: Target, tmp_path: Path) 
     assert answers(InC.made(cls, path), {}, [{}] * 3) == expected
 
 
+@in_test_all
 def test_embedded_c_has_names_that_are_keywords_of_c(target: Target, tmp_path: Path) -> None:
     for single in (False, True):
         source = write(target, tmp_path, single=single)

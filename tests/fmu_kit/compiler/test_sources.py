@@ -10,13 +10,14 @@ import pytest
 from elftools.elf.elffile import ELFFile
 
 from orchestration.components.building import builder, fmus
+from tests.extent import sample
 from tests.fmus.process import run
 
 MODEL = "QuadrotorPlant"
 
 
 @pytest.mark.skipif(shutil.which("cmake") is None or shutil.which("cc") is None, reason="no cmake, or no C compiler")
-@pytest.mark.parametrize("folder", [builder.NATIVE.folder, builder.NATIVE_FMI_3.folder])
+@pytest.mark.parametrize("folder", sample([builder.NATIVE.folder, builder.NATIVE_FMI_3.folder], 1))
 def test_what_fmpy_compiles_flies_to_the_same_bytes_and_needs_no_libm(folder: str, tmp_path: Path) -> None:
     built = fmus.locate(f"{folder}/{MODEL}")
     path = tmp_path / f"{MODEL}.fmu"

@@ -14,6 +14,7 @@ from fmu_kit.compiler.pack.building import modules_of
 from fmu_kit.compiler.trace.tracing import trace
 from fmu_kit.packaging import slave_class
 from fmu_kit.variants import Variant
+from tests.extent import sample, tries
 from tests.fmu_kit.compiler.compiled import compiler
 from tests.fmu_kit.compiler.probes import Pendulum, Zeros
 from tests.fmu_kit.compiler.twins import InC, InPython, Values, answers, library
@@ -30,7 +31,7 @@ FIXED = st.fixed_dictionaries(
 )
 
 
-@pytest.fixture(scope="module", params=PROBES)
+@pytest.fixture(scope="module", params=sample(PROBES, 5))
 def probe(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Target, Path]:
     """Each slave in turn, and the library that it is compiled to."""
     compiler("cc")
@@ -43,7 +44,7 @@ def test_a_slave_in_c_answers_as_in_python(probe: tuple[Target, Path]) -> None:
     slave = slave_class(target)
     reset = InC.made(slave, path)
 
-    @settings(derandomize=True, max_examples=150, database=None)
+    @settings(derandomize=True, max_examples=tries(150, sampled=37), database=None)
     @given(start=INPUTS, fixed=FIXED, steps=STEPS)
     def answer_alike(start: Values, fixed: Values, steps: list[Values]) -> None:
         given = {**start, **fixed}
@@ -54,7 +55,9 @@ def test_a_slave_in_c_answers_as_in_python(probe: tuple[Target, Path]) -> None:
     answer_alike()
 
 
-@pytest.mark.parametrize(("name", "mode"), [*((name, "as_it_is") for name in PROBES), ("Choices", "doubled")])
+@pytest.mark.parametrize(
+    ("name", "mode"), sample([*((name, "as_it_is") for name in PROBES), ("Choices", "doubled")], 3)
+)
 def test_a_slave_with_values_that_are_fixed_answers_in_c_as_in_python(name: str, mode: str, tmp_path: Path) -> None:
     compiler("cc")
     fixed = Variant.of("Fixed", {"mode": mode, "times": 9, "p": 2.0})
@@ -62,7 +65,7 @@ def test_a_slave_with_values_that_are_fixed_answers_in_c_as_in_python(name: str,
     slave = slave_class(target)
     reset = InC.made(slave, library(target, tmp_path))
 
-    @settings(derandomize=True, max_examples=30, database=None)
+    @settings(derandomize=True, max_examples=tries(30, sampled=10), database=None)
     @given(start=INPUTS, q=st.sampled_from([0.25, 2.0, 1e-3]), steps=st.lists(INPUTS, max_size=5))
     def answer_alike(start: Values, q: float, steps: list[Values]) -> None:
         expected = answers(InPython(slave(instance_name="probe")), {**start, "q": q}, steps)

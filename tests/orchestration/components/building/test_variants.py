@@ -16,6 +16,7 @@ from orchestration.simulation.interop.compare import agreements
 from orchestration.simulation.interop.table import TOLERANCE
 from quadcosim import Result, Scenario, UsageError, run
 from tests.commands import Main
+from tests.extent import sample
 from tests.orchestration.simulation.interop.common import LOOP, farthest
 
 MAKINGS = {"python": builder.IN_PYTHON, "native": builder.NATIVE, "FMI 3": builder.NATIVE_FMI_3}
@@ -30,7 +31,7 @@ TIMING = {"period": 0.05, "plant_interval": 0.005, "delay": 0.01}
 CRAZYFLIE = {**load_vehicle("crazyflie", Path()).for_controller("UnifiedController"), **REDESIGN}
 
 
-@pytest.fixture(scope="module", params=MAKINGS)
+@pytest.fixture(scope="module", params=sample([*MAKINGS], 2))
 def fixed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A redesign for one period and one vehicle, as an FMU of each making in turn."""
     flags = VariantFlags(

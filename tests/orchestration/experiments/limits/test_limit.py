@@ -37,6 +37,7 @@ from orchestration.systems.system.model import System
 from orchestration.theory.stability.known_loops import LinearLimit
 from orchestration.theory.stability.local_limit import local_limits
 from quadcosim import Result, Scenario, Timing, UsageError
+from tests.extent import sample
 from tests.fmus import source_tree
 from tests.native import NATIVE
 from tests.orchestration.experiments.studies.common import at, one_line, short
@@ -189,7 +190,7 @@ CASES = [(0.0, 0.0, 60), (1.0, 0.0, 60), (5.0, 0.0, 60), (0.0, 0.01, 30), (1.0, 
          (0.0, 0.03, 200), (1.0, 0.03, 200), (5.0, 0.03, 200)]  # fmt: skip
 
 
-@pytest.mark.parametrize(("coupling", "delay", "periods"), CASES)
+@pytest.mark.parametrize(("coupling", "delay", "periods"), sample(CASES, 3))
 def test_tiny_errors_shrink_one_per_cent_below_the_local_limit_and_grow_one_per_cent_above(
     coupling: float, delay: float, periods: int, fleet: Instances
 ) -> None:
@@ -267,7 +268,7 @@ LOOPS: list[tuple[dict[str, Any], float, int]] = [
 ]
 
 
-@pytest.mark.parametrize(("timing", "lag", "size"), LOOPS)
+@pytest.mark.parametrize(("timing", "lag", "size"), sample(LOOPS, 2))
 def test_powers_of_the_matrix_are_derivatives_of_whole_periods_of_flight(
     timing: dict[str, Any], lag: float, size: int, fleet: Instances
 ) -> None:
@@ -684,7 +685,7 @@ def test_find_runs_the_scenario_and_its_result_is_json() -> None:
     }  # fmt: skip
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", sample([1, 2], 1))
 def test_find_of_a_random_quantity_is_the_same_with_any_number_of_workers(workers: int) -> None:
     base = dataclasses.replace(hover_of(short()), stop_time=0.05)
     found = find(base, "loss", confidence=0.2, scan=0.25, tolerance=0.5, workers=workers)

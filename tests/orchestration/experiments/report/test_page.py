@@ -25,6 +25,7 @@ from orchestration.simulation.runs.simulation import run
 from orchestration.systems.system.file import load_system
 from orchestration.systems.system.paths import changed
 from quadcosim import Scenario, Timing
+from tests.extent import in_test_all
 from tests.native import NATIVE
 from tests.orchestration.experiments.studies.common import axis, sweep
 from tests.patience import PATIENCE
@@ -81,6 +82,7 @@ def of_runs(show: Show, tmp_path_factory: pytest.TempPathFactory) -> Any:
     return show(report(run(long), run(scenario(period=0.2)), out=folder / "report.html"))
 
 
+@in_test_all
 def test_who_has_a_computer_is_drawn_over_the_same_time_as_the_signals(show: Show, tmp_path: Path) -> None:
     system = changed(load_system(EXAMPLES / "autopilot" / "flight.toml"), {"stop_time": 0.3})
     page = show(report(run(system), out=tmp_path / "report.html"))
@@ -225,6 +227,7 @@ def turned(signals: Mapping[str, Floats]) -> dict[str, Floats]:
     return found
 
 
+@in_test_all
 def test_a_flight_in_other_axes_is_converted_for_the_replay_only(show: Show, tmp_path: Path) -> None:
     flown = run(scenario().with_changes(parameters={"plant.frame": "enu", "controller.frame": "enu"}))
     twin = dataclasses.replace(flown, system=changed(flown.system, {"components.plant.parameters.frame": "ned"}))
@@ -303,6 +306,7 @@ def test_a_click_on_a_cell_of_the_map_opens_the_run_behind_it(of_study: Any) -> 
     assert title(of_study).startswith("Run 0")
 
 
+@in_test_all
 def test_the_map_of_a_comparison_says_what_its_numbers_are(of_comparison: Any) -> None:
     assert of_comparison.inner_text("#map-title") == "Share of the starts that survives"
 

@@ -20,6 +20,7 @@ from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
 from quadcosim import QuadcosimError
 from tests.commands import Main
+from tests.extent import in_test_all
 from tests.orchestration.components.fmi.small import known, needs_compiler, small
 from tests.orchestration.experiments.studies.common import (
     PERIODS,
@@ -92,6 +93,7 @@ def test_searches_evaluate_their_runs_on_a_cluster_too(cluster: Cluster) -> None
     assert found[0] == found[1]
 
 
+@in_test_all
 def test_the_death_of_a_dask_worker_loses_nothing(
     folder: Path, reference: list[dict[str, Any]], cluster: Cluster
 ) -> None:

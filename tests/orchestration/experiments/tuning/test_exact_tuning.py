@@ -13,6 +13,7 @@ from orchestration.experiments.tuning.tune import Tuned, tune
 from orchestration.experiments.tuning.tuning_file import load_tuning
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError
+from tests.extent import in_test_all
 from tests.orchestration.theory.exact.common import servo
 from tests.places import EXAMPLES
 
@@ -50,6 +51,7 @@ def test_the_tuned_gains_have_the_lowest_cost_by_matrices_and_another_search(tmp
     assert tuned(tuning(evaluations=40), tmp_path).searches == found.searches
 
 
+@in_test_all
 def test_a_search_that_starts_where_no_cost_is_finite_reduces_the_radius() -> None:
     wide = (
         Axis(name="K", targets=(f"{GAINS}.K",), low=2.0, high=40.0),

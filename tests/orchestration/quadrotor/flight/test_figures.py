@@ -25,6 +25,7 @@ from orchestration.simulation.runs.draw import draw
 from orchestration.simulation.runs.run_labels import labels_of_runs
 from orchestration.systems.system.model import Criterion
 from quadcosim import Result, UsageError
+from tests.extent import sample
 from tests.native import native
 from tests.places import EXAMPLES
 
@@ -80,7 +81,7 @@ def unlabelled(figure: Figure) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("style", [SCREEN, NARROW], ids=["screen", "narrow"])
+@pytest.mark.parametrize("style", sample([SCREEN, NARROW], 1), ids=lambda style: str(style.width))
 def test_every_axis_of_every_figure_has_a_name_and_a_unit(style: Style, flight: Result, slow: Result) -> None:
     for results in ([flight], [flight, slow]):
         made = draw(results, style=style)

@@ -11,6 +11,7 @@ import quadcosim
 from fmu_kit.bundle import Target
 from orchestration.components.building.models import MODELS
 from quadcosim import Result
+from tests.extent import in_test_all
 from tests.fmus.making import PAIR
 from tests.native import assert_near, assert_the_same, natives
 from tests.orchestration.quadrotor.scenarios.signals_table import (
@@ -66,6 +67,7 @@ def flown_by(fmus: Mapping[str, str | Path], name: str) -> Result:
     return quadcosim.run(scenario.with_fmus(plant=fmus["QuadrotorPlant"], controller=fmus["UnifiedController"]))
 
 
+@in_test_all
 @pytest.mark.parametrize("name", FLIGHTS)
 def test_a_native_flight_on_the_same_libm_is_that_of_the_slaves_in_python(name: str, on_libm: dict[str, Path]) -> None:
     assert_the_same(flown_by(on_libm, name), in_python(name))

@@ -24,6 +24,7 @@ from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.distribution import Distribution
 from orchestration.systems.system.model import Criterion, System
 from orchestration.systems.system.paths import changed
+from tests.extent import tries
 from tests.native import assert_the_same
 from tests.orchestration.components.fmi.small import needs_compiler
 from tests.orchestration.simulation.engines.batch.lanes import assert_the_same_signals, in_lanes, shape_of
@@ -64,7 +65,7 @@ def test_random_systems_on_computers_run_the_same_in_schedules_of_any_length(
         assert_the_same(both(of(what, fmu), load=kept.load), whole)
 
 
-@settings(max_examples=30, derandomize=True, deadline=None)
+@settings(max_examples=tries(30, sampled=10), derandomize=True, deadline=None)
 @given(
     systems_on_computers(),
     st.floats(0.0, 1.0),
@@ -242,7 +243,7 @@ def crowds(draw: st.DrawFn) -> list[System]:
     return crowd
 
 
-@settings(max_examples=30, derandomize=True, deadline=None)
+@settings(max_examples=tries(30, sampled=10), derandomize=True, deadline=None)
 @given(crowds())
 def test_systems_on_computers_have_the_same_bits_in_lanes_beside_others(
     fmu: Path, kept: Kept, crowd: list[System]

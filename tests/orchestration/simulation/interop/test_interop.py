@@ -11,6 +11,7 @@ from orchestration.simulation.interop.catalogue import TOOLS, chosen
 from orchestration.simulation.interop.compare import Agreement, agreements
 from orchestration.simulation.interop.table import TOLERANCE, agrees
 from quadcosim import QuadcosimError, Scenario, UsageError
+from tests.extent import sample
 from tests.native import NATIVE
 from tests.orchestration.experiments.studies.common import one_line
 from tests.orchestration.simulation.interop.common import LOOP, components_of, farthest
@@ -47,7 +48,10 @@ FACTS = {
 }
 
 
-@pytest.fixture(scope="session", params=[(0.01, 18.0), (0.001, 5.0)], ids=["10 ms", "1 ms"])
+STEPS = [pytest.param((0.01, 18.0), id="10 ms"), pytest.param((0.001, 5.0), id="1 ms")]
+
+
+@pytest.fixture(scope="session", params=sample(STEPS, 1))
 def compared(request: pytest.FixtureRequest) -> tuple[Scenario, dict[str, Agreement]]:
     """The beginning of the paper's flight at two communication steps, and how each tool agrees.
 

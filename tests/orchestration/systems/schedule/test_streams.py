@@ -11,6 +11,7 @@ from orchestration.simulation.engines.running_system import RunningSystem
 from orchestration.systems.schedule.instant_arrays import Cursor
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
+from tests.extent import tries
 from tests.orchestration.simulation.engines.random_systems import systems_with_more
 from tests.orchestration.simulation.engines.stubs import Stub
 
@@ -29,7 +30,7 @@ def test_a_stream_with_a_number_is_the_spawned_child_of_that_number():
     assert Streams(7, {"connections.valve.loss": 3}).of("connections.valve", "loss").random(5).tolist() == expected
 
 
-@settings(max_examples=60)
+@settings(max_examples=tries(60, sampled=15))
 @given(systems_with_more())
 def test_adding_a_component_and_lossy_connections_changes_no_number_of_the_others(pair):
     """Samples, outcomes of messages and noise are compared: outputs are constant."""

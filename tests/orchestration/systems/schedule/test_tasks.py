@@ -14,6 +14,7 @@ from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.component import Component, SamplingOnArrival
 from orchestration.systems.system.computers import Computer, Message, Network, Task
+from tests.extent import tries
 from tests.orchestration.simulation.engines.stubs import continuous, sampled, system, wire
 
 MS = 1_000_000
@@ -46,7 +47,7 @@ def times(found, what):
 LATE = st.floats(0.0, 0.03)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=tries(40, sampled=10), deadline=None)
 @given(
     period=st.floats(0.01, 0.2), offset=st.floats(0.0, 0.1), share=st.floats(0.0, 0.9), ratio=st.floats(0.9, 1.1),
     delays=st.tuples(LATE, LATE, LATE, LATE), losses=st.tuples(*2 * [st.sampled_from([0.0, 0.3])]),

@@ -22,6 +22,7 @@ from orchestration.theory.stability.matrices import SampledSystem
 from quadcosim import UsageError, limit
 from tests.commands import Main
 from tests.examples.common import native_example as example
+from tests.extent import in_test_all
 from tests.orchestration.components.fmi.small import needs_compiler
 from tests.places import EXAMPLES
 
@@ -150,6 +151,7 @@ def test_a_limit_of_a_loop_without_chance_has_no_mean_square_limit() -> None:
     assert "square" not in found.note
 
 
+@in_test_all
 def test_where_noise_alone_is_random_the_mean_square_limit_is_the_local_one() -> None:
     system = example("minimum_variance", {"stop_time": 5.0})
     system = dataclasses.replace(

@@ -14,6 +14,7 @@ from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.model import System
 from orchestration.theory.exact.periodic_schedule import ScheduleTrace
 from orchestration.theory.exact.repeating import periodic_schedule
+from tests.extent import tries
 from tests.orchestration.simulation.engines.random_systems import some
 
 PERIODS = (0.002, 0.003, 0.004, 0.006, 0.012)
@@ -57,7 +58,7 @@ def tasks_of_any(draw: st.DrawFn, number: int, component: str | None) -> Task:
     )  # fmt: skip
 
 
-@settings(max_examples=120, derandomize=True, deadline=None)
+@settings(max_examples=tries(120, sampled=30), derandomize=True, deadline=None)
 @given(timetables())
 def test_a_hundred_common_periods_later_the_same_happens(system: System) -> None:
     try:

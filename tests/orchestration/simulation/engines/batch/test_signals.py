@@ -11,6 +11,7 @@ from orchestration.systems.schedule import schedule_cache
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System
+from tests.extent import sample, tries
 from tests.orchestration.components.fmi.small import needs_compiler
 from tests.orchestration.quadrotor.scenarios.signals_table import flights, scenario_of
 from tests.orchestration.simulation.engines.batch.lanes import assert_the_same_signals, in_lanes, located, shape_of
@@ -53,7 +54,7 @@ def crowds(draw: st.DrawFn) -> list[System]:
     return crowd
 
 
-@settings(max_examples=40, derandomize=True, deadline=None)
+@settings(max_examples=tries(40, sampled=10), derandomize=True, deadline=None)
 @given(crowds(), st.sampled_from((1, 70, schedule_cache.INSTANTS)))
 def test_random_systems_have_the_same_signals_beside_any_others(
     fmu: Path, kept: Kept, crowd: list[System], instants: int
@@ -67,7 +68,7 @@ def test_random_systems_have_the_same_signals_beside_any_others(
         assert_the_same_signals(shape, found, lane, ran(what, "compiled", load=kept.load))
 
 
-@pytest.mark.parametrize("name", FLIGHTS)
+@pytest.mark.parametrize("name", sample([*FLIGHTS], 3))
 def test_flights_of_the_quadrotor_are_the_same(name: str) -> None:
     system = plain(located(scenario_of(FLIGHTS[name]["scenario"]).as_system()))
     shape = shape_of(system)
@@ -75,7 +76,7 @@ def test_flights_of_the_quadrotor_are_the_same(name: str) -> None:
     assert_the_same_signals(shape, found, 0, ran(system, "compiled"))
 
 
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.parent.name)
+@pytest.mark.parametrize("path", sample(EXAMPLES, 3), ids=lambda path: path.parent.name)
 def test_examples_run_the_same_with_any_seed(path: Path) -> None:
     system = plain(located(replace(load_system(path), stop_time=3.0)))
     crowd = [replace(system, seed=seed) for seed in (1, 2, 3)]

@@ -12,6 +12,7 @@ from orchestration.simulation.interop.table import TOLERANCE, agrees
 from orchestration.simulation.requests.ssp import writing
 from orchestration.systems.system.model import System
 from quadcosim import Scenario, load_scenario
+from tests.extent import in_test_all
 from tests.native import NATIVE
 from tests.orchestration.simulation.interop.common import LOOP, farthest, states_of_master, with_other_parameters
 
@@ -76,6 +77,7 @@ def test_each_tool_takes_the_parameters_from_the_ssp(monkeypatch: pytest.MonkeyP
         assert not agrees(agreement)
 
 
+@in_test_all
 def test_fmus_of_any_name_in_any_folder_with_parameters_of_every_type(
     odd_plant: Path, built: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
