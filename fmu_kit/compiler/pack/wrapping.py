@@ -81,6 +81,7 @@ def build(code: UserCode, out: Path, version: int = 2, systems: Sequence[str] = 
         user = folder / f"user_code{'.cpp' if code.is_cxx else '.c'}"
         (folder / user.name).write_text(user_code(code), encoding="utf-8")
         objects = build_objects(code, user, folder)
+        (folder / "probe.c").write_text(_PROBE, encoding="utf-8")
         starts = _starts(code, objects, folder)
         slave = _slave(code, starts)
         whole = objects.is_pure and not systems
@@ -116,7 +117,6 @@ def _library(code: UserCode, sources: Mapping[str, bytes], main: str) -> bytes:
 
 def _starts(code: UserCode, objects: Objects, folder: Path) -> list[float]:
     """The values of the variables after the code's initialisation, which runs here."""
-    (folder / "probe.c").write_text(_PROBE, encoding="utf-8")
     options = ["-std=gnu11", "-w", f"-DVARIABLES={len(code.places)}"]
     whole = [c_compiler.compiler(), *options, "probe.c", str(objects.path), *libraries(code), "-o", "probe"]
     c_compiler.output_of(whole, folder)

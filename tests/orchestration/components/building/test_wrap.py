@@ -236,6 +236,7 @@ def test_it_is_made_again_when_a_header_changes_only(of: Callable[..., Path], pd
         ("in.x", "in.q", "pd.toml:10: error: 'pd_in' has no member named 'q'"),
         ("pd_init();", "pd_init()", "pd.toml:7: error: expected ';' before '}' token"),
         ('"pd_step(&in, &out);"', "'''\npd_step(&in, &out);\nno;\n'''", "pd.toml:10: error: 'no' undeclared"),
+        ('include = ["."]', 'include = ["."]\ndefines = ["double=5"]', "pd.toml: defines: error: expected"),
         ('["pd.h"]', '["no.h"]', "pd.toml:4: fatal error: no.h: No such file or directory"),
     ],
 )
@@ -254,7 +255,7 @@ def test_what_the_compiler_refuses_in_a_source_has_its_line(of: Callable[..., Pa
     [
         ("return clock() / 1e6;", "clock, used in it.c:5, reads the time: expected a stub"),
         ("return rand();", "rand, used in it.c:5, draws random numbers: expected a stub of rand"),
-        ('printf("%d", 1); return 0;', "writes or reads a file: expected a define that leaves it out"),
+        ('printf("%d", 1); return 0;', "writes or reads a file: expected a stub of printf in a source"),
         ("extern int elsewhere(int); return elsewhere(1);", "elsewhere, used in it.c:5, is in none of the sources"),
     ],
 )
