@@ -24,8 +24,12 @@ Allocator = Callable[[str, int], Bytes]
 
 
 def process_memory(name: str, size: int) -> Bytes:
-    """Allocate memory that ends with the process."""
-    return np.empty(size, dtype=np.uint8)
+    """Allocate memory that ends with the process.
+
+    It is not NumPy's, which asks for huge pages: on virtual machines the first touch of these takes three to four times
+    as long, which was most of the time of a step that is recorded.
+    """
+    return np.frombuffer(bytearray(max(size, 1)), dtype=np.uint8, count=size)
 
 
 @dataclass(frozen=True)
