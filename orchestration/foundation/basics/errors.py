@@ -72,12 +72,13 @@ def no_utf8(error: UnicodeEncodeError) -> UsageError:
 
 
 def one_line(text: str) -> str:
-    """`text` in one line of printable characters, cut to `MAX_MESSAGE_LENGTH`."""
+    """`text` in one line of printable characters, its middle cut to `MAX_MESSAGE_LENGTH`."""
     if not text.isprintable():
         text = "".join(
             c if c.isprintable() else c.encode("unicode_escape").decode() for c in " ".join(text.split("\n"))
         )
-    return text if len(text) <= MAX_MESSAGE_LENGTH else f"{text[: MAX_MESSAGE_LENGTH - 1]}…"
+    half = MAX_MESSAGE_LENGTH // 2
+    return text if len(text) <= MAX_MESSAGE_LENGTH else f"{text[: half - 1]}…{text[-half:]}"
 
 
 def expected_name(name: str, known: Sequence[str]) -> str:

@@ -17,6 +17,7 @@ from orchestration.components.fmi.opening import open_here
 from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.basics.errors import UsageError
 from tests.commands import Main
+from tests.extent import sample
 
 PD_H = """\
 typedef struct { double x, v; } pd_in;
@@ -98,7 +99,7 @@ def pd(folder: Path) -> Path:
     return wrap.build(folder / "pd.toml", wrap.fmu_of(folder / "pd.toml"))
 
 
-@pytest.fixture(scope="module", params=[2, 3])
+@pytest.fixture(scope="module", params=sample([2, 3], 1))
 def tick(folder: Path, request: pytest.FixtureRequest) -> Path:
     """The FMU of code with state in statics of its file and of its function, of FMI 2.0 and 3.0."""
     file = folder / "tick.toml"

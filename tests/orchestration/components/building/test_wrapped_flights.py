@@ -21,6 +21,7 @@ from orchestration.foundation.basics.documents import read_toml
 from orchestration.simulation.runs.simulation import run
 from quadcosim import FmuChoice, Scenario, changed, load_study, load_system
 from tests.commands import Main
+from tests.extent import sample
 from tests.orchestration.components.building.test_wrap import PD, PD_C, PD_H
 from tests.places import ROOT
 
@@ -131,7 +132,7 @@ def wrapped(name: str, folder: Path) -> Path:
     return folder / f"{name}.toml"
 
 
-@pytest.mark.parametrize("name", CONTROLLERS)
+@pytest.mark.parametrize("name", sample([*CONTROLLERS], 1))
 def test_a_law_exported_to_c_and_wrapped_again_flies_the_same_bits(name: str, exported: Path) -> None:
     flight = Scenario(stop_time=0.5, plant=FmuChoice(fmu="native/QuadrotorPlant"))
     one = run(flight.with_changes(controller=FmuChoice(fmu=f"native/{name}")))
