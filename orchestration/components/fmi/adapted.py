@@ -21,7 +21,7 @@ from orchestration.components.fmi.read_description import Model
 from orchestration.components.fmi.slaves import WARNING
 from orchestration.components.fmi.transfers import Numbers
 from orchestration.foundation.basics.c_structures import address, constants, declared, expect_same_sizes
-from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError
+from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
 
@@ -183,10 +183,9 @@ class AdaptedInstance(StepsWithEnd):
 
     # -- a run ---------------------------------------------------------------------------------------------------
 
-    def enter_initialization(self, start: float, stop: float) -> None:
-        """As `NativeInstance`."""
+    def _enter(self, start: float, stop: float | None) -> None:
         self._adapter.now = start
-        super().enter_initialization(start, stop)
+        super()._enter(start, stop)  # type: ignore[safe-super]  # of the class of its version
         base = self.model.ticking[:1]
         if self._intervals is not None and base[0].variability != "constant":
             reference, period, offset = (ctypes.c_uint32 * 1)(base[0].reference), *self._intervals
@@ -208,7 +207,18 @@ class AdaptedInstance(StepsWithEnd):
             values[:] = starts
 
     def save(self) -> bytes:
-        """As `NativeInstance`: with its next event, the step of its solver, and the number of its events."""
+        """As `NativeInstance`, with what `adapter.c` knows."""
+        own = self.own_state()
+        return len(own).to_bytes(8, "little") + own + super().save()
+
+    def restore(self, state: bytes) -> None:
+        """As `NativeInstance`."""
+        begin = 8 + int.from_bytes(state[:8], "little")
+        super().restore(state[begin:])
+        self.restore_own(state[8:begin])
+
+    def own_state(self) -> bytes:
+        """What `adapter.c` knows beside the state of the FMU, which leaves event mode."""
         self._do("settle")
         a = self._adapter
         own = np.array([a.now, a.next, a.h, a.events, a.ends, a.samples, a.starts_late, a.waiting_count])
@@ -218,27 +228,23 @@ class AdaptedInstance(StepsWithEnd):
             sizes = 4 * each.references_count, self._size_of(each.type) * each.count
             parts.append(np.array([each.type, each.references_count, each.count]).tobytes())
             parts += [ctypes.string_at(place, n) for place, n in zip((each.references, each.values), sizes)]
-        return b"".join([*parts, super().save()])
+        return b"".join(parts)
 
-    def restore(self, state: bytes) -> None:
-        """As `NativeInstance`."""
+    def restore_own(self, state: bytes) -> None:
+        """Restore that, after the state of the FMU."""
         reader = BytesIO(state)
         now, following, h, *counts = np.frombuffer(reader.read(8 * 8)).tolist()
         events, ends, samples, late, waiting = map(int, counts)
         self._continue(now=now, next=following, h=h, events=events, ends=ends, samples=samples, starts_late=late)
         for _, values in self._clocked:
             values[:] = np.frombuffer(reader.read(values.nbytes), dtype=values.dtype)
+        self._adapter.tolerance = self._tolerance or TOLERANCE
+        self._do("restored")
         library().empty(self._component)
-        kept = []
         for _ in range(waiting):
             kind, references, count = np.frombuffer(reader.read(3 * 8), dtype=np.int64).tolist()
             of, content = reader.read(4 * references), reader.read(self._size_of(kind) * count)
-            kept.append((kind, of, references, content, count))
-        super().restore(reader.read())
-        self._adapter.tolerance = self._tolerance or TOLERANCE
-        self._do("restored")
-        for values_of_one in kept:
-            library().keep_values(self._component, *values_of_one)
+            library().keep_values(self._component, kind, of, references, content, count)
 
     def take_events(self) -> Floats:
         """As `Instance`."""
@@ -259,12 +265,11 @@ class AdaptedInstance(StepsWithEnd):
         if hasattr(self, "_adapter"):
             library().release(ctypes.byref(self._adapter))
 
-    def failure(self, function: str, status: int, otherwise: str | None = None) -> SimulatorError:
+    def problem(self) -> str | None:
         """As `NativeInstance`."""
         numbers = {number: name for name, number in _constants().items() if name in _PROBLEMS}
-        if (name := numbers.get(self._adapter.problem)) is not None:
-            otherwise = _PROBLEMS[name].format(self._adapter.now)
-        return super().failure(function, status, otherwise)
+        name = numbers.get(self._adapter.problem)
+        return None if name is None else _PROBLEMS[name].format(self._adapter.now)
 
     def _continue(self, **fields: Any) -> None:
         for name, value in fields.items():

@@ -405,12 +405,16 @@ class NativeInstance(Instance):
         elif len(self.warnings) == _MAX_WARNINGS:
             self.warnings.append(f"{self.name} ({self.model.name}): further warnings of this FMU are not kept")
 
+    def problem(self) -> str | None:
+        """Why a call fails that the FMU itself did not refuse; None if it did."""
+        return None
+
     def failure(self, function: str, status: int, otherwise: str | None = None) -> SimulatorError:
         """The error for a call that failed, with the message that the FMU logged; `otherwise` if it logged none."""
         self.failed = True
         diverged = [m for m in self._messages if m[0] > slaves.WARNING and m[1] == DIVERGENCE_CATEGORY]
         silent = f"returned {slaves.status_name(self.model.version, status)}, without a message"
-        summary, details = slaves.failure_text(diverged or self._messages, otherwise or silent)
+        summary, details = slaves.failure_text(diverged or self._messages, otherwise or self.problem() or silent)
         if not diverged and self._names_initial_value(summary):
             return RefusedValueError(f"{self.name}.{summary}", details=details)
         return SimulatorError(self.reported(function, summary), divergence=bool(diverged), details=details)

@@ -22,6 +22,7 @@ from orchestration.components.fmi.instance import Instance
 from orchestration.components.fmi.native_instance import NativeInstance
 from orchestration.components.fmi.read_description import read_model
 from orchestration.components.fmi.trust import content_hash
+from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.processes import subprocesses
 from orchestration.foundation.processes.resource_limits import Limits
 
@@ -130,6 +131,13 @@ def open_here(path: Path, instance_name: str, access: Access = USUAL) -> NativeI
     if model.interface != "co-simulation":
         from orchestration.components.fmi.adapted import adapted  # not before: few FMUs are called so
 
-        return adapted(model)(path, instance_name, access)
+        try:
+            return adapted(model)(path, instance_name, access)
+        except QuadcosimError as error:
+            if model.interface != "event-mode" or model.ticking:
+                raise
+            instance = Fmi3Instance(path, instance_name)
+            instance.warnings.append(f"{instance_name}: handles its events itself, as it refuses event mode: {error}")
+            return instance
     kind = Fmi3Instance if model.version == 3 else Fmi2Instance
     return kind(path, instance_name, access)

@@ -176,8 +176,12 @@ FOLDERS: Mapping[int, tuple[str, ...]] = {
 For other processors than x86, FMI 2.0 uses the names of FMI 3.0 (FMI 2.0.4, section 2.3), and tools use `linux64`.
 """
 
-INSTANTIATES: Mapping[int, str] = {2: "fmi2Instantiate", 3: "fmi3InstantiateCoSimulation"}
-"""The function that makes an instance, by the version of FMI."""
+
+def instantiates(version: int, interface: Interface) -> str:
+    """The name of the function that makes an instance."""
+    if version == 2:
+        return "fmi2Instantiate"
+    return f"fmi3Instantiate{'ModelExchange' if interface == 'model-exchange' else 'CoSimulation'}"
 
 
 class _CachedSignatures:

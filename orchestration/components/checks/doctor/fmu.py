@@ -20,6 +20,7 @@ from orchestration.components.checks.doctor.binaries import (
     origin_in,
     read,
 )
+from orchestration.components.fmi.access import Interface
 from orchestration.components.fmi.archive import (
     DESCRIPTION,
     TOKENS,
@@ -34,6 +35,8 @@ from orchestration.foundation.processes.passable import passable
 CO_SIMULATION = "CoSimulation"
 KINDS = {CO_SIMULATION: "co-simulation", "ModelExchange": "model exchange", "ScheduledExecution": "scheduled execution"}
 """Kinds of an FMU by the elements that declare them"""
+CALLED: Mapping[str, Interface] = {CO_SIMULATION: "co-simulation", "ModelExchange": "model-exchange"}
+"""Kinds that runs use: the interface that it is called by"""
 
 ARCHITECTURES = {
     "x86": "x86",

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from fmu_kit.scratch import temporary_folder
-from orchestration.components.checks.doctor.fmu import CO_SIMULATION, KINDS, InspectedFmu, inspected
+from orchestration.components.checks.doctor.fmu import CALLED, KINDS, InspectedFmu, inspected
 from orchestration.components.fmi.archive import OtherVersionError, UnreadableFmuError
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.foundation.processes import subprocesses
@@ -70,8 +70,8 @@ def _try_loading(path: Path, limits: Limits, environment: Mapping[str, str]) -> 
     if not isinstance(fmu, InspectedFmu):
         words = f": {ending.last_line}" if ending.last_line else ""
         raise UsageError(f"{path}: could not be read, the process {ending.description}{words}")
-    if CO_SIMULATION not in fmu.kinds:
-        return Trial(fmu=fmu, failure=f"not tried: it is for {' and '.join(KINDS[kind] for kind in fmu.kinds)} only")
+    if fmu.kinds[0] not in CALLED:
+        return Trial(fmu=fmu, failure=f"not tried: it is for {KINDS[fmu.kinds[0]]} only")
     return Trial(fmu=fmu, failure=_failure(received, ending))
 
 
@@ -98,7 +98,7 @@ def _try(path: Path, folder: Path, size_limit: float, send: Callable[[object], N
         send({"error": error})
         return
     send({"fmu": fmu})
-    if CO_SIMULATION in fmu.kinds:
+    if fmu.kinds[0] in CALLED:
         try:
             _load(fmu, folder)
         except (QuadcosimError, OSError) as error:
@@ -112,12 +112,12 @@ def _load(fmu: InspectedFmu, folder: Path) -> None:
     import fmpy
 
     from orchestration.components.fmi.slaves import (
-        INSTANTIATES,
         Message,
         expect_readable_place,
         failure_text,
         folder_here,
         instantiate,
+        instantiates,
         load_slave,
     )
 
@@ -127,9 +127,12 @@ def _load(fmu: InspectedFmu, folder: Path) -> None:
     messages: list[Message] = []
     call = "loading"
     try:
-        slave = load_slave(fmu.version, folder, token=fmu.guid, identifier=fmu.model_identifier, name="doctor")
-        call = INSTANTIATES[fmu.version]
-        instantiate(slave, messages)
+        interface = CALLED[fmu.kinds[0]]
+        slave = load_slave(
+            fmu.version, folder, token=fmu.guid, identifier=fmu.model_identifier, name="doctor", interface=interface
+        )
+        call = instantiates(fmu.version, interface)
+        instantiate(slave, messages, interface)
         for call, make in _initialisation(slave, fmu):  # noqa: B007 - the last one is named where it fails
             make()
     except Exception as error:

@@ -7,7 +7,7 @@ from packaging.specifiers import InvalidSpecifier, SpecifierSet
 
 from orchestration.components.checks.doctor.binaries import LINUX, WINDOWS
 from orchestration.components.checks.doctor.dependencies import PYTHON_DLL, missing_dependencies, part_for
-from orchestration.components.checks.doctor.fmu import CO_SIMULATION, KINDS, InspectedFmu, PlatformBinary
+from orchestration.components.checks.doctor.fmu import CALLED, KINDS, InspectedFmu, PlatformBinary
 from orchestration.components.checks.doctor.machine import Machine
 from orchestration.components.checks.doctor.pythons import BY_LOADER, ON_PATH, PRELOADED, PythonLibrary
 from orchestration.components.fmi.slaves import uri_is_read
@@ -162,8 +162,8 @@ def is_specifier(text: str) -> bool:
 
 def _general_needs(fmu: InspectedFmu, machine: Machine, part: PlatformBinary | None) -> list[str]:
     needs = []
-    if CO_SIMULATION not in fmu.kinds:
-        needs.append(f"an FMU for co-simulation; it is for {' and '.join(KINDS[kind] for kind in fmu.kinds)}")
+    if fmu.kinds[0] not in CALLED:
+        needs.append(f"an FMU for {' or '.join(KINDS[kind] for kind in CALLED)}; it is for {KINDS[fmu.kinds[0]]}")
     if part is None:
         needs.append(f"an FMU with a binary for {machine.system}, {machine.architecture}")
     decoded = part is not None and part.finds_python

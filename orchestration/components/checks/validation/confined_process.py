@@ -56,8 +56,8 @@ def check_description(path: Path, size_limit: float, report: Reporter) -> Fmu | 
         archive = read_archive(path, size_limit)
         report.try_rules(rules.OF_ARCHIVES, archive)
         root = read_root(archive)
-        if root.find("CoSimulation") is None:
-            raise UnreadableFmuError(f"{DESCRIPTION}: expected a CoSimulation element, nothing else was checked")
+        if root.find("CoSimulation") is None and root.find("ModelExchange") is None:
+            raise UnreadableFmuError(f"{DESCRIPTION}: expected CoSimulation or ModelExchange, nothing else was checked")
         report.try_rules((standard,), archive)
         if report.try_rules((indices,), root):
             return None

@@ -42,6 +42,8 @@ def capabilities(fmu: Fmu) -> Iterator[str]:
     interface, state = fmu.interface, "FMUstate" if fmu.version == 2 else "FMUState"
     if interface.canSerializeFMUstate and not interface.canGetAndSetFMUstate:
         yield f"canGetAndSet{state} = false: expected true, since canSerialize{state} is"
+    if fmu.description.coSimulation is None:
+        return
     if interface.canReturnEarlyAfterIntermediateUpdate and not interface.providesIntermediateUpdate:
         yield "providesIntermediateUpdate = false: expected true, since canReturnEarlyAfterIntermediateUpdate is"
     clocks = [v.name for v in fmu.variables if v.type == "Clock"]

@@ -10,7 +10,7 @@ from fmpy.model_description import ModelDescription, ModelVariable
 
 from fmu_kit.archive import SOURCE_HASH_FILE
 from orchestration.components.fmi.archive import Archive, UnreadableFmuError
-from orchestration.components.fmi.read_description import attribute, kind_of, read_description, starts_of
+from orchestration.components.fmi.read_description import attribute, declared_of, kind_of, read_description, starts_of
 from orchestration.components.fmi.slaves import binary_folders
 from orchestration.foundation.basics.errors import UsageError
 
@@ -22,7 +22,7 @@ LIBRARIES = (".so", ".dll", ".dylib")
 
 @dataclass(frozen=True, kw_only=True)
 class Fmu:
-    """An FMU for co-simulation by FMI 2.0 or 3.0."""
+    """An FMU of FMI 2.0 or 3.0 for co-simulation, or for model exchange alone."""
 
     archive: Archive
     root: Element
@@ -43,12 +43,12 @@ class Fmu:
 
     @property
     def interface(self) -> Any:
-        """The capabilities for co-simulation, by their names in FMI 2.0."""
-        return self.description.coSimulation
+        """The capabilities of the interface that is checked, by their names in FMI 2.0."""
+        return next(iter(declared_of(self.description).values()))
 
     @property
     def model_identifier(self) -> str:
-        """The model identifier for co-simulation."""
+        """The model identifier of that interface."""
         return str(self.interface.modelIdentifier)
 
     @property
@@ -124,7 +124,7 @@ def _expect_numbers(fmu: Fmu) -> None:
 def _numbers(fmu: Fmu) -> Iterator[tuple[str, str, str]]:
     for element in fmu.root.iterfind("DefaultExperiment"):
         yield from (("DefaultExperiment", key, text) for key, text in element.items())
-    fixed_step = fmu.interface.fixedInternalStepSize
+    fixed_step = getattr(fmu.interface, "fixedInternalStepSize", None)
     if fixed_step is not None:
         yield "CoSimulation", "fixedInternalStepSize", fixed_step
     for v in fmu.variables:

@@ -7,11 +7,12 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from orchestration.components.fmi.adapted import Adapted2, Adapted3, AdaptedInstance
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.components.fmi.fmi3 import Fmi3Instance
 from orchestration.components.fmi.native_instance import NativeInstance
 from orchestration.components.fmi.read_description import Model, Variable
-from orchestration.components.fmi.slaves import INSTANTIATES, Message, failure_text
+from orchestration.components.fmi.slaves import Message, failure_text, instantiates
 from orchestration.foundation.basics.errors import SimulatorError, StoppedStepError
 from orchestration.foundation.basics.simulator import Floats, Transfer
 
@@ -132,12 +133,13 @@ class CheckedInstance(NativeInstance):
 
     def no_instance(self, why: str) -> SimulatorError:
         """As `NativeInstance`."""
-        return SimulatorError(self.reported(INSTANTIATES[self.model.version], why))
+        return SimulatorError(self.reported(instantiates(self.model.version, self.model.interface), why))
 
     def failure(self, function: str, status: int, otherwise: str | None = None) -> SimulatorError:
         """As `NativeInstance`: an error of whatever kind is a refusal."""
         self.failed = True
-        return SimulatorError(self.reported(function, failure_text(self._messages, otherwise or f"status {status}")[0]))
+        silent = otherwise or self.problem() or f"status {status}"
+        return SimulatorError(self.reported(function, failure_text(self._messages, silent)[0]))
 
     def reported(self, function: str, what: str) -> str:
         """As `NativeInstance`; a finding names its FMU already."""
@@ -168,7 +170,7 @@ class CheckedInstance(NativeInstance):
             self._beat()
 
     def _expect_supported(self) -> None:
-        """Any FMU is run, as far as it can be without clocks and events."""
+        """Any FMU is run, as far as it can be without clocks."""
 
 
 class CheckedInstance2(CheckedInstance, Fmi2Instance):
@@ -195,6 +197,30 @@ class CheckedInstance3(CheckedInstance, Fmi3Instance):
             raise self.failure("fmi3DoStep", 0, what)
 
 
+class _CheckedModel(CheckedInstance, AdaptedInstance):
+    """An instance for model exchange."""
+
+    def state(self) -> Any:
+        """As `CheckedInstance`."""
+        return self.own_state(), super().state()
+
+    def restore_state(self, state: Any) -> None:
+        """As `CheckedInstance`."""
+        own, of_fmu = state
+        super().restore_state(of_fmu)
+        self.restore_own(own)
+
+
+class CheckedModel2(_CheckedModel, Adapted2):
+    """An instance of FMI 2.0 for model exchange."""
+
+
+class CheckedModel3(_CheckedModel, Adapted3):
+    """An instance of FMI 3.0 for model exchange."""
+
+
 def instance_of(model: Model, folder: Path, name: str, beat: Callable[[], None]) -> CheckedInstance:
     """A fresh instance of the FMU unpacked in `folder`; raises `SimulatorError`."""
+    if model.interface == "model-exchange":
+        return (CheckedModel2 if model.version == 2 else CheckedModel3)(model, folder, name, beat)
     return (CheckedInstance2 if model.version == 2 else CheckedInstance3)(model, folder, name, beat)

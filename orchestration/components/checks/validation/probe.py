@@ -75,7 +75,7 @@ class Probe:
         """
         experiment = self.fmu.experiment
         share = (experiment.get("stopTime", self.start + 1.0) - self.start) / STEPS
-        step = experiment.get("stepSize", float(self.fmu.interface.fixedInternalStepSize or share))
+        step = experiment.get("stepSize", float(getattr(self.fmu.interface, "fixedInternalStepSize", None) or share))
         return step if math.isfinite(step) and step > 0.0 else 0.01
 
     def points(self, plan: ExcitationPlan) -> list[tuple[float, float]]:
@@ -190,7 +190,7 @@ class Probe:
     @functools.cached_property
     def full_plan(self) -> ExcitationPlan:
         """Parameters near their starts, moving inputs, and uneven steps if the FMU declares that it takes them."""
-        uneven = bool(self.fmu.interface.canHandleVariableCommunicationStepSize)
+        uneven = self.model.varies_step
         return ExcitationPlan(parameters=self.general_parameters, moving=True, uneven=uneven, steps=40)
 
     @functools.cached_property

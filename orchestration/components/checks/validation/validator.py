@@ -17,7 +17,9 @@ _HANGS = 0.5
 
 
 def validate(path: str | Path, *, limits: Limits | None = None) -> list[Finding]:
-    """The problems of the FMU for co-simulation (FMI 2.0 or 3.0) at `path`; an empty list for a valid one.
+    """The problems of the FMU (FMI 2.0 or 3.0) at `path`; an empty list for a valid one.
+
+    It is checked by co-simulation, or by model exchange if it offers that only.
 
     The file is read, and the FMU is run, in a separate process within `limits`. Rules of this project beyond the
     standard apply to FMUs that quadcosim built. Raises `QuadcosimError` if the validation itself fails.

@@ -331,8 +331,8 @@ def test_an_element_that_is_set_leaves_the_others_as_they_were_saved(tmp_path: P
         assert (it.get("u[1]"), it.get("u[2]")) == (1.0, 2.0)
 
 
-def test_fmi_3_with_clocks_or_event_mode_is_refused_by_name(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match=r"has clocks, which are not supported: tick"):
+def test_clocks_and_event_mode_that_are_not_offered_are_refused_by_name(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"has clocks, but no event mode, in which they tick: tick"):
         ran(alone(small(tmp_path / "a", fmi=3, more=CLOCK), array=True))
     with pytest.raises(SimulatorError, match=r"it \(Small\): fmi3DoStep: the FMU asks for event mode"):
         ran(alone(small(tmp_path / "b", "NEEDS_EVENTS", fmi=3), array=True))

@@ -22,11 +22,11 @@ from tests.orchestration.components.checks.doctor.common import (
     AARCH64,
     LINUX64,
     changed,
-    described,
     files_of,
     for_machine,
     requiring,
 )
+from tests.orchestration.components.fmi.exchange import exchange
 from tests.places import ROOT
 
 
@@ -163,13 +163,12 @@ def test_an_fmu_that_fails_to_initialise_is_told_in_its_own_words(plant: Path, t
     assert table["failure"] == text
 
 
-def test_model_exchange_alone_is_not_tried(plant: Path, tmp_path: Path) -> None:
-    path = described(plant, tmp_path / "a.fmu", "<CoSimulation ", "<ModelExchange ")
-    table = examined(path)
-    assert table["kinds"] == ["ModelExchange"]
-    assert table["failure"] == "not tried: it is for model exchange only"
-    needed = "an FMU for co-simulation; it is for model exchange"
-    assert [(host["ready"], needed in host["needs"]) for host in table["hosts"].values()] == [(False, True)] * 2
+@needs_compiler
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_an_fmu_for_model_exchange_alone_is_loaded(fmi: int, tmp_path: Path) -> None:
+    table = examined(exchange(tmp_path, "ball", fmi=fmi))
+    assert (table["kinds"], table["failure"]) == (["ModelExchange"], None)
+    assert [host["ready"] for host in table["hosts"].values()] == [True, True]
 
 
 def failure(path: Path, **limits: float) -> str | None:

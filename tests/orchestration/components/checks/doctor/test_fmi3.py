@@ -82,18 +82,10 @@ def test_a_folder_without_the_library_of_the_model_is_a_problem(fmu: Path, tmp_p
     }
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "kinds", "kinds_text"),
-    [
-        ("<CoSimulation ", "<ScheduledExecution ", ("ScheduledExecution",), "scheduled execution"),
-        ("<CoSimulation ", "<ModelExchange ", ("ModelExchange",), "model exchange"),
-    ],
-)
-def test_what_is_for_no_co_simulation_is_not_tried(
-    old: str, new: str, kinds: tuple[str, ...], kinds_text: str, fmu: Path, tmp_path: Path
-) -> None:
-    trial = try_loading(described(fmu, tmp_path / "a.fmu", old, new), Limits())
-    assert (trial.fmu.kinds, trial.failure) == (kinds, f"not tried: it is for {kinds_text} only")
+def test_what_is_for_scheduled_execution_is_not_tried(fmu: Path, tmp_path: Path) -> None:
+    trial = try_loading(described(fmu, tmp_path / "a.fmu", "<CoSimulation ", "<ScheduledExecution "), Limits())
+    assert trial.fmu.kinds == ("ScheduledExecution",)
+    assert trial.failure == "not tried: it is for scheduled execution only"
 
 
 def test_a_library_without_the_functions_of_fmi_3_does_not_load(fmu: Path, tmp_path: Path) -> None:
