@@ -97,6 +97,8 @@ def run(
         inform(f"follows {follows}")
     for loop in result.provenance.get("loops", ()):
         inform(f"loop {loop}")
+    for where in result.provenance.get("events", ()):
+        inform(f"events of {where}")
     if fmu is not None:
         one_fmu.write(fmu, result)
     if out is not None:

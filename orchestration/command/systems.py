@@ -84,8 +84,8 @@ def show(
     return CommandResult(document=tables_of(shown), lines=as_text(shown, *_from_fmus(shown)).splitlines())
 
 
-def _from_fmus(system: "System") -> tuple[dict[str, str], str, Sequence[str]]:
-    """The units of its objectives, the references of its components, and its algebraic loops.
+def _from_fmus(system: "System") -> tuple[dict[str, str], str, Sequence[str], Sequence[str]]:
+    """The units of its objectives, the references of its components, its algebraic loops, and who handles events.
 
     Empty if FMUs are missing or do not fit: nothing is built, so that no foreign module runs.
     """
@@ -98,8 +98,8 @@ def _from_fmus(system: "System") -> tuple[dict[str, str], str, Sequence[str]]:
         paths = {name: fmus.look_up(fmu, inform) for name, fmu in system.fmus.items()}
         models = {name: read_model(path) for name, path in paths.items() if path is not None}
         if models.keys() != paths.keys():
-            return {}, "", ()
+            return {}, "", (), ()
         found = check_against_fmus(system, models)
     except QuadcosimError:
-        return {}, "", ()
-    return found.units, found.follows, found.loops
+        return {}, "", (), ()
+    return found.units, found.follows, found.loops, found.events

@@ -85,6 +85,8 @@ class AdaptedInstance(StepsWithEnd):
     """An instance in event mode, or for model exchange, that is called as one for co-simulation."""
 
     step_name: ClassVar[str] = "step"
+    _cvode: Any = None
+    """the solver beside that of adapter.c; None: there is none"""
     _intervals: tuple[float, float] | None = None
     """period and offset of the clock of every sample [s]; None: those that the FMU states"""
 
@@ -109,6 +111,11 @@ class AdaptedInstance(StepsWithEnd):
         }  # fmt: skip
         for field, array in self._memory.items():
             setattr(a, field, address(array))
+        if self.model.access.solver == "cvode":
+            from orchestration.components.fmi.cvode import Cvode  # not before: loads its libraries
+
+            self._cvode = Cvode(self._fmu, a, self.version)
+            a.solver = ctypes.cast(self._cvode.function, ctypes.c_void_p).value
         if self.model.ticking:
             self._make_clocks_tick()
         self._load_step(library())
@@ -269,6 +276,9 @@ class AdaptedInstance(StepsWithEnd):
         """As `NativeInstance`."""
         numbers = {number: name for name, number in _constants().items() if name in _PROBLEMS}
         name = numbers.get(self._adapter.problem)
+        if name is None and self._cvode is not None:
+            failure: str | None = self._cvode.failure
+            return failure
         return None if name is None else _PROBLEMS[name].format(self._adapter.now)
 
     def _continue(self, **fields: Any) -> None:

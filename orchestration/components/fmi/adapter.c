@@ -63,6 +63,7 @@ typedef struct {
     void *set_clock;
     int64_t clocks, clock[64], ratio[64], shift[64]; /* one ticks at samples k ≡ shift modulo ratio */
     int64_t samples, starts_late;
+    void *solver; /* in place of that in here */
     Clocked *clocked;
     int64_t clocked_count;
     Waiting *waiting;
@@ -86,6 +87,7 @@ typedef int Access3(void *, const uint32_t *, size_t, void *, size_t);
 typedef int Step(void *, double, double, bool, bool *, bool *, bool *, double *);
 typedef int Update2(void *, void *);
 typedef int Update3(void *, bool *, bool *, bool *, bool *, bool *, double *);
+typedef int Solver(double, bool *);
 typedef int SetClock(void *, const uint32_t *, size_t, const bool *);
 typedef int Completed2(void *, int, int *, int *);
 typedef int Completed3(void *, bool, bool *, bool *);
@@ -392,6 +394,14 @@ static int complete(Adapter *a, bool *event) {
     return status;
 }
 
+/* The same by another solver, which puts the FMU at the time that it reaches, and sets now. */
+static int solve_elsewhere(Adapter *a, double until) {
+    bool crosses = false, event;
+    int status = ((Solver *)a->solver)(until, &crosses);
+    if (status > WARNING || (status = complete(a, &event)) > WARNING) return status;
+    return (crosses || event) && !a->ends ? handle_event(a) : OK;
+}
+
 /* One step of the solver, no further than `until`, or an attempt that was too long; events of its end. */
 static int solve(Adapter *a, double until) {
     int64_t n = a->states;
@@ -450,6 +460,7 @@ step(Adapter *a, double t, double h, bool unused, bool *event, bool *ends, bool 
     int idle = 0, status = conclude(a);
     *event = *early = *ends = false, *reached = end;
     if (!same(a->now, t)) a->now = t, a->fresh = 1;
+    if (a->solver) a->fresh = 1;
     if (a->starts_late) a->starts_late = 0;
     else if (a->clocks && !a->ends && status <= WARNING) status = sample(a);
     for (int64_t i = 0; status <= WARNING; i++) {
@@ -457,7 +468,8 @@ step(Adapter *a, double t, double h, bool unused, bool *event, bool *ends, bool 
         double until = same(a->next, end) ? fmax(a->next, end) : fmin(a->next, end);
         if (i == MOST_STEPS) status = fail(a, ENDLESS_STEPS);
         else if (a->events >= most) status = fail(a, ENDLESS_EVENTS);
-        else status = a->step ? cosimulate(a, until, &idle) : solve(a, until);
+        else if (a->step) status = cosimulate(a, until, &idle);
+        else status = a->solver ? solve_elsewhere(a, until) : solve(a, until);
     }
     if (a->ends || status > WARNING) *ends = a->ends && status <= WARNING, *reached = a->now;
     return status;

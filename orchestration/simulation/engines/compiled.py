@@ -80,6 +80,8 @@ def reason_unavailable(running: RunningSystem) -> str | None:
             return f"components.{name} is not called in this process"
         if "only_calls" not in vars(type(simulator)):
             return f"components.{name} does more than call its FMU"
+        if simulator.model.access.solver == "cvode":
+            return f"components.{name} is solved by CVODE, which is called from Python"
     if stop >= _EXACT:
         return f"stop_time is longer than {seconds(_EXACT):.0f} s"
     try:

@@ -47,6 +47,8 @@ class CheckedSystem:
     """Text of which component follows which reference; empty where none does"""
     loops: Sequence[str]
     """Text of each algebraic loop of wires, and how it is closed"""
+    events: Sequence[str]
+    """Text of each component whose FMU handles its events itself, though it offers that the importer does"""
     of_jobs: Mapping[str, float]
     """Numbers of the run that do not depend on signals: terms about jobs in expressions, by their text"""
 
@@ -92,19 +94,23 @@ def resolve_with_models(request: Request, models: Mapping[str, Model]) -> Resolv
     """As `resolve`, with FMUs whose models have been read."""
     with errors_in_own_terms(request):
         system = request.as_system()
-        models = {name: _as_asked(name, system.components[name], model) for name, model in models.items()}
+        models = _as_asked(system, models)
         fits = check_against_fmus(system, models)
     return ResolvedRequest(request=request, models=models, **vars(fits))
 
 
-def _as_asked(name: str, component: Component, model: Model) -> Model:
-    """The FMU of a component, called in the way that it asks for."""
-    with prefixed(f"components.{name}."):
-        return called(model, component.access)
+def _as_asked(system: System, models: Mapping[str, Model]) -> dict[str, Model]:
+    """The FMUs, each called in the way that its component asks for."""
+    found = {}
+    for name, model in models.items():
+        with prefixed(f"components.{name}."):
+            found[name] = called(model, system.components[name].access)
+    return found
 
 
 def check_against_fmus(system: System, models: Mapping[str, Model]) -> CheckedSystem:
     """Check a system against its FMUs; raises `UsageError` for what they do not have or do not accept."""
+    models = _as_asked(system, models)
     check(system, models)
     words, system = describe_references(system, models), connect_references(system, models)
     for name, component in system.components.items():
@@ -122,8 +128,12 @@ def check_against_fmus(system: System, models: Mapping[str, Model]) -> CheckedSy
         lambda name, output: models[name].follows_at_once(output),
     )
     return CheckedSystem(
-        system=system, parameters=parameters, units=units(system, models), follows=words, loops=loops, of_jobs=of_jobs
-    )
+        system=system, parameters=parameters, units=units(system, models), follows=words, loops=loops, of_jobs=of_jobs,
+        events=[f"{name}: {_HANDLED}" for name, model in models.items() if model.handles_events],
+    )  # fmt: skip
+
+
+_HANDLED = 'the FMU handles its events itself, in its steps; interface = "event-mode" has them handled here and noted'
 
 
 def columns_of(system: System) -> tuple[str, ...]:

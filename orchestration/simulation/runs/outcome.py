@@ -91,6 +91,7 @@ def result_of(
             **outcome.provenance,
             "follows": resolved.follows,
             **({"loops": list(resolved.loops)} if resolved.loops else {}),
+            **({"events": list(resolved.events)} if resolved.events else {}),
             "wall_time": wall_time,
         },
         warnings=(

@@ -52,6 +52,8 @@ class Provenance(TypedDict, total=False):
     """Text of which component follows which reference; empty where none does."""
     loops: list[str]
     """Text of each algebraic loop, and how it is closed; absent without any."""
+    events: list[str]
+    """Text of each component whose FMU handles its events itself, though others could; absent without any."""
     largest_lateness: float
     """The longest time by which an instant of a run with a pace was late [s]; absent without one."""
     wall_time: float

@@ -21,10 +21,17 @@ MAX_RATES = 3
 """rates in a sentence; more are counted"""
 
 
-def as_text(system: System, units: Mapping[str, str] = {}, follows: str = "", loops: Sequence[str] = ()) -> str:
+def as_text(
+    system: System,
+    units: Mapping[str, str] = {},
+    follows: str = "",
+    loops: Sequence[str] = (),
+    events: Sequence[str] = (),
+) -> str:
     """Components, connections, sources, objectives with their `units`, and the criterion, a line each, in columns.
 
-    `follows` describes the references and the components that follow them, `loops` the algebraic loops.
+    `follows` describes the references and the components that follow them, `loops` the algebraic loops,
+    `events` the FMUs that handle their events themselves.
     """
     components = [(name, _fmu(c), describe_rate(c), _parameters(c)) for name, c in system.components.items()]
     connections = [
@@ -45,6 +52,7 @@ def as_text(system: System, units: Mapping[str, str] = {}, follows: str = "", lo
         ("networks", [_message(each) for each in placed_messages(system.networks)]),
         ("follows", [(follows,)] if follows else []),
         ("loops", [(loop,) for loop in loops]),
+        ("events", [(where,) for where in events]),
         (
             "objectives",
             [(name, " ".join(text.split())) for name, text in zip(named, system.objectives.values())],
@@ -117,6 +125,7 @@ def describe_sampling(sampling: Sampling) -> str:
     parts += [f"jitter {_largest(sampling.jitter, sampling.jitter_distribution)}"] if sampling.jitter else []
     parts += [f"clock {sampling.clock_ratio:g} times true time"] if sampling.clock_ratio != 1.0 else []
     parts += ["by its own clock"] if sampling.clock == "fmu" else []
+    parts += [f"clock {sampling.fmu_clock}"] if sampling.fmu_clock is not None else []
     return ", ".join(parts)
 
 

@@ -11,7 +11,8 @@ from orchestration.components.fmi.access import Access
 from orchestration.components.fmi.isolated_instance import IsolatedInstance
 from orchestration.components.fmi.opening import open_here
 from orchestration.components.fmi.reuse import Instances
-from orchestration.foundation.basics.errors import SimulatorError, UsageError
+from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError
+from orchestration.simulation.engines.resolved import resolve
 from orchestration.simulation.requests.request import request_of
 from orchestration.simulation.runs.pause import resume, run_until
 from orchestration.simulation.runs.prepared import prepared
@@ -61,6 +62,18 @@ def test_an_oscillator_is_as_accurate_as_is_asked(fmi: int, tmp_path: Path) -> N
     for tolerance in (1e-6, 1e-10):
         rows = ran(fmu, 20.0, 0.1, tolerance=tolerance).signals
         assert [rows["it.x1"][-1], rows["it.x2"][-1]] == pytest.approx(known, abs=20 * tolerance)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_stiff_oscillator_is_solved_by_cvode(fmi: int, tmp_path: Path) -> None:
+    fmu, known = exchange(tmp_path, "oscillator", fmi=fmi), [2.008149762, -0.04250887527]
+    result = ran(fmu, 20.0, 5.0, None, tolerance=1e-8, solver="cvode")
+    assert [result.signals[f"it.{x}"][-1] for x in ("x1", "x2")] == pytest.approx(known, abs=1e-5)
+    assert result.provenance["engine"] == "python"
+    with pytest.raises(QuadcosimError, match=r"components.it is solved by CVODE, which is called from Python"):
+        ran(fmu, 1.0, 0.1, "compiled", solver="cvode")
+    ball = ran(exchange(tmp_path, "ball", fmi=fmi), 1.4, 0.1, None, tolerance=1e-8, solver="cvode")
+    assert [event.time * 1e-9 for event in ball.events] == pytest.approx(BOUNCES[:2], abs=1e-6)
 
 
 def test_both_engines_and_a_process_give_the_same_rows(tmp_path: Path) -> None:
@@ -147,6 +160,12 @@ def test_an_interface_that_is_not_offered_is_refused_by_name(tmp_path: Path) -> 
         ran(exchange(tmp_path, "ball"), 1.0, 0.1, interface="co-simulation")
     with pytest.raises(UsageError, match=r"solver = cvode: expected none with event-mode: Stair has its own"):
         ran(exchange(tmp_path, "stair", event_mode=True), 1.0, 0.1, interface="event-mode", solver="cvode")
+
+
+def test_who_handles_events_is_said(tmp_path: Path) -> None:
+    fmu = exchange(tmp_path, "stair", event_mode=True)
+    checked = resolve(request_of({"stop_time": 1.0, "components": {"it": {"fmu": str(fmu), "step": 0.1}}}))
+    assert [text.partition(",")[0] for text in checked.events] == ["it: the FMU handles its events itself"]
 
 
 def test_events_without_end_are_an_error(tmp_path: Path) -> None:
