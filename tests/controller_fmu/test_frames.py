@@ -21,7 +21,7 @@ from fmu_kit.trajectory import Trajectory
 from orchestration.components.building.models import MODELS
 from plant_fmu.slave import QuadrotorPlant
 from tests.controller_fmu.wired import Rows, flight
-from tests.extent import sample
+from tests.extent import in_test_all, sample
 
 CONTROLLERS = (UnifiedController, GeometricController, CascadedController)
 PATH = Trajectory(amplitude_x=2.0, amplitude_y=1.5, frequency=0.8, start_z=-1.0, rate_z=0.2, yaw=0.4, yaw_rate=0.5)
@@ -65,6 +65,7 @@ def test_a_redesign_knows_the_built_in_trajectory_along_the_axes_that_are_chosen
     assert_same_flight(one, flight(controller, Frame.NED, None, **still, **sinking, **turning, **mean))
 
 
+@in_test_all
 def test_a_variant_with_its_axes_fixed_has_no_trace_of_others() -> None:
     target = Target.parse(MODELS["QuadrotorPlant"])
 

@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 
 from docs import claim_records as records
-from docs import make_findings
 from orchestration.foundation.basics.errors import UsageError
 from quadcosim import Scenario, fly
 
@@ -29,6 +28,8 @@ def test_every_marked_place_has_its_record() -> None:
 
 @pytest.mark.parametrize("name", CLAIMS)
 def test_every_command_names_a_study_or_a_section_that_exists(name: str) -> None:
+    from docs import make_findings  # not before: each process that collects would load it
+
     for place in records.files_of(CLAIMS[name]):
         if place.startswith("section "):
             assert place.removeprefix("section ") in make_findings.SECTIONS

@@ -10,6 +10,7 @@ from docs.comparisons import read_data
 from docs.make_findings import ends, fates
 from docs.theory import ATTITUDE, PAPER, scaled
 from orchestration.quadrotor.scenarios.scenario import Scenario
+from tests.extent import in_test_all
 from tests.places import ROOT
 
 
@@ -19,6 +20,7 @@ def outcomes(base: Scenario, periods: Iterable[float], kappas: Iterable[float] |
     return ["settled" if good else "diverged" if lost else "bounded" for good, lost in zip(*found.values())]
 
 
+@in_test_all
 def test_limits_that_are_kept_settle_and_what_lies_a_little_above_does_not() -> None:
     limits = {one["coupling"]: one for one in read_data("limits")["limits"] if one["settles"] is not None}
     assert len(limits) == 5

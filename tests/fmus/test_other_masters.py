@@ -9,7 +9,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import fmi2False
 
-from tests.extent import tries
+from tests.extent import in_test_all, sample, tries
 from tests.fmus.expected import COMMAND, MEASUREMENT, law_command
 from tests.fmus.flights import STEPS, Flight
 from tests.fmus.instance import Instance
@@ -388,11 +388,11 @@ PLACES = [
 def commands(built: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, str], list[float]]:
     """Of the controller in each place."""
     folder = tmp_path_factory.mktemp("places")
-    asked = [(str(folder / str(k) / name), form) for k, (name, form) in enumerate(PLACES)]
-    return dict(zip(PLACES, run_script("fly_from", built[CONTROLLER], json.dumps(asked)), strict=True))
+    asked = [(str(folder / str(k) / name), form) for k, (name, form) in enumerate(sample(PLACES, 4))]
+    return dict(zip(sample(PLACES, 4), run_script("fly_from", built[CONTROLLER], json.dumps(asked)), strict=True))
 
 
-@pytest.mark.parametrize("place", PLACES, ids="-".join)
+@pytest.mark.parametrize("place", sample(PLACES, 4), ids="-".join)
 def test_an_fmu_finds_its_resources(place: tuple[str, str], commands: dict[tuple[str, str], list[float]]) -> None:
     assert commands[place] == pytest.approx(law_command(0.0), rel=1e-12)
 
@@ -461,6 +461,7 @@ def test_the_declared_log_categories_are_those_that_messages_carry(controller: I
 # -- threads --------------------------------------------------------------------------------------------
 
 
+@in_test_all
 def test_instances_stepped_from_several_threads_at_once_fly_as_if_alone(
     built: dict[str, Path], alone: dict[str, Rows]
 ) -> None:
@@ -472,4 +473,7 @@ def test_instances_stepped_from_several_threads_at_once_fly_as_if_alone(
 
 
 def test_instances_made_from_several_threads_at_once_leave_the_import_path_as_it_was(built: dict[str, Path]) -> None:
-    assert run_script("instantiated_by_threads", *(built[model] for model in PAIR)) == {"made": 800, "path kept": True}
+    assert run_script("instantiated_by_threads", *(built[model] for model in PAIR)) == {
+        "made": tries(800, sampled=160),
+        "path kept": True,
+    }

@@ -67,7 +67,7 @@ def nothing_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("nothing_kept")
 def test_building_again_in_another_folder_gives_the_same_bytes(built: dict[str, Path], tmp_path: Path) -> None:
-    for path in builder.build(MODELS, tmp_path / "elsewhere"):
+    for path in builder.build(sample([*MODELS], 1), tmp_path / "elsewhere"):
         assert path.read_bytes() == built[path.stem].read_bytes()
 
 

@@ -9,7 +9,9 @@ from threading import Thread
 import fmpy
 from fmpy import fmi2
 
-THREADS, REPETITIONS = 8, 100
+from tests.extent import tries
+
+THREADS, REPETITIONS = 8, tries(100, sampled=20)
 SWITCH_INTERVAL = 1e-5
 """[s]; Python's own 5 ms would let most instantiations run through."""
 

@@ -22,7 +22,7 @@ from orchestration.foundation.recording.recording import InMemory
 from orchestration.quadrotor.flight.names import FIGURES as FLIGHT
 from quadcosim import Scenario, Timing, load_run, run, save_run
 from tests.commands import Done, Main
-from tests.extent import in_test_all
+from tests.extent import in_test_all, sample
 from tests.native import native
 from tests.patience import PATIENCE
 from tests.places import EXAMPLES, ROOT
@@ -292,7 +292,9 @@ def test_plot_zooms_on_a_window(main: Main, here: Path) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are another matter there")
-@pytest.mark.parametrize("out", [[], ["--out", "stopped", "--no-figures"]], ids=["nothing kept", "kept"])
+@pytest.mark.parametrize(
+    "out", sample([[], ["--out", "stopped", "--no-figures"]], 1), ids=lambda out: "kept" if out else "nothing kept"
+)
 def test_ctrl_c_ends_a_flight_with_one_line_and_130(here: Path, out: list[str]) -> None:
     code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n" + (
         "from orchestration.foundation.basics import terminal; terminal.SPARSE = 0.0\n"  # reports when it runs
@@ -537,6 +539,7 @@ def project(here: Path) -> Path:
     return copy
 
 
+@in_test_all
 def test_fmus_are_built_into_the_project_when_they_are_missing_or_old(project: Path) -> None:
     def run() -> list[str]:
         done = subprocess.run(

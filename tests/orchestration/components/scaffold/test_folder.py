@@ -20,6 +20,7 @@ from orchestration.systems.system.file import load_system
 from orchestration.theory.stability.linearise import linearise
 from orchestration.theory.stability.local_limit import local_limits
 from tests.commands import Main
+from tests.extent import in_test_all, sample
 
 LIMITS = {
     "pendulum": ("components.controller.sampling.period", 0.1, 0.3),
@@ -72,7 +73,7 @@ def test_each_passes_its_own_tests_and_a_mistake_is_reported_with_its_line(here:
         assert f"hover_pd.py, line {line}: self.trust: no such variable; expected thrust, torque" in failed
 
 
-@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("name", sample([*KINDS], 1))
 def test_a_plant_and_a_filter_run_good_and_have_a_limit(name: str, here: Path) -> None:
     write(KINDS[name], name, here, author="Ada", license="MIT")
     builder.build_slaves(
@@ -85,6 +86,7 @@ def test_a_plant_and_a_filter_run_good_and_have_a_limit(name: str, here: Path) -
     assert found.large_signal_limit == first
 
 
+@in_test_all
 def test_the_pendulum_has_the_local_limit_of_its_own_integrator(here: Path) -> None:
     """The radius of the loop is 1 at .226652 s, by the matrices of its semi-implicit Euler steps about upright."""
     write("plant", "pendulum", here, author="Ada", license="MIT")

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.stats import binomtest
 
 from orchestration.experiments.comparison import equal_terms, fronts
 from orchestration.experiments.comparison.bandwidth import Bandwidths
@@ -75,6 +74,8 @@ def table(comparison: Comparison) -> pd.DataFrame:
 
 
 def test_a_cell_tells_survival_settling_and_residual_apart(comparison: Comparison, table: pd.DataFrame) -> None:
+    from scipy.stats import binomtest  # not before: each process that collects would load it
+
     cells = {(cell.controller, cell.value): cell for cell in cell_summaries(comparison, table)}
     cell = cells["slow", 0.03]
     assert (cell.count, cell.survives.count, cell.settles.count, cell.diverged) == (40, 32, 21, 8)

@@ -18,7 +18,7 @@ from orchestration.simulation.workers.pool import Pool
 from orchestration.simulation.workers.provenance import versions
 from quadcosim import QuadcosimError
 from tests.commands import Main
-from tests.extent import in_test_all
+from tests.extent import in_test_all, sample
 from tests.orchestration.components.fmi.small import needs_compiler
 from tests.orchestration.experiments.studies.common import (
     NOISY,
@@ -125,7 +125,7 @@ def test_a_sweep_in_lanes_whose_coordinator_is_killed_has_the_same_bits(tmp_path
     assert (tally.coordinators, tally.workers) == (1, 0)
 
 
-@pytest.mark.parametrize("whom", ["the coordinator", "a worker"])
+@pytest.mark.parametrize("whom", sample(["the coordinator", "a worker"], 1))
 def test_an_interrupt_is_reported_in_one_line_with_the_progress(
     folder: Path, reference: list[dict[str, Any]], whom: str
 ) -> None:
@@ -138,7 +138,7 @@ def test_an_interrupt_is_reported_in_one_line_with_the_progress(
     assert all(row in reference for row in bits(folder / STORE))
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", sample([1, 2], 1))
 def test_a_run_that_ends_its_process_fails_and_no_other_run_does(tmp_path: Path, workers: int) -> None:
     base = dataclasses.replace(short(), plant=FmuChoice(fmu=str(sick_plant(tmp_path))))
     masses = axis("plant.mass", 1.0, ABORTS, 1.01, SPENT, 1.02)

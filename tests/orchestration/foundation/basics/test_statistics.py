@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.stats import binom
 
 from orchestration.foundation.basics.statistics import first_end, quantile, refutes, wilson
 from quadcosim import UsageError
@@ -61,6 +60,8 @@ def test_the_interval_of_a_median_is_that_of_the_tables() -> None:
 
 @pytest.mark.parametrize(("n", "share"), [(7, 0.5), (40, 0.9), (200, 0.1), (200, 0.5), (2000, 0.25)])
 def test_the_ends_of_a_quantile_s_interval_are_the_innermost_of_the_binomial_distribution(n: int, share: float) -> None:
+    from scipy.stats import binom  # not before: each process that collects would load it
+
     found = quantile([float(k) for k in range(1, n + 1)], share)
     low, high = found.low if math.isfinite(found.low) else 0, found.high if math.isfinite(found.high) else n + 1
     outside = binom.cdf([low - 1, low], n, share), binom.sf([high - 1, high - 2], n, share)

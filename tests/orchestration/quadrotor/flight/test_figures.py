@@ -25,7 +25,7 @@ from orchestration.simulation.runs.draw import draw
 from orchestration.simulation.runs.run_labels import labels_of_runs
 from orchestration.systems.system.model import Criterion
 from quadcosim import Result, UsageError
-from tests.extent import sample
+from tests.extent import in_test_all, sample
 from tests.native import native
 from tests.places import EXAMPLES
 
@@ -162,6 +162,7 @@ def test_runs_of_different_systems_are_not_laid_over_each_other(flight: Result, 
         draw(flight, ["beauty"])
 
 
+@in_test_all
 @pytest.mark.filterwarnings("error")
 def test_a_flight_that_rests_where_it_should_is_drawn_too(tmp_path: Path) -> None:
     """All its errors are zero, of which there is no logarithm."""

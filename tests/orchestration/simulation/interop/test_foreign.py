@@ -12,7 +12,7 @@ from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System
 from quadcosim import UsageError
 from tests.examples.common import example
-from tests.extent import sample
+from tests.extent import in_test_all, sample
 from tests.orchestration.components.fmi.small import needs_compiler, small
 from tests.orchestration.systems.system.described import described
 
@@ -81,6 +81,7 @@ def test_fmus_of_anybody_fly_as_in_other_masters(text: str, orders: dict[str, st
         assert agreement.trace.steps >= 39
 
 
+@in_test_all
 @needs_compiler
 def test_two_copies_of_one_fmu_are_told_apart_by_a_host_that_goes_by_the_guid(tmp_path: Path) -> None:
     small(tmp_path)

@@ -37,6 +37,7 @@ from quadcosim import (  # fmt: skip
     load_run,
     save_run,
 )
+from tests.extent import in_test_all
 from tests.native import native
 from tests.pictures import expect_picture
 
@@ -150,6 +151,7 @@ def test_the_commands_are_zoomed_on_the_window(result: Result, window: tuple[flo
     assert whole.get_xlim() == pytest.approx((0.0, 0.3))
 
 
+@in_test_all
 def test_a_run_without_samples_can_be_drawn(tmp_path: Path) -> None:
     without = quadcosim.run(native(stop_time=0.05, timing=Timing(offset=1.0)))
     drawn = {path.stem for path in save(drawing.draw(without), tmp_path, SMALL)}
@@ -288,6 +290,7 @@ def kill_while_writing(folder: Path) -> None:
     new_files._cleared.clear()  # as in another process
 
 
+@in_test_all
 def test_a_killed_process_leaves_the_earlier_run_as_it_was(result: Result, folder: Path) -> None:
     before = contents(save_run(result, folder, figures=False))
     kill_while_writing(folder)

@@ -27,7 +27,7 @@ from orchestration.theory.stability import delay_bounds
 from orchestration.theory.stability.delay_bounds import breaking_jitter
 from quadcosim import Timing
 from tests.examples.common import example
-from tests.extent import sample
+from tests.extent import in_test_all, sample
 from tests.native import native
 from tests.orchestration.experiments.studies.common import one_line
 from tests.orchestration.quadrotor.flight.test_margin import DOUBLE
@@ -172,6 +172,7 @@ def test_95_percent_of_what_breaks_hover_is_certified_for_all_axes(period: float
     assert small_gain(timeline.loop, varying) == pytest.approx({0.04: 0.00935, 0.06: 0.00153}[period], abs=1e-5)
 
 
+@in_test_all
 def test_two_at_once_about_hover() -> None:
     """Samples up to 4 ms late and commands up to 23.87 ms, at 40 ms."""
     both = [varying_of(native(), path) for path in (SAMPLE, COMMAND)]
