@@ -77,6 +77,7 @@ bench: .venv/.test
 	$(BIN)/python -m benchmarks.batch
 	$(BIN)/python -m benchmarks.wrapped
 	$(BIN)/python -m benchmarks.floor
+	$(BIN)/python -m benchmarks.taylor
 	$(BIN)/python -m benchmarks.cold
 	$(BIN)/python -m benchmarks.stores
 	$(BIN)/python -m benchmarks.cluster

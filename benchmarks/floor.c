@@ -1,7 +1,8 @@
 /* The paper's flight, sampled with jitter, written by hand for nothing else: law, rigid body, wind and one loop.
 
    How fast such flights can be, as a measure for the engines (floor.py). Lanes are the compiler's vectors; functions are
-   those of the FMUs. One lane is one flight; lanes of a hold that have ended wait with steps of length 0. */
+   those of the FMUs. One lane is one flight; lanes of a hold that have ended wait with steps of length 0. With ORDER, steps are
+   Taylor series (taylor.py). */
 
 #include <math.h>
 #include <stdbool.h>
@@ -138,6 +139,50 @@ static inline State moved(const State *x, R h, const State *d) {
                    add(x->w, scaled(h, d->w)), x->q0 + h * d->q0};
 }
 
+static inline V3 unit(V3 q, R *q0) {
+    R size = 1.0 / q_sqrt(DOT(q, q) + *q0 * *q0);
+    *q0 = size * *q0;
+    return scaled(size, q);
+}
+
+#ifdef ORDER
+
+/* One step by the Taylor series of this order, each lane from its own time over its own length. */
+static void step(State *x, const Command *c, R t, R h) {
+    V3 p[ORDER + 1] = {x->p}, v[ORDER + 1] = {x->v}, q[ORDER + 1] = {x->q};
+    R q0[ORDER + 1] = {x->q0};
+    q_sines wind = q_sin_cos(0.1 * t);
+    R even = 0.01 * wind.cos, odd = -0.001 * wind.sin; /* coefficients of the wind */
+#pragma GCC unroll 16
+    for (int k = 0; k < ORDER; k++) {
+        const double next = 1.0 / (k + 1);
+        R zx = q_all(0.0), zy = zx, zz = zx, rate0, more0;
+        for (int i = 0; i <= k; i++) {
+            V3 a = q[i], b = q[k - i];
+            zx = zx + (a.x * b.z + q0[i] * b.y), zy = zy + (a.y * b.z - q0[i] * b.x);
+            zz = zz + (q0[i] * q0[k - i] - a.x * b.x - a.y * b.y + a.z * b.z);
+        }
+        const R push = k % 2 ? odd : even;
+        V3 force = {push - 2.0 * c->thrust * zx, push - 2.0 * c->thrust * zy, push - c->thrust * zz};
+        if (!k) force.z = force.z + G;
+        V3 rate = rate_of(q[k], q0[k], x->w, &rate0);
+        if (k) rate = add(rate, rate_of(q[k - 1], q0[k - 1], c->torque, &more0)), rate0 = rate0 + more0;
+        p[k + 1] = scaled(q_all(next), v[k]), v[k + 1] = scaled(q_all(next), force);
+        q[k + 1] = scaled(q_all(next), rate), q0[k + 1] = next * rate0;
+        if (k % 2) odd = odd * (-0.01 / ((k + 1.0) * (k + 2.0)));
+        else even = even * (-0.01 / ((k + 1.0) * (k + 2.0)));
+    }
+    *x = (State){p[ORDER], v[ORDER], q[ORDER], add(x->w, scaled(h, c->torque)), q0[ORDER]};
+#pragma GCC unroll 16
+    for (int k = ORDER - 1; k >= 0; k--) {
+        x->p = add(p[k], scaled(h, x->p)), x->v = add(v[k], scaled(h, x->v));
+        x->q = add(q[k], scaled(h, x->q)), x->q0 = q0[k] + h * x->q0;
+    }
+    x->q = unit(x->q, &x->q0);
+}
+
+#else
+
 /* One step of Runge-Kutta 4, each lane from its own time over its own length. */
 static void step(State *x, const Command *c, R t, R h) {
     R half = 0.5 * h, w0 = 0.01 * q_cos(0.1 * t), w1 = 0.01 * q_cos(0.1 * (t + half)), w2 = 0.01 * q_cos(0.1 * (t + h));
@@ -149,9 +194,10 @@ static void step(State *x, const Command *c, R t, R h) {
     sum = moved(&sum, q_all(2.0), &k3);
     sum = moved(&sum, q_all(1.0), &k4);
     *x = moved(x, h / 6.0, &sum);
-    R size = 1.0 / q_sqrt(DOT(x->q, x->q) + x->q0 * x->q0);
-    x->q = scaled(size, x->q), x->q0 = size * x->q0;
+    x->q = unit(x->q, &x->q0);
 }
+
+#endif
 
 /* Fly LANES flights from x = `starts`, each sampled at its `count` own `samples` [ns], in steps of `grid` [ns] to `end`;
    `ends` gets the last position and velocity, lane by lane, six arrays of LANES. */

@@ -28,12 +28,13 @@ TOLERANCE = 1e-9
 """Largest difference at the end [m, m/s]"""
 
 
-def by_hand() -> ctypes.CDLL:
+def by_hand(*options: str) -> ctypes.CDLL:
     """The library of floor.c, for this processor."""
     runtime = Path(c_compiler.__file__).parent.parent / "runtime"
     headers = {name: (runtime / name).read_bytes() for name in ("lanes.h", "mathematics.h")}
     sources = {**headers, "floor.c": Path(__file__).with_suffix(".c").read_bytes()}
-    options = (*c_compiler.FOR_THIS_PROCESSOR, f"-DQUADCOSIM_LANES={lanes.preferred_lanes()}", "-Wno-psabi")
+    width = f"-DQUADCOSIM_LANES={lanes.preferred_lanes()}"
+    options = (*c_compiler.FOR_THIS_PROCESSOR, width, "-Wno-psabi", *options)
     library = c_compiler.compiled_here(sources, "floor.c", options=options)
     with tempfile.NamedTemporaryFile(suffix=".so") as file:
         file.write(library)
@@ -55,8 +56,10 @@ def samples(period: float, jitter: float) -> np.ndarray:
     return nominal + np.array(late, dtype=np.int64)
 
 
-def flown_by_hand(library: ctypes.CDLL, starts: np.ndarray, instants: np.ndarray) -> np.ndarray:
-    """The last values of each run, of shape (runs, 6)."""
+def flown_by_hand(
+    library: ctypes.CDLL, starts: np.ndarray, instants: np.ndarray, grid: float = GRID, stop: float = STOP
+) -> np.ndarray:
+    """The last values of each run in steps of `grid` [s], of shape (runs, 6)."""
     width, ends = lanes.preferred_lanes(), np.empty((RUNS // lanes.preferred_lanes(), 6, lanes.preferred_lanes()))
     whole = ctypes.c_int64
     for i in range(RUNS // width):
@@ -65,8 +68,8 @@ def flown_by_hand(library: ctypes.CDLL, starts: np.ndarray, instants: np.ndarray
             ctypes.c_void_p(address(starts[group])),
             ctypes.c_void_p(address(instants[group])),
             whole(instants.shape[1]),
-            whole(round(GRID * 1e9)),
-            whole(round(STOP * 1e9)),
+            whole(round(grid * 1e9)),
+            whole(round(stop * 1e9)),
             ctypes.c_void_p(address(ends[i])),
         )
     return np.asarray(ends.transpose(0, 2, 1).reshape(RUNS, 6))
