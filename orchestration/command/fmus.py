@@ -68,6 +68,9 @@ def build(
     fmi: Annotated[
         int, option("--fmi", "Version of FMI, 3 with --native only; then in native/fmi3/.", min=2, max=3)
     ] = 2,
+    clock: Annotated[
+        bool, option("--clock", "With --fmi 3: slaves that sample have an input clock; in native/fmi3/clocked/.", "")
+    ] = False,
     *,
     variant: VariantFlags,
 ) -> CommandResult:
@@ -83,7 +86,10 @@ def build(
         raise UsageError("--target: expected --native with it; FMUs with Python inside are the same for all systems")
     if fmi == 3 and not native:
         raise UsageError("--fmi 3: expected --native with it; FMUs with Python inside are of FMI 2.0")
-    packing = builder.IN_PYTHON if not native else builder.NATIVE_FMI_3 if fmi == 3 else builder.NATIVE
+    if clock and fmi != 3:
+        raise UsageError("--clock: expected --native --fmi 3 with it; there are no clocks before")
+    of_fmi_3 = builder.CLOCKED_FMI_3 if clock else builder.NATIVE_FMI_3
+    packing = builder.IN_PYTHON if not native else of_fmi_3 if fmi == 3 else builder.NATIVE
     if variant.is_set and variant.name is None:
         raise UsageError("--set, --vehicle: expected --name NAME, the name of the FMU with these values")
     if variant.name is not None and variant.name in MODELS:

@@ -6,6 +6,7 @@ from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
 from fmu_kit import write_description
+from fmu_kit.compiler.emit.sampling_clock import CLOCK
 from fmu_kit.variables import Variable
 from fmu_kit.write_description import GUID_PLACEHOLDER, NATIVE_LOG_CATEGORIES
 
@@ -13,10 +14,11 @@ TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumerati
 """Types of variables, by their names in FMI 2.0"""
 
 
-def to_xml(slave: Any) -> Element:
+def to_xml(slave: Any, *, has_clock: bool) -> Element:
     """The FMI 3.0 description of a `Slave` class without Python inside, with the placeholder as its token.
 
-    Variables have the value references that they have in FMI 2.0; the independent variable comes after them.
+    Variables have the value references that they have in FMI 2.0; the independent variable comes after them, then the
+    clock of its samples, if it has one.
     """
     root = Element(
         "fmiModelDescription",
@@ -32,7 +34,7 @@ def to_xml(slave: Any) -> Element:
         canSerializeFMUState="true",
         providesDirectionalDerivatives="true",
         canHandleVariableCommunicationStepSize="true",
-        hasEventMode="false",
+        hasEventMode=str(has_clock).lower(),
     )
     write_description.add_units(root, slave.variables)
     write_description.add_types(
@@ -44,6 +46,8 @@ def to_xml(slave: Any) -> Element:
     for value_reference, variable in enumerate(slave.variables):
         variables.append(_variable(variable, value_reference))
     variables.append(_time(len(slave.variables)))
+    if has_clock:
+        variables.append(_clock(slave, len(slave.variables) + 1))
     _add_structure(root, slave)
     return root
 
@@ -64,6 +68,20 @@ def _time(value_reference: int) -> Element:
         description="The time of the last communication point",
         causality="independent",
         variability="continuous",
+    )
+
+
+def _clock(slave: Any, value_reference: int) -> Element:
+    """The clock at whose ticks it samples, in event mode; without that its parameters say when."""
+    return Element(
+        "Clock",
+        name=CLOCK,
+        valueReference=str(value_reference),
+        description="Ticks at each sample, in event mode",
+        causality="input",
+        variability="discrete",
+        intervalVariability="fixed",
+        intervalDecimal=repr(slave.default_experiment.step_size),
     )
 
 

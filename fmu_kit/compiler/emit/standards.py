@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 from fmu_kit import write_description
 from fmu_kit.compiler.emit import description_3, terminals
+from fmu_kit.compiler.emit.sampling_clock import samples
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,6 +25,8 @@ class Standard:
     """makes the other description files, by path, from the slave class and the file to compile"""
     calls: Mapping[str, str]
     """the functions that a phase may refuse, by their names in instance.h"""
+    has_clocks: bool = False
+    """whether a slave that samples has a clock, at whose ticks a host makes it sample"""
     types: Mapping[str, str]
     """Type in the names of the functions that get and set its values, by type of FMI 2.0"""
 
@@ -70,7 +73,7 @@ STANDARDS = {
     3: Standard(
         version=3,
         main="fmi3.c",
-        describe=lambda slave, main: description_3.to_xml(slave),
+        describe=lambda slave, main: description_3.to_xml(slave, has_clock=False),
         beside=_beside_3,
         calls={
             "SETUP_EXPERIMENT": "fmi3EnterInitializationMode",
@@ -89,3 +92,7 @@ STANDARDS = {
     ),
 }
 """Standards by version of FMI"""
+CLOCKED = replace(
+    STANDARDS[3], has_clocks=True, describe=lambda slave, main: description_3.to_xml(slave, has_clock=samples(slave))
+)
+"""FMI 3.0, with clocks"""

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from fmu_kit.compiler.emit.c_code import ERRORS
 from fmu_kit.compiler.emit.c_names import c_string, place_names
+from fmu_kit.compiler.emit.sampling_clock import sampling_period
 from fmu_kit.compiler.emit.standards import Standard
 from fmu_kit.compiler.trace.errors import TraceError
 from fmu_kit.compiler.trace.memory import Memory, attribute_name
@@ -46,6 +47,7 @@ def tables(program: Program, guid: str, standard: Standard) -> str:
     parts = [
         f"#define GUID {c_string(guid)}",
         f"#define MODEL {c_string(program.model)}",
+        *(_clock(program.slave) if standard.has_clocks else ()),
         f"enum {{ REALS = {sum(v.type == 'Real' for v in variables)} }};",
         "typedef enum { REAL, INTEGER, BOOLEAN, STRING, ENUMERATION } Type;",
         "/* The type whose functions get and set each variable. */",
@@ -74,6 +76,14 @@ def tables(program: Program, guid: str, standard: Standard) -> str:
         _array("Text wrong_type[5][2]", (_wrong_type(slave, alike[type], standard.types[type]) for type in alike)),
     ]
     return "\n".join(parts) + "\n"
+
+
+def _clock(slave: type[Slave]) -> Iterator[str]:
+    """The clock of a slave that samples: the place of its period, and the interval [s] unless a host sets it."""
+    period = sampling_period(slave)
+    if period is not None:
+        yield f"enum {{ SAMPLE_PERIOD = {period} }};"
+        yield f"#define CLOCK_INTERVAL {slave.default_experiment.step_size!r}"
 
 
 def places(program: Program) -> str:

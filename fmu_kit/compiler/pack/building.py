@@ -20,7 +20,7 @@ from fmu_kit.archive import NATIVE_TABLES
 from fmu_kit.bundle import PackagingError, Target, bundled_sources, path_in_bundle
 from fmu_kit.compiler.emit.c_code import c_code
 from fmu_kit.compiler.emit.lane_code import lane_code
-from fmu_kit.compiler.emit.standards import STANDARDS, Standard
+from fmu_kit.compiler.emit.standards import CLOCKED, STANDARDS, Standard
 from fmu_kit.compiler.emit.tables import places, tables
 from fmu_kit.compiler.pack import c_compiler
 from fmu_kit.compiler.pack.freshness import source_hash
@@ -59,15 +59,18 @@ def build(
     folder: Path,
     *,
     version: int = 2,
+    clocked: bool = False,
     systems: Sequence[str] = (),
     mathematics: c_compiler.Mathematics = "own",
 ) -> Path:
     """Write `folder`/Model.fmu of FMI 2.0 or 3.0, replacing it atomically, and return its path.
 
+    With `clocked` it is of FMI 3.0, and a slave that samples has an input clock.
+
     It has a library for each of `systems`, compiled by zig; without any, one for this machine, by its compiler. The
     latter can use the mathematics of libm, to be compared on this machine with the slave in Python, bit for bit.
     """
-    standard = STANDARDS[version]
+    standard = CLOCKED if clocked else STANDARDS[version]
     try:
         program = precompute(trace(slave_class(target), modules_of(target)))
         sources = c_sources(program, GUID_PLACEHOLDER, standard)
@@ -137,12 +140,13 @@ def _python_sources(target: Target) -> dict[str, str]:
 
 
 def main(arguments: list[str]) -> int:
-    """`python -m fmu_kit.compiler.pack.building [--fmi VERSION] [--target SYSTEM,…] FOLDER …`.
+    """`python -m fmu_kit.compiler.pack.building [--fmi VERSION] [--clock] [--target SYSTEM,…] FOLDER …`.
 
     The other arguments are those of `fmu_kit.packaging`.
     """
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("--fmi", type=int, choices=STANDARDS, default=2)
+    parser.add_argument("--clock", action="store_true")
     parser.add_argument("--target")
     options, others = parser.parse_known_args(arguments)
     try:
@@ -150,7 +154,7 @@ def main(arguments: list[str]) -> int:
     except PackagingError as error:
         print(error, file=sys.stderr)
         return 1
-    return packaging.main(others, functools.partial(build, version=options.fmi, systems=systems))
+    return packaging.main(others, functools.partial(build, version=options.fmi, clocked=options.clock, systems=systems))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 /* A slave for hosts of FMI 3.0: the functions of the standard, each implemented by one of instance.h.
 
-   For co-simulation, without event mode, clocks and early return. */
+   For co-simulation, without early return. A slave that samples (CLOCK_INTERVAL) has an input clock, which says in event
+   mode when it does; without event mode its parameters say so. */
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -11,7 +12,14 @@ typedef bool Truth;
 
 #define FMI(name) fmi3##name
 
-enum { TIME = VARIABLES }; /* the independent variable, after all others */
+enum { TIME = VARIABLES, CLOCK }; /* the independent variable, after all others, and the clock of samples, if any */
+
+#if defined(CLOCK_INTERVAL)
+enum { HAS_CLOCK = 1 };
+#else
+enum { HAS_CLOCK = 0, SAMPLE_PERIOD = 0 };
+#define CLOCK_INTERVAL 0.0
+#endif
 
 struct Host {
     void (*log)(void *environment, Status status, Text category, Text message);
@@ -45,10 +53,11 @@ void *fmi3InstantiateCoSimulation(Text name, Text token, Text resources, bool vi
 {
     Whole *whole;
     (void)resources, (void)visible, (void)early_return, (void)intermediate, (void)n, (void)intermediate_update;
-    if (!name || !token || events || strcmp(token, GUID) != 0) {
+    const int no_events = events && !HAS_CLOCK;
+    if (!name || !token || no_events || strcmp(token, GUID) != 0) {
         if (log)
             log(environment, ERROR, "logStatusError",
-                events ? "eventModeUsed: expected false, this FMU has no event mode"
+                no_events ? "eventModeUsed: expected false, this FMU has no event mode"
                        : "instantiationToken: expected " GUID ", that of this FMU");
         return NULL;
     }
@@ -58,6 +67,8 @@ void *fmi3InstantiateCoSimulation(Text name, Text token, Text resources, bool vi
     whole->host.log = log;
     whole->host.environment = environment;
     whole->instance.host = &whole->host;
+    whole->instance.state.mode = events ? EVENT_MODE : NO_EVENTS;
+    whole->instance.state.interval = CLOCK_INTERVAL;
     return whole;
 }
 
@@ -96,6 +107,8 @@ CALL(EnterInitializationMode, bool has_tolerance, double tolerance, double start
 {
     INSTANCE;
     (void)has_tolerance, (void)tolerance;
+    if (m->state.mode != NO_EVENTS)
+        m->state.memory[SAMPLE_PERIOD] = 0.0; /* a sample at every tick */
     return set_times(m, start_time, has_stop, stop) == OK ? enter_initialization(m) : ERROR;
 }
 
@@ -124,8 +137,12 @@ PLAIN(Terminate)
 
 PLAIN(Reset)
 {
+    Mode mode;
     INSTANCE;
+    mode = m->state.mode == NO_EVENTS ? NO_EVENTS : EVENT_MODE;
     begin(m);
+    m->state.mode = mode;
+    m->state.interval = CLOCK_INTERVAL;
     return OK;
 }
 
@@ -198,16 +215,77 @@ NONE_OF(UInt64, uint64_t)
 NONE_OF(String, Text)
 NO_VARIABLES(GetBinary, size_t *sizes, const uint8_t **values, size_t n_values)
 NO_VARIABLES(SetBinary, const size_t *sizes, const uint8_t *const *values, size_t n_values)
-NO_VARIABLES(GetClock, bool *values)
-NO_VARIABLES(SetClock, const bool *values)
-NO_VARIABLES(GetIntervalDecimal, double *intervals, int *qualifiers)
-NO_VARIABLES(SetIntervalDecimal, const double *intervals)
 NO_VARIABLES(GetIntervalFraction, uint64_t *counters, uint64_t *resolutions, int *qualifiers)
 NO_VARIABLES(SetIntervalFraction, const uint64_t *counters, const uint64_t *resolutions)
-NO_VARIABLES(GetShiftDecimal, double *shifts)
-NO_VARIABLES(SetShiftDecimal, const double *shifts)
 NO_VARIABLES(GetShiftFraction, uint64_t *counters, uint64_t *resolutions)
 NO_VARIABLES(SetShiftFraction, const uint64_t *counters, const uint64_t *resolutions)
+
+/* -- the clock of samples --------------------------------------------------------------------------------------- */
+
+enum { INTERVAL_CHANGED = 2 };
+
+static Status expect_clock(Instance *m, References vr, size_t n, int is_time)
+{
+    for (size_t i = 0; i < n; i++)
+        if (!HAS_CLOCK || vr[i] != CLOCK)
+            return refuse_with(m, "value references: expected those of clocks", "", "");
+    return is_time ? OK : refuse_with(m, "clock: expected ticks in event mode, and its interval set before steps", "", "");
+}
+
+CALL(GetClock, References vr, size_t n, bool *values)
+{
+    INSTANCE;
+    for (size_t i = 0; i < n; i++)
+        values[i] = m->state.tick != NO_TICK;
+    return expect_clock(m, vr, n, 1);
+}
+
+CALL(SetClock, References vr, size_t n, const bool *values)
+{
+    INSTANCE;
+    if (expect_clock(m, vr, n, !n || m->state.mode == EVENT_MODE) != OK)
+        return ERROR;
+    for (size_t i = 0; i < n; i++)
+        if (values[i] && m->state.tick == NO_TICK)
+            m->state.tick = TICKS;
+    return OK;
+}
+
+CALL(GetIntervalDecimal, References vr, size_t n, double *intervals, int *qualifiers)
+{
+    INSTANCE;
+    for (size_t i = 0; i < n; i++)
+        intervals[i] = m->state.interval, qualifiers[i] = INTERVAL_CHANGED;
+    return expect_clock(m, vr, n, 1);
+}
+
+CALL(SetIntervalDecimal, References vr, size_t n, const double *intervals)
+{
+    INSTANCE;
+    if (expect_clock(m, vr, n, !n || m->state.phase == INSTANTIATED || m->state.phase == INITIALIZATION) != OK)
+        return ERROR;
+    for (size_t i = 0; i < n; i++) {
+        if (!(intervals[i] > 0.0) || !q_isfinite(intervals[i]))
+            return refuse_with(m, "interval of the clock: expected a positive number", "", "");
+        m->state.interval = intervals[i];
+    }
+    return OK;
+}
+
+CALL(SetShiftDecimal, References vr, size_t n, const double *shifts)
+{
+    INSTANCE;
+    (void)shifts; /* it samples whenever the clock ticks */
+    return expect_clock(m, vr, n, !n || m->state.phase == INSTANTIATED || m->state.phase == INITIALIZATION);
+}
+
+CALL(GetShiftDecimal, References vr, size_t n, double *shifts)
+{
+    INSTANCE;
+    for (size_t i = 0; i < n; i++)
+        shifts[i] = 0.0;
+    return expect_clock(m, vr, n, 1);
+}
 
 /* -- states ------------------------------------------------------------------------------------------------------ */
 
@@ -280,12 +358,54 @@ WITHOUT(GetNumberOfVariableDependencies, unsigned vr, size_t *n)
 WITHOUT(GetVariableDependencies, unsigned vr, size_t *elements, unsigned *independents, size_t *of_independents,
         int *dependency_kinds, size_t n)
 WITHOUT(GetOutputDerivatives, References vr, size_t n, const int32_t *orders, double *values, size_t n_values)
-WITHOUT(UpdateDiscreteStates, bool *again, bool *terminate, bool *nominals, bool *continuous, bool *has_next, double *next)
 WITHOUT_PLAIN(EnterConfigurationMode)
 WITHOUT_PLAIN(ExitConfigurationMode)
-WITHOUT_PLAIN(EnterEventMode)
-WITHOUT_PLAIN(EnterStepMode)
-WITHOUT_PLAIN(EvaluateDiscreteStates)
+
+/* -- event mode, for a host that asked for it ------------------------------------------------------------------- */
+
+#define IN_MODE(name, condition) \
+    if (m->state.mode == NO_EVENTS) \
+        return NOT_OFFERED(name); \
+    if (m->state.phase != STEPPING || !(condition)) \
+        return refuse_with(m, "fmi3" #name ": not allowed in this mode", "", "")
+
+PLAIN(EnterEventMode)
+{
+    INSTANCE;
+    IN_MODE(EnterEventMode, m->state.mode == STEP_MODE);
+    m->state.mode = EVENT_MODE;
+    return OK;
+}
+
+PLAIN(EnterStepMode)
+{
+    INSTANCE;
+    IN_MODE(EnterStepMode, m->state.mode == EVENT_MODE && m->state.tick == NO_TICK);
+    m->state.mode = STEP_MODE;
+    return OK;
+}
+
+PLAIN(EvaluateDiscreteStates)
+{
+    int error;
+    INSTANCE;
+    IN_MODE(EvaluateDiscreteStates, m->state.mode == EVENT_MODE);
+    error = m->state.tick == TICKS ? take_sample(m) : 0;
+    return error ? refuse(m, error) : OK;
+}
+
+CALL(UpdateDiscreteStates, bool *again, bool *terminate, bool *nominals, bool *continuous, bool *has_next, double *next)
+{
+    int error;
+    INSTANCE;
+    IN_MODE(UpdateDiscreteStates, m->state.mode == EVENT_MODE);
+    if (m->state.tick == TICKS && (error = take_sample(m)))
+        return refuse(m, error);
+    m->state.tick = NO_TICK;
+    *again = *terminate = *nominals = *continuous = *has_next = false;
+    *next = 0.0;
+    return OK;
+}
 
 /* Functions of model exchange and scheduled execution: some hosts require every function of the standard. */
 WITHOUT(SetTime, double t)

@@ -22,6 +22,8 @@
 
 typedef enum { OK, WARNING, DISCARD, ERROR, FATAL } Status;
 typedef enum { INSTANTIATED, INITIALIZATION, STEPPING, TERMINATED, FAILED, PHASES } Phase;
+typedef enum { NO_EVENTS, STEP_MODE, EVENT_MODE } Mode; /* of a host that says by a clock when to sample, FMI 3.0 */
+typedef enum { NO_TICK, TICKS, SAMPLED } Tick;
 typedef enum { LOG_WARNING, LOG_ERROR, LOG_DIVERGENCE, CATEGORIES } Category;
 enum { LONGEST_TEXT = 1024 };
 
@@ -47,8 +49,11 @@ typedef struct {
     double time;     /* of the last communication point */
     double reached;  /* start time of the next step; not a number before the first: any */
     double stop;     /* stop time; infinite if none is defined */
+    double interval; /* of the clock */
     unsigned warned; /* bits of the warnings that were sent */
     Phase phase;
+    Mode mode;
+    Tick tick; /* of the clock, in event mode; SAMPLED: its outputs are computed */
 } State;
 
 /* Its bytes, for the host. */
@@ -225,10 +230,19 @@ static Status advance(Instance *m, double t, double h)
     int error;
     if (expect(m, DO_STEP) != OK || expect_in_time(m, t, h) != OK)
         return ERROR;
-    if ((error = model_do_step(m, t, h)))
+    if (m->state.mode == EVENT_MODE)
+        return refuse_with(m, "fmi3DoStep: expected fmi3EnterStepMode before", "", "");
+    if (m->state.mode == NO_EVENTS && (error = model_do_step(m, t, h)))
         return refuse(m, error);
     m->state.time = m->state.reached = t + h;
     return OK;
+}
+
+/* The sample of a tick of the clock, held until the next one. */
+static int take_sample(Instance *m)
+{
+    m->state.tick = SAMPLED;
+    return model_do_step(m, m->state.time, m->state.interval);
 }
 
 static Status end(Instance *m)
@@ -266,9 +280,11 @@ static int have_type(References vr, size_t n, Type type)
     return 1;
 }
 
-/* In initialisation mode, recompute the values to be read if others were set since they were computed. */
+/* Compute the values to be read: at a tick, and in initialisation mode if others were set since they were computed. */
 static int bring_up_to_date(Instance *m, References vr, size_t n)
 {
+    if (m->state.tick == TICKS)
+        return take_sample(m);
     if (m->state.phase != INITIALIZATION || m->state.memory[KEPT_STALE] == 0.0)
         return 0;
     for (size_t i = 0; i < n; i++)
@@ -285,6 +301,8 @@ static Status expect_settable(Instance *m, unsigned vr, Type type)
         return refuse_references(m, &vr, 1, type);
     if ((refusal = refused_setting[vr][m->state.phase]))
         return refuse_with(m, refusal, "", "");
+    if (m->state.tick == SAMPLED)
+        return refuse_with(m, "inputs: expected before any value is read at a tick", "", "");
     if (!(kinds[vr] & INPUT) || m->state.phase != STEPPING)
         m->state.memory[KEPT_STALE] = 1.0;
     return OK;

@@ -58,7 +58,11 @@ NATIVE_FMI_3 = Packing(
     command=("fmu_kit.compiler.pack.building", "--fmi", "3"),
     source_hash=functools.partial(freshness.source_hash, version=3),
 )
-PACKINGS = (NATIVE_FMI_3, NATIVE, IN_PYTHON)
+CLOCKED_FMI_3 = replace(
+    NATIVE_FMI_3, folder="native/fmi3/clocked", command=("fmu_kit.compiler.pack.building", "--fmi", "3", "--clock")
+)
+"""Those at whose input clock a slave samples that otherwise has its own period"""
+PACKINGS = (CLOCKED_FMI_3, NATIVE_FMI_3, NATIVE, IN_PYTHON)
 """Those with a separate folder first: `native/NAME` is an FMU of this project, as NAME is."""
 
 

@@ -256,7 +256,7 @@ class Model:
     def expect_clocks_that_tick(self) -> None:
         """Raise `UsageError` for an FMU with clocks that do not tick as it is called."""
         clocks = [v.name for v in self.variables.values() if v.kind == "Clock"]
-        if clocks and not self.ticking:
+        if clocks and not self.ticking and not self.follows_kit:  # which samples at every step without its clock
             if "event-mode" not in declared_of(self.description):
                 raise UsageError(f"{self.path}: has clocks, but no event mode, in which they tick: {', '.join(clocks)}")
             raise UsageError(

@@ -3,6 +3,7 @@
 import ctypes
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import fmpy
 import numpy as np
@@ -28,7 +29,7 @@ from tests.fmus.archive import files_of
 from tests.fmus.expected import COMMAND, MEASUREMENT
 from tests.fmus.making import PAIR
 from tests.fmus.process import run, run_script
-from tests.native import assert_the_same
+from tests.native import NATIVE, assert_near, assert_the_same
 
 START = 0.5
 """[s]"""
@@ -42,8 +43,8 @@ def read(name: str) -> ModelDescription:
 class Instance:
     """Of the controller, its messages kept."""
 
-    def __init__(self, folder: Path) -> None:
-        path = fmus.locate("native/fmi3/UnifiedController")
+    def __init__(self, folder: Path, path: Path | None = None, **how: bool) -> None:
+        path = path or fmus.locate("native/fmi3/UnifiedController")
         fmpy.extract(str(path), str(folder))
         description = fmpy.read_model_description(str(path))
         self.references = {v.name: v.valueReference for v in description.modelVariables}
@@ -54,7 +55,7 @@ class Instance:
             modelIdentifier=description.modelName,
             instanceName="controller",
         )
-        self.fmu.instantiate(loggingOn=True, logMessage=self._log)
+        self.fmu.instantiate(loggingOn=True, logMessage=self._log, **how)
 
     def _log(self, environment: object, status: int, category: bytes, message: bytes) -> None:
         self.messages.append(f"{category.decode()}: {message.decode()}")
@@ -209,6 +210,50 @@ def test_a_flight_is_that_of_fmi_2_to_the_byte() -> None:
         for folder in ("native/fmi3", "native")
     ]
     assert_the_same(*simulated)
+
+
+CLOCKED = "native/fmi3/clocked/UnifiedController"
+
+
+@pytest.mark.parametrize("engine", ["python", "compiled"])
+def test_a_controller_samples_at_the_ticks_of_its_clock_as_else_at_its_steps(engine: Any) -> None:
+    plain = NATIVE.with_changes(stop_time=0.2).as_system()
+    without_ticks = quadcosim.changed(plain, {"components.controller.fmu": CLOCKED})
+    by_ticks = quadcosim.changed(without_ticks, {"components.controller.sampling.fmu_clock": "sample_clock"})
+    expected, ticked, stepped = (quadcosim.run(each, engine=engine) for each in (plain, by_ticks, without_ticks))
+    assert_the_same(stepped, expected)
+    assert_near(ticked, expected, 1e-12)
+
+
+def test_a_tick_computes_what_is_read_and_no_step_does(tmp_path: Path) -> None:
+    path = fmus.locate(CLOCKED)
+    assert validate_fmu(str(path)) == []
+    plain, ticking = Instance(tmp_path / "plain"), Instance(tmp_path / "ticking", path, eventModeUsed=True)
+    for instance in (plain, ticking):
+        instance.initialise()
+    assert ticking.get(*COMMAND) == plain.get(*COMMAND)
+    fmu, turned, clock = ticking.fmu, [plain.references["angular_velocity.x"]], [ticking.references["sample_clock"]]
+    fmu.setFloat64(turned, [0.7])
+    fmu.setClock(clock, [True])
+    plain.fmu.setFloat64(turned, [0.7])
+    plain.fmu.doStep(START, 0.01)
+    sampled = plain.get(*COMMAND)
+    assert ticking.get(*COMMAND) == sampled
+    with pytest.raises(FMICallException):
+        fmu.doStep(START, 0.01)
+    assert ticking.messages[-1] == "logStatusError: fmi3DoStep: expected fmi3EnterStepMode before"
+    fmu.reset()
+    ticking.initialise()
+    fmu.setFloat64(turned, [0.7])
+    fmu.setClock(clock, [True])
+    fmu.updateDiscreteStates()
+    fmu.enterStepMode()
+    assert ticking.get(*COMMAND) == sampled
+    fmu.setFloat64(turned, [0.1])
+    fmu.doStep(START, 0.02)
+    assert ticking.get("time", *COMMAND) == [START + 0.02, *sampled]
+    for instance in (plain, ticking):
+        instance.fmu.freeInstance()
 
 
 def test_ecos_flies_both_as_it_does_those_of_fmi_2() -> None:
