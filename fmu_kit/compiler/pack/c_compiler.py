@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.util
 import os
 import platform
@@ -14,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from fmu_kit import libraries
 from fmu_kit.bundle import PackagingError
 from fmu_kit.scratch import temporary_folder
 
@@ -120,8 +122,8 @@ def _linked(command: list[str], options: Sequence[str], units: Sequence[Unit], a
     for_units = [option for option in options if not option.startswith("-Wl,") and option not in ("-shared", "-s")]
     objects = {}
     for i, unit in enumerate(units):
-        called = [*command, *for_units, *unit.options, "-c"]
-        objects[f"unit{i}.o"] = _compiled(called, unit.sources, unit.main)
+        compile_ = functools.partial(_compiled, [*command, *for_units, *unit.options, "-c"], unit.sources, unit.main)
+        objects[f"unit{i}.o"] = libraries.cached_content("objects", unit.sources, compile_.args[::2], compile_)
     return _compiled([*command, *options], objects, "", (*objects, *after))
 
 

@@ -18,6 +18,7 @@ from orchestration.experiments.live.sliders import Slider, Sliders, usual_slider
 from orchestration.foundation.basics.errors import UsageError, expected_name
 from orchestration.simulation.engines.batch.shape import Shape
 from orchestration.simulation.engines.resolved import check_against_fmus, columns_of
+from orchestration.simulation.engines.wasm.given_timing import reason
 from orchestration.simulation.engines.wasm.modules import module_of
 from orchestration.simulation.engines.wasm.settings import Setting
 from orchestration.simulation.engines.wasm.tables_of_system import SystemTables, tables_of
@@ -82,13 +83,14 @@ def live(
         system = located(loaded.as_system())
         models = {each: read_model(Path(component.fmu)) for each, component in system.components.items()}
         check(system, models)
-        chosen = _chosen(loaded, system, models, vary, map)
+        given = reason(connect_references(system, models))
+        chosen = _chosen(loaded, system, models, vary, map, given)
         system = connect_references(_with_ends(loaded, system, chosen), models)
         fits = check_against_fmus(system, models)
         system = fits.system
         free = [path for slider in chosen.sliders for path in loaded.paths_of(slider.path)]
         tables = [_tables(system, models, lanes, free) for lanes in _LANES.values()]
-        document = _document(loaded, tables[0], chosen, name, fits.units)
+        document = _document(loaded, tables[0], chosen, name, fits.units, given)
         modules = {each: module_of(table, table.shape.lanes) for each, table in zip(_LANES, tables)}
     return Live(html=_as_html(document, modules))
 
@@ -97,11 +99,14 @@ def live(
 
 
 def _chosen(
-    request: Request, system: System, models: Mapping[str, Model], vary: Ranges | None, axes: tuple[str, str] | None
-) -> Sliders:
+    request: Request, system: System, models: Mapping[str, Model], vary: Ranges | None,
+    axes: tuple[str, str] | None, given: str | None,
+) -> Sliders:  # fmt: skip
     """The sliders that are asked for; raises `UsageError` for a path that has no number or an empty range."""
     usual = usual_sliders(request, system, models)
     sliders = [each for each in usual.sliders if _is_there(request, models, each.path)]
+    if given:
+        sliders = [each for each in sliders if all(".parameters." in path for path in request.paths_of(each.path))]
     if vary is not None:
         words = {each.path: each for each in usual.sliders}
         sliders = []
@@ -166,6 +171,8 @@ def _tables(system: System, models: Mapping[str, Model], lanes: int, free: Seque
         for what in ("noise", "quantisation"):
             keys.append((what, [p for p in tables.settings.at if p.startswith(f"connections.{x.name}.{what}.")]))
         for key, paths in keys:
+            if not set(paths) <= set(tables.settings.at):
+                continue
             neutral = 1.0 if key == "scale" else 0.0
             values = {path: limited[tables.settings.at[path]].value for path in paths}
             is_off = all(value == neutral for value in values.values())
@@ -200,8 +207,9 @@ def _on_its_side(setting: Setting, neutral: float, is_off: bool) -> Setting:
 
 
 def _document(
-    request: Request, tables: SystemTables, chosen: Sliders, name: str | None, units: Mapping[str, str]
-) -> dict[str, Any]:
+    request: Request, tables: SystemTables, chosen: Sliders, name: str | None, units: Mapping[str, str],
+    given: str | None,
+) -> dict[str, Any]:  # fmt: skip
     shape, at = tables.shape, tables.settings.at
     system, models = shape.system, shape.models
     targets = {}
@@ -218,7 +226,8 @@ def _document(
         paths = request.paths_of(each.path)
         missing = [path for path in paths if path not in at]
         if missing:
-            raise UsageError(f"vary {each.path}: expected a number that a page can set")
+            why = f"; {given}, so its timing is that of the file" if given else ""
+            raise UsageError(f"vary {each.path}: expected a number that a page can set{why}")
         targets[each.path] = [at[path] for path in paths]
         value = tables.settings.all[at[paths[0]]].value
         sliders.append({
@@ -234,7 +243,9 @@ def _document(
         "targets": targets, "sliders": sliders, "map": chosen.map, "measure": _measure(system, chosen),
         "columns": [[column, *map(int, shape.place(column)), described[column].unit or ""] for column in columns],
         "seen": seen, "objectives": [*shape.nodes], "good": [*shape.nodes].index(GOOD) if GOOD in shape.nodes else -1,
-        "units": dict(units), "optional": [*system.optional], "outcomes": [*system.criterion.outcomes],
+        "units": dict(units), "fixed": given and f"{given}: the timing is that of the file, and has no sliders",
+        "span": max((30.0 * c.sampling.period for c in system.components.values() if c.sampling), default=1.0),
+        "optional": [*system.optional], "outcomes": [*system.criterion.outcomes],
         "components": [*shape.names], "connections": [[x.name, x.sender, x.receiver] for x in system.connections],
         "sampled": [shape.names[i] for i in shape.wires.sampled],
     }  # fmt: skip

@@ -59,6 +59,7 @@ function addControls() {
     }
     controls.set(slider.path, control), control.set(slider.value);
   }
+  if (system.fixed) $("controls").append(Object.assign(document.createElement("p"), { className: "hint", textContent: system.fixed }));
 }
 
 /** The slider of a value, which `put` takes over. */
@@ -143,7 +144,7 @@ function spanOfClock(given) {
   const now = system.settings.map(([, value]) => value);
   for (const [path, value] of Object.entries(given)) for (const i of system.targets[path] ?? []) now[i] = value;
   const periods = now.filter((_, i) => system.settings[i][0].endsWith(".sampling.period"));
-  return Math.min(now[0], periods.length ? 30 * Math.max(...periods) : 1);
+  return Math.min(now[0], periods.length ? 30 * Math.max(...periods) : system.span);
 }
 
 async function fly() {

@@ -261,9 +261,13 @@ static void put_settings(int lane, const double *inner) {
 
 /* Set the inputs that sources feed to their values at the start. */
 static void feed_first(int lane) {
+#if TIMING_IS_GIVEN
+    const double *const values = given_at_first;
+#else
     double values[GIVEN_ALL + 1];
     rewind_sources(lane);
     given_at(lane, settings[lane], 0, values);
+#endif
     for (int i = 0; i < COMPONENTS; i++)
         for (const Fed *fed = component_table[i].all_fed; fed < component_table[i].all_fed + component_table[i].all_fed_count; fed++)
             components[i].memory[fed->place * L + lane] = values[fed->source];
@@ -351,6 +355,10 @@ static double *numbers_for(double **values, int64_t *capacity, int64_t count) {
 
 /* The values of sources at the instants of a lane; 0 without memory. */
 static int tabulate_sources(int lane) {
+#if TIMING_IS_GIVEN
+    const double *const tables[] = {seen_regular, seen_own, given_regular, given_own};
+    for (int i = 0; i < 4; i++) source_tables[lane][i].values = (double *)tables[i];
+#else
     if (!set_out_sources(lane, settings[lane])) return 0;
     for (int own = 0; own < 2; own++) {
         int64_t count = own ? drawn[lane].own_count : drawn[lane].regular_count;
@@ -365,6 +373,7 @@ static int tabulate_sources(int lane) {
                 (fed ? given_at : seen_at)(lane, settings[lane], times[i], into + i * width);
         }
     }
+#endif
     tracks[lane].seen[lane] = source_tables[lane][0].values, tracks[lane].seen_own[lane] = source_tables[lane][1].values;
     tracks[lane].given[lane] = source_tables[lane][2].values;
     tracks[lane].given_own[lane] = source_tables[lane][3].values;

@@ -8,9 +8,7 @@ from decimal import Decimal
 from orchestration.components.fmi.instance import convert_value, number_of
 from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.components.fmi.read_description import NUMERIC, Model, Variable
-from orchestration.foundation.basics.errors import UsageError
 from orchestration.systems.schedule.plan import MAX_TIME
-from orchestration.systems.system.distribution import Distribution
 from orchestration.systems.system.model import System
 
 _LATEST = MAX_TIME / 1e9
@@ -41,36 +39,38 @@ def decimal_of(value: float) -> tuple[int, int]:
 class Settings:
     """All settings of a system, in the order in which C has them."""
 
-    def __init__(self, system: System, models: Mapping[str, Model], free: Collection[str] = ()) -> None:
+    def __init__(
+        self, system: System, models: Mapping[str, Model], free: Collection[str] = (), *, timing_is_given: bool = False
+    ) -> None:
         """Parameters that are whole numbers choose between laws: only the `free` ones, by path, may be changed.
 
-        Raises `UsageError` for a value that is no number, as a distribution is.
+        With `timing_is_given` there are no settings of timing, nor of sources, but fixed ones.
         """
-        self._free = free
+        self._free, self._is_given = free, timing_is_given
         self.all: list[Setting] = []
         self.at: dict[str, int] = {}
         """Places by path"""
-        self._add("stop_time", system.stop_time, 0.0, _LATEST, excludes_low=True)
-        self._add("seed", system.seed, 0.0, 2.0**63, is_whole=True)
+        self._fixed_if_given("stop_time", system.stop_time, 0.0, _LATEST, excludes_low=True)
+        self._fixed_if_given("seed", system.seed, 0.0, 2.0**63, is_whole=True)
         for name, component in system.components.items():
             place = f"components.{name}"
             if component.step is not None:
-                self._add(f"{place}.step", component.step, 0.0, _LATEST, excludes_low=True)
+                self._of_timing(f"{place}.step", component.step, 0.0, _LATEST, excludes_low=True)
             sampling = component.sampling
             if sampling is not None:
-                self._add(f"{place}.sampling.period", sampling.period, 0.0, _LATEST, excludes_low=True)
-                self._add(f"{place}.sampling.offset", sampling.offset, 0.0, _LATEST)
-                self._add(f"{place}.sampling.jitter", sampling.jitter, 0.0, _LATEST)
-                self._add(f"{place}.sampling.clock_ratio", sampling.clock_ratio, 0.0, excludes_low=True)
+                self._of_timing(f"{place}.sampling.period", sampling.period, 0.0, _LATEST, excludes_low=True)
+                self._of_timing(f"{place}.sampling.offset", sampling.offset, 0.0, _LATEST)
+                self._of_timing(f"{place}.sampling.jitter", sampling.jitter, 0.0, _LATEST)
+                self._fixed_if_given(f"{place}.sampling.clock_ratio", sampling.clock_ratio, 0.0, excludes_low=True)
             for variable in models[name].variables.values():
                 self._add_parameter(place, variable, component.parameters.get(variable.name))
         for x in system.connections:
             place = f"connections.{x.name}"
-            self._add(f"{place}.delay", x.delay, 0.0, _LATEST)
-            self._add(f"{place}.delay_jitter", x.delay_jitter, 0.0, _LATEST)
-            self._add(f"{place}.loss", x.loss, 0.0, 1.0)
+            self._of_timing(f"{place}.delay", x.delay, 0.0, _LATEST)
+            self._of_timing(f"{place}.delay_jitter", x.delay_jitter, 0.0, _LATEST)
+            self._of_timing(f"{place}.loss", x.loss, 0.0, 1.0)
             if x.burst_length is not None:
-                self._add(f"{place}.burst_length", x.burst_length, 1.0)
+                self._of_timing(f"{place}.burst_length", x.burst_length, 1.0)
             for what, values in (("noise", x.noise), ("quantisation", x.quantisation)):
                 each = [0.0] * len(x.start)
                 for signal, value in values.items():
@@ -84,18 +84,26 @@ class Settings:
             for key in ("constant", "noise", "period", "scale"):
                 if (value := getattr(source, key)) is not None:
                     excludes = key == "period"
-                    self._add(f"sources.{name}.{key}", value, 0.0 if key in ("noise", "period") else -_MOST,
-                              excludes_low=excludes)  # fmt: skip
+                    self._of_timing(f"sources.{name}.{key}", value, 0.0 if key in ("noise", "period") else -_MOST,
+                                    excludes_low=excludes)  # fmt: skip
 
     def _add(self, path: str, value: object, low: float = -_MOST, high: float = _MOST,
              *, excludes_low: bool = False, is_whole: bool = False) -> None:  # fmt: skip
-        if isinstance(value, Distribution):
-            raise UsageError(f"{path}: expected one number for a page; it is a distribution")
         assert isinstance(value, (int, float))
         self.at[path] = len(self.all)
         self.all.append(
             Setting(path=path, value=value, low=low, high=high, excludes_low=excludes_low, is_whole=is_whole)
         )
+
+    def _of_timing(self, path: str, value: object, low: float, high: float = _MOST, **limits: bool) -> None:
+        if not self._is_given:
+            self._add(path, value, low, high, **limits)
+
+    def _fixed_if_given(self, path: str, value: float, low: float, high: float = _MOST, **limits: bool) -> None:
+        if self._is_given:
+            self._add(path, value, value, value, is_whole=limits.get("is_whole", False))
+        else:
+            self._add(path, value, low, high, **limits)
 
     def _add_parameter(self, place: str, variable: Variable, given: object) -> None:
         is_one = variable.causality == "parameter" and not variable.is_constant and variable.kind in NUMERIC

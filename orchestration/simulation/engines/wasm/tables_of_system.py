@@ -9,10 +9,11 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.engines.batch.shape import Shape
 from orchestration.simulation.engines.batch.writing import ExpressionWriter
 from orchestration.simulation.engines.wasm import normal_numbers
+from orchestration.simulation.engines.wasm.given_timing import GivenTiming, reason
 from orchestration.simulation.engines.wasm.settings import Settings
 from orchestration.simulation.engines.wasm.sources_in_c import SourcesInC, key_text, number_text, numbers_text
 from orchestration.systems.expressions.over_run import reductions
-from orchestration.systems.expressions.syntax import Call, Node
+from orchestration.systems.expressions.syntax import Call, Node, names_job_measure
 from orchestration.systems.schedule.common_timetable import CommonTimetable
 from orchestration.systems.schedule.streams import (
     DELAY,
@@ -47,16 +48,17 @@ def tables_of(shape: Shape, settings: Settings | None = None, free: Collection[s
     Raises `UsageError`, naming it, for what a page cannot have.
     """
     system = shape.system
-    if system.uses_scheduler:
-        raise UsageError("computers and networks: expected none in a page")
     for name, component in system.components.items():
         if component.sampling is not None and component.sampling.clock == "fmu":
             raise UsageError(f"components.{name}.sampling.clock = fmu: expected master in a page")
-    settings = settings or Settings(system, shape.models, free)
-    sources = SourcesInC(shape, settings)
+    given = GivenTiming(shape) if reason(system) else None
+    settings = settings or Settings(system, shape.models, free, timing_is_given=given is not None)
+    if given is not None and given.size > MOST_INSTANTS:
+        raise UsageError(f"a page has room for {MOST_INSTANTS} instants and messages; this run has {given.size}")
+    sources = None if given else SourcesInC(shape, settings)
     return SystemTables(
-        shape=shape, settings=settings, timing=_timing(shape, settings, sources),
-        system=_system(shape, settings, sources),
+        shape=shape, settings=settings, timing=_timing(shape, settings, sources, given),
+        system=_system(shape, settings, sources, given),
     )  # fmt: skip
 
 
@@ -72,7 +74,7 @@ def _table(kind: str, name: str, rows: Sequence[str]) -> str:
 # -- timing ------------------------------------------------------------------------------------------------------------
 
 
-def _timing(shape: Shape, settings: Settings, sources: SourcesInC) -> str:
+def _timing(shape: Shape, settings: Settings, sources: SourcesInC | None, given: GivenTiming | None) -> str:
     system, at = shape.system, settings.at
     common, streams = CommonTimetable(system, {}), Streams(0, system.streams)
     plan, connections, names = common.plan, system.connections, [*system.components]
@@ -81,12 +83,13 @@ def _timing(shape: Shape, settings: Settings, sources: SourcesInC) -> str:
         place, keys = f"connections.{x.name}", (DELAY, DELAY_JITTER, LOSS, NOISE)
         routes.append(
             f"{{{common.place[common.sender[i]]}, {common.place[common.receiver[i]]}, {int(x.order == 'jacobi')}, "
-            f"{int(i in plan.read_ahead)}, {at[f'{place}.delay']}, {at[f'{place}.delay_jitter']}, "
-            f"{at[f'{place}.loss']}, {at.get(f'{place}.burst_length', -1)}, {int(x.jitter_distribution == 'normal')}, "
+            f"{int(i in plan.read_ahead)}, {at.get(f'{place}.delay', -1)}, {at.get(f'{place}.delay_jitter', -1)}, "
+            f"{at.get(f'{place}.loss', -1)}, {at.get(f'{place}.burst_length', -1)}, "
+            f"{int(x.jitter_distribution == 'normal')}, "
             f"{', '.join(key_text(streams.key(place, key)) for key in keys)}, "
             f"{len(x.start)}, {int(any(x.noise.values()))}, {_TABLES[shape.wires.table(i)]}}}"
         )
-    for k, name in enumerate(plan.sampled):
+    for k, name in enumerate(() if given else plan.sampled):
         place, sampling = f"components.{name}", system.components[name].sampling
         assert sampling is not None
         incoming = [i for i in plan.measured if connections[i].receiver == name]
@@ -97,37 +100,48 @@ def _timing(shape: Shape, settings: Settings, sources: SourcesInC) -> str:
             f"{{{names.index(name)}, {of}, {int(sampling.jitter_distribution == 'normal')}, "
             f"{key_text(streams.key(place, JITTER))}, incoming{k}, outgoing{k}, {len(incoming)}, {len(outgoing)}}}"
         )
-    posts = [
-        f"{{{j}, {at[f'components.{names[i]}.step']}}}"
-        for i in common.points
-        for j in plan.posted
-        if common.sender[j] == i
-    ]
-    points = [f"{{{at[f'components.{names[i]}.step']}, 0, {1 << int(common.place[i])}u}}" for i in common.points]
+    posts = (
+        []
+        if given
+        else [
+            f"{{{j}, {at[f'components.{names[i]}.step']}}}"
+            for i in common.points
+            for j in plan.posted
+            if common.sender[j] == i
+        ]
+    )
+    points = (
+        []
+        if given
+        else [f"{{{at[f'components.{names[i]}.step']}, 0, {1 << int(common.place[i])}u}}" for i in common.points]
+    )
     for name, source in system.sources.items():
-        if source.period is not None:
+        if source.period is not None and not given:
             places = {int(common.place[names.index(component_of(end))]) for end in source.to} - {-1}
             points.append(f"{{{at[f'sources.{name}.period']}, 1, {sum(1 << place for place in places)}u}}")
-    has_normals = bool(sources.drawn) or any(any(x.noise.values()) for x in connections)
+    drawn = sources.drawn if sources else []
+    has_normals = bool(drawn) or any(any(x.noise.values()) for x in connections)
     counts = {
         "ROUTES": len(routes), "CLOCKS": len(clocks), "POSTS": len(posts), "POINTS": len(points),
-        "DRAWN": len(sources.drawn), "CONTINUOUS": len(common.continuous), "STOP_TIME_SETTING": at["stop_time"],
+        "DRAWN": len(drawn), "CONTINUOUS": len(common.continuous), "STOP_TIME_SETTING": at["stop_time"],
         "SEED_SETTING": at["seed"],
     }  # fmt: skip
     return "\n".join([
-        "#include <math.h>", f"#define NORMALS {int(has_normals)}", f"#define LOWEST {LOWEST!r}",
+        "#include <math.h>", f"#define TIMING_IS_GIVEN {int(given is not None)}",
+        f"#define NORMALS {int(has_normals)}", f"#define LOWEST {LOWEST!r}",
         f"#define HIGHEST {HIGHEST!r}", f"#define MOST_INSTANTS {MOST_INSTANTS}.0",
         f"enum {{ {', '.join(f'{name} = {value}' for name, value in counts.items())} }};", *lines,
         _table("RouteTable", "route_table", routes), _table("ClockTable", "clock_table", clocks),
         _table("PostTable", "post_table", posts), _table("PointsTable", "points_table", points),
-        _table("DrawnTable", "drawn_table", sources.drawn), normal_numbers.tables() if has_normals else "", "",
+        _table("DrawnTable", "drawn_table", drawn), normal_numbers.tables() if has_normals else "",
+        given.timing if given else "", "",
     ])  # fmt: skip
 
 
 # -- components, connections, expressions ------------------------------------------------------------------------------
 
 
-def _system(shape: Shape, settings: Settings, sources: SourcesInC) -> str:
+def _system(shape: Shape, settings: Settings, sources: SourcesInC | None, given: GivenTiming | None) -> str:
     system, at, wires, names = shape.system, settings.at, shape.wires, shape.names
     lines = ["#define DECLARED " + " ".join(f"DECLARE(c{i})" for i in range(len(names))), "DECLARED"]
     components = [_component(i, shape, settings, lines) for i in range(len(names))]
@@ -154,9 +168,9 @@ def _system(shape: Shape, settings: Settings, sources: SourcesInC) -> str:
     bursts = [
         f"{{{at[f'connections.{x.name}.loss']}, {at[f'connections.{x.name}.burst_length']}}}"
         for x in system.connections
-        if x.burst_length is not None
+        if f"connections.{x.name}.burst_length" in at
     ]
-    named = [_named(name, shape, settings) for name in shape.numbers]
+    named = [_named(name, shape, settings, given) for name in shape.numbers]
     calls = [*shape.calls]
     own = [*shape.expressions.folds.values]
     inner = [own.index(shape.calls[call]) for call in shape.inner]
@@ -167,13 +181,14 @@ def _system(shape: Shape, settings: Settings, sources: SourcesInC) -> str:
         "NUMBERS": len(named) + 1 + len(inner), "STATES": len(shape.expressions.states), "REDUCTIONS": len(own),
         "OBJECTIVES": len(shape.nodes), "PASSES": shape.passes, "SEEN_COUNT": shape.seen_count,
         "CONSTANTS_COUNT": len(shape.expressions.folds.writer.constants), "GIVEN_COUNT": shape.given_count,
-        "GIVEN_ALL": sources.width, "CONTINUOUS_COUNT": len(wires.continuous), "SAMPLED_COUNT": len(wires.sampled),
+        "GIVEN_ALL": sources.width if sources else 0, "CONTINUOUS_COUNT": len(wires.continuous),
+        "SAMPLED_COUNT": len(wires.sampled),
         "SOME_BY_THEMSELVES": 0, "BURSTS_COUNT": len(bursts), "MOST_VARIABLES": most,
         "STOP_TIME_SETTING": at["stop_time"],
     }  # fmt: skip
-    has_normals = bool(sources.drawn) or any(any(x.noise.values()) for x in system.connections)
+    has_normals = bool(sources and sources.drawn) or any(any(x.noise.values()) for x in system.connections)
     return "\n".join([
-        f"#define NORMALS {int(has_normals)}",
+        f"#define NORMALS {int(has_normals)}", f"#define TIMING_IS_GIVEN {int(given is not None)}",
         f"enum {{ {', '.join(f'{name} = {value}' for name, value in counts.items())} }};", *lines,
         _table("ComponentTable", "component_table", components),
         _table("ConnectionTable", "connection_table", connections), _table("GroupTable", "group_table", groups),
@@ -186,7 +201,7 @@ def _system(shape: Shape, settings: Settings, sources: SourcesInC) -> str:
         _table("struct { int32_t setting; double value; }", "named_numbers", named),
         "static __attribute__((unused)) double number_at(int i, const Setting *s) {",
         "    return named_numbers[i].setting < 0 ? named_numbers[i].value : s[named_numbers[i].setting].value;", "}",
-        sources.text, _finish(shape, calls, own), "",
+        sources.text if sources else given.sources if given else "", _finish(shape, calls, own), "",
     ])  # fmt: skip
 
 
@@ -230,7 +245,9 @@ def _connection(i: int, shape: Shape, settings: Settings, lines: list[str]) -> s
     )
 
 
-def _named(name: str, shape: Shape, settings: Settings) -> str:
+def _named(name: str, shape: Shape, settings: Settings, given: GivenTiming | None) -> str:
+    if given and names_job_measure(name):
+        return f"{{-1, {number_text(given.number(shape, name))}}}"
     owner, variable = component_of(name), shape.models[component_of(name)].variables[variable_of(name)]
     path = f"components.{owner}.parameters.{variable.name}"
     if path in settings.at:

@@ -1,12 +1,15 @@
 import random
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from orchestration.simulation.engines.wasm.modules import library_of
 from orchestration.simulation.engines.wasm.tables_of_system import tables_of
+from orchestration.simulation.requests.request import request_of
 from quadcosim import Scenario, fly
 from tests.orchestration.simulation.engines.wasm.machines import Native, Page, hashes_of, tables
+from tests.places import ROOT
 
 COLUMNS = ("plant.position.x", "plant.position.z", "plant.quaternion.w", "plant.thrust", "controller.torque.y")
 PATHS = {
@@ -103,6 +106,19 @@ def test_a_page_refuses_what_a_request_would(of_one_lane):
     period, jitter, loss = (PATHS[f"timing.{key}"] for key in ("period", "jitter", "command_loss"))
     refused = [page.fly([values], COLUMNS) for values in ({jitter: 0.01}, {period: 0.0}, {loss: 1.5}, {period: 1e-7})]
     assert refused == [(5, jitter), (1, period), (2, loss), (9, period)]
+
+
+@pytest.mark.parametrize("name", ["three_servos/can.toml", "references/lemniscate.toml"])
+def test_timing_and_sources_that_a_page_cannot_compute_are_given_to_it(name):
+    loaded: Any = request_of(ROOT / "examples" / name)
+    request = replace(loaded, stop_time=0.3)
+    of = tables(request, 1)
+    columns = of.shape.board.columns[1:]
+    flown = fly(request, {"stop_time": [0.3]}, record=columns)
+    page = page_of(of)
+    assert page.fly([{}], columns)[0][0] == hashes_of(flown, columns)[0]
+    assert not [path for path in of.settings.at if path.endswith((".sampling.period", ".delay", ".jitter", ".loss"))]
+    assert page.fly([{"stop_time": 0.2}], columns) == (1, "stop_time")
 
 
 def test_settings_have_a_place_each(of_one_lane):
