@@ -21,6 +21,7 @@ Where to begin:
 - `margin` certifies how far a delay, a jitter or a run of losses may vary without making the linear loop unstable;
 - `schedule` computes which task or message has each computer and network when, and bounds on response times;
 - `linearise` opens a loop about its operating point, sampled, held and delayed as it is: two state-space systems;
+- `bode` computes gain, phase and delay margins of a sampled loop with its delays, `step` how it takes back a step;
 - `sweep` runs a `Study` over axes, `compare` compares controllers, `tune` searches for gains: stored runs are not
   repeated, and results become a table with `to_pandas`;
 - `Simulation` stops a run at each sample, where your code takes the place of a controller or any other component;
@@ -94,13 +95,16 @@ if TYPE_CHECKING:  # also what `__getattr__` finds public names by
     from orchestration.theory.certificates.region import Region
     from orchestration.theory.certificates.region import region as margin_region
     from orchestration.theory.exact.expect import Expected, expect
+    from orchestration.theory.stability.frequency import Bode, bode
     from orchestration.theory.stability.linearise import Linearised, linearise
     from orchestration.theory.stability.state_space import StateSpace
+    from orchestration.theory.stability.step_response import Step, step
 
 __all__ = [
     "Arrivals",
     "Axis",
     "Basin",
+    "Bode",
     "Certified",
     "Checked",
     "Compared",
@@ -136,6 +140,7 @@ __all__ = [
     "SimulatorError",
     "Source",
     "StateSpace",
+    "Step",
     "Study",
     "Swept",
     "System",
@@ -146,6 +151,7 @@ __all__ = [
     "UsageError",
     "Vehicle",
     "basin",
+    "bode",
     "changed",
     "check_certificate",
     "compare",
@@ -170,6 +176,7 @@ __all__ = [
     "run",
     "save_run",
     "schedule",
+    "step",
     "sweep",
     "tune",
 ]

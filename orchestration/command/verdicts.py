@@ -25,7 +25,9 @@ if TYPE_CHECKING:
     from orchestration.theory.certificates.margin import Certified
     from orchestration.theory.certificates.region import Region
     from orchestration.theory.exact.expect import Expected
+    from orchestration.theory.stability.frequency import Bode
     from orchestration.theory.stability.linearise import Linearised
+    from orchestration.theory.stability.step_response import Step
 
 DIGITS_OF_RUN = 3
 MAX_NAMED = 3
@@ -169,6 +171,33 @@ def of_linearised(loop: Linearised) -> str:
     """Whether the linear loop is stable, and its sizes."""
     sizes = f"{loop.name} with {_states(len(loop.component.A))}, the rest with {_states(len(loop.rest.A))}"
     return f"{_stable(loop.radius)}, sampled every {quantity(loop.rest.dt, 's')}: {sizes}"
+
+
+def of_bode(found: Bode) -> str:
+    """The smallest margins of a loop, or that it is unstable and has none."""
+    clock = f"sampled every {quantity(found.dt, 's')}"
+    if not found.stable:
+        return f"{_stable(found.radius)}, {clock}: an unstable loop has no margins"
+    gains = [loop.gain_margin for loop in found.loops if loop.gain_margin is not None]
+    phases = [loop.phase_margin for loop in found.loops if loop.phase_margin is not None]
+    delays = [loop.delay_margin for loop in found.loops if loop.delay_margin is not None]
+    margins = [
+        f"gain margin {min(gains, key=lambda one: abs(math.log(one))):.3g}" if gains else "infinite gain margin",
+        f"phase margin {min(phases, key=abs):.3g}°" if phases else "infinite phase margin",
+        f"delay margin {quantity(min(delays), 's')}" if delays else "infinite delay margin",
+    ]
+    return f"stable, {clock}: {', '.join(margins)} (small deviations)"
+
+
+def of_step(found: Step) -> str:
+    """How long the slowest loop takes, and what it takes back."""
+    slowest = found.slowest
+    over = "" if slowest.overshoot is None else f", overshoot {slowest.overshoot:.3g} %"
+    settled = f"settles in {quantity(slowest.settling_time, 's')}"
+    return (
+        f"a step on {slowest.output} {settled}{over}, {100.0 * slowest.steady_state:.4g} % taken back, "
+        f"sampled every {quantity(found.dt, 's')} (small deviations)"
+    )
 
 
 def of_schedule(found: Scheduled) -> str:

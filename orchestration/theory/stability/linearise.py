@@ -1,7 +1,9 @@
 """A system about its operating point, cut open at one component: that component, and the rest of the loop."""
 
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,6 +15,7 @@ from orchestration.foundation.processes.passable import passable
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.runs.replacement import component_named
 from orchestration.systems.system.files import files_of
+from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
 from orchestration.theory.stability.known_loops import rested
 from orchestration.theory.stability.linear_simulator import OpenPort
@@ -20,6 +23,8 @@ from orchestration.theory.stability.loop_at_rest import AtRest, at_rest
 from orchestration.theory.stability.matrices import of_samples
 from orchestration.theory.stability.period_map import period_map
 from orchestration.theory.stability.state_space import StateSpace, reduced
+
+Found = TypeVar("Found")
 
 
 @passable
@@ -50,23 +55,48 @@ def linearise(request: RequestLike, component: str | None = None) -> Linearised:
     Raises `UsageError` for a system that does not rest there, for FMUs that cannot save their state, and for a
     component that is not sampled, or is sampled more often than another one.
     """
+    return in_isolation(request, _linearised, component)
+
+
+def in_isolation(request: RequestLike, find: Callable[[Request, str | None], Found], component: str | None) -> Found:
+    """What `find` says of a request and a component, in a process that may load its FMUs."""
     loaded = request_of(request)
     with errors_in_own_terms(loaded):
         files = files_of(system_of(loaded))
-    return isolated_call(files.fmus.values(), _linearised, loaded, component)
+    return isolated_call(files.fmus.values(), find, loaded, component)
 
 
 def _linearised(request: Request, component: str | None) -> Linearised:
     with errors_in_own_terms(request), closing(Instances()) as instances:
         system = rested(request)
-        name = component_named(system, component, "at which to cut the loop open")
-        if system.components[name].sampling is None:
-            raise UsageError(f"component: {name}: expected a sampled component")
+        name = sampled_component(system, component)
         with at_rest(system, instances) as loop:
-            return _cut_open(loop, name)
+            return cut_open(loop, name)
 
 
-def _cut_open(loop: AtRest, name: str) -> Linearised:
+def sampled_component(system: System, component: str | None) -> str:
+    """The component at which a loop is cut open; raises `UsageError` for one that is not sampled."""
+    name = component_named(system, component, "at which to cut the loop open")
+    if system.components[name].sampling is None:
+        raise UsageError(f"component: {name}: expected a sampled component")
+    return name
+
+
+def cut_open(loop: AtRest, name: str) -> Linearised:
+    """A loop at rest, cut open at a sampled component; raises `UsageError` for one that is not the slowest."""
+    sampling = loop.simulation.system.components[name].sampling
+    assert sampling is not None
+    rest = rest_of_loop(loop, name)
+    return Linearised(
+        name=name,
+        component=StateSpace(**vars(of_samples(loop.tangents[name], sampling.period)), dt=rest.dt),
+        rest=rest,
+        radius=float(np.abs(np.linalg.eigvals(period_map(loop))).max(initial=0.0)),
+    )
+
+
+def rest_of_loop(loop: AtRest, name: str) -> StateSpace:
+    """The rest of a loop at rest, as a sampled component sees it; raises `UsageError` as `cut_open`."""
     sampling, tangent = loop.simulation.system.components[name].sampling, loop.tangents[name]
     assert sampling is not None
     if sampling.true_period != loop.period:
@@ -77,11 +107,4 @@ def _cut_open(loop: AtRest, name: str) -> Linearised:
     whole = period_map(loop, {name: port})
     size = len(whole) - len(port.inputs)
     A, B, C = reduced(whole[:size, :size], whole[:size, size:], whole[size:, :size])
-    return Linearised(
-        name=name,
-        component=StateSpace(**vars(of_samples(tangent, sampling.period)), dt=dt),
-        rest=StateSpace(
-            A=A, B=B, C=C, D=np.array(whole[size:, size:]), dt=dt, inputs=port.outputs, outputs=port.inputs
-        ),
-        radius=float(np.abs(np.linalg.eigvals(period_map(loop))).max(initial=0.0)),
-    )  # fmt: skip
+    return StateSpace(A=A, B=B, C=C, D=np.array(whole[size:, size:]), dt=dt, inputs=port.outputs, outputs=port.inputs)

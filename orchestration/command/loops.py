@@ -1,0 +1,94 @@
+"""The commands that draw a loop: over the frequency, and after a step."""
+
+import dataclasses
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from orchestration.command import verdicts
+from orchestration.command.flags import FlightFlags, ScenarioFile, Timing, flight_options, request_from
+from orchestration.command.options import option
+from orchestration.command.registry import CommandResult
+from orchestration.foundation.basics.number_text import quantity
+from orchestration.foundation.basics.terminal import in_columns, inform
+
+if TYPE_CHECKING:
+    from orchestration.simulation.figures.gallery import Figures
+
+Cut = Annotated[
+    str | None,
+    option("--component", "Where the loop is cut open; default: the only component that is sampled.", "NAME"),
+]
+Folder = Annotated[Path | None, option("--out", "Folder for the figure.", "DIR")]
+
+
+@flight_options
+def bode(
+    scenario: ScenarioFile = None,
+    timing: Timing = None,
+    component: Cut = None,
+    out: Folder = None,
+    *,
+    flags: FlightFlags,
+) -> CommandResult:
+    """Compute gain, phase and delay margins of each command's loop, sampled, held and delayed as it is; draw them."""
+    from orchestration.theory.stability.frequency import bode as response_of
+
+    found = response_of(request_from(scenario, flags, timing), component)
+    if out is not None:
+        _draw(found.plot(), out)
+    rows = [("loop", "gain margin", "phase margin", "delay margin", "crossover", "peak of sensitivity")]
+    for loop in found.loops:
+        gain, phase, delay, crossover = loop.gain_margin, loop.phase_margin, loop.delay_margin, loop.crossover
+        rows.append(
+            (
+                loop.output,
+                "infinite" if gain is None else f"{gain:.4g}",
+                "infinite" if phase is None else f"{phase:.4g}°",
+                "infinite" if delay is None else quantity(delay, "s"),
+                "-" if crossover is None else f"{crossover:.4g} rad/s",
+                f"{loop.sensitivity_peak:.4g}",
+            )
+        )
+    document = {
+        "dt": found.dt,
+        "stable": found.stable,
+        "sensitivity_peak": found.sensitivity_peak,
+        "loops": [dataclasses.asdict(loop) for loop in found.loops],
+    }
+    lines = list(in_columns(rows, right=True)) if found.loops else []
+    return CommandResult(document=document, verdict=verdicts.of_bode(found), lines=lines)
+
+
+@flight_options
+def step(
+    scenario: ScenarioFile = None,
+    timing: Timing = None,
+    component: Cut = None,
+    out: Folder = None,
+    *,
+    flags: FlightFlags,
+) -> CommandResult:
+    """Compute how each command's loop takes back a step that is added to the command; draw it."""
+    from orchestration.theory.stability.step_response import step as response_of
+
+    found = response_of(request_from(scenario, flags, timing), component)
+    if out is not None:
+        _draw(found.plot(), out)
+    rows = [("loop", "rise time", "overshoot", "settling time", "final value")]
+    for loop in found.loops:
+        rise = "-" if loop.rise_time is None else quantity(loop.rise_time, "s")
+        over = "-" if loop.overshoot is None else f"{loop.overshoot:.3g} %"
+        rows.append((loop.output, rise, over, quantity(loop.settling_time, "s"), f"{loop.steady_state:.4g}"))
+    slowest = dataclasses.asdict(found.slowest)
+    document = {
+        "dt": found.dt,
+        **{name: slowest[name] for name in ("rise_time", "overshoot", "settling_time", "steady_state")},
+        "loops": [dataclasses.asdict(loop) for loop in found.loops],
+    }
+    lines = list(in_columns(rows, right=True))
+    return CommandResult(document=document, verdict=verdicts.of_step(found), lines=lines)
+
+
+def _draw(figures: "Figures", out: Path) -> None:
+    for path in figures.save(out):
+        inform(str(path))

@@ -1,0 +1,350 @@
+"""Loops in the frequency domain: each command's loop, the others closed, with its margins as a sampled loop."""
+
+import math
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from orchestration.components.fmi.reuse import Instances
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.extras import explains_missing
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.processes.passable import passable
+from orchestration.simulation.requests.request import RequestLike, request_of
+from orchestration.simulation.workers.choice import single_run_execution
+from orchestration.systems.system.distribution import lowest
+from orchestration.systems.system.files import files_of
+from orchestration.systems.system.model import System
+from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
+from orchestration.theory.stability.known_loops import rested
+from orchestration.theory.stability.linearise import (
+    Linearised,
+    cut_open,
+    in_isolation,
+    rest_of_loop,
+    sampled_component,
+)
+from orchestration.theory.stability.loop_at_rest import KnownTangents, at_rest
+from orchestration.theory.stability.operating_point import deterministic
+from orchestration.theory.stability.state_space import StateSpace
+
+if TYPE_CHECKING:
+    from orchestration.simulation.figures.gallery import Figures
+
+Complexes = npt.NDArray[np.complex128]
+
+NEAR_ONE = 1e-7
+"""Distance of a spectral radius from 1 that rounding may explain"""
+LOWEST = 1e-5
+"""Lowest frequency, as a share of the highest"""
+SLOWER = 0.03
+"""Lowest frequency, as a share of the slowest rate of the closed loop: below are the integrators alone"""
+FREQUENCIES = 1500
+BESIDE_A_POLE = np.linspace(-4.0, 4.0, 17)
+"""Further frequencies about that of a pole, in units of its damping"""
+HALVINGS = 60
+PROVED = 1e-3
+"""Relative distance from a gain margin at which the loop is stable on one side and unstable on the other"""
+EXACT = 1e-6
+"""Change of a delay margin, in periods, at which its iteration ends"""
+ITERATIONS = 20
+BEYOND = 1.5
+"""Factor on the least delay margin beyond which an estimate at another crossover cannot be less"""
+
+
+@passable
+@dataclass(frozen=True, kw_only=True)
+class LoopMargins:
+    """The loop of one command, cut where it leaves the component, and its margins."""
+
+    input: str
+    """The inputs that the command goes to, as COMPONENT.VARIABLE."""
+    output: str
+    """The command, as COMPONENT.VARIABLE."""
+    gain_margin: float | None
+    """The factor on the command nearest to 1 at which the loop becomes unstable; None: infinite."""
+    phase_margin: float | None
+    """The smallest distance of the phase from that of -1 where the gain is 1 [deg]; None: it is nowhere 1."""
+    delay_margin: float | None
+    """The further delay of the command at which the loop becomes unstable [s]; None: infinite."""
+    crossover: float | None
+    """The frequency of the phase margin [rad/s]; None: the gain is nowhere 1."""
+    sensitivity_peak: float
+    """The largest absolute value of the sensitivity 1 / (1 + L)."""
+
+
+@passable
+@dataclass(frozen=True, kw_only=True)
+class Bode:
+    """The loops of a component about its operating point, one for each command, with the others closed."""
+
+    dt: float
+    """Time from sample to sample [s]."""
+    stable: bool
+    """Whether the closed loop is stable; margins are those of a stable loop only."""
+    radius: float
+    """The spectral radius of the closed loop over a period."""
+    sensitivity_peak: float | None
+    """The largest of the loops' peaks; None: the loop is unstable."""
+    loops: tuple[LoopMargins, ...]
+    """The loops with their margins; empty if the loop is unstable."""
+    frequencies: Floats = field(repr=False)
+    """Frequencies up to half the sampling rate [rad/s], shape (n,)."""
+    gains: Complexes = field(repr=False)
+    """Loop gains L at them, which negative feedback closes, shape (loops, n)."""
+
+    @explains_missing
+    def plot(self, *, style: Literal["screen", "paper", "slides"] = "screen") -> "Figures":
+        """The loop gain, its phase and the sensitivity over the frequency; a notebook shows it.
+
+        `style` sets its size and fonts. Raises `UsageError` for an unknown style.
+        """
+        from orchestration.simulation.figures.gallery import Figures
+        from orchestration.simulation.figures.style import style_named
+        from orchestration.theory.stability.loop_figures import bode_figure
+
+        chosen = style_named(style)
+        with chosen.applied():
+            return Figures({"bode": bode_figure(self, chosen)}, chosen)
+
+
+def bode(request: RequestLike, component: str | None = None) -> Bode:
+    """The loop gains of a sampled component with all holds and delays, about the operating point, and their margins.
+
+    As `linearise`, of which it is the frequency response: default `component` is the only sampled one. Each loop is cut
+    at one command, with the others closed. A delay margin is exact also for parts of a period: the loop is linearised
+    with it.
+
+    Raises `UsageError` as `linearise`, and for a loop whose stability rounding may decide.
+    """
+    loaded, _ = single_run_execution(request_of(request), "auto")
+    return in_isolation(loaded, _bode, component)
+
+
+def expect_decided(loop: Linearised) -> None:
+    """Raise `UsageError` for a loop whose stability rounding may decide, or whose halves are not the whole of it."""
+    radius, by_halves = loop.radius, radius_with(loop, 0, 1.0)
+    if abs(radius - 1.0) < NEAR_ONE:
+        raise UsageError(f"the loop is neither stable nor unstable: its spectral radius is {radius:.9g}, which is 1")
+    if loop.rest.D.any() or (radius < 1.0) != (max(radius, by_halves) < 1.0):
+        raise UsageError(
+            f"the loop as a whole has a spectral radius of {radius:.6g}, its two halves one of {by_halves:.6g}: "
+            "the loop cannot be cut open there"
+        )
+
+
+def _bode(request: Request, component: str | None) -> Bode:
+    with errors_in_own_terms(request), closing(Instances()) as instances:
+        system = deterministic(rested(request))
+        name = sampled_component(system, component)
+        known: KnownTangents = {}
+        models = files_of(system).models_of(system)
+        with at_rest(system, instances, models=models, known=known) as rest:
+            loop = cut_open(rest, name)
+
+        def late(delay: float) -> StateSpace:
+            with at_rest(delayed(system, name, delay), instances, models=models, known=known) as rest:
+                return rest_of_loop(rest, name)
+
+        expect_decided(loop)
+        frequencies, stable = _frequencies(loop), loop.radius < 1.0
+        gains = loop_gains(loop, frequencies)
+        found = tuple(_margins(loop, i, frequencies, gains[i], late, system) for i in _commands(loop)) if stable else ()
+    return Bode(
+        dt=loop.rest.dt, stable=stable, radius=loop.radius, loops=found, frequencies=frequencies, gains=gains,
+        sensitivity_peak=max((each.sensitivity_peak for each in found), default=None),
+    )  # fmt: skip
+
+
+def delayed(system: System, name: str, delay: float) -> System:
+    """The system with a further delay [s] of all that a component sends."""
+    connections = (
+        x.with_delay(lowest(x.delay) + delay) if x.sender == name and delay else x for x in system.connections
+    )
+    return replace(system, connections=tuple(connections))
+
+
+def receivers_of(request: RequestLike, output: str) -> str:
+    """The inputs that an output is connected to, as COMPONENT.VARIABLE."""
+    connections = system_of(request_of(request)).connections
+    return ", ".join(end for x in connections for start, end in zip(x.start, x.end) if start == output)
+
+
+def _commands(loop: Linearised) -> range:
+    return range(len(loop.component.outputs))
+
+
+def _margins(
+    loop: Linearised, i: int, frequencies: Floats, gain: Complexes, late: Callable[[float], StateSpace], system: System
+) -> LoopMargins:
+    def gain_at(frequency: float) -> complex:
+        return complex(loop_gains(loop, np.array([frequency]))[i, 0])
+
+    output = f"{loop.name}.{loop.component.outputs[i]}"
+    crossings = [_root(lambda w: abs(gain_at(w)) - 1.0, *ends) for ends in _changes(frequencies, np.abs(gain) - 1.0)]
+    phases = {w: _phase_margin(gain_at(w)) for w in crossings}
+    crossover = min(phases, key=lambda w: abs(phases[w]), default=None)
+    return LoopMargins(
+        input=receivers_of(system, output),
+        output=output,
+        gain_margin=_gain_margin(loop, i, frequencies, gain, gain_at),
+        phase_margin=None if crossover is None else math.degrees(phases[crossover]),
+        delay_margin=_delay_margin(loop, i, crossings, gain_at, late),
+        crossover=crossover,
+        sensitivity_peak=float(np.abs(1.0 / (1.0 + gain)).max()),
+    )
+
+
+def _phase_margin(gain: complex) -> float:
+    """The angle from -1 to a gain, within half a turn [rad]."""
+    return float(np.angle(-gain))
+
+
+def _gain_margin(
+    loop: Linearised, i: int, frequencies: Floats, gain: Complexes, gain_at: Callable[[float], complex]
+) -> float | None:
+    """The factor nearest to 1 beyond which the loop is unstable, as its eigenvalues confirm."""
+    ends = [gain_at(w) for w in (0.0, math.pi / loop.rest.dt) if _is_finite_at(loop, w)]
+    inner = [gain_at(_root(lambda w: gain_at(w).imag, *pair)) for pair in _changes(frequencies, gain.imag)]
+    factors = [-1.0 / each.real for each in [*ends, *inner] if each.real < 0.0]
+    for factor in sorted(factors, key=lambda one: abs(math.log(one))):
+        away = math.copysign(PROVED, factor - 1.0)
+        if radius_with(loop, i, factor * (1.0 - away)) < 1.0 <= radius_with(loop, i, factor * (1.0 + away)):
+            return factor
+    return None
+
+
+def _delay_margin(
+    loop: Linearised,
+    i: int,
+    crossings: Sequence[float],
+    gain_at: Callable[[float], complex],
+    late: Callable[[float], StateSpace],
+) -> float | None:
+    """The further delay of a command at which the loop becomes unstable [s].
+
+    Of whole periods n the loop gain has the factor z^-n; by the part of a period that remains the hold is shifted,
+    so that the loop is linearised with it: to a fixed point.
+    """
+    dt = loop.rest.dt
+    least: float | None = None
+    for estimate, crossing in sorted((_turn(gain_at(crossing)) / crossing, crossing) for crossing in crossings):
+        if least is not None and estimate > BEYOND * least:
+            break
+        delay, at = estimate, crossing
+        for _ in range(ITERATIONS):
+            whole = math.floor(delay / dt)
+            rest = late(delay - whole * dt)
+
+            def gain_late(w: float, rest: StateSpace = rest) -> complex:
+                return complex(loop_gains(loop, np.array([w]), i, rest)[i, 0])
+
+            near = np.linspace(0.8 * at, min(1.25 * at, math.pi / dt), 61)
+            sizes = np.abs(loop_gains(loop, near, i, rest)[i]) - 1.0
+            ends = min(_changes(near, sizes), key=lambda pair: abs(sum(pair) / 2.0 - at), default=None)
+            if ends is None:
+                break
+            at = _root(lambda w: abs(gain_late(w)) - 1.0, *ends)
+            left = _phase_margin(gain_late(at) * np.exp(-1j * at * dt * whole)) / at
+            delay += left
+            if abs(left) < EXACT * dt:
+                least = delay if least is None else min(least, delay)
+                break
+        else:
+            raise UsageError(f"{loop.component.outputs[i]}: its delay margin near {delay:.4g} s cannot be computed")
+    return least
+
+
+def _turn(gain: complex) -> float:
+    """The angle from -1 up to a gain, in a turn [rad]."""
+    return float(np.angle(-gain)) % (2.0 * math.pi)
+
+
+def loop_gains(
+    loop: Linearised, frequencies: Floats, only: int | None = None, late: StateSpace | None = None
+) -> Complexes:
+    """The gain of the loop of each command with the others closed, shape (commands, n).
+
+    The command `only` reaches the rest of the loop as it reaches `late`.
+    """
+    z = np.exp(1j * frequencies * loop.rest.dt)
+    rest, law = _response(loop.rest, z), _response(loop.component, z)
+    if late is not None:
+        rest[:, :, only] = _response(late, z)[:, :, only]
+    back = -law @ rest
+    count = back.shape[1]
+    gains = np.empty((count, len(z)), dtype=complex)
+    for i in range(count):
+        others = [j for j in range(count) if j != i]
+        closed = np.eye(len(others)) + back[:, others][:, :, others]
+        through = np.linalg.solve(closed, back[:, others][:, :, [i]])
+        gains[i] = (back[:, [i], i] - (back[:, [i]][:, :, others] @ through)[:, :, 0])[:, 0]
+    return gains
+
+
+def _response(of: StateSpace, z: Complexes) -> Complexes:
+    """The transfer function at some z, shape (n, outputs, inputs)."""
+    if not len(of.A):
+        return np.tile(of.D.astype(complex), (len(z), 1, 1))
+    states = np.linalg.solve(z[:, None, None] * np.eye(len(of.A)) - of.A, of.B.astype(complex)[None])
+    return np.asarray(of.C @ states + of.D, dtype=complex)
+
+
+def closed_loop(loop: Linearised, factors: Floats | None = None) -> Floats:
+    """The matrix of both halves over a sample; `factors` on the commands, default 1."""
+    rest, law = loop.rest, loop.component
+    gain = np.eye(len(law.outputs)) if factors is None else np.diag(factors)
+    B = rest.B @ gain
+    return np.block([[rest.A + B @ law.D @ rest.C, B @ law.C], [law.B @ rest.C, law.A]])
+
+
+def radius_with(loop: Linearised, i: int, factor: float) -> float:
+    """The spectral radius of both halves with a factor on one command."""
+    factors = np.ones(len(loop.component.outputs))
+    factors[i] = factor
+    return float(np.abs(np.linalg.eigvals(closed_loop(loop, factors))).max(initial=0.0))
+
+
+def _is_finite_at(loop: Linearised, frequency: float) -> bool:
+    """Whether neither half has a pole at a frequency."""
+    z = np.exp(1j * frequency * loop.rest.dt)
+    poles = np.concatenate([np.linalg.eigvals(half.A) for half in (loop.rest, loop.component)])
+    return not len(poles) or float(np.abs(poles - z).min()) > np.sqrt(NEAR_ONE)
+
+
+def _frequencies(loop: Linearised) -> Floats:
+    """Frequencies at which loops are evaluated [rad/s]: even in the logarithm, and closer about those of poles."""
+    dt = loop.rest.dt
+    top = math.pi / dt
+    closed = _rates(closed_loop(loop), dt)
+    rates = np.concatenate([closed, _rates(loop.rest.A, dt), _rates(loop.component.A, dt)])
+    low = max(SLOWER * float(np.abs(closed).min(initial=top)), LOWEST * top)
+    about = [abs(rate.imag) + BESIDE_A_POLE * max(abs(rate.real), 1e-3 * abs(rate.imag)) for rate in rates]
+    found = np.concatenate([np.geomspace(low, top, FREQUENCIES), *about])
+    return np.unique(found[(found >= low) & (found <= top)])
+
+
+def _rates(A: Floats, dt: float) -> Complexes:
+    """The rates of decay and rotation of the motions of a matrix that do not end at once [1/s]."""
+    poles = np.linalg.eigvals(A).astype(complex)
+    rates: Complexes = np.log(poles[np.abs(poles) > LOWEST]) / dt
+    return rates
+
+
+def _changes(frequencies: Floats, values: Floats) -> list[tuple[float, float]]:
+    """Neighbouring frequencies between which a value changes its sign."""
+    signs = np.sign(values)
+    places = np.flatnonzero(signs[:-1] * signs[1:] < 0.0)
+    return [(float(frequencies[place]), float(frequencies[place + 1])) for place in places]
+
+
+def _root(of: Callable[[float], float], low: float, high: float) -> float:
+    rising = of(high) > of(low)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if (of(middle) > 0.0) == rising else (middle, high)
+    return 0.5 * (low + high)

@@ -1,0 +1,147 @@
+"""Margins and steps of sampled loops: against python-control, against the loop made as late, and what is refused."""
+
+import dataclasses
+import json
+import math
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from orchestration.systems.system.model import System
+from orchestration.systems.system.paths import changed
+from orchestration.theory.stability.frequency import closed_loop, delayed, expect_decided, loop_gains
+from quadcosim import Bode, Linearised, StateSpace, Step, UsageError, bode, linearise, step
+from tests.commands import Main
+from tests.examples.common import example
+from tests.orchestration.experiments.studies.test_systems import DELAY
+from tests.places import EXAMPLES
+
+NAMES = ("dc_servo", "lqg")
+"""Loops of one command: one has a law that is stable alone, one an unstable plant"""
+
+
+@cache
+def system_of(name: str) -> System:
+    return example(name)
+
+
+@cache
+def bode_of(name: str) -> Bode:
+    return bode(system_of(name))
+
+
+@cache
+def step_of(name: str) -> Step:
+    return step(system_of(name))
+
+
+@cache
+def loop_gain(name: str) -> Any:
+    """The loop gain as a system of python-control."""
+    control = pytest.importorskip("control")
+    loop = linearise(system_of(name))
+    return control.ss(-loop.component.to_control() * loop.rest.to_control())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_margins_are_those_of_python_control(name: str) -> None:
+    control = pytest.importorskip("control")
+    gain, phase, distance, _, crossover = control.stability_margins(loop_gain(name))[:5]
+    found = bode_of(name)
+    (loop,) = found.loops
+    assert found.stable
+    assert loop.gain_margin == pytest.approx(gain, rel=1e-5)
+    assert (loop.phase_margin, loop.crossover) == (pytest.approx(phase, abs=0.05), pytest.approx(crossover, rel=1e-3))
+    assert loop.sensitivity_peak == found.sensitivity_peak == pytest.approx(1.0 / distance, rel=1e-3)
+    at = loop_gain(name)(np.exp(1j * np.array([loop.crossover, 1.0]) * found.dt))
+    assert abs(at[0]) == pytest.approx(1.0, rel=1e-6)
+    assert 180.0 + math.degrees(np.angle(at[0])) == pytest.approx(loop.phase_margin, abs=1e-4)
+    assert np.interp(1.0, found.frequencies, np.abs(found.gains[0])) == pytest.approx(abs(at[1]), rel=1e-4)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_step_is_that_of_python_control(name: str) -> None:
+    control = pytest.importorskip("control")
+    closed = control.feedback(loop_gain(name), 1.0)
+    known, found = control.step_info(closed, T=step_of(name).times), step_of(name)
+    (loop,) = found.loops
+    assert loop == found.slowest
+    assert loop.steady_state == pytest.approx(float(np.real(closed.dcgain())), rel=1e-6)
+    assert (loop.rise_time, loop.settling_time) == (
+        pytest.approx(known["RiseTime"], abs=1e-9), pytest.approx(known["SettlingTime"], abs=1e-9),
+    )  # fmt: skip
+    assert loop.overshoot == pytest.approx(known["Overshoot"], abs=0.01)
+    assert found.responses[0] == pytest.approx(control.step_response(closed, found.times).outputs, rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_loop_that_is_late_by_its_delay_margin_is_between_stable_and_unstable(name: str) -> None:
+    """Also by a part of a period: 11.497 ms are 1.92 periods of the servo."""
+    (loop,) = bode_of(name).loops
+    assert loop.delay_margin is not None
+    assert (loop.input.rpartition(".")[2], loop.output) == ("u", "controller.u")
+    sooner, later = (
+        linearise(delayed(system_of(name), "controller", share * loop.delay_margin)).radius for share in (0.999, 1.001)
+    )
+    assert sooner < 1.0 < later
+
+
+def test_a_loop_of_one_command_has_the_others_closed() -> None:
+    """The sensitivity of a command is the entry of (I - C G)^-1 on the diagonal."""
+    random = np.random.default_rng(5)
+
+    def half(states: int, inputs: int, outputs: int, D: float) -> StateSpace:
+        A, B, C = (0.3 * random.normal(size=size) for size in ((states, states), (states, inputs), (outputs, states)))
+        return StateSpace(
+            A=A, B=B, C=C, D=D * random.normal(size=(outputs, inputs)), dt=0.1, inputs=("",) * inputs,
+            outputs=("",) * outputs,
+        )  # fmt: skip
+
+    loop = Linearised(name="law", component=half(2, 2, 3, 0.5), rest=half(4, 3, 2, 0.0), radius=0.5)
+    z = np.exp(0.7j)
+
+    def at(of: StateSpace) -> np.ndarray:
+        return np.asarray(of.C @ np.linalg.solve(z * np.eye(len(of.A)) - of.A, of.B) + of.D)
+
+    sensitivity = np.diag(np.linalg.inv(np.eye(3) - at(loop.component) @ at(loop.rest)))
+    assert 1.0 / (1.0 + loop_gains(loop, np.array([7.0]))[:, 0]) == pytest.approx(sensitivity, rel=1e-9)
+
+
+def test_an_unstable_loop_has_no_margins_and_no_step() -> None:
+    late = changed(system_of("dc_servo"), {DELAY: 0.02})
+    found = bode(late)
+    assert (found.stable, found.loops, found.sensitivity_peak) == (False, (), None)
+    with pytest.raises(UsageError, match=r"^step: expected a stable loop; the spectral radius of this one is 1\.04"):
+        step(late)
+
+
+def test_a_loop_that_rounding_decides_is_refused_and_so_are_halves_that_are_not_the_loop() -> None:
+    loop = linearise(system_of("dc_servo"))
+    expect_decided(loop)
+    with pytest.raises(UsageError, match="neither stable nor unstable"):
+        expect_decided(dataclasses.replace(loop, radius=1.0 + 1e-9))
+    law = dataclasses.replace(loop.component, C=10.0 * loop.component.C, D=10.0 * loop.component.D)
+    with pytest.raises(UsageError, match="cannot be cut open there"):
+        expect_decided(dataclasses.replace(loop, component=law))
+    assert np.abs(np.linalg.eigvals(closed_loop(loop))).max() == pytest.approx(loop.radius, rel=1e-9)
+
+
+def test_the_commands_print_the_margins_first_and_draw(main: Main, tmp_path: Path) -> None:
+    file = EXAMPLES / "dc_servo" / "system.toml"
+    document = json.loads(main("bode", file, "--json", "--out", tmp_path).stdout)
+    assert document.keys() == {"verdict", "dt", "stable", "sensitivity_peak", "loops"}
+    assert document["loops"] == [dataclasses.asdict(loop) for loop in bode_of("dc_servo").loops]
+    assert document["verdict"] == (
+        "stable, sampled every 6 ms: gain margin 3.25, phase margin 33.7°, delay margin 11.5 ms (small deviations)"
+    )
+    stepped = json.loads(main("step", file, "--json", "--out", tmp_path).stdout)
+    assert {"rise_time", "overshoot", "settling_time", "steady_state"} < stepped.keys()
+    assert stepped["verdict"].startswith("a step on controller.u settles in 300 ms, overshoot 54.7 %, 100 % taken back")
+    for name in ("bode", "step"):
+        assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+    gain, _, sensitivity = bode_of("dc_servo").plot()["bode"].axes
+    assert gain.lines[1].get_xydata() == pytest.approx(np.array([[51.097, 1.0]]), rel=1e-4)  # the dot at the crossover
+    assert np.max(np.asarray(sensitivity.lines[0].get_ydata())) == bode_of("dc_servo").sensitivity_peak
