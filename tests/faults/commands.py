@@ -110,6 +110,7 @@ BEFORE = {
     "paused": _before(f"{_RUN} --pause-at 0.02 --out paused"),
     "store": _before("sweep study.toml --out store"),
     "half": _before("sweep study.toml --out half --engine compiled", killed_at=60),
+    "hover": _before("new controller hover --c"),
     "results": _before("tune gains.toml --out gains --engine compiled", killed_at=20),
 }
 """By the folder that it makes"""
@@ -161,5 +162,13 @@ COMMANDS = (
     ),
     _command("limit", f"{_LIMIT} --out limits"),
     _command("margin", f"{_MARGIN} --out a.json", "a.json"),
+    _command(
+        "margin --and",
+        f"{_MARGIN} --and components.controller.sampling.jitter --out region",
+        "region/1.json",
+        "region/region.png",
+    ),
+    _command("live", f"live {_INTEGRATOR} --out a.html", "a.html"),
+    _command("wrap", "wrap hover/hover.toml", "hover/Hover.fmu", needs="hover"),
     _command("interop", f"interop {_INTEGRATOR} --tool libcosim --stop-time 0.2 --out agreement"),
 )

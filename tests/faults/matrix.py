@@ -143,7 +143,7 @@ class Matrix:
                 yield "lost", f"then: {len(lost)} rows of {path.name} were made again"
         if any((place / "tmp").iterdir()):  # the next command that needs a temporary folder removes what is there
             self._run(RUN, place)
-        left = [str(path.relative_to(place)) for path in (place / "tmp").iterdir()]
+        left = [str(path.relative_to(place)) for path in (place / "tmp").iterdir() if not _is_a_trial(path)]
         if left := left + [name for name in last if HIDDEN.search(name)]:
             yield "left", ", ".join(sorted(left)[:3])
 
@@ -187,6 +187,11 @@ def numbers(fault: Fault, count: int) -> Iterator[int]:
         n = n + 1 if n < each else 2 * n
     if count:
         yield count
+
+
+def _is_a_trial(path: Path) -> bool:
+    """Whether it is the file by which Python's `tempfile` tries a folder, in a process that was killed just then."""
+    return re.fullmatch(r"[a-z0-9_]{8}", path.name) is not None and path.read_bytes() in (b"", b"blat")
 
 
 def _new_place(place: Path) -> Path:

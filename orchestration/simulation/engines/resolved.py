@@ -22,9 +22,10 @@ from orchestration.systems.schedule.fixed_step import FixedStep
 from orchestration.systems.schedule.streams import VALUE, Streams
 from orchestration.systems.signals.library import make_signal
 from orchestration.systems.system.check import check, connect_references, describe_references, recorded_variables
-from orchestration.systems.system.component import Component, Sampling, SamplingOnArrival, has_scheduled_instants
+from orchestration.systems.system.component import Component, Sampling, has_scheduled_instants
 from orchestration.systems.system.connection import variable_of
 from orchestration.systems.system.model import System, expressions
+from orchestration.systems.system.placement import placed_tasks
 from orchestration.systems.system.request import Request, errors_in_own_terms
 from orchestration.systems.system.source import MOTION, Source
 
@@ -256,32 +257,31 @@ def fixed_steps(system: System, models: Mapping[str, Model]) -> dict[str, FixedS
     return steps
 
 
-def unbelieved_periods(system: System, models: Mapping[str, Model]) -> dict[str, float]:
-    """The components whose code believes another sampling period than theirs, and what it believes [s]."""
-    found = {}
-    for name, component in system.components.items():
-        sampling = component.sampling
-        if sampling is None or isinstance(sampling, SamplingOnArrival):
-            continue
-        believed = models[name].believed_period
-        if believed is not None and not math.isclose(believed, sampling.period, rel_tol=1e-6):
-            found[name] = believed
-    return found
+def unbelieved_periods(system: System, models: Mapping[str, Model]) -> dict[str, tuple[float, float]]:
+    """The components whose code believes another sampling period than theirs: theirs, that of their task on a computer
+    too, and what it believes [s].
+    """
+    samplings = {name: component.sampling for name, component in system.components.items()}
+    periods = {name: sampling.period for name, sampling in samplings.items() if isinstance(sampling, Sampling)}
+    periods |= {
+        each.task.component: each.task.period
+        for each in placed_tasks(system.computers)
+        if each.task.component is not None and each.task.period is not None
+    }
+    return {
+        name: (period, believed)
+        for name, period in periods.items()
+        if (believed := models[name].believed_period) is not None and not math.isclose(believed, period, rel_tol=1e-6)
+    }
 
 
 def periods_in_words(system: System, models: Mapping[str, Model]) -> list[str]:
     """A warning for each such component of a run."""
     return [
-        f"{name} ({models[name].name}): is sampled every {_period_of(system, name):g} s, but its code believes "
-        f"{believed:g} s: what it computes of time is wrong by that ratio"
-        for name, believed in unbelieved_periods(system, models).items()
+        f"{name} ({models[name].name}): is sampled every {period:g} s, but its code believes {believed:g} s: what it "
+        "computes of time is wrong by that ratio"
+        for name, (period, believed) in unbelieved_periods(system, models).items()
     ]
-
-
-def _period_of(system: System, name: str) -> float:
-    sampling = system.components[name].sampling
-    assert sampling is not None
-    return sampling.period
 
 
 def other_periods_in_words(system: System, models: Mapping[str, Model]) -> list[str]:
@@ -289,7 +289,7 @@ def other_periods_in_words(system: System, models: Mapping[str, Model]) -> list[
     return [
         f"{name} ({models[name].name}): its code believes {believed:g} s; at other periods this is the limit of that "
         "code, whose constants of time stay, not of a design for each period"
-        for name, believed in unbelieved_periods(system, models).items()
+        for name, (_, believed) in unbelieved_periods(system, models).items()
     ]
 
 

@@ -67,6 +67,15 @@ def test_a_run_at_another_period_warns_and_at_its_own_does_not(integrator: Path)
     )
 
 
+def test_a_task_of_a_computer_at_another_period_warns(integrator: Path) -> None:
+    task = '[computers.node.tasks.control]\ncomponent = "controller"\nperiod = 0.2\n'
+    text = integrator.read_text().replace("sampling = { period = 0.05 }\n", "")
+    placed = integrator.with_name("placed.toml")
+    placed.write_text(f"{text}\n{task}")
+    (told,) = run(changed(load_system(placed), {"stop_time": 1.0})).warnings
+    assert told.startswith("controller (Pd): is sampled every 0.2 s, but its code believes 0.05 s")
+
+
 def bits(path: Path) -> list[tuple[Any, ...]]:
     """What is stored of each run, but for how long it took and by which engine."""
     with contextlib.closing(sqlite3.connect(path)) as store:
