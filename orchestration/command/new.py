@@ -7,8 +7,6 @@ import typer
 
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, result_of_files
-from orchestration.components.scaffold import examples as shipped
-from orchestration.components.scaffold.folder import Kind, git_author, write
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import inform
 
@@ -21,6 +19,8 @@ def new(
     in_c: Annotated[bool, option("--c", "A controller in C, and the file by which it is wrapped.")] = False,
 ) -> CommandResult:
     """Write a folder NAME here: a law in a few lines, its test, a system that uses it, a page of commands."""
+    from orchestration.components.scaffold.folder import Kind, git_author, write
+
     kinds = {each: each for each in get_args(Kind)}
     if kind not in kinds:
         raise UsageError(f"new {kind}: expected {', '.join(kinds)}")
@@ -40,6 +40,8 @@ def examples(
     out: Annotated[Path, option("--out", "Folder for them.", "DIR")] = Path(),
 ) -> CommandResult:
     """Write the folders examples, studies and gains here: the files that the documentation uses."""
+    from orchestration.components.scaffold import examples as shipped
+
     written = result_of_files(shipped.write(out))
     inform(f"next: quadcosim run {out / 'examples' / 'water_tank' / 'system.toml'}")
     return written
