@@ -8,7 +8,7 @@ from fmpy import sundials
 from fmpy.fmi1 import FMICallException
 
 _AT_ROOT = 2
-"""What CVode returns where an event indicator has changed its sign"""
+"""Code that CVode returns where an event indicator has changed its sign"""
 _MOST_STEPS = 1_000_000
 """Its own steps from one communication point to the next, at most"""
 SOLVE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, ctypes.POINTER(ctypes.c_bool))
