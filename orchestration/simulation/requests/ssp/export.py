@@ -6,7 +6,7 @@ from pathlib import Path
 
 from orchestration.components.building import fmus
 from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
-from orchestration.components.fmi.read_description import Model, Variable, read_model
+from orchestration.components.fmi.read_description import Model, Variable, called, read_model
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.engines.resolved import source_values
 from orchestration.systems.schedule.plan import Plan
@@ -65,7 +65,7 @@ def export_of(request: Request, announce: Callable[[str], None] | None = None) -
         system = _with_constants_at_rest(connect_references(system, models))
         plan = Plan(system)
         step, unequal = _common_step(system, models)
-        unsupported = (*_unsupported(system), *unequal)
+        unsupported = (*_unsupported(system, models), *unequal)
         return Export(
             system=system,
             parts=tuple(_part(system, name, located[name], models[name]) for name in plan.sampled + plan.continuous),
@@ -97,8 +97,11 @@ def complete_export(request: Request, announce: Callable[[str], None] | None) ->
     return export
 
 
-def _unsupported(system: System) -> Iterator[str]:
+def _unsupported(system: System, models: Mapping[str, Model]) -> Iterator[str]:
     for name, component in system.components.items():
+        interface = called(models[name], component.access).interface
+        if interface != "co-simulation":
+            yield f"components.{name}.interface = {interface}: an SSP is written of co-simulation alone; expected that"
         if component.sampling is not None:
             yield from _unsupported_fields(f"components.{name}.sampling", component.sampling, ("jitter", "clock_ratio"))
     for table in ("computers", "networks"):

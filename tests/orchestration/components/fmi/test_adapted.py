@@ -14,6 +14,7 @@ from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError
 from orchestration.simulation.engines.resolved import resolve
 from orchestration.simulation.requests.request import request_of
+from orchestration.simulation.requests.ssp.export import export_of
 from orchestration.simulation.runs.pause import resume, run_until
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.systems.system.paths import changed
@@ -166,6 +167,12 @@ def test_who_handles_events_is_said(tmp_path: Path) -> None:
     fmu = exchange(tmp_path, "stair", event_mode=True)
     checked = resolve(request_of({"stop_time": 1.0, "components": {"it": {"fmu": str(fmu), "step": 0.1}}}))
     assert [text.partition(",")[0] for text in checked.events] == ["it: the FMU handles its events itself"]
+
+
+def test_an_ssp_is_not_written_of_other_interfaces(tmp_path: Path) -> None:
+    system = request_of({"stop_time": 1.0, "components": {"it": {"fmu": str(exchange(tmp_path, "ball")), "step": 0.1}}})
+    expected = "components.it.interface = model-exchange: an SSP is written of co-simulation alone; expected that"
+    assert export_of(system, None).unsupported == (expected,)
 
 
 def test_events_without_end_are_an_error(tmp_path: Path) -> None:
