@@ -16,7 +16,8 @@ def report(
     what: Annotated[
         list[Path],
         typer.Argument(
-            help="Directories of runs, or one study file, its store, or a comparison file.", metavar="WHAT..."
+            help="Directories of runs; a study file or its store, or two over one another; or a comparison file.",
+            metavar="WHAT...",
         ),
     ],
     out: Annotated[

@@ -1,4 +1,4 @@
-"""A report as one HTML file that contains its data, the code of the page and the plotting library."""
+"""A report as one HTML file that contains its data and the code of the page."""
 
 import html
 import json
@@ -11,8 +11,8 @@ from orchestration.experiments.report.model import Report, as_json
 from orchestration.simulation.figures import palette, shades
 
 SCRIPTS = (
-    "data.js", "words.js", "theme.js", "scene.js", "peaks.js", "timeplots.js", "map.js", "shares.js", "run.js",
-    "tables.js", "page.js",
+    "data.js", "words.js", "theme.js", "plots.js", "scene.js", "peaks.js", "timeplots.js", "map.js", "shares.js",
+    "run.js", "tables.js", "page.js",
 )  # fmt: skip
 """Scripts in the order of loading; each depends only on those before it"""
 FIGURES = {
@@ -36,13 +36,10 @@ def write(report: Report, out: Path) -> Path:
 
 def as_html(report: Report) -> str:
     """The text of the file."""
-    from plotly.offline import get_plotlyjs  # comes with an extra
-
     parts = {
         "title": html.escape(report.title),
         "style": _text("style.css"),
         "data": _in_script(as_json(report)),
-        "plotly": get_plotlyjs(),
         "figures": json.dumps(FIGURES),
         "script": "\n".join(_text(name) for name in SCRIPTS),
     }

@@ -189,6 +189,16 @@ class ComparisonCells:
 
 
 @dataclass(frozen=True, kw_only=True)
+class OtherStudy:
+    """A second study over the same axes, drawn over the first."""
+
+    name: str
+    table: ReportTable
+    """Its runs, without metrics"""
+    shares: tuple[Shares, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Report:
     """The whole document."""
 
@@ -210,6 +220,7 @@ class Report:
     overall: ReportShare | None = None
     shares: tuple[Shares, ...] = ()
     compared: ComparisonCells | None = None
+    other: OtherStudy | None = None
     contents: tuple[str, ...] = ()
     """sentences: what the file contains and what it omits"""
     warnings: tuple[str, ...] = ()

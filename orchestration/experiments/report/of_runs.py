@@ -17,8 +17,8 @@ from orchestration.systems.schedule.resources import timeline_of
 from orchestration.systems.system.component import flattened
 from orchestration.systems.system.model import System
 
-BYTES = 9_000_000
-"""Characters that the signals of all runs may take"""
+BYTES, BYTES_OF_ONE = 9_000_000, 700_000
+"""Characters that the signals of all runs, and of one, may take"""
 MAX_ROWS, MIN_ROWS = 6000, 200
 """Most and fewest rows of a run"""
 MAX_RUNS = 200
@@ -37,7 +37,7 @@ def runs_report(results: Mapping[str, Result], command: str) -> Report:
     blobs = Blobs()
     tracks = Tracks(blobs)
     columns = sum(len(result.columns) for result in results.values())
-    rows = int(min(MAX_ROWS, max(MIN_ROWS, BYTES / _CODED / columns)))
+    rows = int(min(MAX_ROWS, max(MIN_ROWS, min(BYTES, BYTES_OF_ONE * len(results)) / _CODED / columns)))
     runs = [_run(name, result, tracks, blobs, rows) for name, result in results.items()]
     first = next(iter(results.values()))
     summaries = [_summary(name, result) for name, result in results.items()]

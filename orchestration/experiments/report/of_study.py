@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from orchestration.experiments.report.blobs import Blobs
-from orchestration.experiments.report.model import Report, ReportRun, ReportShare, Setting
+from orchestration.experiments.report.model import OtherStudy, Report, ReportRun, ReportShare, Setting
 from orchestration.experiments.report.reruns import Rerun, fastest, rerun
 from orchestration.experiments.report.subset import MAX_IN_BATCHES, MAX_SINGLY, Wanted, points_for, select
 from orchestration.experiments.report.tables import ColumnAxis, Row, is_good, report_table, share_of, shares_along
@@ -81,11 +81,13 @@ def study_report(
     *,
     axes: Sequence[ColumnAxis] | None = None,
     choose: Choose | None = None,
+    other: tuple[str, Stored, Study | None] | None = None,
 ) -> Report:
     """The report of a store; if the `study` is known, runs are simulated again for their signals.
 
-    Runs that are not required are selected by `choose`. `axes` are by default those of the study. Raises `UsageError`
-    for a run that the study does not have.
+    Runs that are not required are selected by `choose`. `axes` are by default those of the study. `other` is a second
+    study, which is drawn over it. Raises `UsageError` for a run that the study does not have, and for a second one over
+    other axes.
     """
     blobs = Blobs()
     tracks = Tracks(blobs)
@@ -98,7 +100,7 @@ def study_report(
     return Report(
         kind="study",
         title=name,
-        summary=summary_of(overall, words, stored),
+        summary=summary_of(overall, words, stored) + ("" if other is None else _summary_of_other(*other)),
         words=words,
         layouts=tuple(tracks.layouts),
         runs=tuple(embedded.runs),
@@ -115,10 +117,34 @@ def study_report(
         shares=tuple(
             along for axis in axes if (along := shares_along(stored.rows, axis, by_chance=by_chance)) is not None
         ),
+        other=None if other is None else _over(*other, axes=axes, of=name, blobs=blobs),
         contents=tuple(embedded.contents),
         provenance=tuple(provenance_of(stored.about)),
         command=command,
     )  # fmt: skip
+
+
+def _over(
+    name: str, stored: Stored, study: Study | None, *, axes: Sequence[ColumnAxis], of: str, blobs: Blobs
+) -> OtherStudy:
+    own = {axis.name: axis for axis in axes_of(stored, study)}
+    if {*own} != {axis.name for axis in axes}:
+        listed = ", ".join(axis.name for axis in axes)
+        raise UsageError(
+            f"{name}: its axes are {', '.join(own)}; expected those of {of}, over which it is drawn: {listed}"
+        )
+    by_chance = is_sample(stored, study)
+    shares = (shares_along(stored.rows, axis, by_chance=by_chance) for axis in axes)
+    table = report_table(
+        stored.rows, axes, (), stored.units, blobs, tracks={}, messages={},
+        is_grid=json.loads(stored.about.get("grid", "null")) is not None,
+    )  # fmt: skip
+    return OtherStudy(name=name, table=table, shares=tuple(along for along in shares if along is not None))
+
+
+def _summary_of_other(name: str, stored: Stored, study: Study | None) -> str:
+    overall = share_of("all runs", None, stored.rows, by_chance=is_sample(stored, study))
+    return f" Over it {name}: {summary_of(overall, words_of(stored, study), stored)}"
 
 
 def axes_of(stored: Stored, study: Study | None) -> list[ColumnAxis]:

@@ -1,4 +1,4 @@
-"""The sources of a report: directories of runs, one study or its store, one comparison."""
+"""The sources of a report: directories of runs, one study or its store, two over one another, one comparison."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -29,13 +29,16 @@ def report_of(
     if not what:
         raise UsageError(f"expected {EXPECTED}")
     kinds = [_kind(path) for path in what]
-    if len(what) > 1 and set(kinds) != {"run"}:
-        raise UsageError(f"{', '.join(map(str, what))}: expected directories of runs, or one study or comparison alone")
+    if len(what) > 1 and set(kinds) != {"run"} and not (len(what) == 2 and {*kinds} <= {"study", "store"}):
+        listed = ", ".join(map(str, what))
+        raise UsageError(f"{listed}: expected directories of runs, one or two studies, or one comparison alone")
     if kinds[0] == "run":
         if wanted.required or wanted.most is not None:
             raise UsageError("--run and --flights: expected a study or a comparison with them")
         return of_runs.runs_report(dict(_runs(what)), command)
-    return _of_many(what[0], kinds[0], command, wanted, store)
+    if kinds[0] == "comparison":
+        return _of_comparison(what[0], command, wanted, store)
+    return _of_studies(what, kinds, command, wanted, store)
 
 
 def _kind(path: Path) -> str:
@@ -58,21 +61,32 @@ def _runs(paths: Sequence[Path]) -> Iterator[tuple[str, Result]]:
         yield (name if names.count(name) == 1 else str(path)), load_run(path)
 
 
-def _of_many(path: Path, kind: str, command: str, wanted: Wanted, store: Path | None) -> Report:
+def _of_studies(
+    paths: Sequence[Path], kinds: Sequence[str], command: str, wanted: Wanted, store: Path | None
+) -> Report:
     # reading stores needs an extra
-    from orchestration.experiments.comparison.file import load_comparison
-    from orchestration.experiments.report import of_comparison, of_study
+    from orchestration.experiments.report import of_study
     from orchestration.experiments.studies.store import store_path
+    from orchestration.experiments.studies.study import Study
     from orchestration.experiments.studies.study_file import load_study
 
-    if kind == "store":
-        file = path / STORE if path.is_dir() else path
-        name = file.resolve().parent.name
-        return of_study.study_report(name, of_study.read(file), None, command, wanted)
-    if kind == "study":
-        study = load_study(path)
-        stored = of_study.read(store_path(study.name, store), study)
-        return of_study.study_report(study.name, stored, study, command, wanted)
+    found: list[tuple[str, of_study.Stored, Study | None]] = []
+    for path, kind in zip(paths, kinds):
+        if kind == "store":
+            file = path / STORE if path.is_dir() else path
+            found.append((file.resolve().parent.name, of_study.read(file), None))
+        else:
+            study = load_study(path)
+            folder = store if path is paths[0] else None
+            found.append((study.name, of_study.read(store_path(study.name, folder), study), study))
+    first, *others = found
+    return of_study.study_report(*first, command, wanted, other=others[0] if others else None)
+
+
+def _of_comparison(path: Path, command: str, wanted: Wanted, store: Path | None) -> Report:
+    from orchestration.experiments.comparison.file import load_comparison
+    from orchestration.experiments.report import of_comparison
+    from orchestration.experiments.studies.store import store_path
+
     comparison = load_comparison(path)
-    file = store_path(comparison.name, store)
-    return of_comparison.comparison_report(comparison, file, command, wanted)
+    return of_comparison.comparison_report(comparison, store_path(comparison.name, store), command, wanted)

@@ -8,13 +8,11 @@ from orchestration.experiments.report import html, of_runs
 from orchestration.experiments.report.sources import report_of
 from orchestration.experiments.report.subset import Progress, Wanted
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.extras import needs
 from orchestration.simulation.runs.result import Result
 
 ENDINGS = (".html", ".htm")
 
 
-@needs("plotly")
 def report(
     *what: Result | str | Path,
     out: str | Path | None = None,
@@ -24,11 +22,12 @@ def report(
 ) -> Path:
     """Write one HTML file of results or directories of runs, or of a study, its store or a comparison; its path.
 
-    The file is self-contained. `out` is the file, by default `report_NAME.html`, or the folder of the store of the
-    study, by default `results/NAME`, which the file is then written to. Of a study, the signals of `flights` runs are
-    included, those of the runs with the numbers `runs` among them.
+    Of two studies over the same axes the second is drawn over the first. The file is self-contained. `out` is the file,
+    by default `report_NAME.html`, or the folder of the store of the study, by default `results/NAME`, which the file is
+    then written to. Of a study, the signals of `flights` runs are included, those of the runs with the numbers `runs`
+    among them.
 
-    Raises `UsageError` for anything else, `QuadcosimError` without the plotting library.
+    Raises `UsageError` for anything else.
     """
     if not what:
         raise UsageError("report: expected runs, a study or a comparison")

@@ -10,7 +10,6 @@ from orchestration.foundation.basics.errors import QuadcosimError
 EXTRAS = {
     "studies": ("cma", "dask", "distributed", "filelock", "pandas", "SALib", "scipy", "xarray"),
     "interop": ("libcosimpy", "ecospy", "tbb", "fmu-manipulation-toolbox"),
-    "report": ("plotly",),
     "gym": ("gymnasium",),
     "control": ("control",),
     "certificates": ("clarabel", "flint", "python-flint"),

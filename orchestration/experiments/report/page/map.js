@@ -5,7 +5,7 @@ const MARKS = { good: "circle", bad: "x-thin-open", diverged: "triangle-down-ope
 const MAX_SYMBOLS = 2500;
 const VALUE = "value";
 
-const map = { x: null, y: null, metric: null, fixed: {}, row: null, rows: [], isGrid: false, shades: null };
+const map = { x: null, y: null, metric: null, fixed: {}, row: null, rows: [], isGrid: false, shades: null, box: null, inside: null };
 
 function startMap() {
   byId("map").hidden = false;
@@ -52,6 +52,7 @@ function buildMapControls() {
 function changeMap(change) {
   Object.assign(map, change);
   if (map.x === map.y) map.y = VALUE;
+  map.box = null;
   buildMapControls();
   drawMap();
 }
@@ -70,16 +71,50 @@ function drawMap() {
   map.rows = rowsOfSlice();
   map.isGrid = report.table.is_grid && map.y !== VALUE;
   map.shades = shadesOf(map.rows.filter((row) => kindOf(outcomeOf(row)) === "good").map((row) => cellOf(map.metric, row)));
+  map.inside = rowsInBox();
+  measureSlider();
   const traces = map.isGrid ? gridTraces() : pointTraces();
   const holder = byId("map-plot");
+  holder.onbox = choseBox;
+  holder.onwhole = () => choseBox(null, null);
+  holder.redraw = drawMap;
+  holder.onpoint = ({ data }) => openRow(data);
   return drawPlot(holder, [...traces, chosenTrace()], mapLayout()).then(() => {
-    if (!map.isDrawn) holder.on("plotly_click", (event) => openRow(rowOfPoint(event.points[0])));
     map.isDrawn = true;
-    byId("map-hint").textContent = mapHint();
+    byId("map-hint").replaceChildren(mapHint(), ...(map.inside ? [button("All runs", () => choseBox(null, null))] : []));
   });
 }
 
+/** Take the runs in a box that was drawn over the map; null: all again. */
+function choseBox(across, up) {
+  map.box = across && { across, up };
+  drawMap();
+  if (map.inside && !map.inside.has(map.row)) openRow(firstOf([...map.inside]));
+}
+
+function rowsInBox() {
+  if (!map.box || !map.isDrawn) return null;
+  const { x, y } = byId("map-plot").plot.axes;
+  const isIn = (axis, [low, high], value) => onAxis(axis, value) >= low && onAxis(axis, value) <= high;
+  const found = map.rows.filter((row) => {
+    const [across, up] = placeOnMap(row);
+    return isIn(x, map.box.across, across) && isIn(y, map.box.up, up);
+  });
+  return found.length ? new Set(found) : null;
+}
+
+/** Runs in the box, how many of them are good, and the median of the metric among these. */
+function boxText() {
+  const rows = [...map.inside];
+  const good = rows.filter((row) => kindOf(outcomeOf(row)) === "good");
+  const values = good.map((row) => cellOf(map.metric, row)).filter(Number.isFinite).sort((a, b) => a - b);
+  const median = values.length ? (values[(values.length - 1) >> 1] + values[values.length >> 1]) / 2 : NaN;
+  const middle = values.length ? `; median ${map.metric.label} of these: ${withUnit(Number(median.toPrecision(4)), map.metric.unit)}` : "";
+  return `In the box: ${rows.length} of ${map.rows.length} runs, ${good.length} ${report.words[0]} (${percent(good.length / rows.length)})${middle}. The slider goes over their flights. `;
+}
+
 function mapHint() {
+  if (map.inside) return boxText();
   const flights = report.runs.length ? ` ${report.runs.length} of ${report.table.count} have their signals in this file.` : "";
   const there = new Set(map.rows.map((row) => kindOf(outcomeOf(row))));
   const [good, bad] = report.words;
@@ -88,13 +123,9 @@ function mapHint() {
     : { good: `Discs: ${good}`, bad: `✕: ${bad}`, diverged: "▽: diverged" };
   const parts = ["good", "bad", "diverged"].filter((kind) => there.has(kind)).map((kind) => signs[kind]);
   if (map.isGrid && there.has("good") && there.size > 1) parts.push(`orange line: edge of what is ${good}`);
+  if (map.isGrid && report.other) parts.push(`dashed line: that of ${report.other.name}`);
   const clipped = map.shades.isClipped ? " Some values lie beyond the colours, which are for the others." : "";
-  return `${parts.join("; ")}.${clipped} Click, or move with the arrow keys, to open a run.${flights}`;
-}
-
-function rowOfPoint(point) {
-  if (point.customdata === undefined || point.customdata === null) return map.row;
-  return Array.isArray(point.customdata) ? point.customdata[0] : point.customdata;
+  return `${parts.join("; ")}.${clipped} Click, or move with the arrow keys, to open a run; drag a box to choose among runs.${flights}`;
 }
 
 /** The hover text of a run. */
@@ -150,9 +181,9 @@ function isNarrowMap() {
 /** The colour bar, its ticks in the metric's own numbers. */
 function colorBar() {
   const { low, high, isLogarithmic } = map.shades;
-  const title = { text: escaped(titled(map.metric.label, map.metric.unit)), side: isNarrowMap() ? "top" : "right" };
-  const lies = isNarrowMap() ? { orientation: "h", x: 0.5, y: -0.18, yanchor: "top", nticks: 5 } : {};
-  const bar = { title, thickness: 14, outlinewidth: 0, len: 1, ...lies };
+  const title = { text: escaped(titled(map.metric.label, map.metric.unit)) };
+  const lies = isNarrowMap() ? { orientation: "h" } : {};
+  const bar = { title, ...lies };
   if (!isLogarithmic) return bar;
   const ticks = [];
   for (let power = Math.floor(low); power <= high; power += 1) {
@@ -171,25 +202,40 @@ function gridTraces() {
   const place = (axis) => new Map(valuesOf(axis).map((value, i) => [value, i]));
   const [columns, lines] = [place(map.x), place(map.y)];
   const empty = () => up.map(() => new Array(across.length).fill(null));
-  const [colors, codes, texts, rows, kinds] = [empty(), empty(), empty(), empty(), empty()];
+  const [colors, codes, rows, kinds, faded] = [empty(), empty(), empty(), empty(), empty()];
   for (const row of map.rows) {
     const [i, j] = [lines.get(cellOf(map.y, row)), columns.get(cellOf(map.x, row))];
     const kind = kindOf(outcomeOf(row));
     kinds[i][j] = kind;
     rows[i][j] = row;
-    texts[i][j] = hoverOf(row);
+    faded[i][j] = isOutside(row);
     codes[i][j] = { good: 0, bad: 1, diverged: 2 }[kind];
     if (kind === "good") colors[i][j] = colorOf(cellOf(map.metric, row));
   }
-  const gaps = across.length * up.length <= 900 ? { xgap: 1, ygap: 1 } : {};
-  const scale = [[0, "rgba(0,0,0,0)"], [1 / 3, "rgba(0,0,0,0)"], [1 / 3, NOT_GOOD.bad], [2 / 3, NOT_GOOD.bad], [2 / 3, NOT_GOOD.diverged], [1, NOT_GOOD.diverged]];
+  const gaps = { faded, ...(across.length * up.length <= 900 ? { xgap: 1 } : {}) };
   const values = colors.flat();
   return [
-    { type: "heatmap", x: across, y: up, z: colors, zmin: map.shades.low, zmax: map.shades.high, colorscale: "Viridis", colorbar: colorBar(), hoverinfo: "skip", showscale: values.some(Number.isFinite), ...gaps },
-    { type: "heatmap", x: across, y: up, z: codes, zmin: -0.5, zmax: 2.5, colorscale: scale, showscale: false, customdata: rows, text: texts, hovertemplate: "%{text}<extra></extra>", ...gaps },
+    { type: "heatmap", x: across, y: up, z: colors, zmin: map.shades.low, zmax: map.shades.high, colorscale: "Viridis", colorbar: colorBar(), showscale: values.some(Number.isFinite), ...gaps },
+    { type: "heatmap", x: across, y: up, z: codes, colors: [null, NOT_GOOD.bad, NOT_GOOD.diverged], customdata: rows, said: (i, j) => hoverOf(rows[i][j]), ...gaps },
     ...symbolTraces(kinds, across, up),
     edgeTrace(kinds, across, up),
+    ...edgeOfOther(across, up),
   ];
+}
+
+/** The edge of what is good in a second study, over the same values. */
+function edgeOfOther(across, up) {
+  if (!report.other) return [];
+  const own = new Map(report.other.table.columns.map((column) => [column.name, column]));
+  const others = axes.filter((axis) => axis !== map.x && axis !== map.y && valuesOf(axis).length > 1);
+  const kinds = up.map(() => new Array(across.length).fill(null));
+  for (let row = 0; row < report.other.table.count; row += 1) {
+    if (!others.every((axis) => cellOf(own.get(axis.name), row) === map.fixed[axis.name])) continue;
+    const [i, j] = [up.indexOf(cellOf(own.get(map.y.name), row)), across.indexOf(cellOf(own.get(map.x.name), row))];
+    if (i >= 0 && j >= 0) kinds[i][j] = kindOf(cellOf(own.get("outcome"), row));
+  }
+  const edge = edgeTrace(kinds, across, up);
+  return [{ ...edge, line: { color: paint("other-edge"), width: 2.5, dash: "dash" } }];
 }
 
 /** Signs on what is not good, where there is room for them. */
@@ -203,7 +249,7 @@ function symbolTraces(kinds, across, up) {
       found.y.push(up[i]);
     }));
     return {
-      type: "scatter", mode: "markers", ...found, hoverinfo: "skip", showlegend: false,
+      type: "scatter", mode: "markers", ...found, showlegend: false,
       marker: { symbol: MARKS[kind], size: 5, color: kind === "bad" ? "#3b4249" : "#fff", line: { width: 1, color: kind === "bad" ? "#3b4249" : "#fff" } },
     };
   });
@@ -229,7 +275,7 @@ function edgeTrace(kinds, across, up) {
       if (isThere(i + 1, j) && isThere(i, j) && isGood(i, j) !== isGood(i + 1, j)) { x.push(xs[j], xs[j + 1], null); y.push(ys[i + 1], ys[i + 1], null); }
     }
   }
-  return { type: "scatter", mode: "lines", x, y, line: { color: paint("edge-of-good"), width: 2.5 }, hoverinfo: "skip", showlegend: false };
+  return { type: "scatter", mode: "lines", x, y, line: { color: paint("edge-of-good"), width: 2.5 }, showlegend: false };
 }
 
 // -- points of a sample -----------------------------------------------------------------------------------
@@ -240,7 +286,6 @@ function heights() {
 }
 
 function pointTraces() {
-  const many = map.rows.length > 1500 && hasWebGL();
   const bottom = heights().reduce((least, value) => Math.min(least, value), Infinity);
   return ["good", "bad", "diverged"].flatMap((kind) => {
     const rows = map.rows.filter((row) => kindOf(outcomeOf(row)) === kind);
@@ -254,9 +299,8 @@ function pointTraces() {
     const colored = kind === "good" && map.y !== VALUE;
     const plain = { good: COLORS[0], bad: paint("bad"), diverged: COLORS[1] }[kind];
     return {
-      type: many ? "scattergl" : "scatter", mode: "markers", name: escaped(`${word} (${rows.length})`),
-      x: rows.map((row) => cellOf(map.x, row)), y: rows.map(height), customdata: rows, text: rows.map(hoverOf),
-      hovertemplate: "%{text}<extra></extra>",
+      type: "scatter", mode: "markers", name: escaped(`${word} (${rows.length})`),
+      x: rows.map((row) => cellOf(map.x, row)), y: rows.map(height), customdata: rows, said: (i) => hoverOf(rows[i]), faded: rows.map(isOutside),
       marker: {
         symbol: MARKS[kind], size: kind === "good" ? 7 : 8, line: { width: kind === "good" ? 0 : 1.5, color: plain },
         color: colored ? rows.map((row) => colorOf(cellOf(map.metric, row))) : plain,
@@ -277,7 +321,7 @@ function chosenTrace() {
   const isShown = map.row !== null && map.rows.includes(map.row);
   const [x, y] = isShown ? placeOnMap(map.row) : [null, null];
   return {
-    type: "scatter", mode: "markers", x: [x, x], y: [y, y], hoverinfo: "skip", showlegend: false, name: "open",
+    type: "scatter", mode: "markers", x: [x, x], y: [y, y], showlegend: false, name: "open",
     marker: { symbol: "square-open", size: [15, 19], color: ["#000", "#fff"], line: { width: [2.5, 2] } },
   };
 }
@@ -285,9 +329,8 @@ function chosenTrace() {
 function markOnMap(row) {
   map.row = row;
   if (!map.isDrawn) return undefined;
-  const holder = byId("map-plot");
-  const { x, y } = chosenTrace();
-  return Plotly.restyle(holder, { x: [x], y: [y] }, [holder.data.length - 1]);
+  const { data, layout } = byId("map-plot");
+  return drawTraces(byId("map-plot"), [...data.slice(0, -1), chosenTrace()], layout);
 }
 
 /** The neighbour of the open run in the direction of an arrow key. */
@@ -323,17 +366,21 @@ function spreadOf(axis) {
   return values.at(-1) - values[0] || 1;
 }
 
+/** Whether a run is not among those of the box. */
+function isOutside(row) {
+  return Boolean(map.inside && !map.inside.has(row));
+}
+
 function mapLayout() {
   const y = map.y === VALUE ? { title: { text: escaped(titled(map.metric.label, map.metric.unit)) }, type: isWide(heights()) ? "log" : "linear" } : axisLayout(map.y);
   return {
-    height: isNarrowMap() ? 520 : 470, margin: { l: 66, r: 10, t: 26, b: isNarrowMap() ? 120 : 50 }, hovermode: "closest", dragmode: "pan", xaxis: axisLayout(map.x),
+    height: isNarrowMap() ? 520 : 470, margin: { l: 66, r: 10, t: 26, b: isNarrowMap() ? 120 : 50 }, xaxis: axisLayout(map.x),
     yaxis: y, showlegend: !map.isGrid,
-    legend: { orientation: "h", x: 0, y: 1.0, yanchor: "bottom" },
-    uirevision: [map.x.name, map.y === VALUE ? VALUE : map.y.name].join(),
+    legend: { x: 0, y: 1, isAbove: true },
   };
 }
 
 function axisLayout(axis) {
   const type = axis.words ? "category" : axis.logarithmic ? "log" : "linear";
-  return { title: { text: escaped(titled(axis.label, axis.unit)), standoff: 8 }, type, zeroline: false, exponentformat: "power" };
+  return { title: { text: escaped(titled(axis.label, axis.unit)) }, type, zeroline: false };
 }

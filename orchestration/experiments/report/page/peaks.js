@@ -48,7 +48,7 @@ function tracesOfInset(traces, { span: [first, last] }, number) {
   return traces.map(({ x, y, line, opacity }) => {
     const near = [Math.max(0, placeAt(x, from)), Math.min(x.length, placeAt(x, to) + 2)];
     return {
-      x: x.slice(...near), y: y.slice(...near), line: { ...line, width: 1.1 }, opacity, mode: "lines", hoverinfo: "skip", showlegend: false,
+      x: x.slice(...near), y: y.slice(...near), line: { ...line, width: 1.1 }, opacity, mode: "lines", showlegend: false,
       xaxis: `x${number}`, yaxis: `y${number}`,
     };
   });
@@ -58,7 +58,7 @@ function tracesOfInset(traces, { span: [first, last] }, number) {
 function layoutOfInset({ peak, time }, unit, number, top, inner) {
   const left = gap() > 46 ? 0.42 : 0.58;
   const [low, high] = [top - (0.54 * PANEL) / inner, top - (0.2 * PANEL) / inner];
-  const axis = { showgrid: false, zeroline: false, tickfont: { size: 9 }, ticks: "outside", ticklen: 2, fixedrange: true, linecolor: paint("edge"), mirror: true, showline: true };
+  const axis = { showgrid: false, zeroline: false, tickfont: { size: 9 }, fixedrange: true, linecolor: paint("edge"), showline: true };
   return {
     axes: {
       [`xaxis${number}`]: { ...axis, domain: [left, 0.995], anchor: `y${number}`, nticks: 5 },

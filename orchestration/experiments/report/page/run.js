@@ -12,9 +12,9 @@ function startRun() {
   buildRunControls();
 }
 
-/** The runs of the slider: those with signals, in a comparison those of the open cell. */
+/** The runs of the slider: those with signals, in a comparison those of the open cell, in a study those of the box. */
 function sliderRuns() {
-  return cells.open ? map.rows.map(runOfRow).filter(Boolean) : report.runs;
+  return cells.open ? map.rows.map(runOfRow).filter(Boolean) : map.inside ? [...map.inside].map(runOfRow).filter(Boolean) : report.runs;
 }
 
 /** The slider over the current runs. */
@@ -22,7 +22,7 @@ function measureSlider() {
   if (!controlsOf.slider) return;
   const count = sliderRuns().length;
   Object.assign(controlsOf.slider, { max: Math.max(0, count - 1), disabled: count < 2 });
-  controlsOf.over.textContent = cells.open ? `${count} of the cell` : report.table ? "Flights" : "Runs";
+  controlsOf.over.textContent = cells.open ? `${count} of the cell` : map.inside ? `${count} of the box` : report.table ? "Flights" : "Runs";
 }
 
 function buildRunControls() {
@@ -169,6 +169,7 @@ function showSignals() {
   const hasScene = Boolean(signals && signals.space);
   byId("replay").hidden = !hasScene;
   byId("player").hidden = !signals;
+  controlsOf.play.hidden = controlsOf.speed.hidden = !hasScene;
   byId("signals").hidden = !signals;
   document.body.classList.toggle("no-signals", !signals);
   clearTimeout(pending);
@@ -225,11 +226,12 @@ function buildPlayer() {
   controlsOf.time = element("input", { type: "range", min: 0, max: 1, step: 0.01, value: 0 });
   controlsOf.time.oninput = () => setTime(Number(controlsOf.time.value));
   controlsOf.clock = element("output", { className: "clock" });
+  controlsOf.speed = choice("Speed", SPEEDS.map((speed) => [speed, `${speed}×`]), 1, (speed) => { player.speed = Number(speed); });
   byId("player").append(
     controlsOf.play,
     element("label", { className: "wide" }, "Time", controlsOf.time),
     controlsOf.clock,
-    choice("Speed", SPEEDS.map((speed) => [speed, `${speed}×`]), 1, (speed) => { player.speed = Number(speed); }),
+    controlsOf.speed,
   );
 }
 

@@ -14,23 +14,31 @@ function startShares() {
 
 function drawShares() {
   const { axis, unit, logarithmic, shares: found } = report.shares[shares.of];
-  const share = found.map((each) => each.good / each.runs);
-  const has = found.some((each) => each.low !== null);
+  byId("shares-plot").redraw = drawShares;
   const isNumber = found.every((each) => each.value !== null);
-  const trace = {
-    type: "scatter", mode: isNumber ? "lines+markers" : "markers", x: found.map((each) => (isNumber ? each.value : each.label)), y: share,
-    line: { color: COLORS[0], width: 1.2 }, marker: { size: 7, color: COLORS[0] }, text: found.map((each) => `${escaped(axis)} ${escaped(each.label)}${escaped(afterNumber(unit))}<br>${escaped(shareText(each))}`),
-    hovertemplate: "%{text}<extra></extra>",
-    ...(has ? { error_y: { type: "data", symmetric: false, array: found.map((each, i) => each.high - share[i]), arrayminus: found.map((each, i) => share[i] - each.low), thickness: 1.4, width: 4 } } : {}),
-  };
+  const other = report.other?.shares.find((each) => each.axis === axis);
+  const traces = [traceOfShares(report.title, axis, unit, found, isNumber, 0)];
+  if (other) traces.push(traceOfShares(report.other.name, axis, unit, other.shares, isNumber, 1));
   const layout = {
-    height: 270, margin: { l: 60, r: 10, t: 10, b: 48 }, hovermode: "closest",
+    height: 270, margin: { l: 60, r: 10, t: other ? 26 : 10, b: 48 }, legend: { x: 0, y: 1, isAbove: true }, showlegend: Boolean(other),
     xaxis: { title: { text: escaped(titled(axis, unit)) }, type: isNumber ? (logarithmic ? "log" : "linear") : "category", zeroline: false },
     yaxis: { title: { text: `share ${escaped(report.words[0])}` }, range: [-0.03, 1.03], tickformat: ".0%", zeroline: false },
   };
-  drawPlot(byId("shares-plot"), [trace], layout);
-  const rows = found.map((each) => [each.label, `${each.good} of ${each.runs}`, percent(each.good / each.runs), each.low === null ? "–" : `${percent(each.low)} to ${percent(each.high)}`]);
+  drawPlot(byId("shares-plot"), traces, layout);
+  const rowOf = (each, name) => [name + each.label, `${each.good} of ${each.runs}`, percent(each.good / each.runs), each.low === null ? "–" : `${percent(each.low)} to ${percent(each.high)}`];
+  const rows = [...found.map((each) => rowOf(each, other ? `${report.title}: ` : "")), ...(other?.shares ?? []).map((each) => rowOf(each, `${report.other.name}: `))];
   byId("shares-table").replaceChildren(tableOf(rows, [titled(axis, unit), report.words[0], "share", "95 % interval"]));
+}
+
+function traceOfShares(name, axis, unit, found, isNumber, place) {
+  const share = found.map((each) => each.good / each.runs);
+  const has = found.some((each) => each.low !== null);
+  return {
+    type: "scatter", mode: isNumber ? "lines+markers" : "markers", name: escaped(name), x: found.map((each) => (isNumber ? each.value : each.label)), y: share,
+    line: { color: COLORS[place], width: 1.2, dash: DASHES[place] }, marker: { symbol: SHAPES[place], size: 7, color: COLORS[place] },
+    said: (i) => `${escaped(name)}, ${escaped(axis)} ${escaped(found[i].label)}${escaped(afterNumber(unit))}<br>${escaped(shareText(found[i]))}`,
+    ...(has ? { error_y: { array: found.map((each, i) => each.high - share[i]), arrayminus: found.map((each, i) => share[i] - each.low), width: 4 } } : {}),
+  };
 }
 
 // -- the cells of a comparison ----------------------------------------------------------------------------
@@ -38,6 +46,7 @@ function drawShares() {
 /** Shares over the axis, a line for each controller, with their intervals. */
 function drawSharesOfCells() {
   const { controllers, label: axis, unit } = report.compared;
+  byId("shares-plot").redraw = drawSharesOfCells;
   byId("shares").hidden = false;
   byId("shares-title").textContent = "Shares that survive and settle, with 95 % intervals";
   byId("shares-text").textContent = "Wilson intervals, over the starts of each cell. Lines: those that survive; dots: those that settle by the horizon.";
@@ -46,15 +55,15 @@ function drawSharesOfCells() {
     return [["survives", "survive", "lines+markers"], ["settles", "settle", "markers"]].map(([key, word, mode]) => {
       const share = found.map((cell) => cell[key].good / cell[key].runs);
       return {
-        type: "scatter", mode, name: escaped(controller), legendgroup: controller, showlegend: key === "survives", x: found.map((cell) => cell.value), y: share,
+        type: "scatter", mode, name: escaped(controller), showlegend: key === "survives", x: found.map((cell) => cell.value), y: share,
         line: { color: COLORS[i % 8], dash: DASHES[i % 8], width: 1.6 }, marker: { symbol: SHAPES[i % 8] + (key === "settles" ? "-open" : ""), size: 7, color: COLORS[i % 8] },
-        text: found.map((cell) => `${escaped(controller)}, ${withUnit(cell.value, unit)}<br>${escaped(shareText(cell[key], word))}`), hovertemplate: "%{text}<extra></extra>",
-        error_y: { type: "data", symmetric: false, array: found.map((cell, k) => cell[key].high - share[k]), arrayminus: found.map((cell, k) => share[k] - cell[key].low), thickness: 1.1, width: 3 },
+        said: (k) => `${escaped(controller)}, ${withUnit(found[k].value, unit)}<br>${escaped(shareText(found[k][key], word))}`,
+        error_y: { array: found.map((cell, k) => cell[key].high - share[k]), arrayminus: found.map((cell, k) => share[k] - cell[key].low), width: 3 },
       };
     });
   });
   const layout = {
-    height: 330, margin: { l: 60, r: 10, t: 10, b: 48 }, hovermode: "closest", legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom" },
+    height: 330, margin: { l: 60, r: 10, t: 26, b: 48 }, legend: { x: 0, y: 1, isAbove: true },
     xaxis: { title: { text: escaped(titled(axis, unit)) }, zeroline: false },
     annotations: namesOnLines(controllers.map((controller) => cellsHere().filter((cell) => cell.controller === controller))),
     yaxis: { title: { text: "share of the starts" }, range: [-0.03, 1.03], tickformat: ".0%", zeroline: false },
@@ -77,7 +86,7 @@ function namesOnLines(groups) {
     const x = below > 0 ? group[below - 1].value + along * (group[below].value - group[below - 1].value) : group[last].value;
     return {
       x, y: below > 0 ? height : share[last], text: escaped(group[0].controller), showarrow: false, xanchor: below > 0 ? "center" : "right",
-      font: { size: 11, color: COLORS[report.compared.controllers.indexOf(group[0].controller) % 8] }, bgcolor: paint("paper"), opacity: 0.9, borderpad: 1,
+      font: { size: 11, color: COLORS[report.compared.controllers.indexOf(group[0].controller) % 8] }, bgcolor: paint("paper"),
     };
   });
 }
@@ -127,26 +136,25 @@ function drawCells() {
   const table = (make) => rows.map((controller) => values.map((value) => { const cell = at(controller, value); return cell ? make(cell) : null; }));
   const room = byId("map-plot").clientWidth > 42 * values.length + 180;
   const heat = {
-    type: "heatmap", x: values, y: rows, z: table((cell) => cell.survives.good / cell.survives.runs), zmin: 0, zmax: 1, colorscale: "Cividis", xgap: 1, ygap: 1,
-    text: table((cell) => (room ? String(Math.round((100 * cell.survives.good) / cell.survives.runs)) : "")), texttemplate: "%{text}", textfont: { size: 11 },
-    customdata: table((cell) => cell.number), hovertext: table(hoverOfCell), hovertemplate: "%{hovertext}<extra></extra>",
-    colorbar: { tickformat: ".0%", thickness: 14, outlinewidth: 0, title: { text: "share that survives", side: "right" } },
+    type: "heatmap", x: values, y: rows, z: table((cell) => cell.survives.good / cell.survives.runs), zmin: 0, zmax: 1, colorscale: "Cividis", xgap: 1,
+    text: table((cell) => (room ? String(Math.round((100 * cell.survives.good) / cell.survives.runs)) : "")), 
+    customdata: table((cell) => cell.number), said: (i, j) => hoverOfCell(at(rows[i], values[j])),
+    colorbar: { tickformat: ".0%", title: { text: "share that survives" } },
   };
   const layout = {
-    height: Math.max(220, 110 + 42 * rows.length), margin: { l: 20, r: 10, t: 10, b: 50 }, dragmode: false,
-    xaxis: { title: { text: escaped(titled(axis, unit)), standoff: 8 }, zeroline: false, showgrid: false }, yaxis: { type: "category", automargin: true },
+    height: Math.max(220, 110 + 42 * rows.length), margin: { l: 20, r: 10, t: 10, b: 50 },
+    xaxis: { title: { text: escaped(titled(axis, unit)) }, zeroline: false, showgrid: false }, yaxis: { type: "category", showgrid: false },
   };
   const holder = byId("map-plot");
-  return drawPlot(holder, [heat, chosenCell()], layout).then(() => {
-    if (!cells.isDrawn) holder.on("plotly_click", (event) => openCell(report.compared.cells.find((cell) => cell.number === event.points[0].customdata)));
-    cells.isDrawn = true;
-  });
+  holder.redraw = drawCells;
+  holder.onpoint = ({ data }) => openCell(report.compared.cells.find((cell) => cell.number === data));
+  return drawPlot(holder, [heat, chosenCell()], layout);
 }
 
 function chosenCell() {
   const cell = cells.open;
   const [x, y] = cell && cellsHere().includes(cell) ? [cell.value, cell.controller] : [null, null];
-  return { type: "scatter", mode: "markers", x: [x, x], y: [y, y], hoverinfo: "skip", showlegend: false, marker: { symbol: "square-open", size: [26, 31], color: ["#000", "#fff"], line: { width: [2.5, 2] } } };
+  return { type: "scatter", mode: "markers", x: [x, x], y: [y, y], showlegend: false, marker: { symbol: "square-open", size: [26, 31], color: ["#000", "#fff"], line: { width: [2.5, 2] } } };
 }
 
 function stepOverCells(event) {
@@ -166,8 +174,7 @@ function stepOverCells(event) {
 function openCell(cell) {
   if (!cell) return;
   cells.open = cell;
-  const { x, y } = chosenCell();
-  Plotly.restyle(byId("map-plot"), { x: [x], y: [y] }, [1]);
+  drawCells();
   byId("cell").hidden = false;
   byId("cell-title").textContent = `${cell.controller}, ${report.compared.label} ${withUnit(cell.value, report.compared.unit)}`;
   byId("cell-text").textContent = `${shareText(cell.survives, "survive")}, ${shareText(cell.settles, "settle")}. Each point is a run; click one, or use the arrow keys, to open it.`;
@@ -199,12 +206,13 @@ function rowsOfCell(cell) {
 function drawRunsOfCell() {
   const holder = byId("cell-plot");
   const layout = { ...mapLayout(), height: 260, margin: { l: 66, r: 10, t: 26, b: 50 } };
+  holder.redraw = drawRunsOfCell;
+  holder.onpoint = ({ data }) => openRow(data);
   return drawPlot(holder, [...pointTraces(), chosenTrace()], layout).then(() => {
     if (cells.hasRuns) return;
     cells.hasRuns = true;
     holder.setAttribute("aria-label", "Runs of the cell. Arrow keys open the neighbouring run.");
     holder.addEventListener("keydown", stepOnMap);
-    holder.on("plotly_click", (event) => openRow(rowOfPoint(event.points[0])));
   });
 }
 
@@ -212,6 +220,5 @@ function markInCell(row) {
   map.row = row;
   if (!cells.hasRuns) return;
   const holder = byId("cell-plot");
-  const { x, y } = chosenTrace();
-  Plotly.restyle(holder, { x: [x], y: [y] }, [holder.data.length - 1]);
+  drawTraces(holder, [...holder.data.slice(0, -1), chosenTrace()], holder.layout);
 }

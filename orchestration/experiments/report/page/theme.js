@@ -33,15 +33,12 @@ function nameScheme() {
 }
 
 /** Draw a plot in the colours of the page. */
-function drawPlot(holder, traces, layout, options = PLOTLY) {
-  const themed = {
-    ...layout, font: { ...FONT, color: paint("ink") }, paper_bgcolor: paint("paper"), plot_bgcolor: paint("paper"),
-    hoverlabel: { ...HOVER, font: { ...HOVER.font } },
-  };
+function drawPlot(holder, traces, layout) {
+  const themed = { ...layout, paper_bgcolor: paint("paper"), plot_bgcolor: paint("paper") };
   for (const [name, axis] of Object.entries(layout)) {
-    if (/^[xy]axis\d*$/.test(name)) themed[name] = { gridcolor: paint("grid"), zerolinecolor: paint("edge"), spikecolor: paint("edge"), ...axis };
+    if (/^[xy]axis\d*$/.test(name)) themed[name] = { gridcolor: paint("grid"), zerolinecolor: paint("edge"), ...axis };
   }
-  return Plotly.react(holder, traces, themed, options);
+  return drawTraces(holder, traces, themed);
 }
 
 takeScheme(prefersDark.matches ? "dark" : "light");

@@ -37,7 +37,8 @@ function drawTimePlot(signals, beside, names, whole = true) {
   const traces = [...byPanel.flat(), ...peaks.flatMap((peak, k) => (peak ? tracesOfInset(byPanel[k], peak, panels.length + 1 + k) : []))];
   const holder = byId("time-plot");
   holder.style.height = `${height}px`;
-  return drawPlot(holder, traces, timeLayout(panels, height, signals, peaks), { ...PLOTLY, displayModeBar: false }).then(() => {
+  holder.redraw = () => drawTimePlot(timePlot.signals, timePlot.beside, names, timePlot.whole);
+  return drawPlot(holder, traces, timeLayout(panels, height, signals, peaks)).then(() => {
     if (!timePlot.isDrawn) listenToTimePlot(holder);
     timePlot.isDrawn = true;
     moveCursor();
@@ -53,7 +54,7 @@ function tracesOfBars({ rows, row, begin, end }, k) {
   }
   return lines.map(({ x, y }, place) => ({
     x, y, name: escaped(rows[place]), yaxis: k ? `y${k + 1}` : "y", mode: "lines", showlegend: false, connectgaps: false,
-    line: { color: COLORS[place % 8], width: Math.min(12, 90 / rows.length) }, hovertemplate: `${escaped(rows[place])}<extra></extra>`,
+    line: { color: COLORS[place % 8], width: Math.min(12, 90 / rows.length) }, said: (_, t) => (row.some((own, i) => own === place && begin[i] <= t && t <= end[i]) ? escaped(rows[place]) : ""),
   }));
 }
 
@@ -70,20 +71,19 @@ function tracesOf(panel, k, signals, beside, names) {
   return found;
 }
 
-function traceOf(panel, line, i, k, signals, other) {
+function traceOf(panel, line, i, k, of, other) {
   const place = line.reference ? i - panel.lines.filter((each) => !each.reference).length : i;
   const alone = panel.lines.length === 1;
   const name = other ? `${line.label} (${other})` : line.label;
   const isNarrow = gap() > 46; // there is room for few words
   const inLegend = other || (line.reference ? (isNarrow ? "ref." : "reference") : line.label);
   return {
-    x: signals.time,
-    y: signals.columns[line.column],
+    x: of.time,
+    y: of.columns[line.column],
     name: escaped(inLegend),
     yaxis: k ? `y${k + 1}` : "y",
     legend: k ? `legend${k + 1}` : "legend",
     showlegend: other ? place === 0 && !(isNarrow && k) : line.reference ? place === 0 : !alone,
-    legendrank: other ? 1200 : line.reference ? 1100 : 1000,
     mode: "lines",
     opacity: other ? 0.75 : 1,
     line: {
@@ -92,7 +92,7 @@ function traceOf(panel, line, i, k, signals, other) {
       dash: other || line.reference ? "dot" : DASHES[place % 8],
       shape: line.held ? "hv" : "linear",
     },
-    hovertemplate: `${escaped(name)}: %{y:.5~g}${escaped(afterNumber(panel.unit))}<extra></extra>`,
+    said: (i) => `${escaped(name)}: ${shown(Number((of.columns[line.column][i] ?? NaN).toPrecision(5)))}${escaped(afterNumber(panel.unit))}`,
   };
 }
 
@@ -100,22 +100,19 @@ function timeLayout(panels, height, signals, peaks) {
   const inner = height - topMargin() - MARGIN.b;
   const isNarrow = gap() > 46;
   const layout = {
-    height, margin: { ...MARGIN, t: topMargin() }, hovermode: "x", hoversubplots: "axis", dragmode: "zoom", annotations: [],
+    height, margin: { ...MARGIN, t: topMargin() }, annotations: [],
     xaxis: {
-      title: { text: "time [s]", standoff: 6 }, anchor: panels.length > 1 ? `y${panels.length}` : "y", showgrid: true,
-      zeroline: false, range: [signals.time[0], signals.time[signals.time.length - 1]],
-      hoverformat: ".4~f", ticksuffix: " s", showticksuffix: "last", showspikes: true, spikemode: "across", spikethickness: 1,
-      spikedash: "dot",
+      title: { text: "time [s]" }, anchor: panels.length > 1 ? `y${panels.length}` : "y", showgrid: true,
+      range: [signals.time[0], signals.time[signals.time.length - 1]],
     },
   };
   panels.forEach((panel, k) => {
     const top = 1 - (k * (PANEL + gap())) / inner;
     layout[k ? `yaxis${k + 1}` : "yaxis"] = {
-      ...(panel.bars ? rowsOf(panel.bars) : {}), domain: [top - PANEL / inner, top], type: panel.logarithmic ? "log" : "linear", nticks: 5, exponentformat: "e", ...(panel.logarithmic ? powersIn(panel, signals) : {}),
+      ...(panel.bars ? rowsOf(panel.bars) : {}), domain: [top - PANEL / inner, top], type: panel.logarithmic ? "log" : "linear", nticks: 5,
     };
     layout[k ? `legend${k + 1}` : "legend"] = {
       orientation: "h", x: isNarrow ? 0 : 1, xanchor: isNarrow ? "left" : "right", y: top + 2 / inner, yanchor: "bottom", font: { size: 11 },
-      bgcolor: "rgba(0,0,0,0)",
     };
     if (peaks[k]) {
       const { axes: own, note } = layoutOfInset(peaks[k], panel.unit, panels.length + 1 + k, top, inner);
@@ -136,26 +133,10 @@ function rowsOf({ rows }) {
   return { tickvals: rows.map((_, place) => place), ticktext: rows.map((name) => escaped(name.slice(name.indexOf(".") + 1))), range: [rows.length - 0.5, -0.5], tickfont: { size: 9 }, zeroline: false };
 }
 
-/** Ticks of a logarithmic axis at few powers of ten, as 10⁻³. */
-function powersIn(panel, signals) {
-  const values = panel.lines.flatMap((line) => [...(signals.columns[line.column] ?? [])]).filter((value) => value > 0);
-  const powers = values.map(Math.log10);
-  const [low, high] = powers.reduce(([a, b], power) => [Math.min(a, power), Math.max(b, power)], [Infinity, -Infinity]);
-  if (!(high - low > 1)) return {};
-  const step = Math.max(1, Math.round((high - low) / 4));
-  const found = [];
-  for (let power = Math.ceil(low / step) * step; power <= high; power += step) found.push(power);
-  return { tickvals: found.map((power) => 10 ** power), ticktext: found.map((power) => (power < -3 || power > 3 ? `10${superscript(power)}` : String(10 ** power))) };
-}
-
 function listenToTimePlot(holder) {
-  holder.on("plotly_click", (event) => setTime(event.points[0].x));
-  holder.on("plotly_relayout", (change) => {
-    if (timePlot.whole && "xaxis.range[0]" in change) showSpan(change["xaxis.range[0]"], change["xaxis.range[1]"]);
-    else moveCursor();
-  });
-  holder.on("plotly_doubleclick", () => { showSpan(...wholeSpan()); return false; });
-  new ResizeObserver(moveCursor).observe(holder);
+  holder.onpoint = ({ x }) => setTime(x);
+  holder.onspan = showSpan;
+  holder.onwhole = () => showSpan(...wholeSpan());
 }
 
 function wholeSpan() {
@@ -169,14 +150,14 @@ function showSpan(from, to) {
   if (from <= first && to >= last) return redrawSignals();
   if (timePlot.whole) redrawSignals(false); // who looks closer sees peaks where they are
   const range = [Math.max(first, from), Math.min(last, to)];
-  const update = { "xaxis.range": range };
+  const { data, layout } = byId("time-plot");
+  layout.xaxis.range = range;
   panelsOfRun(timePlot.signals).forEach((panel, k) => {
     if (panel.bars) return;
     const own = k ? `y${k + 1}` : "y";
-    const seen = seenRange(byId("time-plot").data.filter((trace) => trace.yaxis === own), range, panel.logarithmic);
-    update[`yaxis${k ? k + 1 : ""}.${seen ? "range" : "autorange"}`] = seen ?? true;
+    layout[axisName(own)].range = seenRange(data.filter((trace) => trace.yaxis === own), range, panel.logarithmic) ?? layout[axisName(own)].range;
   });
-  return Plotly.relayout(byId("time-plot"), update);
+  return drawTraces(byId("time-plot"), data, layout).then(moveCursor);
 }
 
 /** The range of the traces in a span of time, with some margin; null without values. */
@@ -197,8 +178,7 @@ function seenRange(traces, [from, to], isLogarithmic) {
 
 /** Save the visible part as a picture. */
 function saveSignals() {
-  const holder = byId("time-plot");
-  return Plotly.downloadImage(holder, { format: "svg", width: holder.clientWidth, height: holder.clientHeight, filename: "signals" });
+  savePlot(byId("time-plot"), "signals.svg");
 }
 
 /** Zoom about the instant of the replay. */
@@ -209,13 +189,13 @@ function zoomTime(factor) {
 }
 
 function moveCursor() {
-  const full = byId("time-plot")._fullLayout;
+  const { plot } = byId("time-plot");
   const cursor = byId("cursor");
-  if (!full || !full.xaxis || !full.xaxis.l2p) return;
-  const at = full.xaxis.l2p(player.t);
-  const isInside = at >= -0.5 && at <= full.xaxis._length + 0.5;
-  cursor.style.display = isInside ? "block" : "none";
-  cursor.style.left = `${full.xaxis._offset + at}px`;
+  if (!plot) return;
+  const { x } = plot.axes;
+  const at = x.toPixel(player.t);
+  cursor.style.display = at >= x.at[0] - 0.5 && at <= x.at[1] + 0.5 ? "block" : "none";
+  cursor.style.left = `${at}px`;
   cursor.style.top = `${topMargin()}px`;
-  cursor.style.height = `${full.height - topMargin() - MARGIN.b}px`;
+  cursor.style.height = `${plot.height - topMargin() - MARGIN.b}px`;
 }

@@ -4,8 +4,6 @@ const DASHES = ["solid", "dash", "dashdot", "dot", "longdash", "longdashdot", "s
 const SHAPES = ["circle", "square", "diamond", "triangle-up", "x", "star", "cross", "hexagon"];
 const SUPERSCRIPTS = "⁰¹²³⁴⁵⁶⁷⁸⁹";
 const FONT = { family: 'system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif', size: 12 };
-const HOVER = { align: "left", font: { family: FONT.family, size: 12 } };
-const PLOTLY = { displaylogo: false, responsive: true, modeBarButtons: [["zoom2d", "pan2d", "resetScale2d", "toImage"]], toImageButtonOptions: { format: "svg" } };
 
 /** A number to six digits; a dash for none. */
 function shown(value) {
@@ -31,7 +29,7 @@ function titled(name, unit) {
   return unit ? `${name} [${unit}]` : name;
 }
 
-/** Text as Plotly takes it, which knows some tags. */
+/** Text for labels of plots, which know some tags. */
 function escaped(text) {
   return String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
 }
@@ -94,12 +92,3 @@ function badge(outcome) {
 }
 
 const isStill = window.matchMedia("(prefers-reduced-motion: reduce)");
-
-/** Whether this browser draws by WebGL. */
-const hasWebGL = (() => {
-  let known;
-  return () => {
-    if (known === undefined) known = Boolean(document.createElement("canvas").getContext("webgl"));
-    return known;
-  };
-})();

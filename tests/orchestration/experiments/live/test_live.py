@@ -8,6 +8,7 @@ import random
 import re
 import shutil
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -247,6 +248,21 @@ def test_an_installed_package_has_the_page_of_the_paper(monkeypatch, tmp_path, m
     monkeypatch.chdir(tmp_path)
     assert main("live", "--out", "here.html").returncode == 0
     assert (tmp_path / "here.html").read_text(encoding="utf-8") == "the page"
+
+
+@ZIG
+def test_the_page_beside_a_report_begins_with_the_stored_run(main, tmp_path):
+    flown = tmp_path / "flown"
+    main("run", "--native", "--period", "0.02", "--stop-time", "0.5", "--no-figures", "--out", flown)
+    main("report", flown, "--live", "--out", tmp_path / "page.html")
+    beside = SimpleNamespace(html=(tmp_path / "page_live.html").read_text(encoding="utf-8"))
+    document = json.loads(unpacked(beside, "system"))
+    settings = {path: value for path, value, *_ in document["settings"]}
+    assert (settings["stop_time"], settings["components.controller.sampling.period"]) == (0.5, 0.02)
+    assert document["name"].endswith("flown/scenario.toml")
+    for several in ([flown, flown], [tmp_path / "page.html"]):
+        done = main("report", *several, "--live", code=2)
+        assert "expected the directory of" in done.stderr
 
 
 def test_what_a_page_cannot_vary_is_named():

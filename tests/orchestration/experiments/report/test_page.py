@@ -147,6 +147,15 @@ count = 3
     return show(report(file, out=folder, flights=4))
 
 
+def wait_for(page: Any, condition: str) -> None:
+    """Wait until an expression holds; Playwright's own way needs `eval`, which the page forbids itself."""
+    for _ in range(round(20 * PATIENCE)):
+        if page.evaluate(condition):
+            return
+        page.wait_for_timeout(50)
+    raise AssertionError(condition)
+
+
 def clock(page: Any) -> float:
     return float(page.inner_text("#player output").split()[0])
 
@@ -160,7 +169,7 @@ def test_play_moves_the_vehicle_and_pause_stops_it(of_runs: Any) -> None:
     picture = "document.getElementById('scene').toDataURL()"
     before, numbers = of_runs.evaluate(picture), of_runs.inner_text("#readout")
     of_runs.get_by_role("button", name="Play").click()
-    of_runs.wait_for_function("parseFloat(document.querySelector('#player output').textContent) > 0.1")
+    wait_for(of_runs, "parseFloat(document.querySelector('#player output').textContent) > 0.1")
     of_runs.get_by_role("button", name="Pause").click()
     stopped = clock(of_runs)
     assert of_runs.evaluate(picture) != before
@@ -211,7 +220,7 @@ def test_the_replay_shows_thrust_and_the_attitude_that_the_vehicle_should_have(o
         assert "reference, outlined: now" in key
         assert "thrust" in key
     assert "; thrust " in of_runs.inner_text("#readout")
-    lines = of_runs.evaluate("document.getElementById('time-plot').data.map((each) => each.hovertemplate)")
+    lines = of_runs.evaluate("document.getElementById('time-plot').data.map((each) => each.said?.(0) ?? '')")
     assert any("yaw of the reference" in line for line in lines)
 
 
@@ -248,12 +257,12 @@ def test_a_flight_in_other_axes_is_converted_for_the_replay_only(show: Show, tmp
 
 
 def test_hovering_over_a_plot_shows_the_value_with_its_unit(of_runs: Any) -> None:
-    plot = of_runs.locator("#time-plot .nsewdrag").nth(3)
+    plot = of_runs.locator("#time-plot .plot-area").nth(3)
     plot.scroll_into_view_if_needed()
     box = plot.bounding_box()
     of_runs.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    of_runs.wait_for_selector("#time-plot .hovertext")
-    said = " ".join(of_runs.locator("#time-plot .hovertext").all_text_contents())
+    of_runs.wait_for_selector("#time-plot .said:visible")
+    said = " ".join(of_runs.locator("#time-plot .said").all_text_contents())
     assert "thrust: " in said
     assert " N" in said
     assert " m" in said, "the panels are linked"
@@ -263,9 +272,9 @@ def test_zooming_by_button_narrows_all_panels(of_runs: Any) -> None:
     span = "(() => { const r = document.getElementById('time-plot').layout.xaxis.range; return r[1] - r[0]; })()"
     whole = of_runs.evaluate(span)
     of_runs.get_by_role("button", name="Zoom in").click()
-    of_runs.wait_for_function(f"{span} < {0.6 * whole}")
+    wait_for(of_runs, f"{span} < {0.6 * whole}")
     of_runs.get_by_role("button", name="Whole run").click()
-    of_runs.wait_for_function(f"{span} > {0.9 * whole}")
+    wait_for(of_runs, f"{span} > {0.9 * whole}")
 
 
 def test_a_short_peak_is_clipped_noted_and_shown_in_an_inset_until_zoomed(of_runs: Any) -> None:
@@ -275,13 +284,13 @@ def test_a_short_peak_is_clipped_noted_and_shown_in_an_inset_until_zoomed(of_run
         return [notes.length, data.filter((each) => each.xaxis).length];
     })()"""
     of_runs.get_by_label("Beside it").select_option("none")
-    of_runs.wait_for_function("!document.getElementById('time-plot').data.some((each) => each.name === 'run 2')")
+    wait_for(of_runs, "!document.getElementById('time-plot').data.some((each) => each.name === 'run 2')")
     notes, lines = of_runs.evaluate(found)
     assert lines >= notes > 0
     of_runs.get_by_role("button", name="Zoom in").click()
-    of_runs.wait_for_function(f"{found}.join() === '0,0'")
+    wait_for(of_runs, f"{found}.join() === '0,0'")
     of_runs.get_by_role("button", name="Whole run").click()
-    of_runs.wait_for_function(f"{found}.join() === '{notes},{lines}'")
+    wait_for(of_runs, f"{found}.join() === '{notes},{lines}'")
     of_runs.get_by_label("Beside it").select_option("run 2")
 
 
@@ -296,14 +305,53 @@ def test_every_control_has_a_name_and_can_be_reached_by_key(of_runs: Any, of_stu
 
 
 def test_a_click_on_a_cell_of_the_map_opens_the_run_behind_it(of_study: Any) -> None:
-    plot = of_study.locator("#map-plot .nsewdrag")
+    plot = of_study.locator("#map-plot .plot-area")
     box = plot.bounding_box()
     of_study.mouse.click(box["x"] + 0.3 * box["width"], box["y"] + 0.3 * box["height"])
-    of_study.wait_for_function("document.getElementById('run-title').textContent.startsWith('Run 1')")
+    wait_for(of_study, "document.getElementById('run-title').textContent.startsWith('Run 1')")
     assert "period 10 ms" in of_study.inner_text("#run-text")
     assert of_study.is_visible("#scene")
     of_study.locator("#map-plot").press("ArrowDown")
     assert title(of_study).startswith("Run 0")
+
+
+def test_a_box_over_the_map_chooses_among_the_runs_until_all_are_taken_again(of_study: Any) -> None:
+    box = of_study.locator("#map-plot .plot-area").bounding_box()
+    of_study.mouse.move(box["x"] + 0.05 * box["width"], box["y"] + 0.05 * box["height"])
+    of_study.mouse.down()
+    of_study.mouse.move(box["x"] + 0.45 * box["width"], box["y"] + 0.95 * box["height"])
+    of_study.mouse.up()
+    wait_for(of_study, "document.getElementById('map-hint').textContent.startsWith('In the box: 2 of 4 runs, ')")
+    assert of_study.get_by_label("2 of the box").is_visible()
+    of_study.get_by_role("button", name="All runs").click()
+    wait_for(of_study, "!document.getElementById('map-hint').textContent.startsWith('In the box: ')")
+    assert of_study.get_by_label("Flights").is_visible()
+
+
+def test_a_second_study_is_drawn_over_the_first(of_study: Any, show: Show) -> None:
+    """The same study twice: the edges and shares of both are the same."""
+    folder = Path(of_study.url.removeprefix("file://")).parent
+    page = show(report(folder, folder, out=folder / "twice.html"))
+    assert " Over it study0: 4 runs: " in page.inner_text("#summary")
+    assert "dashed line: that of study0" in page.inner_text("#map-hint")
+    traces = "document.getElementById('map-plot').data"
+    edge, other = page.evaluate(
+        f"{traces}.filter((one) => one.mode === 'lines').map((one) => [one.x, one.y, one.line.dash])"
+    )
+    assert edge[:2] == other[:2]
+    assert (edge[2], other[2]) == (None, "dash")
+    wait_for(page, "document.getElementById('shares-plot').data?.length === 2")
+    own, others = page.evaluate("document.getElementById('shares-plot').data.map((each) => [each.x, each.y])")
+    assert own == others
+    page.close()
+
+
+def test_where_nothing_moves_there_is_no_button_to_play_it(show: Show, tmp_path: Path) -> None:
+    servo = changed(load_system(EXAMPLES / "double_integrator" / "system.toml"), {"stop_time": 1.0})
+    page = show(report(run(servo), out=tmp_path / "report.html"))
+    assert page.get_by_label("Time", exact=True).is_visible()
+    assert not page.get_by_role("button", name="Play").is_visible()
+    page.close()
 
 
 @in_test_all
@@ -319,23 +367,23 @@ def test_the_slider_goes_over_the_flights_of_the_open_cell(of_comparison: Any) -
     slider.press("ArrowRight")
     assert title(of_comparison) == last != first
     of_comparison.locator("#map-plot").press("ArrowRight")
-    of_comparison.wait_for_function("document.getElementById('cell-title').textContent.includes('20 ms')")
-    of_comparison.wait_for_function(f"document.getElementById('run-title').textContent !== {last!r}")
+    wait_for(of_comparison, "document.getElementById('cell-title').textContent.includes('20 ms')")
+    wait_for(of_comparison, f"document.getElementById('run-title').textContent !== {last!r}")
     assert "period 20 ms" in of_comparison.inner_text("#run-text")
     slider.press("End")
     assert "period 20 ms" in of_comparison.inner_text("#run-text")
 
 
 def test_the_lines_of_a_comparison_have_the_names_of_their_controllers(of_comparison: Any) -> None:
-    of_comparison.wait_for_function("document.getElementById('shares-plot').layout?.annotations?.length === 1")
+    wait_for(of_comparison, "document.getElementById('shares-plot').layout?.annotations?.length === 1")
     assert of_comparison.evaluate("document.getElementById('shares-plot').layout.annotations[0].text") == "own"
 
 
 def test_hovering_over_a_cell_shows_settings_and_metric(of_study: Any) -> None:
-    box = of_study.locator("#map-plot .nsewdrag").bounding_box()
+    box = of_study.locator("#map-plot .plot-area").bounding_box()
     of_study.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 0.7 * box["height"])
-    of_study.wait_for_function("document.querySelector('#map-plot .hovertext')?.textContent.includes('run 0: ')")
-    said = of_study.locator("#map-plot .hovertext").text_content()
+    wait_for(of_study, "document.querySelector('#map-plot .said')?.textContent.includes('run 0: ')")
+    said = of_study.locator("#map-plot .said").text_content()
     assert "period: 10 ms" in said
     assert "largest position error" in said
 
@@ -365,7 +413,7 @@ def test_the_page_and_its_plots_are_dark_where_the_system_is_until_a_button_is_u
             path.split('.').reduce((found, key) => found[key], document.getElementById('time-plot')))]"""
     light = of_runs.evaluate(colors)
     of_runs.emulate_media(color_scheme="dark")
-    of_runs.wait_for_function("document.documentElement.dataset.scheme === 'dark'")
+    wait_for(of_runs, "document.documentElement.dataset.scheme === 'dark'")
     dark = of_runs.evaluate(colors)
     assert all(one != other for one, other in zip(light, dark))
     of_runs.get_by_role("button", name="Light").click()
@@ -376,7 +424,7 @@ def test_the_page_and_its_plots_are_dark_where_the_system_is_until_a_button_is_u
 def test_on_a_phone_nothing_is_wider_than_the_page_and_signals_come_before_metrics(of_runs: Any, of_study: Any) -> None:
     for page in (of_runs, of_study):
         page.set_viewport_size({"width": 390, "height": 844})
-        page.wait_for_function("document.documentElement.scrollWidth <= 390")
+        wait_for(page, "document.documentElement.scrollWidth <= 390")
         tops = [page.locator(f"#{name}").bounding_box()["y"] for name in ("run", "signals", "facts")]
         assert tops == sorted(tops)
         page.set_viewport_size({"width": 1400, "height": 900})
@@ -386,7 +434,7 @@ def test_with_reduced_motion_the_replay_shows_a_picture_a_second(of_runs: Any) -
     of_runs.emulate_media(reduced_motion="reduce")
     of_runs.get_by_label("Time", exact=True).fill("0")
     of_runs.get_by_role("button", name="Play").click()
-    of_runs.wait_for_function("parseFloat(document.querySelector('#player output').textContent) > 0")
+    wait_for(of_runs, "parseFloat(document.querySelector('#player output').textContent) > 0")
     assert clock(of_runs) >= 1.0
     of_runs.get_by_role("button", name="Pause").click()
     of_runs.emulate_media(reduced_motion="no-preference")

@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 
-import quadcosim
 from orchestration.experiments.comparison import run as comparing
 from orchestration.experiments.tuning import tune as tuning
 from orchestration.foundation.basics.extras import needs
@@ -25,7 +24,6 @@ def without(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
 @pytest.mark.parametrize(
     ("package", "extra", "command"),
     [
-        ("plotly", "report", lambda: quadcosim.report("nothing")),
         ("pandas", "studies", lambda: comparing.compare(None)),  # type: ignore[arg-type]
         ("cma", "studies", lambda: tuning.tune(None, out="out")),  # type: ignore[arg-type]
     ],
