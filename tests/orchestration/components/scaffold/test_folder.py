@@ -7,6 +7,7 @@ import zipfile
 from pathlib import Path
 from xml.etree.ElementTree import fromstring
 
+import numpy as np
 import pytest
 
 from orchestration.components.building import builder, fmus
@@ -17,8 +18,10 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.requests.ranges import Varied
 from orchestration.simulation.runs.simulation import run
 from orchestration.systems.system.file import load_system
+from orchestration.systems.system.model import System
 from orchestration.theory.stability.linearise import linearise
 from orchestration.theory.stability.local_limit import local_limits
+from quadcosim import bode, expect, margin
 from tests.commands import Main
 from tests.extent import in_test_all, sample
 
@@ -51,8 +54,8 @@ def test_five_commands_lead_to_the_limit_plot_of_ones_own_controller(here: Path,
     assert "good             True" in main("run", "hover_pd/system.toml", "--native").stdout
     period = ("--of", "components.controller.sampling.period", "--from", "0.1", "--to", "0.2", "--scan", "0.1")
     found = main("limit", "hover_pd/system.toml", "--native", *period, "--tolerance", "0.1").stdout
-    assert "large_signal_limit   0.1" in found
-    assert "local_limit          0.11" in found
+    assert "large_signal_limit   100 ms" in found
+    assert "local_limit          111." in found
     drawn = here / "hover_pd" / "limit_components_controller_sampling_period.png"
     assert drawn.read_bytes().startswith(b"\x89PNG")
 
@@ -84,6 +87,8 @@ def test_a_plant_and_a_filter_run_good_and_have_a_limit(name: str, here: Path) -
     of, first, last = LIMITS[name]
     found = limit.find(system, of, first=first, last=last, scan=last - first, tolerance=last)
     assert found.large_signal_limit == first
+    if KINDS[name] == "plant":
+        _expect_linear_theory(system)
 
 
 @in_test_all
@@ -96,6 +101,22 @@ def test_the_pendulum_has_the_local_limit_of_its_own_integrator(here: Path) -> N
     found = local_limits(varied, Range(first=0.05, step=0.05, last=0.25, tolerance=5e-4))
     assert found.limit == pytest.approx(0.226652, abs=5e-6)
     assert len(linearise(system).rest.A) == 2
+
+
+def _expect_linear_theory(system: System) -> None:
+    """It has margins and an LQR; where its integrator is too coarse for an answer, the message has what to change."""
+    control = pytest.importorskip("control")
+    (margins,) = bode(system).loops
+    assert margins.gain_margin == pytest.approx(0.5 * 9.81 * 0.4 / 4.0, rel=1e-3), "k_p is m g l there"
+    loop = linearise(system)
+    gain, _, poles = control.dlqr(loop.rest.to_control(), np.eye(2), np.eye(1))
+    assert gain.shape == (1, 2)
+    assert np.abs(poles).max() < 1.0
+    with pytest.raises(UsageError, match=r"no linear system in continuous time: .*expected as_simulated"):
+        expect(system)
+    assert expect(system, as_simulated=True).mean_square_radius == pytest.approx(loop.radius**2, rel=1e-4)
+    with pytest.raises(UsageError, match="expected a component that integrates more accurately"):
+        margin(system, "connections.command.delay_jitter")
 
 
 @pytest.mark.parametrize(
