@@ -14,7 +14,7 @@ import numpy as np
 
 from fmu_kit.new_files import write_atomically
 from orchestration.components.fmi.read_description import Model, read_model
-from orchestration.experiments.live.sliders import Slider, Sliders, usual_sliders
+from orchestration.experiments.live.sliders import Slider, Sliders, parameters_without_ranges, usual_sliders
 from orchestration.foundation.basics.errors import UsageError, expected_name
 from orchestration.simulation.engines.batch.shape import Shape
 from orchestration.simulation.engines.resolved import check_against_fmus, columns_of
@@ -107,6 +107,7 @@ def _chosen(
     sliders = [each for each in usual.sliders if _is_there(request, models, each.path)]
     if given:
         sliders = [each for each in sliders if all(".parameters." in path for path in request.paths_of(each.path))]
+        sliders = sliders or parameters_without_ranges(system, models)
     if vary is not None:
         words = {each.path: each for each in usual.sliders}
         sliders = []

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.components.fmi.read_description import Model
 from orchestration.experiments.live.known_sliders import KNOWN_SLIDERS
 from orchestration.systems.system.component import Sampling, has_scheduled_instants
@@ -92,6 +93,22 @@ def _of_parameters(system: System, models: Mapping[str, Model]) -> list[Slider]:
                 path = f"components.{name}.parameters.{variable.name}"
                 found.append(Slider(path=path, words=f"{name}.{variable.name}", low=low, high=high, group="Parameters"))
     return found
+
+
+def parameters_without_ranges(system: System, models: Mapping[str, Model]) -> list[Slider]:
+    """Sliders of positive parameters, from a fifth of their values to five times these."""
+    found = []
+    for name, component in system.components.items():
+        for variable in models[name].variables.values():
+            value = component.parameters.get(variable.name, variable.start)
+            is_one = variable.causality == "parameter" and variable.kind == "Real" and not variable.is_constant
+            if not is_one or variable.name in (SAMPLE_PERIOD, SAMPLE_OFFSET):
+                continue
+            if isinstance(value, (int, float)) and 0.0 < value < math.inf:
+                path = f"components.{name}.parameters.{variable.name}"
+                found.append(Slider(path=path, words=f"{name}.{variable.name}", low=value / 5.0, high=5.0 * value,
+                                    group="Parameters", logarithmic=True))  # fmt: skip
+    return found[:_MOST_PARAMETERS]
 
 
 def _rounded(value: float) -> float:
