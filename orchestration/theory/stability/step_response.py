@@ -39,7 +39,7 @@ class LoopStep:
     rise_time: float | None
     """The time from 10 to 90 % of the final value [s]; None: the final value is 0."""
     overshoot: float | None
-    """What exceeds the final value, as a share of it [%]; None: the final value is 0."""
+    """Excess over the final value, as a share of it [%]; None: the final value is 0."""
     settling_time: float
     """The time from which on it stays within 2 % of the final value, or of the largest where that is 0 [s]."""
     steady_state: float
