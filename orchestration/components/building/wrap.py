@@ -30,6 +30,7 @@ from typing import Any
 from fmu_kit.archive import read_wrapped
 from fmu_kit.units import base_unit_exponents
 from orchestration.components.building import consent
+from orchestration.components.building.models import WRAPPED
 from orchestration.foundation.basics.documents import read_text, toml_of
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError, prefixed
 from orchestration.foundation.basics.records import record
@@ -223,8 +224,12 @@ def build(path: Path, out: Path, *, version: int = 2, systems: str | None = None
 
 
 def _parsed(path: Path, text: str) -> WrapFile:
+    if path.suffix != WRAPPED:
+        raise UsageError(
+            f"{path}: expected the {WRAPPED} file that describes the code, as from quadcosim new controller NAME --c"
+        )
+    tables = toml_of(text, str(path))
     with prefixed(f"{path}: "):
-        tables = toml_of(text, "it")
         for kind in ("inputs", "outputs", "parameters"):
             found = tables.get(kind, {})
             if isinstance(found, dict):

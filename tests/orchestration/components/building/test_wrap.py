@@ -276,6 +276,7 @@ def test_code_that_fails_at_its_start_is_told_by_its_signal(of: Callable[..., Pa
         ("period = 0.05", "period = -1", "period = -1: expected a positive number of seconds"),
         ("period = 0.05", "", "period: expected the sampling period that the code believes"),
         ('unit = "m"', 'unit = "parsec"', "inputs.x: unit parsec: expected powers of"),
+        ("period = 0.05", "period", "pd.toml: expected TOML"),
         ("sources", "source", "source: no such key; expected one of"),
         ('"pd.c"', '"no.c"', "sources: no.c: no such file in"),
         ('v = { c = "in.v"', '"v w" = { c = "in.v"', "inputs.v w: expected a name"),
@@ -289,6 +290,8 @@ def test_a_file_that_does_not_fit_is_refused_in_words(of: Callable[..., Path], o
 def test_the_command_ends_with_2_for_a_refused_source_and_makes_fmus(of: Callable[..., Path], main: Main) -> None:
     file = of(lambda text: text.replace("in.x", "in.q"))
     assert f"{file.parent}/pd.toml:10: error: 'pd_in' has no member named 'q'" in main("wrap", file, code=2).stderr
+    code = main("wrap", file.with_suffix(".c"), code=2).stderr
+    assert f"{file.with_suffix('.c')}: expected the .toml file that describes the code, as from quadcosim new" in code
     of()
     made = main("wrap", file, "--fmi", "3", "--out", file.parent / "x").stdout.strip()
     assert made == str(file.parent / "x" / "Pd.fmu")
