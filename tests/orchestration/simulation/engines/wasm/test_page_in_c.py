@@ -4,6 +4,8 @@ from typing import Any
 
 import pytest
 
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.simulation.engines.wasm import modules
 from orchestration.simulation.engines.wasm.modules import library_of
 from orchestration.simulation.engines.wasm.tables_of_system import tables_of
 from orchestration.simulation.requests.request import request_of
@@ -119,6 +121,12 @@ def test_timing_and_sources_that_a_page_cannot_compute_are_given_to_it(name):
     assert page.fly([{}], columns)[0][0] == hashes_of(flown, columns)[0]
     assert not [path for path in of.settings.at if path.endswith((".sampling.period", ".delay", ".jitter", ".loss"))]
     assert page.fly([{"stop_time": 0.2}], columns) == (1, "stop_time")
+
+
+def test_c_of_a_user_is_refused_by_the_name_of_its_component(of_one_lane, monkeypatch):
+    monkeypatch.setattr(modules, "sources_of", lambda name, model: {"lanes.c": b"", "law.o": b""})
+    with pytest.raises(UsageError, match=r"components\.plant: a user's own C"):
+        modules.units_of(of_one_lane, 1)
 
 
 def test_settings_have_a_place_each(of_one_lane):
