@@ -112,5 +112,7 @@ def interop(
             inform(str(path))
     far = [agreement.tool.name for agreement in found if not table.agrees(agreement)]
     document = [table.as_dict(agreement) for agreement in found]
+    if far:
+        inform(f"farther than {table.TOLERANCE:g} from this project's master: {'; '.join(far)}")
     verdict = verdicts.of_agreements(far, len(found), table.TOLERANCE)
     return CommandResult(document=document, verdict=verdict, lines=table.text(found).splitlines(), good=not far)
