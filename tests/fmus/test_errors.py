@@ -373,7 +373,7 @@ def test_a_temporary_folder_that_pythonfmu_cannot_find_is_refused(
 ) -> None:
     plain = without_loader(built[PLANT], tmp_path)
     said = loaded_in(tmp_path / name, plain)
-    assert said.startswith(f"{plain}: expected a co-simulation FMU that loads here: unpacked in {tmp_path / name}")
+    assert said.startswith(f"{plain}: expected an FMU for co-simulation that loads here: unpacked in {tmp_path / name}")
     assert "other characters than ASCII letters, digits, spaces and - . _ ~: set TMPDIR" in said
     assert said.count("\n") == 1
 

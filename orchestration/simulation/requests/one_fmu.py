@@ -35,8 +35,9 @@ def alone(
     `interval` [s] is that of the communication points, `inputs` a CSV file with a column for each input that it feeds.
     Raises `UsageError` for a file that is no FMU, and for an experiment that does not begin at 0.
     """
+    model = read_model(path)
     with prefixed(f"{path}: "):
-        model = called(read_model(path), Access(interface=interface))
+        model = called(model, Access(interface=interface))
     begin = experiment(model, "startTime")
     if begin is not None:
         raise UsageError(f"{path}: its default experiment begins at {begin:g} s; expected 0, where runs begin here")

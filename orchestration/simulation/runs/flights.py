@@ -19,14 +19,14 @@ class Flights(Mapping[str, Any]):
     """The results of many runs as arrays by name: `flights["position_rmse"]` has a value for each run."""
 
     arrays: Mapping[str, Any]
-    """Arrays by name: of an output the shape that the given values have together, NaN where it has no value; `time` and
+    """The arrays: of an output the shape that the given values have together, NaN where it has no value; `time` and
     what was recorded have one axis more, of the rows, NaN after the last row of a run that has fewer."""
     given: Mapping[str, Any]
-    """The values that were given, by path, as arrays that broadcast to that shape"""
+    """The values that were given, by path, as arrays that broadcast to that shape."""
     recorded: tuple[str, ...]
-    """The names of the arrays with rows"""
+    """The names of the arrays with rows."""
     shape: tuple[int, ...]
-    """The shape that the given values have together, so that of the outputs"""
+    """The shape that the given values have together, so that of the outputs."""
     engine: str
     """The engine of the runs: `batch`, which is SIMD lanes, `compiled` or `python`; the numbers are the same."""
     reason: str | None

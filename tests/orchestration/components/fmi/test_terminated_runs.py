@@ -141,7 +141,10 @@ def test_a_termination_is_kept_and_told(tmp_path: Path, main: Main) -> None:
     assert again.metrics == json.loads((tmp_path / "kept" / "metrics.json").read_text()) == result.metrics
     assert "terminated: it (Small)" in repr(result._repr_html_())
     (tmp_path / "system.toml").write_text(result.request.to_toml(), encoding="utf-8")
-    assert "terminated: it (Small): fmi2DoStep: ends the run at 0.05 s" in main("run", tmp_path / "system.toml").stdout
+    assert (
+        "terminated at 50 ms: it (Small): fmi2DoStep: ends the run at 0.05 s"
+        in main("run", tmp_path / "system.toml").stdout
+    )
 
 
 def test_no_outcome_of_a_criterion_is_called_so() -> None:

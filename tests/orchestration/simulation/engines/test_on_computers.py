@@ -215,7 +215,7 @@ def test_a_run_tells_what_becomes_of_tasks_and_frames_beside_messages_and_so_do_
     events = load_run(tmp_path / "whole").events
     assert events == ran(what, engine).events
     assert [event for event in events if event.what not in messages] == [*timeline_of(what).happenings()]
-    assert {event.kind for event in events} == set(KINDS) - {"skipped", "aborted"}
+    assert {event.kind for event in events} == set(KINDS) - {"skipped", "aborted", "event"}
     assert [event.time for event in events] == sorted(event.time for event in events)
     at_once = [(event.kind, event.what) for event in events if event.time == 10_000_000]
     assert at_once == [("finished", "one.load"), ("started", "one.control"), ("sampled", "measured")]

@@ -99,7 +99,7 @@ def system_of(folder: Path, text: str) -> System:
     [
         ("area =", "aria =", "components.tank.parameters.aria: ", "area"),
         ("area = 2.0", "level = 2.0", "components.tank.parameters.level: ", "expected a parameter"),
-        ("area = 2.0", "valve = 2.0", "components.tank.parameters.valve: is connected; ", "expected a parameter or"),
+        ("area = 2.0", "valve = 2.0", "components.tank.parameters.valve: is connected; ", "expected a parameter,"),
         ("area = 2.0", 'area = "big"', "components.tank.parameters.area = big: ", "expected a number"),
         ("rough = true", "rough = 1.5", "components.tank.parameters.rough = 1.5: ", "expected true or false"),
         ("rough = true", "pipes = 1.5", "components.tank.parameters.pipes = 1.5: ", "expected a whole number"),
