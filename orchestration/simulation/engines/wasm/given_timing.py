@@ -16,6 +16,8 @@ from orchestration.systems.system.connection import component_of
 from orchestration.systems.system.distribution import Distribution
 from orchestration.systems.system.model import System
 
+EXACT = ("hover", "step")
+"""Motions of sums and products alone, whose C has the bits of Python's"""
 _ALL = 2**40
 """More instants than a page has"""
 
@@ -32,7 +34,7 @@ def reason(system: System) -> str | None:
             if isinstance(getattr(x, key), Distribution):
                 return f"connections.{x.name}.{key} is a distribution"
     for name, source in system.sources.items():
-        if source.to and (source.is_built_in or source.is_motion or source.signal is not None):
+        if source.to and source.signal not in EXACT and (source.is_built_in or source.is_motion or source.signal):
             return f"sources.{name} is a function of time"
     return None
 

@@ -9,7 +9,7 @@ from orchestration.simulation.engines.wasm import modules
 from orchestration.simulation.engines.wasm.modules import library_of
 from orchestration.simulation.engines.wasm.tables_of_system import tables_of
 from orchestration.simulation.requests.request import request_of
-from quadcosim import Scenario, fly
+from quadcosim import ReferenceChoice, Scenario, fly
 from tests.orchestration.simulation.engines.wasm.machines import Native, Page, hashes_of, tables
 from tests.places import ROOT
 
@@ -121,6 +121,13 @@ def test_timing_and_sources_that_a_page_cannot_compute_are_given_to_it(name):
     assert page.fly([{}], columns)[0][0] == hashes_of(flown, columns)[0]
     assert not [path for path in of.settings.at if path.endswith((".sampling.period", ".delay", ".jitter", ".loss"))]
     assert page.fly([{"stop_time": 0.2}], columns) == (1, "stop_time")
+
+
+def test_motions_of_sums_and_products_are_computed_by_a_page_under_any_clock():
+    request = Scenario(stop_time=2.5, reference=ReferenceChoice(name="step"))
+    of = tables(request, 1)
+    flown = fly(request, {"timing.period": [0.013]}, record=COLUMNS)
+    assert hashes(page_of(of), [{"timing.period": 0.013}]) == hashes_of(flown, COLUMNS)
 
 
 def test_c_of_a_user_is_refused_by_the_name_of_its_component(of_one_lane, monkeypatch):
