@@ -382,5 +382,5 @@ function mapLayout() {
 
 function axisLayout(axis) {
   const type = axis.words ? "category" : axis.logarithmic ? "log" : "linear";
-  return { title: { text: escaped(titled(axis.label, axis.unit)) }, type, zeroline: false };
+  return { title: { text: escaped(titled(axis.label, axis.unit)) }, type, words: axis.words, zeroline: false };
 }

@@ -54,7 +54,7 @@ function onAxis(axis, value) {
 function axisOf(id, spec, traces, [from, to]) {
   const values = traces.flatMap((trace) => (trace.type === "heatmap" ? [trace[id[0]]] : [trace[id[0]]]));
   const isWords = spec.type === "category" || values.some((some) => typeof some[0] === "string");
-  const axis = { ...spec, id, isLogarithmic: spec.type === "log", words: isWords ? [...new Set(values.flatMap((some) => [...some]))].filter((value) => value !== null) : null };
+  const axis = { ...spec, id, isLogarithmic: spec.type === "log", words: isWords ? spec.words ?? [...new Set(values.flatMap((some) => [...some]))].filter((value) => typeof value === "string") : null };
   const domain = spec.domain ?? [0, 1];
   axis.at = domain.map((share) => from + share * (to - from));
   axis.ends = spec.range ? [...spec.range] : rangeOf(axis, traces);

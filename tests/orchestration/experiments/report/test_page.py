@@ -18,6 +18,7 @@ from orchestration.experiments.comparison.file import load_comparison
 from orchestration.experiments.comparison.run import compare
 from orchestration.experiments.report.writing import report
 from orchestration.experiments.studies.study import Study
+from orchestration.experiments.studies.study_file import load_study
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.quadrotor.flight.layout import ATTITUDE, DESIRED, PLACE
 from orchestration.quadrotor.scenarios.wiring import POSITION_REFERENCE
@@ -343,6 +344,21 @@ def test_a_second_study_is_drawn_over_the_first(of_study: Any, show: Show) -> No
     wait_for(page, "document.getElementById('shares-plot').data?.length === 2")
     own, others = page.evaluate("document.getElementById('shares-plot').data.map((each) => [each.x, each.y])")
     assert own == others
+    page.close()
+
+
+def test_an_axis_of_words_has_a_tick_for_each_and_its_cells_fill_the_map(show: Show, tmp_path: Path) -> None:
+    file = tmp_path / "orders.toml"
+    file.write_text(
+        "[base]\nstop_time = 0.02\n[base.timing]\nplant_interval = 0.005\n"
+        '[[axes]]\nname = "timing.order"\nvalues = ["gauss-seidel", "jacobi"]\n'
+        '[[axes]]\nname = "plant.initial.position.z"\nvalues = [0.0, 2.0]\n'  # the second is good: there is an edge
+    )
+    sweep(load_study(file), folder=tmp_path)
+    page = show(report(file, out=tmp_path, flights=1, runs=[0]))
+    texts = page.locator("#map-plot text").all_text_contents()
+    assert {"gauss-seidel", "jacobi"} <= {*texts}
+    assert "-0.5" not in texts  # the end of the edge, which is no word; ticks of numbers have another minus
     page.close()
 
 
