@@ -4,7 +4,8 @@ import csv
 import io
 from collections.abc import Iterator, Sequence
 
-from orchestration.experiments.comparison.cells import CellSummary, Median, Share
+from orchestration.command.comparison_text import median_text, share_text
+from orchestration.experiments.comparison.cells import CellSummary
 from orchestration.experiments.comparison.design import Comparison
 from orchestration.experiments.comparison.outcome import Outcome
 from orchestration.foundation.basics.errors import UsageError
@@ -58,10 +59,10 @@ def _columns(comparison: Comparison, cells: Sequence[CellSummary]) -> tuple[list
     for name in comparison.values_of(comparison.conditions[0].name, comparison.values[0]):
         columns[name] = [f"{cell.values[name]:g}" for cell in cells]
     columns |= {
-        "survives": [_share(cell.survives) for cell in cells],
-        "settles": [_share(cell.settles) for cell in cells],
+        "survives": [share_text(cell.survives) for cell in cells],
+        "settles": [share_text(cell.settles) for cell in cells],
         **{
-            f"{name.replace('_', ' ')} [{unit}]": [_median(c.medians[name]) for c in cells]
+            f"{name.replace('_', ' ')} [{unit}]": [median_text(c.medians[name]) for c in cells]
             for name, unit in _UNITS.items()
         },
     }
@@ -71,14 +72,3 @@ def _columns(comparison: Comparison, cells: Sequence[CellSummary]) -> tuple[list
 def _latex(row: Sequence[str]) -> str:
     escaped = (cell.replace("_", r"\_").replace("%", r"\%").replace("&", r"\&").replace("#", r"\#") for cell in row)
     return " & ".join(escaped) + r" \\"
-
-
-def _share(share: Share) -> str:
-    return f"{share.value:.2f} [{share.low:.2f}, {share.high:.2f}]"
-
-
-def _median(median: Median) -> str:
-    if median.value is None:
-        return "-"
-    low, high = ("?" if end is None else f"{end:.3g}" for end in (median.low, median.high))
-    return f"{median.value:.3g} [{low}, {high}]"

@@ -37,14 +37,14 @@ def cell_lines(comparison: Comparison, cell: CellSummary) -> Iterator[str]:
     """One cell, a quantity per line."""
     place = f"{cell.controller}, {cell.vehicle}, {cell.condition}, {comparison.axis.name} {cell.value:g}"
     yield f"cell {cell.cell}: {place}"
-    yield f"{'survives':<22}  {cell.survives.count} of {cell.count}: {_share(cell.survives)}"
+    yield f"{'survives':<22}  {cell.survives.count} of {cell.count}: {share_text(cell.survives)}"
     late = f", {cell.diverged_late} of them in the second half of the horizon" if cell.diverged_late else ""
     yield f"{'diverged':<22}  {cell.diverged}{late}"
-    yield f"{'settles':<22}  {cell.settles.count} of {cell.count}: {_share(cell.settles)}"
+    yield f"{'settles':<22}  {cell.settles.count} of {cell.count}: {share_text(cell.settles)}"
     units = {PEAK: " N.m", VARIATION: " N.m", "settling_time": " s", "residual": " m"}
     for name, median in cell.medians.items():
         fate = "settle" if name == "settling_time" else "survive"
-        yield f"{name:<22}  {_median(median)}{units.get(name, '')}, median of those that {fate}"
+        yield f"{name:<22}  {median_text(median)}{units.get(name, '')}, median of those that {fate}"
 
 
 def _limits(outcome: Outcome) -> Iterator[list[str]]:
@@ -61,14 +61,16 @@ def _limit(limit: GridLimit) -> str:
 
 
 def _counts(cell: CellSummary) -> str:
-    return f"{cell.survives.count} / {cell.settles.count}  {_share(cell.survives)}"
+    return f"{cell.survives.count} / {cell.settles.count}  {share_text(cell.survives)}"
 
 
-def _share(share: Share) -> str:
+def share_text(share: Share) -> str:
+    """A share with its interval."""
     return f"{share.value:.3f} [{share.low:.3f}, {share.high:.3f}]"
 
 
-def _median(median: Median) -> str:
+def median_text(median: Median) -> str:
+    """A median with its interval; a dash where no run has the value."""
     if median.value is None:
         return "-"
     low, high = ("?" if end is None else f"{end:.4g}" for end in (median.low, median.high))
