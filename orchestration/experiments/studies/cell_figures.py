@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 
 from orchestration.experiments.studies.axes import Axis, Value
 from orchestration.experiments.studies.axis_labels import SCALES, edges, name_of, quantity_of
-from orchestration.experiments.studies.shares import GOOD, cells_of, certain
+from orchestration.experiments.studies.shares import GOOD, cells_of, differ
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.figures import cells as mesh
 from orchestration.simulation.figures.palette import BLACK, BLUE, CYCLE, DASHES, MARKS, NOT_GOOD
@@ -46,7 +46,8 @@ def cell_lines(
     across = quantity_of(axis, units)
     figure = style.figure(32.0)
     panel = figure.add_subplot()
-    groups = _by_law(cells_of(table, _names(axis, laws), metric), laws)
+    found = cells_of(table, _names(axis, laws), metric)
+    groups = _by_law(found, laws)
     for i, (law, group) in enumerate(groups):
         how: dict[str, Any] = {"color": CYCLE[i % len(CYCLE)] if law else BLUE, "linestyle": DASHES[i % len(DASHES)]}
         at = across.of(group[axis.name])
@@ -58,7 +59,7 @@ def cell_lines(
         panel.set_ylim(-0.02, 1.02)
     if laws is not None:
         figure.legend(loc="outside right upper", title=name_of(laws))
-    figure.suptitle(_repetitions(table, _names(axis, laws), metric))
+    figure.suptitle(_repetitions(found, metric))
     return figure
 
 
@@ -79,7 +80,8 @@ def cell_maps(
     """
     x, y = (quantity_of(axis, units) for axis in axes)
     places = (edges(axes[0], x.of(table[axes[0].name])), edges(axes[1], y.of(table[axes[1].name])))
-    groups = _by_law(cells_of(table, _names(*axes, laws), metric), laws)
+    found = cells_of(table, _names(*axes, laws), metric)
+    groups = _by_law(found, laws)
     count = 3 if len(groups) == 2 else len(groups)
     columns = min(count, 3 if style.is_wide else 1)
     rows = -(-count // columns)
@@ -110,7 +112,9 @@ def cell_maps(
         panel.xaxis.set_tick_params(labelbottom=True)
     for panel in panels[:count:columns]:
         panel.set_ylabel(y.title)
-    figure.suptitle(_repetitions(table, _names(*axes, laws), metric))
+    dots = "; dots: that of the difference excludes 0" if metric == GOOD and len(groups) == 2 else ""
+    repetitions = _repetitions(found, metric)
+    figure.suptitle(repetitions and repetitions + dots)
     handles: list[Patch | Line2D] = []
     if any(_has_limit(grid["share"]) for grid in grids):
         handles.append(Line2D([], [], color=mesh.LIMIT["colors"], label=f"half of the runs {words[0]}"))
@@ -181,7 +185,7 @@ def _difference(
     quantities: tuple[Quantity, Quantity],
     metric: str,
 ) -> None:
-    """The second law minus the first, with dots where the shares certainly differ."""
+    """The second law minus the first, with dots where the interval of the difference of the shares excludes 0."""
     difference = grids[1]["value"] - grids[0]["value"]
     known = np.abs(difference[np.isfinite(difference)])
     size = 1.0 if metric == GOOD or not known.max(initial=0.0) else float(known.max())
@@ -196,7 +200,7 @@ def _difference(
     marked = [
         (row[axes[0].name], row[axes[1].name])
         for _, row in both.iterrows()
-        if certain(*({name: row[f"{name}.{law}"] for name in columns} for law in (0, 1)))
+        if differ(*({name: row[f"{name}.{law}"] for name in columns} for law in (0, 1)))
     ]
     if marked:
         x, y = (quantity.of(values) for quantity, values in zip(quantities, zip(*marked)))
@@ -209,14 +213,11 @@ def _title(metric: str, words: tuple[str, str], units: Mapping[str, str]) -> str
     return f"median of {labels.metric_with_unit(metric, units.get(metric))}, where {words[0]}"
 
 
-def _repetitions(table: "pd.DataFrame", by: list[str], metric: str) -> str:
-    """The number of runs of a cell, and how wide the intervals of their shares are."""
-    counted = cells_of(table, by, metric)
-    counts = sorted(set(counted["count"]))
-    runs = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
-    if counts == [1]:
+def _repetitions(cells: "pd.DataFrame", metric: str) -> str:
+    """The number of runs of a cell, and how wide the intervals of their shares are; empty where none repeats."""
+    fewest, most = cells["count"].min(), cells["count"].max()
+    if most == 1:
         return ""
-    width = 0.5 * (counted["high"] - counted["low"]).max()
-    note = f"; intervals at 95 % of up to ±{width:.2f}" if metric == GOOD else ""
-    dots = "; dots: the two certainly differ" if metric == GOOD and len(by) == 3 else ""
-    return f"{runs} runs a cell{note}{dots}"
+    runs = f"{fewest}" if fewest == most else f"{fewest} to {most}"
+    width = 0.5 * (cells["high"] - cells["low"]).max()
+    return f"{runs} runs a cell" + (f"; intervals at 95 % of up to ±{width:.2f}" if metric == GOOD else "")

@@ -47,7 +47,7 @@ def shares_of(table: "pd.DataFrame", by: Sequence[str]) -> "pd.DataFrame":
     return cells_of(table, by).drop(columns="value")
 
 
-def certain(one: Mapping[str, float], other: Mapping[str, float]) -> bool:
+def differ(one: Mapping[str, float], other: Mapping[str, float]) -> bool:
     """Whether the 95 % interval of the difference of the shares of two cells, by Newcombe's method 10, excludes 0.
 
     Runs with the same seed are taken as independent, which makes it wider than a paired one where they are alike.

@@ -71,7 +71,6 @@ class GivenTiming:
         values = {name: source_values(system, name, parameters, streams) for name in system.sources}
         seen = [values[name] for name in shape.seen]
         fed = [name for name, source in system.sources.items() if source.to]
-        fed = [name for name, source in system.sources.items() if source.to]
         texts = [_table("double", "given_at_first", [x for name in fed for x in values[name].at(0.0)])]
         for name, instants in (("regular", span.regular), ("own", span.own)):
             t = seconds(instants.times)

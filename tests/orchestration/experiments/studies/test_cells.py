@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from orchestration.experiments.studies.cell_figures import cell_lines, cell_maps
-from orchestration.experiments.studies.shares import cells_of, certain
+from orchestration.experiments.studies.shares import cells_of, differ
 from orchestration.experiments.studies.study_file import load_study
 from orchestration.foundation.basics.statistics import wilson
 from orchestration.quadrotor.scenarios.vehicle import load_vehicle
@@ -62,17 +62,17 @@ def test_runs_that_no_criterion_judges_have_no_share() -> None:
         cells_of(runs().assign(good=pd.NA), ["timing.period"])
 
 
-def test_two_shares_differ_certainly_where_newcombes_interval_excludes_0() -> None:
+def test_two_shares_differ_where_newcombes_interval_excludes_0() -> None:
     # Newcombe (1998), table II: 56/70 against 48/80 has the interval .0524 to .3339, 9/10 against 3/10 .1705 to .8090,
     # 10/10 against 0/20 .6791 to 1, 5/56 against 0/29 -.0381 to .1926
     def cell(good: int, count: int) -> dict[str, float]:
         low, high = wilson(good, count)
         return {"share": good / count, "low": low, "high": high}
 
-    assert certain(cell(56, 70), cell(48, 80))
-    assert certain(cell(9, 10), cell(3, 10))
-    assert certain(cell(0, 20), cell(10, 10))
-    assert not certain(cell(5, 56), cell(0, 29))
+    assert differ(cell(56, 70), cell(48, 80))
+    assert differ(cell(9, 10), cell(3, 10))
+    assert differ(cell(0, 20), cell(10, 10))
+    assert not differ(cell(5, 56), cell(0, 29))
 
 
 def test_a_map_of_two_laws_has_a_third_panel_with_their_difference() -> None:
@@ -83,7 +83,16 @@ def test_a_map_of_two_laws_has_a_third_panel_with_their_difference() -> None:
     shown = set(zip(*(map(float, np.round(data, 6)) for data in marks.get_data())))  # type: ignore[arg-type]
     assert shown == {(10.0, 0.0), (10.0, 0.1), (20.0, 0.0), (20.0, 0.1), (20.0, 0.2)}  # 8 and 6 of 8 may be alike
     assert [text.get_text() for text in figure.axes[1].texts] == ["0/8", "3/8", "6/8", "0/8", "0/8", "0/8"]
-    assert figure.get_suptitle() == ("8 runs a cell; intervals at 95 % of up to ±0.28; dots: the two certainly differ")
+    assert figure.get_suptitle() == (
+        "8 runs a cell; intervals at 95 % of up to ±0.28; dots: that of the difference excludes 0"
+    )
+
+
+def test_one_law_alone_has_one_map_and_no_word_of_a_difference() -> None:
+    alone = runs().query("controller == 'CascadedController'")
+    law = axis("controller", "CascadedController")
+    figure = cell_maps(alone, (PERIODS, LOSSES), law, "good", WORDS, units={})
+    assert figure.get_suptitle() == "8 runs a cell; intervals at 95 % of up to ±0.28"
 
 
 def test_shares_over_one_axis_are_a_line_with_a_band_for_each_law() -> None:
