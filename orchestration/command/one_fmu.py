@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from orchestration.command.flags import FlightFlags, assigned
 from orchestration.command.options import option
 from orchestration.command.registry import expect_positive
-from orchestration.components.fmi.access import INTERFACES, Interface
+from orchestration.components.fmi.access import INTERFACES, SCHEDULED, Interface
 from orchestration.foundation.basics.errors import UsageError, expected_name
 
 if TYPE_CHECKING:
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from orchestration.systems.system.model import System
 
 _of_fmu = partial(option, panel="One FMU")
+_ALONE = tuple(name for name in INTERFACES if name != SCHEDULED)
+"""Interfaces by which one component is a whole FMU"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +35,7 @@ class OneFmuFlags:
     ] = None
 
     interface: Annotated[
-        str | None, _of_fmu("--interface", "By which it is called; default: co-simulation.", "|".join(INTERFACES))
+        str | None, _of_fmu("--interface", "By which it is called; default: co-simulation.", "|".join(_ALONE))
     ] = None
 
     def __post_init__(self) -> None:
@@ -58,7 +60,7 @@ class OneFmuFlags:
         return replace(flags, stop_time=None, set=None).applied_to_system(system)
 
     def _interface(self) -> Interface | None:
-        known = {name: name for name in INTERFACES}
+        known = {name: name for name in _ALONE}
         if self.interface is not None and self.interface not in known:
             raise UsageError(f"--interface {self.interface}: {expected_name(self.interface, list(known))}")
         return None if self.interface is None else known[self.interface]

@@ -30,7 +30,7 @@ from typing import Any
 from fmu_kit.archive import read_wrapped
 from fmu_kit.units import base_unit_exponents
 from orchestration.components.building import consent
-from orchestration.components.building.models import WRAPPED
+from orchestration.components.building.models import FMI3, WRAPPED
 from orchestration.foundation.basics.documents import read_text, toml_of
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError, prefixed
 from orchestration.foundation.basics.records import record
@@ -165,7 +165,14 @@ class WrapFile:
 def fmu_of(path: Path, version: int = 2) -> Path:
     """The FMU that is made of a file, beside it, or in fmi3/ for FMI 3.0; raises `UsageError` for an invalid file."""
     name = load(path).name
-    return path.parent / ("" if version == 2 else f"fmi{version}") / f"{name}.fmu"
+    return path.parent / ("" if version == 2 else FMI3) / f"{name}.fmu"
+
+
+def described_by(path: Path) -> tuple[Path, int]:
+    """The file that a path stands for, and the version of FMI of its FMU: `fmi3/NAME.toml` is of NAME.toml beside."""
+    if path.parent.name == FMI3 and not path.is_file():
+        return path.parent.parent / path.name, 3
+    return path, 2
 
 
 def load(path: Path) -> WrapFile:
@@ -177,12 +184,13 @@ def locate(path: Path, announce: Callable[[str], None] | None = None) -> Path:
     """The FMU of a file, made first if it is missing or its sources have changed; where consent is required for that,
     `UsageError` states how to give it.
     """
-    fmu = fmu_of(path)
+    path, version = described_by(path)
+    fmu = fmu_of(path, version)
     if is_out_of_date(fmu, path):
         consent.expect(fmu, path.parent)
         if announce is not None:
             announce(f"building {fmu}")
-        build(path, fmu)
+        build(path, fmu, version=version)
     return fmu
 
 

@@ -6,8 +6,9 @@ from typing import Any, Literal, get_args
 
 from orchestration.foundation.processes.passable import passable
 
-Interface = Literal["co-simulation", "event-mode", "model-exchange"]
+Interface = Literal["co-simulation", "event-mode", "model-exchange", "scheduled-execution"]
 """Interfaces of FMUs; event-mode is co-simulation whose events the importer processes"""
+SCHEDULED: Interface = "scheduled-execution"
 Solver = Literal["dormand-prince", "cvode"]
 INTERFACES: tuple[Interface, ...] = get_args(Interface)
 
@@ -22,7 +23,8 @@ class Access:
     solver: Solver | None = None
     """None: Dormand and Prince's, for model exchange"""
     clock: str | None = None
-    """The periodic input clock that ticks at every sample, for event mode; None: the fastest, if there is any"""
+    """The periodic input clock that ticks at every sample, for event mode; None: the fastest, if there is any. For
+    scheduled execution, that of the partition"""
 
     def __str__(self) -> str:
         return json.dumps(asdict(self))

@@ -1,4 +1,4 @@
-"""Instances of FMUs for model exchange, and of those whose events the importer processes, by adapter.c."""
+"""Instances of FMUs for model exchange, of those whose events the importer processes, and of partitions: adapter.c."""
 
 import ctypes
 import functools
@@ -14,6 +14,7 @@ import numpy as np
 from fmu_kit.bundle import PackagingError
 from fmu_kit.compiler.pack.c_compiler import OPTIONS, compiled_here
 from fmu_kit.libraries import cached_library
+from orchestration.components.fmi.access import SCHEDULED, USUAL, Access, Interface
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.components.fmi.fmi3 import Fmi3Instance, StepsWithEnd
 from orchestration.components.fmi.instance import start_number
@@ -21,7 +22,7 @@ from orchestration.components.fmi.read_description import Model
 from orchestration.components.fmi.slaves import WARNING
 from orchestration.components.fmi.transfers import Numbers
 from orchestration.foundation.basics.c_structures import address, constants, declared, expect_same_sizes
-from orchestration.foundation.basics.errors import QuadcosimError, UsageError
+from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
 
@@ -38,6 +39,12 @@ _EXCHANGE = {
     "indicators": "GetEventIndicators", "nominals": "GetNominalsOfContinuousStates",
     "completed": "CompletedIntegratorStep",
 }  # fmt: skip
+_FUNCTIONS: Mapping[Interface, Mapping[str, str]] = {
+    "event-mode": {**_EVENTS, **_STEP},
+    "model-exchange": {**_EVENTS, **_EXCHANGE},
+    SCHEDULED: {"activate": "ActivateModelPartition"},
+}
+"""Fields of the adapter, and the functions of the FMU in them"""
 _IN_FMI2 = {"UpdateDiscreteStates": "NewDiscreteStates", "GetContinuousStateDerivatives": "GetDerivatives"}
 _TYPES_OF_FMI2 = {"Float64": "Real", "Int32": "Integer", "Boolean2": "Boolean"}
 
@@ -97,10 +104,9 @@ class AdaptedInstance(StepsWithEnd):
     def _called(self) -> tuple[Any, ctypes.c_void_p]:
         self._clocked: list[tuple[Numbers, Numbers]] = []  # start values, and the values of the last tick
         self._adapter = a = _types()["Adapter"](fmu=self._fmu.component, version=self.version, next=math.inf)
-        exchange = self.model.interface == "model-exchange"
-        if exchange:
+        if self.model.interface == "model-exchange":
             a.states, a.crossings = self._sizes()
-        for field, function in (_EVENTS | (_EXCHANGE if exchange else _STEP)).items():
+        for field, function in _FUNCTIONS[self.model.interface].items():
             if self._is_called(field):
                 setattr(a, field, self._address_of(function))
         for name, place in self._accesses().items():
@@ -128,6 +134,8 @@ class AdaptedInstance(StepsWithEnd):
         a.set_clock, a.clocks = self._address_of("SetClock"), len(ticking)
         for i, clock in enumerate(ticking):
             a.clock[i], a.ratio[i] = clock.reference, 1  # until the samples are known
+        if a.activate:
+            return  # values are read at the end of each job alone
         bits = {clock.reference: 1 << i for i, clock in enumerate(ticking)}
         numbers, kinds = _constants(), self._accesses()
         table = []
@@ -193,6 +201,10 @@ class AdaptedInstance(StepsWithEnd):
     def _enter(self, start: float, stop: float | None) -> None:
         self._adapter.now = start
         super()._enter(start, stop)  # type: ignore[safe-super]  # of the class of its version
+        self._set_interval()
+
+    def _set_interval(self) -> None:
+        """Tell the FMU the interval of the clock of every sample."""
         base = self.model.ticking[:1]
         if self._intervals is not None and base[0].variability != "constant":
             reference, period, offset = (ctypes.c_uint32 * 1)(base[0].reference), *self._intervals
@@ -314,6 +326,87 @@ class Adapted3(AdaptedInstance, Fmi3Instance):
     step_name = "step"
 
 
+class Partition(Adapted3):
+    """A partition of an FMU for scheduled execution: each step is a job.
+
+    The first one of an instance owns it: it enters and leaves initialisation, saves the state, and frees it.
+    """
+
+    only_calls = True
+    step_name = "step"
+
+    def __init__(
+        self, path: Path, instance_name: str, access: Access = USUAL, owner: "Partition | None" = None
+    ) -> None:
+        """`owner`: the first partition of the instance; None: this one."""
+        self._owner = owner
+        self._has_entered = False
+        unpacked = None if owner is None or owner._folder is None else owner._folder.path
+        super().__init__(path, instance_name, access, unpacked=unpacked)
+
+    def beside(self, instance_name: str, access: Access) -> "Partition":
+        """As `Instance`."""
+        return Partition(self.path, instance_name, access, self)
+
+    def _instantiate(self, folder: Path) -> Any:
+        if self._owner is None:
+            return super()._instantiate(folder)
+        self._messages = self._owner._messages
+        return self._owner._fmu
+
+    def _enter(self, start: float, stop: float | None) -> None:
+        first = self._owner or self
+        if not first._has_entered:
+            first._has_entered = True
+            super()._enter(start, stop)
+        else:
+            self._adapter.now = start
+            self._set_interval()
+
+    def enter_initialization(self, start: float, stop: float) -> None:
+        """As any instance; its inputs are what is set from here on."""
+        super().enter_initialization(start, stop)
+        library().empty(self._component)
+
+    def exit_initialization(self) -> None:
+        """As any instance; at the first partition that leaves it, the instance does."""
+        first = self._owner or self
+        if first._has_entered:
+            first._has_entered = False
+            super().exit_initialization()
+        else:
+            self._initial_values.clear()
+            self._do("begin")
+
+    def reset(self) -> None:
+        """As any instance."""
+        super().reset()
+        self._has_entered = False
+
+    def save(self) -> bytes:
+        """As any instance; that of the first partition is the whole state of the FMU."""
+        return super().save() if self._owner is None else self.own_state()
+
+    def restore(self, state: bytes) -> None:
+        """As any instance."""
+        if self._owner is None:
+            super().restore(state)
+        else:
+            self.restore_own(state)
+
+    def failure(self, function: str, status: int, otherwise: str | None = None) -> SimulatorError:
+        """As any instance; no partition is called after it."""
+        (self._owner or self).failed = True
+        return super().failure(function, status, otherwise)
+
+    def close(self) -> None:
+        """As any instance; only the first partition frees what they share."""
+        self.failed |= self._owner is not None
+        super().close()
+
+
 def adapted(model: Model) -> type[AdaptedInstance]:
     """The class of the instances of an FMU."""
+    if model.interface == SCHEDULED:
+        return Partition
     return Adapted2 if model.version == 2 else Adapted3

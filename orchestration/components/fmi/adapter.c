@@ -43,7 +43,8 @@ typedef struct {
     void *fmu; /* the instance */
     int64_t version;
     void *enter_event, *leave_event, *update;
-    void *step; /* of co-simulation; NULL: model exchange */
+    void *step;     /* of co-simulation; NULL: model exchange, or */
+    void *activate; /* the partition of its only clock, of scheduled execution: an adapter for each, with one instance */
     void *set_time, *set_states, *get_states, *derivatives, *indicators, *nominals, *completed;
     void *get[12], *set[12];
     int64_t states, crossings; /* numbers of continuous states and event indicators */
@@ -89,6 +90,7 @@ typedef int Update2(void *, void *);
 typedef int Update3(void *, bool *, bool *, bool *, bool *, bool *, double *);
 typedef int Solver(double, bool *);
 typedef int SetClock(void *, const uint32_t *, size_t, const bool *);
+typedef int Activate(void *, uint32_t, double);
 typedef int Completed2(void *, int, int *, int *);
 typedef int Completed3(void *, bool, bool *, bool *);
 
@@ -239,8 +241,10 @@ static void forget(Adapter *a) {
 }
 
 static int set(Adapter *a, int type, const uint32_t *references, size_t n, void *values, size_t count) {
-    if (a->running && a->clocks) return keep(a, type, references, n, values, count);
-    if (a->running) {
+    if (a->activate || (a->running && a->clocks)) {
+        int status = keep(a, type, references, n, values, count);
+        if (a->running || status > WARNING) return status;
+    } else if (a->running) {
         size_t size = count * bytes[type];
         if (size > a->buffer_size) {
             void *buffer = realloc(a->buffer, size);
@@ -252,6 +256,13 @@ static int set(Adapter *a, int type, const uint32_t *references, size_t n, void 
         if ((status = enter_event(a)) > WARNING) return status;
     }
     return call(a, a->set[type], references, n, values, count);
+}
+
+static int set_waiting(Adapter *a) {
+    int status = OK;
+    for (Waiting *w = a->waiting; status <= WARNING && w < a->waiting + a->waiting_count; w++)
+        status = call(a, a->set[w->type], w->references, (size_t)w->references_count, w->values, (size_t)w->count);
+    return status;
 }
 
 /* A sample: clocks tick, inputs are set, and what has a value while they tick is read, all before the update. */
@@ -267,14 +278,19 @@ static int sample(Adapter *a) {
         }
     a->samples++;
     if (status <= WARNING && ticks) status = ((SetClock *)a->set_clock)(a->fmu, ticking, (size_t)ticks, on);
-    for (Waiting *w = a->waiting; status <= WARNING && w < a->waiting + a->waiting_count; w++)
-        status = call(a, a->set[w->type], w->references, (size_t)w->references_count, w->values, (size_t)w->count);
+    if (status <= WARNING) status = set_waiting(a);
     forget(a);
     for (Clocked *c = a->clocked; status <= WARNING && c < a->clocked + a->clocked_count; c++) {
         uint32_t reference = (uint32_t)c->reference;
         if (c->clocks & which) status = call(a, a->get[c->type], &reference, 1, c->values, (size_t)c->count);
     }
     return status > WARNING ? status : conclude(a);
+}
+
+/* A job of a partition begins at t, with its inputs: another one may have set variables that they share. */
+static int run_partition(Adapter *a, double t) {
+    int status = set_waiting(a);
+    return status > WARNING ? status : ((Activate *)a->activate)(a->fmu, (uint32_t)a->clock[0], t);
 }
 
 /* -- model exchange ------------------------------------------------------------------------------------------------ */
@@ -461,6 +477,11 @@ step(Adapter *a, double t, double h, bool unused, bool *event, bool *ends, bool 
     *event = *early = *ends = false, *reached = end;
     if (!same(a->now, t)) a->now = t, a->fresh = 1;
     if (a->solver) a->fresh = 1;
+    if (a->activate) {
+        status = a->starts_late ? OK : run_partition(a, t);
+        a->starts_late = 0, a->now = end;
+        return status;
+    }
     if (a->starts_late) a->starts_late = 0;
     else if (a->clocks && !a->ends && status <= WARNING) status = sample(a);
     for (int64_t i = 0; status <= WARNING; i++) {
@@ -503,7 +524,7 @@ OF_FMI2(Boolean, Boolean2, int)
 
 /* Initialisation has ended at `now`, which leaves the FMU in event mode. */
 EXPORT int begin(Adapter *a) {
-    a->running = a->in_event = 1;
+    a->running = 1, a->in_event = !a->activate;
     if (a->nominals) {
         int status = ((GetNumbers *)a->nominals)(a->fmu, a->nominal, (size_t)a->states);
         if (status > WARNING) return status;

@@ -11,7 +11,7 @@ from fmpy.model_description import ModelDescription
 
 from orchestration.components.fmi.access import USUAL, Access
 from orchestration.components.fmi.read_description import Kind, Model, Variable
-from orchestration.foundation.basics.errors import UsageError, expected_name, shown
+from orchestration.foundation.basics.errors import QuadcosimError, UsageError, expected_name, shown
 from orchestration.foundation.basics.simulator import Floats, Simulator
 
 Value: TypeAlias = float | bool | str
@@ -162,10 +162,17 @@ class Instance(Simulator, Protocol):
         """
         raise UsageError(f"{self.name}: has no clock")
 
+    def beside(self, instance_name: str, access: Access) -> "Instance":
+        """Another partition of the same instance of an FMU; raises `QuadcosimError` where there can be none."""
+        raise QuadcosimError(
+            f"{self.path}: expected to be in the process of the run, where the partitions of {instance_name} share an "
+            "instance"
+        )
+
     @property
     def has_events(self) -> bool:
         """Whether events within its FMU are noted."""
-        return self.model.interface != "co-simulation"
+        return self.model.interface in ("event-mode", "model-exchange")
 
     def take_events(self) -> Floats:
         """The number of events within the FMU that were taken before, and the times of those since [s]."""

@@ -19,7 +19,7 @@ from fmpy.model_description import ModelDescription, ModelVariable, Unknown
 from fmu_kit.archive import read_source_hash, read_wrapped
 from fmu_kit.units import BASE
 from orchestration.components.fmi import trust
-from orchestration.components.fmi.access import INTERFACES, USUAL, Access, Interface
+from orchestration.components.fmi.access import INTERFACES, SCHEDULED, USUAL, Access, Interface
 from orchestration.components.fmi.archive import (
     TOKENS,
     OtherVersionError,
@@ -135,8 +135,11 @@ class Model:
 
     @cached_property
     def believed_period(self) -> float | None:
-        """The sampling period that a user's own code believes [s]; None for other FMUs."""
+        """The sampling period that a user's own code believes [s], or that of a partition; None for other FMUs."""
         wrapped = read_wrapped(self.path)
+        if wrapped is not None and self.ticking:
+            interval = self.ticking[0].interval
+            return None if interval is None else float(interval)
         period = None if wrapped is None else wrapped.get("period")
         return period if isinstance(period, float) and period > 0.0 else None
 
@@ -242,7 +245,9 @@ class Model:
 
     @cached_property
     def ticking(self) -> tuple[InputClock, ...]:
-        """The clocks that tick as it is called, that of every sample first."""
+        """The clocks that tick as it is called, that of every sample first; of a partition, its own."""
+        if self.interface == SCHEDULED:
+            return () if self.access.clock is None else (self._base_clock(),)
         if self.interface != "event-mode" or not self.clocks:
             return ()
         base = self._base_clock()
@@ -256,8 +261,11 @@ class Model:
     def expect_clocks_that_tick(self) -> None:
         """Raise `UsageError` for an FMU with clocks that do not tick as it is called."""
         clocks = [v.name for v in self.variables.values() if v.kind == "Clock"]
+        offered = declared_of(self.description)
         if clocks and not self.ticking and not self.follows_kit:  # which samples at every step without its clock
-            if "event-mode" not in declared_of(self.description):
+            if SCHEDULED in offered and "event-mode" not in offered:
+                return  # they are of its partitions
+            if "event-mode" not in offered:
                 raise UsageError(f"{self.path}: has clocks, but no event mode, in which they tick: {', '.join(clocks)}")
             raise UsageError(
                 f"{self.path}: its clocks {', '.join(clocks)} do not tick: expected sampling = {{ fmu_clock = "
@@ -270,7 +278,7 @@ class Model:
 
     def follows_at_once(self, output: str) -> frozenset[str] | None:
         """The inputs that an output follows before the next step; None: all of them, or unknown."""
-        if self.interface == "co-simulation":
+        if self.interface in ("co-simulation", SCHEDULED):
             return frozenset()
         declared = self._output_dependencies.get(output)
         return self.depends_on(output) if declared is None else declared
@@ -303,8 +311,7 @@ def read_description(path: Path) -> ModelDescription:
         raise UsageError(f"{path}: FMI {description.fmiVersion}; expected FMI 2.0 or 3.0")
     offered = declared_of(description)
     if not offered:
-        kind = "scheduled execution" if description.scheduledExecution is not None else "no interface"
-        raise UsageError(f"{path}: offers {kind}; expected co-simulation or model exchange")
+        raise UsageError(f"{path}: offers no interface; expected co-simulation, model exchange or scheduled execution")
     token = TOKENS[description.fmiMajorVersion]
     identifiers = [("modelIdentifier", interface.modelIdentifier) for interface in offered.values()]
     for name, value in ((token, description.guid), *identifiers):
@@ -320,6 +327,7 @@ def declared_of(description: ModelDescription) -> dict[Interface, Any]:
         "co-simulation": slave,
         "event-mode": slave if slave is not None and slave.hasEventMode else None,
         "model-exchange": model,
+        SCHEDULED: description.scheduledExecution,
     }
     return {name: found[name] for name in INTERFACES if found[name] is not None}
 
@@ -359,7 +367,24 @@ def called(model: Model, access: Access) -> Model:
         raise UsageError(f"sampling.fmu_clock = {access.clock}: {model.name} has {clocks}; expected one of its clocks")
     if access.solver is not None and interface != "model-exchange":
         raise UsageError(f"solver = {access.solver}: expected none with {interface}: {model.name} has its own")
+    if interface == SCHEDULED:
+        return _partition(model, access)
     return replace(model, access=access, interface=interface)
+
+
+def _partition(model: Model, access: Access) -> Model:
+    """A partition: its clock, and the variables that belong to it or to no clock."""
+    names = ", ".join(clock.name for clock in model.clocks)
+    if access.clock is None:
+        raise UsageError(f"interface = scheduled-execution: {model.name}: expected partition, one of {names}")
+    own = next(clock.reference for clock in model.clocks if clock.name == access.clock)
+    others = {
+        each.name
+        for each in model.description.modelVariables
+        if each.clocks and own not in [clock.valueReference for clock in each.clocks]
+    }
+    variables = {name: v for name, v in model.variables.items() if v.whole not in others}
+    return replace(model, access=access, interface=SCHEDULED, variables=variables)
 
 
 @functools.lru_cache(maxsize=64)
@@ -383,10 +408,17 @@ def _read_model(path: Path, changed: int, size: int) -> Model:
         variables=variables,
         initial_dependencies=_dependencies(
             description.initialUnknowns, variables, frozenset() if description.initialUnknowns else None
-        ),
+        )
+        | _of_partitions(description, variables),
         access=USUAL,
         interface=next(iter(declared_of(description))),
     )
+
+
+def _of_partitions(description: ModelDescription, variables: Mapping[str, Variable]) -> dict[str, frozenset[str]]:
+    """What the outputs of partitions depend on at initialisation: nothing, they have their start values."""
+    clocked = {v.name for v in description.modelVariables if v.clocks} if description.scheduledExecution else ()
+    return {v.name: frozenset() for v in variables.values() if v.causality == "output" and v.whole in clocked}
 
 
 PERIODIC = ("constant", "fixed", "tunable")

@@ -18,7 +18,7 @@ from fmpy import fmi2, fmi3
 from fmpy.fmi1 import printLogMessage
 
 from fmu_kit import loader
-from orchestration.components.fmi.access import Interface
+from orchestration.components.fmi.access import SCHEDULED, Interface
 from orchestration.foundation.basics.errors import QuadcosimError
 
 ENTRY = "resources/slavemodule.txt"
@@ -181,7 +181,8 @@ def instantiates(version: int, interface: Interface) -> str:
     """The name of the function that makes an instance."""
     if version == 2:
         return "fmi2Instantiate"
-    return f"fmi3Instantiate{'ModelExchange' if interface == 'model-exchange' else 'CoSimulation'}"
+    names = {"model-exchange": "ModelExchange", SCHEDULED: "ScheduledExecution"}
+    return f"fmi3Instantiate{names.get(interface, 'CoSimulation')}"
 
 
 class _CachedSignatures:
@@ -243,6 +244,12 @@ class FMU3Model(_Texts3, fmi3.FMU3Model):  # type: ignore[misc]
     _signatures: ClassVar[dict[str, tuple[Any, Any, Any]]] = {}
 
 
+class FMU3ScheduledExecution(_Texts3, fmi3.FMU3ScheduledExecution):  # type: ignore[misc]
+    """Of FMI 3.0 for scheduled execution."""
+
+    _signatures: ClassVar[dict[str, tuple[Any, Any, Any]]] = {}
+
+
 def binary_folders(files: Iterable[str]) -> list[str]:
     """The folders that have binaries, of the files of an FMU."""
     parts = [name.split("/") for name in files]
@@ -264,7 +271,8 @@ def load_slave(
     arguments = {"guid": token, "unzipDirectory": str(folder), "modelIdentifier": identifier, "instanceName": name}
     exchange = interface == "model-exchange"
     if version == 3:
-        return (FMU3Model if exchange else FMU3Slave)(**arguments)
+        scheduled = interface == SCHEDULED
+        return (FMU3Model if exchange else FMU3ScheduledExecution if scheduled else FMU3Slave)(**arguments)
     here = folder_here(version, sorted(each.name for each in (folder / "binaries").iterdir()))
     library = folder / "binaries" / here / f"{identifier}{fmpy.sharedLibraryExtension}"
     return (FMU2Model if exchange else FMU2Slave)(**arguments, libraryPath=str(library))

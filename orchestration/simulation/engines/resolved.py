@@ -7,6 +7,7 @@ from fractions import Fraction
 
 from fmu_kit.trajectory import Trajectory
 from orchestration.components.building import fmus
+from orchestration.components.fmi.access import SCHEDULED
 from orchestration.components.fmi.instance import number_of
 from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD, TRAJECTORY
 from orchestration.components.fmi.read_description import NUMERIC, InputClock, Model, called, read_model
@@ -22,7 +23,7 @@ from orchestration.systems.schedule.fixed_step import FixedStep
 from orchestration.systems.schedule.streams import VALUE, Streams
 from orchestration.systems.signals.library import make_signal
 from orchestration.systems.system.check import check, connect_references, describe_references, recorded_variables
-from orchestration.systems.system.component import Component, Sampling, has_scheduled_instants
+from orchestration.systems.system.component import Component, Sampling, has_scheduled_instants, instance_of
 from orchestration.systems.system.connection import variable_of
 from orchestration.systems.system.model import System, expressions
 from orchestration.systems.system.placement import placed_tasks
@@ -148,6 +149,12 @@ def columns_of(system: System) -> tuple[str, ...]:
 def _expect_clock(name: str, component: Component, model: Model) -> None:
     """Raise `UsageError` for a clock that the FMU does not have, or for parameters of it that the master sets."""
     sampling = component.sampling
+    if model.interface == SCHEDULED and not model.ticking:
+        names = ", ".join(clock.name for clock in model.clocks)
+        raise UsageError(
+            f"components.{name}.partition: expected one of {names}: {model.name} is for scheduled execution, in which "
+            "each component is a partition"
+        )
     if model.ticking:
         _expect_ticks(name, sampling, model.ticking[0])
     if sampling is None or not model.has_clock:
@@ -261,6 +268,7 @@ def unbelieved_periods(system: System, models: Mapping[str, Model]) -> dict[str,
     """The components whose code believes another sampling period than theirs: theirs, that of their task on a computer
     too, and what it believes [s].
     """
+    models = _as_asked(system, models)
     samplings = {name: component.sampling for name, component in system.components.items()}
     periods = {name: sampling.period for name, sampling in samplings.items() if isinstance(sampling, Sampling)}
     periods |= {
@@ -291,6 +299,18 @@ def other_periods_in_words(system: System, models: Mapping[str, Model]) -> list[
         "code, whose constants of time stay, not of a design for each period"
         for name, (_, believed) in unbelieved_periods(system, models).items()
     ]
+
+
+def idle_partitions(system: System, models: Mapping[str, Model]) -> list[str]:
+    """A warning for each instance with partitions that no component is, which never run."""
+    found = []
+    for shared in dict.fromkeys(map(instance_of, system.components.values())):
+        names = [name for name, one in system.components.items() if shared and instance_of(one) == shared]
+        taken = [system.components[name].partition for name in names]
+        idle = [clock.name for name in names[:1] for clock in models[name].clocks if clock.name not in taken]
+        if idle:
+            found.append(f"{names[0]} ({models[names[0]].name}): no component is its partition {', '.join(idle)}")
+    return found
 
 
 def uneven_steps(system: System, models: Mapping[str, Model]) -> list[str]:

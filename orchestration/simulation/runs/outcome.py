@@ -9,7 +9,7 @@ from orchestration.foundation.basics.errors import Named, SimulatorError
 from orchestration.foundation.basics.interrupt import Interrupted
 from orchestration.foundation.processes.passable import passable
 from orchestration.foundation.recording.recording import Recorder
-from orchestration.simulation.engines.resolved import ResolvedRequest, periods_in_words, uneven_steps
+from orchestration.simulation.engines.resolved import ResolvedRequest, idle_partitions, periods_in_words, uneven_steps
 from orchestration.simulation.results import objectives
 from orchestration.simulation.results.units import column_infos
 from orchestration.simulation.runs.result import Provenance, Result
@@ -98,6 +98,7 @@ def result_of(
             *resolved.request.warnings(resolved.parameters),
             *uneven_steps(resolved.system, resolved.models),
             *periods_in_words(resolved.system, resolved.models),
+            *idle_partitions(resolved.system, resolved.models),
             *outcome.warnings,
             *([] if odd is None else [odd]),
             *([] if outcome.failure is None else [str(outcome.failure)]),

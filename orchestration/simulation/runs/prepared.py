@@ -34,7 +34,7 @@ from orchestration.simulation.runs.result import Provenance, Result
 from orchestration.systems.schedule.compiled_timetable import timetable
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.system.check import recorded_variables
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, instance_of
 from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request, errors_in_own_terms
@@ -149,7 +149,7 @@ def prepared(
     system, models, parameters = resolved.system, resolved.models, resolved.parameters
     streams = Streams(system.seed, system.streams)
     with deferred_interrupts() as interrupt, ExitStack() as stack:
-        instances = {name: stack.enter_context(load(model.path, name, model.access)) for name, model in models.items()}
+        instances = _loaded(system, models, load, stack)
         with errors_in_own_terms(request):
             schedule = timetable(system, streams, fixed_steps(system, models))
             for name, component in system.components.items():
@@ -190,6 +190,21 @@ def prepared(
         )
         stack.callback(run.restore_process)  # also after a failure
         yield run
+
+
+def _loaded(system: System, models: Mapping[str, Model], load: Loader, stack: ExitStack) -> dict[str, Instance]:
+    """The instance of each component; partitions of one follow the first of them."""
+    instances: dict[str, Instance] = {}
+    first: dict[tuple[str, str | None], Instance] = {}
+    for name, model in models.items():
+        shared = instance_of(system.components[name])
+        if shared in first:
+            instances[name] = stack.enter_context(first[shared].beside(name, model.access))
+        else:
+            instances[name] = stack.enter_context(load(model.path, name, model.access))
+            if shared is not None:
+                first[shared] = instances[name]
+    return instances
 
 
 def _seconds(time: int | None) -> float | None:

@@ -8,7 +8,7 @@ from dataclasses import field
 from fractions import Fraction
 from typing import Any
 
-from orchestration.components.fmi.access import USUAL, Access, Interface, Solver
+from orchestration.components.fmi.access import SCHEDULED, USUAL, Access, Interface, Solver
 from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.foundation.basics.records import Scalar, record
 from orchestration.foundation.basics.times import exact_nanoseconds, is_at_least
@@ -133,6 +133,10 @@ class Component:
     """The relative tolerance of the FMU's solver; default: that of the experiment that the FMU declares, if any."""
     interface: Interface | None = None
     """The interface by which the FMU is called; default: co-simulation, or model exchange where it offers that only."""
+    partition: str | None = None
+    """The input clock of an FMU for scheduled execution whose partition it is: each step is a job of that partition."""
+    instance: str | None = None
+    """The instance that its partition belongs to, by any name; default: one for all partitions of the FMU."""
     solver: Solver | None = None
     """The solver of an FMU for model exchange; default: dormand-prince. For a stiff one, cvode, in the Python loop."""
     align: Align = "exact"
@@ -144,6 +148,8 @@ class Component:
     @property
     def access(self) -> Access:
         """How its FMU is called."""
+        if self.partition is not None:
+            return Access(interface=SCHEDULED, solver=self.solver, clock=self.partition)
         clock = None if self.sampling is None else self.sampling.fmu_clock
         if self.interface is None and self.solver is None and clock is None:
             return USUAL
@@ -155,10 +161,49 @@ class Component:
         if self.step is not None:
             require_positive(self, "step")
             require(is_at_least(self.step, 1.0), "step", self.step, "at least a nanosecond")
+        if self.partition is not None:
+            require(self.interface in (None, SCHEDULED), "interface", self.interface, f"{SCHEDULED} beside partition")
+            require(self.step is None, "step", self.step, "none beside partition, which is sampled or a task")
+            own = None if self.sampling is None else self.sampling.fmu_clock
+            require(own is None, "sampling.fmu_clock", own, "none beside partition, which is a clock")
+        else:
+            require(self.interface != SCHEDULED, "partition", "none", f"an input clock of the FMU, for {SCHEDULED}")
+            require(self.instance is None, "instance", self.instance, "none without partition")
         if self.sampling is not None:
             require(self.step is None, "step", self.step, "none beside sampling, whose period it follows")
             if self.sampling.fmu_clock is not None and self.interface is not None:
                 require(self.interface == "event-mode", "interface", self.interface, "event-mode beside fmu_clock")
+
+
+def instance_of(component: Component) -> tuple[str, str | None] | None:
+    """What the components with one instance of an FMU have in common; None: the component has its own."""
+    return None if component.partition is None else (component.fmu, component.instance)
+
+
+def expect_partitions(components: Mapping[str, Component]) -> None:
+    """Raise `UsageError` for components that cannot be partitions of one instance."""
+    for name, one in components.items():
+        if one.partition is None:
+            continue
+        first = next(each for each, other in components.items() if instance_of(other) == instance_of(one))
+        taken = next(each for each, other in components.items() if _is_same_partition(other, one))
+        expected = f"another one than {taken} has, or instance = NAME for another instance of the FMU"
+        require(taken == name, f"components.{name}.partition", one.partition, expected)
+        ratio, other = (_ratio(components[each]) for each in (name, first))
+        place = f"components.{name}: its clock_ratio"
+        require(ratio == other, place, ratio, f"{other}, that of {first}, which has the same instance")
+        for key, value in one.parameters.items():
+            before = components[first].parameters.get(key, value)
+            place = f"components.{name}.parameters.{key}"
+            require(before == value, place, value, f"{before}, as of {first}, which has the same instance")
+
+
+def _is_same_partition(one: Component, other: Component) -> bool:
+    return (instance_of(one), one.partition) == (instance_of(other), other.partition)
+
+
+def _ratio(component: Component) -> float:
+    return 1.0 if component.sampling is None else component.sampling.clock_ratio
 
 
 Values = Mapping[str, Parameter]

@@ -191,7 +191,8 @@ def _largest(jitter: Varying, spread: str) -> str:
 
 
 def _fmu(component: Component) -> str:
-    return Path(component.fmu).name
+    fmu, partition, instance = Path(component.fmu).name, component.partition, component.instance
+    return fmu + (f", partition {partition}" if partition else "") + (f" of {instance}" if instance else "")
 
 
 def _parameters(component: Component) -> str:

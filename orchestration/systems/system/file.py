@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from orchestration.components.building.models import PATHS
+from orchestration.components.building.models import FMI3, PATHS, WRAPPED
 from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError, expected_name, prefixed
@@ -96,10 +96,13 @@ def system_from_tables(tables: Mapping[str, Any], folder: Path) -> System:
     """The system of a TOML document whose relative paths start at `folder`; raises `UsageError`."""
     table = parsed(tables, SystemTable)
     given = {key: getattr(table, key) for key in fields_of(SystemTable) if key != "order"}
+    tasks = {task.component for computer in table.computers.values() for task in computer.tasks.values()}
     system = System(
         **given
         | {
-            "components": {name: _component(name, value, folder) for name, value in table.components.items()},
+            "components": {
+                name: _component(name, value, folder, name in tasks) for name, value in table.components.items()
+            },
             "connections": tuple(
                 _connection(i, value, table.order, folder) for i, value in enumerate(table.connections)
             ),
@@ -118,36 +121,61 @@ def system_from_tables(tables: Mapping[str, Any], folder: Path) -> System:
     return system
 
 
-def _component(name: str, table: Any, folder: Path) -> Component:
+def _component(name: str, table: Any, folder: Path, is_task: bool) -> Component:
     place = f"components.{name}"
     keys = table.as_dict(without=("sampling",))
     keys["fmu"] = str(folder / table.fmu) if table.fmu.endswith(PATHS) else table.fmu
     keys["parameters"] = parameters_in(table.parameters, f"{place}.parameters")
+    of_clock = {}
+    if table.partition is not None:
+        keys["fmu"] = _with_partitions(keys["fmu"])
+        of_clock = {} if is_task else _of_clock(f"{place}.partition", table.partition, keys["fmu"])
     if table.sampling is not None:
-        keys["sampling"] = _sampling(f"{place}.sampling", table.sampling, folder, keys["fmu"])
+        keys["sampling"] = _sampling(f"{place}.sampling", table.sampling, folder, keys["fmu"], of_clock)
+    elif of_clock:
+        keys["sampling"] = _part(f"{place}.sampling", Sampling, of_clock)
     return _part(place, Component, keys)
 
 
-def _sampling(place: str, table: Any, folder: Path, fmu: str) -> Sampling:
+def _with_partitions(fmu: str) -> str:
+    """The path of an FMU that has partitions: that of a controller in C is of FMI 3.0."""
+    path = Path(fmu)
+    return str(path.parent / FMI3 / path.name) if path.suffix == WRAPPED and path.is_file() else fmu
+
+
+def _sampling(place: str, table: Any, folder: Path, fmu: str, of_clock: Mapping[str, float]) -> Sampling:
     keys = {key: value for key, value in with_distributions(f"{place}.", table, folder).items() if value is not None}
     if table.fmu_clock is not None and table.on is None:
-        keys = {**_of_clock(place, table.fmu_clock, fmu), **keys, "fmu_clock": table.fmu_clock}
+        keys = {**_of_clock(f"{place}.fmu_clock", table.fmu_clock, fmu), **keys, "fmu_clock": table.fmu_clock}
     if table.on is None:
-        return _part(place, Sampling, keys)
+        return _part(place, Sampling, {**of_clock, **keys})
     require(table.period is None, f"{place}.period", table.period, "none beside on: messages say when it runs")
     return _part(place, SamplingOnArrival, keys)
 
 
 def _of_clock(place: str, clock: str, fmu: str) -> dict[str, float]:
-    """Period and offset of an FMU's clock [s], as far as the FMU states them."""
-    if not Path(fmu).is_file():
+    """Period and offset of an FMU's clock [s], as far as the FMU states them, or the code that it is made of."""
+    with prefixed(f"{place} = {clock}: "):
+        known = _clocks(fmu)
+    if known is None:
         return {}
-    with prefixed(f"{place}.fmu_clock = {clock}: "):
-        known = {each.name: each for each in read_model(fmu).clocks}
     if clock not in known:
-        raise UsageError(f"{place}.fmu_clock = {clock}: {expected_name(clock, list(known))}")
-    interval = known[clock].interval
-    return {} if interval is None else {"period": float(interval), "offset": float(known[clock].shift)}
+        raise UsageError(f"{place} = {clock}: {expected_name(clock, list(known))}")
+    return known[clock]
+
+
+def _clocks(fmu: str) -> dict[str, dict[str, float]] | None:
+    """Period and offset of each clock; None where the FMU is not there yet."""
+    if fmu.endswith(WRAPPED):
+        from orchestration.components.building import wrap  # not before: loads what reads such files
+
+        return {task.name: {"period": float(task.period)} for task in wrap.load(wrap.described_by(Path(fmu))[0]).tasks}
+    if not Path(fmu).is_file():
+        return None
+    return {
+        each.name: {} if each.interval is None else {"period": float(each.interval), "offset": float(each.shift)}
+        for each in read_model(fmu).clocks
+    }
 
 
 def _computer(name: str, table: Any, folder: Path) -> Computer:

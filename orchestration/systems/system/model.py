@@ -12,7 +12,7 @@ from orchestration.foundation.basics.errors import UsageError, listed, prefixed
 from orchestration.foundation.basics.records import record
 from orchestration.foundation.basics.times import is_at_least
 from orchestration.systems.expressions.syntax import is_number, parse
-from orchestration.systems.system.component import Component, has_scheduled_instants
+from orchestration.systems.system.component import Component, expect_partitions, has_scheduled_instants
 from orchestration.systems.system.computers import Computer, Network
 from orchestration.systems.system.connection import Connection, component_of
 from orchestration.systems.system.file_tables import tables_of
@@ -189,6 +189,8 @@ class System:
         if self.uses_scheduler or not is_stepped:
             components = with_tasks(self.components, self.connections, self.computers, self.networks)
             object.__setattr__(self, "components", components)
+        if any(one.partition is not None for one in self.components.values()):
+            expect_partitions(self.components)
         _require_names("connections", (x.name for x in self.connections))
         _require_names("objectives", self.objectives)
         causes = self._causes()

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.components.building.models import PATHS
-from orchestration.components.fmi.access import Access
+from orchestration.components.fmi.access import SCHEDULED, Access
 from orchestration.components.fmi.read_description import Model, called, declared_of
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.systems.system.connection import component_of
@@ -65,7 +65,7 @@ def propose(fmus: Sequence[tuple[str, Model]], folder: Path, resources: Proposed
     resources = resources or ProposedResources()
     if not (fmus or resources.tables):
         raise UsageError("expected at least one FMU")
-    fmus = [(text, _whose_clocks_tick(model)) for text, model in fmus]
+    fmus = [(text, each) for text, model in fmus for each in _whose_clocks_tick(model)]
     models = [model for _, model in fmus]
     named = dict(zip(component_names(models), models))
     matches = match(named)
@@ -103,12 +103,14 @@ def propose(fmus: Sequence[tuple[str, Model]], folder: Path, resources: Proposed
     )
 
 
-def _whose_clocks_tick(model: Model) -> Model:
-    """The FMU, in event mode if it has clocks; raises `UsageError` for one whose clocks cannot tick."""
+def _whose_clocks_tick(model: Model) -> list[Model]:
+    """The FMU, in event mode if it has clocks, or its partitions; raises `UsageError` if its clocks cannot tick."""
+    if model.interface == SCHEDULED:
+        return [called(model, Access(interface=SCHEDULED, clock=clock.name)) for clock in model.clocks]
     if model.clocks and "event-mode" in declared_of(model.description):
-        return called(model, Access(interface="event-mode"))
+        return [called(model, Access(interface="event-mode"))]
     model.expect_clocks_that_tick()
-    return model
+    return [model]
 
 
 def _resources(tables: Mapping[str, Any]) -> list[list[str]]:
@@ -178,9 +180,11 @@ def _component(name: str, fmu: str, model: Model, folder: Path, sampled: str | N
     lines = [f"[components.{name}]", f"fmu = {_text(place)}"]
     step = experiment(model, "stepSize")
     if model.ticking:
-        clock = model.ticking[0]
-        stated = "" if clock.interval is not None else f", period = {step or PERIOD!r}"
-        lines.append(f"sampling = {{ fmu_clock = {_text(clock.name)}{stated} }}")
+        clock, scheduled = model.ticking[0], model.interface == SCHEDULED
+        keys = [f"fmu_clock = {_text(clock.name)}"] * (not scheduled)
+        keys += [f"period = {step or PERIOD!r}"] * (clock.interval is None)
+        lines += [f"partition = {_text(clock.name)}"] * scheduled
+        lines += [f"sampling = {{ {', '.join(keys)} }}"] * bool(keys)
     elif sampled is not None:
         note = "" if step else "; its FMU does not say how often"
         lines.append(f"sampling = {{ period = {step or PERIOD!r} }}    # sampled, as {sampled}{note}")

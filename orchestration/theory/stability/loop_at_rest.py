@@ -149,6 +149,8 @@ def at_rest(
 def _expect_period(system: System) -> Fraction:
     expect_fixed_periods(system)
     for name, component in system.components.items():
+        if component.partition is not None:
+            raise UsageError(f"{name} is a partition, whose state is that of the whole instance")
         if component.sampling is not None and component.sampling.clock == "fmu":
             raise UsageError(f"{name} has its own clock")
     period = hyperperiod_of(system)

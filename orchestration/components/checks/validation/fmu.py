@@ -9,6 +9,7 @@ from xml.etree.ElementTree import Element
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from fmu_kit.archive import SOURCE_HASH_FILE
+from orchestration.components.fmi.access import SCHEDULED
 from orchestration.components.fmi.archive import Archive, UnreadableFmuError
 from orchestration.components.fmi.read_description import attribute, declared_of, kind_of, read_description, starts_of
 from orchestration.components.fmi.slaves import binary_folders
@@ -102,6 +103,8 @@ def read_fmu(archive: Archive, root: Element) -> Fmu:
         fmu = Fmu(archive=archive, root=root, description=read_description(archive.path))
     except UsageError as error:
         raise UnreadableFmuError(str(error).removeprefix(f"{archive.path}: ")) from error
+    if [*declared_of(fmu.description)] == [SCHEDULED]:
+        raise UnreadableFmuError("offers scheduled execution; expected co-simulation or model exchange, to be checked")
     _expect_numbers(fmu)
     return fmu
 

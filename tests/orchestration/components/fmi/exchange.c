@@ -1,5 +1,5 @@
-/* FMUs for model exchange (FMI 2.0, FMI 3.0) and co-simulation in event mode (FMI 3.0): several models in one library,
-   chosen by their GUID. A state or input is a Float64 (Real), value reference VR. */
+/* FMUs for model exchange (FMI 2.0, FMI 3.0), and for co-simulation in event mode and scheduled execution (FMI 3.0):
+   several models in one library, chosen by their GUID. A state or input is a Float64 (Real), value reference VR. */
 
 #include <float.h>
 #include <math.h>
@@ -9,18 +9,19 @@
 #include <string.h>
 
 /* Value references: time is 0, X and DX two each, Y is p·u + q·w + x, C counts. */
-enum { T, X1, X2, DX1, DX2, U, W, P, Q, Y, START, PERIOD, COUNT = 20, UPDATES, MISUSED, TICKS, CLOCK = 30 };
+enum { T, X1, X2, DX1, DX2, U, W, P, Q, Y, START, PERIOD, COUNT = 20, UPDATES, MISUSED, TICKS, CLOCK = 30, JOBS = 40 };
 
 typedef struct {
     double v[11];
     int ticking[2], ticks[2], misused; /* of the clocked law: its clocks, how often they ticked, accesses without them */
+    int jobs[4]; /* of three partitions, and of all */
     double period;
     int count, updates, kind, mode; /* mode 0: before the end of initialisation, 1: event mode, 2: between events */
     double next;
 } Model;
 
-static const char *kinds[] = {"integrator", "ball", "stair", "oscillator", "gain", "restless", "busy", "law", NULL};
-enum { INTEGRATOR, BALL, STAIR, OSCILLATOR, GAIN, RESTLESS, BUSY, LAW };
+static const char *kinds[] = {"integrator", "ball", "stair", "oscillator", "gain", "restless", "busy", "law", "clocks", NULL};
+enum { INTEGRATOR, BALL, STAIR, OSCILLATOR, GAIN, RESTLESS, BUSY, LAW, CLOCKS };
 
 static int states_of(const Model *m) { return m->kind == STAIR || m->kind == GAIN || m->kind >= BUSY ? 0 : 2; }
 static int crossings_of(const Model *m) { return m->kind == BALL || m->kind == RESTLESS; }
@@ -40,6 +41,7 @@ static void *make(const char *guid) {
 
 static void evaluate(Model *m) {
     double *v = m->v;
+    if (m->kind == CLOCKS) return;
     if (!m->mode) v[X1] = v[START];
     v[Y] = v[P] * v[U] + v[Q] * v[W] + (m->kind == GAIN || m->kind == LAW ? 0 : v[X1]);
     v[DX1] = v[X2];
@@ -88,7 +90,7 @@ static int set(Model *m, const uint32_t *r, size_t n, const double *in) {
 }
 static int get_whole(Model *m, const uint32_t *r, size_t n, int32_t *out) {
     for (size_t i = 0; i < n; i++)
-        out[i] = r[i] == COUNT ? m->count : r[i] == UPDATES ? m->updates : r[i] == MISUSED ? m->misused : m->ticks[r[i] - TICKS];
+        out[i] = r[i] >= JOBS ? m->jobs[r[i] - JOBS] : r[i] == COUNT ? m->count : r[i] == UPDATES ? m->updates : r[i] == MISUSED ? m->misused : m->ticks[r[i] - TICKS];
     return 0;
 }
 static int enter(Model *m, int from, int to) {
@@ -110,6 +112,17 @@ void *fmi3InstantiateCoSimulation(
     const char *n, const char *token, const char *r, bool v, bool l, bool events, bool early, const uint32_t *of,
     size_t count, void *e, void *log, void *intermediate) {
     return make(token);
+}
+void *fmi3InstantiateScheduledExecution(
+    const char *n, const char *token, const char *r, bool v, bool l, void *e, void *log, void *up, void *lock, void *un) {
+    return make(token);
+}
+/* A job: what it computes has u, its time, and how many jobs there were. */
+int fmi3ActivateModelPartition(Model *m, uint32_t clock, double t) {
+    if (m->mode != 1) return 3;
+    m->jobs[clock - CLOCK]++, m->jobs[3]++;
+    m->v[Y] = m->v[U] + t + 1000 * m->jobs[3];
+    return 0;
 }
 void fmi3FreeInstance(void *m) { free(m); }
 const char *fmi3GetVersion(void) { return "3.0"; }
@@ -242,7 +255,6 @@ UNUSED(fmi2GetString)
 UNUSED(fmi2SetBoolean)
 UNUSED(fmi2SetInteger)
 UNUSED(fmi2SetString)
-UNUSED(fmi3ActivateModelPartition)
 UNUSED(fmi3EnterConfigurationMode)
 UNUSED(fmi3EvaluateDiscreteStates)
 UNUSED(fmi3ExitConfigurationMode)
@@ -267,7 +279,6 @@ UNUSED(fmi3GetUInt32)
 UNUSED(fmi3GetUInt64)
 UNUSED(fmi3GetUInt8)
 UNUSED(fmi3GetVariableDependencies)
-UNUSED(fmi3InstantiateScheduledExecution)
 UNUSED(fmi3SetBinary)
 UNUSED(fmi3SetBoolean)
 UNUSED(fmi3SetFloat32)

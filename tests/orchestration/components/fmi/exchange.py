@@ -55,6 +55,20 @@ _CLOCKED = """<fmiModelDescription fmiVersion="3.0" modelName="Law" instantiatio
   </ModelVariables>
   <ModelStructure><Output valueReference="9"/></ModelStructure>
 </fmiModelDescription>"""
+_CLOCKS = """<fmiModelDescription fmiVersion="3.0" modelName="Clocks" instantiationToken="clocks">
+  <ScheduledExecution modelIdentifier="clocks" canGetAndSetFMUState="true" canSerializeFMUState="true"/>
+  <ModelVariables>
+    <Float64 name="u" valueReference="5" causality="input" variability="discrete" clocks="30 31" start="0"/>
+    <Float64 name="y" valueReference="9" causality="output" variability="discrete" clocks="30 31 32" start="0"/>
+    <Float64 name="p" valueReference="7" causality="parameter" variability="fixed" start="1"/>
+    <Int32 name="jobs1" valueReference="40" causality="output" clocks="30"/>
+    <Int32 name="jobs2" valueReference="41" causality="output" clocks="31"/>
+    <Int32 name="jobs3" valueReference="42" causality="output" clocks="32"/>
+    <Int32 name="total" valueReference="43" causality="output" clocks="30 31 32"/>
+    {clocks}
+  </ModelVariables>
+  <ModelStructure><Output valueReference="9"/></ModelStructure>
+</fmiModelDescription>"""
 _FAST = '<Clock name="{name}" valueReference="{reference}" causality="input" intervalVariability="{kind}" {interval}/>'
 
 _FMI2 = """<fmiModelDescription fmiVersion="2.0" modelName="{name}" guid="{guid}" numberOfEventIndicators="{crossings}">
@@ -120,11 +134,23 @@ def clock(name: str, kind: str = "constant", interval: str = 'intervalDecimal="0
 
 def law(folder: Path, *clocks: str) -> Path:
     """The controller y = -u - w of `exchange.c`, clocked by the first of these clocks."""
+    return _with_clocks(folder, "law", _CLOCKED.format(clocks="".join(clocks)))
+
+
+def partitions(folder: Path, *more: str) -> Path:
+    """Three partitions of `exchange.c`, which count their jobs; `more` are other clocks."""
+    kinds = ("constant", "tunable", "fixed")
+    intervals = ('intervalDecimal="1"', 'intervalDecimal="2.5"', "")
+    own = (clock(f"inClock{i + 1}", kinds[i], intervals[i], 30 + i) for i in range(3))
+    return _with_clocks(folder, "clocks", _CLOCKS.format(clocks="".join((*own, *more))))
+
+
+def _with_clocks(folder: Path, name: str, description: str) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
-    path = folder / "law.fmu"
+    path = folder / f"{name}.fmu"
     with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("modelDescription.xml", _CLOCKED.format(clocks="".join(clocks)))
-        archive.writestr(f"binaries/{fmpy.platform_tuple}/law{fmpy.sharedLibraryExtension}", _library())
+        archive.writestr("modelDescription.xml", description)
+        archive.writestr(f"binaries/{fmpy.platform_tuple}/{name}{fmpy.sharedLibraryExtension}", _library())
     return path
 
 
