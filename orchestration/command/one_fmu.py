@@ -10,6 +10,7 @@ from orchestration.command.options import option
 from orchestration.command.registry import expect_positive
 from orchestration.components.fmi.access import INTERFACES, SCHEDULED, Interface
 from orchestration.foundation.basics.errors import UsageError, expected_name
+from orchestration.foundation.basics.terminal import inform
 
 if TYPE_CHECKING:
     from orchestration.simulation.runs.result import Result
@@ -25,6 +26,9 @@ class OneFmuFlags:
     """The flags that only a run of one FMU has; None: not set, its default experiment applies."""
 
     inputs: Annotated[Path | None, _of_fmu("--inputs", "Inputs over time, a column for each.", "FILE.csv")] = None
+    start_time: Annotated[float | None, _of_fmu("--start-time", "Its own time at which the run begins.", "SECONDS")] = (
+        None
+    )
     output: Annotated[Path | None, _of_fmu("--output", "Write the outputs as fmpy does.", "FILE.csv")] = None
     output_interval: Annotated[
         float | None, _of_fmu("--output-interval", "Distance of rows, and communication step.", "SECONDS")
@@ -44,19 +48,21 @@ class OneFmuFlags:
 
     def expect_none(self) -> None:
         """Raise `UsageError` for any of them: what runs is not one FMU."""
-        given = [f"--{f.name.replace('_', '-')}" for f in fields(self) if getattr(self, f.name)]
+        given = [f"--{f.name.replace('_', '-')}" for f in fields(self) if getattr(self, f.name) is not None]
         if given:
             raise UsageError(f"{', '.join(given)}: for one FMU only; expected run MODEL.fmu")
 
     def applied_to(self, path: Path, flags: FlightFlags) -> "System":
         """The FMU at `path` alone, with these flags and those of any system; `--set` has the names of the FMU."""
-        from orchestration.simulation.requests.one_fmu import alone
+        from orchestration.simulation.requests.one_fmu import alone, remarks
 
         system = alone(
-            path, stop_time=flags.stop_time, interval=self.output_interval, tolerance=self.tolerance,
-            inputs=self.inputs, record=self.record or (), parameters=assigned("set", flags.set),
-            interface=self._interface(),
+            path, start_time=self.start_time, stop_time=flags.stop_time, interval=self.output_interval,
+            tolerance=self.tolerance, inputs=self.inputs, record=self.record or (),
+            parameters=assigned("set", flags.set), interface=self._interface(),
         )  # fmt: skip
+        for remark in remarks(system):
+            inform(remark)
         return replace(flags, stop_time=None, set=None).applied_to_system(system)
 
     def _interface(self) -> Interface | None:

@@ -25,6 +25,8 @@ class Access:
     clock: str | None = None
     """The periodic input clock that ticks at every sample, for event mode; None: the fastest, if there is any. For
     scheduled execution, that of the partition"""
+    start_time: float = 0.0
+    """Its own time [s] at 0 of a run"""
 
     def __str__(self) -> str:
         return json.dumps(asdict(self))

@@ -269,7 +269,7 @@ class AdaptedInstance(StepsWithEnd):
         """As `Instance`."""
         a = self._adapter
         times = (ctypes.c_double * a.noted_count).from_address(a.noted) if a.noted_count else ()
-        taken: Floats = np.array([a.events - a.noted_count, *times])
+        taken: Floats = np.array([a.events - a.noted_count, *(time - self.start_time for time in times)])
         a.noted_count = 0
         return taken
 

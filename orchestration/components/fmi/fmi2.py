@@ -30,6 +30,7 @@ class Fmi2Instance(NativeInstance):
 
     def step(self, t: float, h: float) -> None:
         """Advance from `t` to `t + h` seconds."""
+        t += self.start_time
         status = self._do_step(self._component, t, h, True)
         if status > WARNING:
             raise self.step_error(status, t + h)

@@ -24,6 +24,7 @@ class StepsWithEnd(NativeInstance):
 
     def step(self, t: float, h: float) -> None:
         """Advance from `t` to `t + h` seconds."""
+        t += self.start_time
         status = self._do_step(self._component, t, h, True, *self._step_arguments)
         if status > WARNING or self._event or self._ends or self._early:
             raise self.step_error(status, t + h)

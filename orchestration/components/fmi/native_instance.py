@@ -67,6 +67,8 @@ class NativeInstance(Instance):
         self.model = read_model(path, access)
         self._layout = TransferLayout(instance_name, self.model, self.stored)
         self._tolerance = self.model.tolerance
+        self.start_time = access.start_time
+        """Its own time [s] at 0 of a run: what its functions receive is later by that"""
         self._expect_supported()
         self.guard = None if self.model.is_own else Surroundings()
         try:
@@ -124,7 +126,8 @@ class NativeInstance(Instance):
     def enter_initialization(self, start: float, stop: float) -> None:
         """As `Simulator`; values that the FMU has lost are set once more."""
         self._expect_alive()
-        self._enter(start, None if math.isinf(stop) else stop)
+        begin = self.start_time
+        self._enter(begin + start, None if math.isinf(stop) else begin + stop)
         for name, value in self._lost_values():
             self._put(self.variable(name), value)
         for name, value in self._lost_values():

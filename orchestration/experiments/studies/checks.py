@@ -10,8 +10,7 @@ from orchestration.experiments.studies.store_columns import expect_columns
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import warn
 from orchestration.simulation.engines.batch.shape import outline
-from orchestration.simulation.engines.resolved import check_against_fmus, other_periods_in_words, table_columns
-from orchestration.systems.signals.table_file import read_table
+from orchestration.simulation.engines.resolved import check_against_fmus, other_periods_in_words, table_of
 from orchestration.systems.signals.waypoints import read_waypoints
 from orchestration.systems.system.check import check_parameter, connect_references
 from orchestration.systems.system.files import Files
@@ -122,7 +121,7 @@ def expect_tables(system: System) -> None:
         if source.file is not None and source.is_motion:
             read_waypoints(source.file, source.parameters)
         elif source.file is not None:
-            read_table(source.file, table_columns(source), system.stop_time)
+            table_of(source, system.stop_time)
 
 
 def describe_run(index: int, settings: Mapping[str, Any]) -> str:

@@ -155,7 +155,7 @@ def _values_of(of: Any) -> dict[str, Any]:
     return {name: value for name, value in values.items() if name not in _LATER or value is not None}
 
 
-_LATER = ("interface", "partition", "instance", "solver", "fmu_clock")
+_LATER = ("interface", "partition", "instance", "solver", "fmu_clock", "start_time", "outside")
 """Keys without which rows were stored before there were any; those rows are still found"""
 
 

@@ -148,6 +148,7 @@ static int make_room(Channel *c, int lane) { return 0; } /* the buffer holds all
 static void step(Loop *l, int64_t index, Lanes lanes, q_real begin, q_real length, int64_t until, const Instant *now) {
     Component *c = &l->components[index];
     int status, is_done;
+    begin += c->start_time;
     l->component = l->calling = index, l->end = begin + length;
     if (c->version == 3) {
         status = ((Step3 *)c->step)(c->fmu, begin, length, true, c->event, c->ends, c->early, c->reached);

@@ -239,14 +239,22 @@ def _of_file_or_signal(system: System, name: str, streams: Streams) -> sources.S
         if source.is_motion:
             return sources.Moving(sources.motion_values(signal), quantities)
         return sources.gusts(signal, system.stop_time, streams.of(f"sources.{name}", VALUE))
-    from orchestration.systems.signals.table_file import read_table
     from orchestration.systems.signals.waypoints import read_waypoints
 
-    assert source.file is not None
     if source.is_motion:
+        assert source.file is not None
         return sources.Moving(sources.spline_values(read_waypoints(source.file, source.parameters)), quantities)
-    table = read_table(source.file, table_columns(source), system.stop_time)
+    table = table_of(source, system.stop_time)
     return sources.HeldValues(*table) if source.interpolation == "previous" else sources.TableValues(*table)
+
+
+def table_of(source: Source, stop_time: float) -> tuple[Floats, Floats]:
+    """The table of a source's file over the time of the run, as `read_table`."""
+    from orchestration.systems.signals.table_file import read_table
+
+    assert source.file is not None
+    begin, held = source.start_time or 0.0, source.outside == "held"
+    return read_table(source.file, table_columns(source), stop_time, begin=begin, held=held)
 
 
 def table_columns(source: Source) -> Sequence[str]:

@@ -57,6 +57,7 @@ class RunStructures(SystemStructures):
             index,
             fmu=instance.handle,
             step=instance.address(instance.step_name),
+            start_time=instance.start_time,
             version=3 if instance.step_outputs else 2,
             foreign=instance.guard is not None,
             messages_waiting=ctypes.addressof(instance.messages_waiting),

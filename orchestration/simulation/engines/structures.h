@@ -116,6 +116,7 @@ typedef struct {
     int64_t by_itself;
     /* of FMUs */
     void *fmu, *step;
+    double start_time; /* [s] its own at 0 */
     int32_t version, unused;
     int32_t foreign, moved;     /* whether it may change the rounding mode, and whether it has */
     bool *event, *ends, *early; /* what an FMU of FMI 3 returns from a step */

@@ -1,7 +1,8 @@
 """One FMU alone as a system, as `fmpy simulate` runs it: its default experiment, and inputs from a file."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from decimal import Decimal
 from pathlib import Path
 
 from fmpy.util import auto_interval
@@ -9,7 +10,7 @@ from fmpy.util import auto_interval
 from orchestration.components.fmi.access import Access, Interface
 from orchestration.components.fmi.read_description import Model, called, read_model
 from orchestration.foundation.basics.errors import UsageError, did_you_mean, listed, prefixed
-from orchestration.systems.signals.table_file import TIME, header_of
+from orchestration.systems.signals.table_file import TIME, header_of, read_rows
 from orchestration.systems.system.component import Component, Parameter
 from orchestration.systems.system.model import System
 from orchestration.systems.system.proposal import component_names, experiment
@@ -22,6 +23,7 @@ MOST_ROWS = 1000
 def alone(
     path: Path,
     *,
+    start_time: float | None = None,
     stop_time: float | None = None,
     interval: float | None = None,
     tolerance: float | None = None,
@@ -32,16 +34,18 @@ def alone(
 ) -> System:
     """The FMU at `path` as the only component, in continuous time; what is not given follows its default experiment.
 
-    `interval` [s] is that of the communication points, `inputs` a CSV file with a column for each input that it feeds.
-    Raises `UsageError` for a file that is no FMU, and for an experiment that does not begin at 0.
+    `interval` [s] is that of the communication points, `inputs` a CSV file with a column for each input that it feeds,
+    whose first and last row hold before and after. `start_time` and `stop_time` are times of the FMU; the run begins
+    at 0. Raises `UsageError` for a file that is no FMU.
     """
     model = read_model(path)
     with prefixed(f"{path}: "):
         model = called(model, Access(interface=interface))
-    begin = experiment(model, "startTime")
-    if begin is not None:
-        raise UsageError(f"{path}: its default experiment begins at {begin:g} s; expected 0, where runs begin here")
-    end = stop_time or experiment(model, "stopTime") or 1.0
+    begin = (_time(model, "startTime") or 0.0) if start_time is None else start_time
+    stop = _time(model, "stopTime") if stop_time is None else stop_time
+    end = 1.0 if stop is None else float(Decimal(repr(stop)) - Decimal(repr(begin)))
+    if end <= 0.0:
+        raise UsageError(f"{path}: runs from {begin:g} s to {begin + end:g} s: expected an end after its start")
     step = interval or _interval(model, end)
     if stop_time is None and not model.varies_step and end > step:
         end = step * math.floor(end / step + 1e-9)  # as fmpy: no shorter step at the end
@@ -53,8 +57,9 @@ def alone(
         record=_recorded(model, record),
         parameters=dict(parameters or {}),
         interface=interface,
+        start_time=begin or None,
     )
-    sources = {} if inputs is None else _sources(model, name, inputs)
+    sources = {} if inputs is None else _sources(model, name, inputs, begin)
     return System(stop_time=end, components={name: component}, sources=sources)
 
 
@@ -63,6 +68,24 @@ def outputs(model: Model) -> list[str]:
     of_states = (one.variable.derivative for one in model.description.derivatives or ())
     states = [state.name for state in of_states if state is not None and state.causality in ("output", "local")]
     return list(model.names("output")) or states[:5]
+
+
+def remarks(system: System) -> Iterator[str]:
+    """What a run of one FMU does with times that the user may expect otherwise."""
+    (component,) = system.components.values()
+    begin = component.start_time or 0.0
+    if begin:
+        yield f"its time begins at {begin:g} s, where that of the run is 0"
+    for file in dict.fromkeys(source.file for source in system.sources.values() if source.file is not None):
+        first, *_, last = read_rows(file, (TIME,)).columns[TIME].tolist()
+        if first > begin or last < begin + system.stop_time:
+            yield f"{file} covers {first:g} to {last:g} s: its first and last row hold before and after"
+
+
+def _time(model: Model, key: str) -> float | None:
+    """A time of its default experiment [s]; None: it has none."""
+    declared = getattr(model.description.defaultExperiment, key, None)
+    return None if declared is None else float(declared)
 
 
 def _interval(model: Model, stop_time: float) -> float:
@@ -84,20 +107,25 @@ def _recorded(model: Model, names: Sequence[str]) -> tuple[str, ...] | None:
     return tuple(each for name in names for each in elements.get(name, [name])) or None
 
 
-def _sources(model: Model, name: str, inputs: Path) -> dict[str, Source]:
+def _sources(model: Model, name: str, inputs: Path, begin: float) -> dict[str, Source]:
     """The columns of a file as inputs: continuous ones along the line between rows, all others held."""
-    columns = [column for column in header_of(inputs) if column != TIME]
-    known = model.names("input")
-    for column in columns:
-        if column not in known:
+    known, columns = model.names("input"), dict[str, str]()
+    for column in header_of(inputs):
+        elements = [each for each in known if model.variables[each].whole == column]
+        if column in known:
+            columns[column] = column
+        elif elements:
+            columns |= {each: f"{column}[{i}]" for i, each in enumerate(elements, 1)}
+        elif column != TIME:
             hint = did_you_mean(column, known)
             raise UsageError(f"{inputs}: {model.name} has no input {column}; its inputs are {listed(known)}{hint}")
     sources = {}
     for interpolation, continuous in (("linear", True), ("previous", False)):
-        fed = [column for column in columns if (model.variables[column].variability == "continuous") is continuous]
+        fed = [each for each in columns if (model.variables[each].variability == "continuous") is continuous]
         if fed:
-            to = tuple(f"{name}.{column}" for column in fed)
+            to = tuple(f"{name}.{each}" for each in fed)
             sources[f"{interpolation}_inputs"] = Source(
-                to=to, file=inputs, interpolation="linear" if continuous else "previous", columns=tuple(fed)
-            )
+                to=to, file=inputs, interpolation="linear" if continuous else "previous",
+                columns=tuple(columns[each] for each in fed), start_time=begin or None, outside="held",
+            )  # fmt: skip
     return sources

@@ -27,7 +27,7 @@ def write(result: Result, model: Model, names: Sequence[str], path: Path) -> Non
 
 def table(result: Result, model: Model, names: Sequence[str]) -> npt.NDArray[Any]:
     """The structured array of fmpy's `simulate_fmu`; `names` are scalars, and all elements of arrays."""
-    (component,) = result.system.components
+    ((component, stated),) = result.system.components.items()
     declared = {v.name: v for v in model.description.modelVariables}
     chosen = dict.fromkeys(model.variables[name].whole for name in names)
     integer = "Int64" if model.version == 3 else "Integer"
@@ -36,7 +36,7 @@ def table(result: Result, model: Model, names: Sequence[str]) -> npt.NDArray[Any
     layout = [("time", np.float64, ())]
     layout += [(name, _TYPES[types[name]], tuple(declared[name].shape or ())) for name in ordered]
     filled = np.zeros(len(result.rows), dtype=layout)
-    filled["time"] = result.signals["time"]
+    filled["time"] = result.signals["time"] + (stated.start_time or 0.0)
     for name in ordered:
         elements = [v.name for v in model.variables.values() if v.whole == name]
         values = np.column_stack([result.signals[f"{component}.{element}"] for element in elements])

@@ -1,6 +1,7 @@
 """Reads tables over time from CSV files."""
 
 import csv
+import itertools
 import math
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
@@ -48,22 +49,25 @@ class TableRows:
 TIME = "time"
 
 
-def read_table(path: Path, columns: Sequence[str], stop_time: float) -> tuple[Floats, Floats]:
-    """Times (n,) [s] and the values of `columns` (n, m) of a CSV file with a column `time`; rows of one time jump.
+def read_table(
+    path: Path, columns: Sequence[str], stop_time: float, *, begin: float = 0.0, held: bool = False
+) -> tuple[Floats, Floats]:
+    """Times (n,) [s] from its time `begin` on, and the values of `columns` (n, m), of a CSV file with a column `time`.
 
-    Raises `UsageError` if a column is missing, a value is not finite, time decreases or the table does not cover
-    [0, stop_time].
+    Rows of one time jump. Raises `UsageError` if a column is missing, a value is not finite, time decreases or the
+    table does not cover `begin` to begin + stop_time, unless its ends are `held`.
     """
     rows = read_rows(path, (TIME, *columns))
     rows.expect_increasing_times(jumps=True)
     time = rows.columns[TIME]
-    if time[0] > 0.0 or time[-1] < stop_time:
-        raise UsageError(f"{path}: covers {time[0]:g} to {time[-1]:g} s, expected 0 to stop_time = {stop_time:g} s")
-    return time, np.column_stack([rows.columns[name] for name in columns])
+    if not held and (time[0] > begin or time[-1] < begin + stop_time):
+        end = f"{begin + stop_time:g} s" if begin else f"stop_time = {stop_time:g} s"
+        raise UsageError(f"{path}: covers {time[0]:g} to {time[-1]:g} s, expected {begin:g} to {end}")
+    return time - begin, np.column_stack([rows.columns[name] for name in columns])
 
 
 def read_rows(path: Path, columns: Sequence[str]) -> TableRows:
-    """A CSV file that has at least these columns.
+    """A CSV file that has at least these columns; one whose cells have several numbers is as many, as u[1] and u[2].
 
     Raises `UsageError` for a missing column and, naming line and column, for a value that is no finite number.
     """
@@ -98,12 +102,15 @@ def _names(lines: Any) -> list[str]:
 
 
 def _read_rows(path: Path, lines: Any, columns: Sequence[str]) -> TableRows:
-    header = _names(lines)
+    names = _names(lines)
+    first: list[str] = next(filter(None, lines), [])
+    header = _elements(names, first)
     _expect_columns(path, header, columns)
     numbers, places = array("d"), []
-    for row in lines:
-        if not row:
+    for cells in itertools.chain([first], lines):
+        if not cells:
             continue
+        row = cells if header is names else [number for cell in cells for number in cell.split() or [cell]]
         place = f"{path}: line {lines.line_num}"
         if len(row) != len(header):
             raise UsageError(f"{place}: {len(row)} values, expected {len(header)} as in the header")
@@ -118,6 +125,18 @@ def _read_rows(path: Path, lines: Any, columns: Sequence[str]) -> TableRows:
         raise UsageError(f"{path}: expected at least two rows of numbers")
     table = np.array(numbers).reshape(-1, len(header))
     return TableRows(path=path, columns={name: table[:, i].copy() for i, name in enumerate(header)}, lines=places)
+
+
+def _elements(names: list[str], row: Sequence[str]) -> list[str]:
+    """The names of the columns, those of arrays by elements: of columns with several numbers in their first cell."""
+    counts = [len(cell.split()) for cell in row]
+    if max(counts, default=1) <= 1 or len(counts) != len(names):
+        return names
+    return [
+        name if count <= 1 else f"{name}[{i}]"
+        for name, count in zip(names, counts)
+        for i in range(1, max(count, 1) + 1)
+    ]
 
 
 def _expect_columns(path: Path, header: Sequence[str], columns: Sequence[str]) -> None:

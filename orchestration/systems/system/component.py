@@ -21,7 +21,13 @@ from orchestration.systems.system.distribution import (
     require_varying,
     spreads,
 )
-from orchestration.systems.system.requirements import require, require_not_negative, require_own_clock, require_positive
+from orchestration.systems.system.requirements import (
+    is_finite,
+    require,
+    require_not_negative,
+    require_own_clock,
+    require_positive,
+)
 
 
 @record()
@@ -139,6 +145,8 @@ class Component:
     """The instance that its partition belongs to, by any name; default: one for all partitions of the FMU."""
     solver: Solver | None = None
     """The solver of an FMU for model exchange; default: dormand-prince. For a stiff one, cvode, in the Python loop."""
+    start_time: float | None = None
+    """The FMU's own time at which the run begins [s]; default: 0. All other times are those of the run, from 0."""
     align: Align = "exact"
     """The treatment of an instant between two points of a component that only takes its own fixed step: an error
     (exact), or it moves to the next point (next)."""
@@ -151,13 +159,16 @@ class Component:
         if self.partition is not None:
             return Access(interface=SCHEDULED, solver=self.solver, clock=self.partition)
         clock = None if self.sampling is None else self.sampling.fmu_clock
-        if self.interface is None and self.solver is None and clock is None:
+        if self.interface is None and self.solver is None and clock is None and not self.start_time:
             return USUAL
-        return Access(interface=self.interface or ("event-mode" if clock else None), solver=self.solver, clock=clock)
+        interface: Interface | None = self.interface or ("event-mode" if clock else None)
+        return Access(interface=interface, solver=self.solver, clock=clock, start_time=self.start_time or 0.0)
 
     def __post_init__(self) -> None:
         if self.tolerance is not None:
             require_positive(self, "tolerance")
+        if self.start_time is not None:
+            require(is_finite(self.start_time), "start_time", self.start_time, "a finite number")
         if self.step is not None:
             require_positive(self, "step")
             require(is_at_least(self.step, 1.0), "step", self.step, "at least a nanosecond")

@@ -7,7 +7,7 @@ from pathlib import Path
 from orchestration.foundation.basics.records import record
 from orchestration.foundation.basics.times import is_at_least
 from orchestration.systems.signals import WINDS
-from orchestration.systems.system.choices import Interpolation
+from orchestration.systems.system.choices import Interpolation, Outside
 from orchestration.systems.system.connection import variable_of
 from orchestration.systems.system.requirements import is_finite, require, require_not_negative, require_positive
 
@@ -35,6 +35,11 @@ class Source:
     """The values between the rows of a file: the line (linear), the row before (previous), or a smooth curve (spline)
     through the rows as way-points, with columns x, y, z [m] and either `time` [s] or, optionally, `hold` [s] and
     `speed` [m/s]."""
+    start_time: float | None = None
+    """The time of a file with a column for each input at which the run begins [s]; default: 0."""
+    outside: Outside | None = None
+    """The values of such a file before its first and after its last row: these rows' (held); default: it must cover
+    the run."""
     columns: tuple[str, ...] | None = None
     """The columns of the file in the order of the inputs; default: the names of the inputs."""
     noise: float | None = None
@@ -107,6 +112,10 @@ class Source:
             require(is_table, "columns", ", ".join(self.columns), "none but for a file with a column for each input")
             count = len(self.to)
             require(len(self.columns) == count, "columns", len(self.columns), f"{count} names, one for each input")
+        for key in ("start_time", "outside"):
+            given = getattr(self, key)
+            require(is_table or given is None, key, given, "none but for a file with a column for each input")
+        require(self.start_time is None or is_finite(self.start_time), "start_time", self.start_time, "a finite number")
 
     def _expect_signal(self) -> None:
         if self.signal is not None or self.interpolation == "spline":

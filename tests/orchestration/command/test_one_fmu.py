@@ -8,7 +8,7 @@ import pytest
 from fmpy.util import read_csv, write_csv
 
 from orchestration.simulation.requests.request import load_request
-from quadcosim import UsageError
+from quadcosim import run
 from tests.commands import Main
 from tests.orchestration.components.fmi.exchange import exchange
 from tests.orchestration.components.fmi.small import known, needs_compiler, small
@@ -100,7 +100,25 @@ def test_a_model_of_differential_equations_is_solved_as_near_to_fmpy_as_is_asked
 
 
 @needs_compiler
-def test_an_experiment_that_begins_later_is_refused(here: Path) -> None:
-    fmu = small(here, tolerance='1e-6" startTime="5')  # type: ignore[arg-type]
-    with pytest.raises(UsageError, match="its default experiment begins at 5 s; expected 0"):
-        load_request(fmu)
+def test_an_experiment_may_begin_later_and_inputs_end_before_as_in_fmpy(main: Main, here: Path) -> None:
+    inputs, fmu = here / "short.csv", known(small(here, fmi=3, tolerance='1e-6" startTime="5" stopTime="7'))  # type: ignore[arg-type]
+    inputs.write_text("time,u\n5.25,1 2\n6,3 -1\n")
+    flags = ("--inputs", inputs, "--output-interval", "0.125", "--in-process")
+    ran = main("run", fmu, *flags, "--output", "out.csv")
+    expected = by_fmpy(fmu, inputs, output_interval=0.125)
+    assert Path("out.csv").read_text() == expected
+    assert [expected.splitlines()[i].partition(",")[0] for i in (1, -1)] == ["5.0", "7.0"]
+    assert "its time begins at 5 s, where that of the run is 0" in ran.stderr
+    assert "short.csv covers 5.25 to 6 s: its first and last row hold before and after" in ran.stderr
+    main("run", fmu, *flags, "--start-time", "5.5", "--stop-time", "6.5", "--engine", "python", "--output", "out.csv")
+    assert Path("out.csv").read_text() == by_fmpy(fmu, inputs, output_interval=0.125, start_time=5.5, stop_time=6.5)
+    assert "runs from 7 s to 7 s: expected an end after" in main("run", fmu, "--start-time", "7", code=2).stderr
+
+
+@needs_compiler
+def test_an_fmu_is_called_at_its_own_time_by_both_loops_and_its_events_are_at_those_of_the_run(here: Path) -> None:
+    component = {"fmu": str(exchange(here, "stair")), "step": 0.7, "start_time": 0.5}
+    for engine in ("python", "compiled"):
+        result = run({"stop_time": 3.5, "components": {"it": component}}, engine=engine, in_process=True)
+        assert result.signals["it.count"].tolist() == [1, 2, 2, 3, 4, 5]
+        assert [event.time for event in result.events] == [k * 10**9 + 5 * 10**8 for k in range(4)]

@@ -10,12 +10,11 @@ from fmu_kit.trajectory import Trajectory
 from orchestration.components.fmi.kit import TRAJECTORY
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.engines.batch.shape import Shape
-from orchestration.simulation.engines.resolved import table_columns
+from orchestration.simulation.engines.resolved import table_of
 from orchestration.simulation.engines.wasm.settings import Settings
 from orchestration.simulation.engines.wasm.symbols import Lines, Text
 from orchestration.systems.schedule.streams import VALUE, Streams
 from orchestration.systems.signals.library import make_signal
-from orchestration.systems.signals.table_file import read_table
 from orchestration.systems.system.source import MOTION, Source
 
 
@@ -101,8 +100,7 @@ class SourcesInC:
             return self._motion(name, source, signal)
         if source.is_motion:
             raise UsageError(f"sources.{name}: expected no way-points in a page")
-        assert source.file is not None
-        time, columns = read_table(source.file, table_columns(source), self._system.stop_time)
+        time, columns = table_of(source, self._system.stop_time)
         function = "on_step" if source.interpolation == "previous" else "on_line"
         return [
             f"static const double times[] = {{{numbers_text(time)}}};",
