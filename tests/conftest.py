@@ -116,12 +116,10 @@ def making(request: pytest.FixtureRequest) -> Making:
 
 
 @pytest.fixture(scope="session")
-def built(making: Making, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Both FMUs by model name, freshly built into a folder of the session; those of C in their own folder."""
-    if making.native:
-        return {model: fmus.locate(f"native/{model}") for model in MODELS}
-    folder = tmp_path_factory.mktemp("fmus")
-    return {path.stem: path for path in builder.build(MODELS, folder)}
+def built(making: Making) -> dict[str, Path]:
+    """The FMUs by model name, of the current sources: built once for all processes, and kept."""
+    folder = builder.NATIVE.folder if making.native else ""
+    return {model: fmus.locate(Path(folder, model).as_posix()) for model in MODELS}
 
 
 @pytest.fixture
