@@ -156,7 +156,7 @@ class Declaration(property):
             "named_quantity": quantity,
             "terminal": terminal,
         }
-        self._frame = frame
+        self.frame = frame
 
     def __set_name__(self, owner: type, attribute: str) -> None:
         self.attribute, self.name = attribute, self.name or attribute
@@ -183,7 +183,7 @@ class Declaration(property):
 
     def _in_declared_frame(self, get: _Get, put: _Put) -> tuple[_Get, _Put]:
         """The two functions, converting between the axes of the FMU and those of the attributes."""
-        turn = self._frame
+        turn = self.frame
         if turn is None:
             return get, put
 

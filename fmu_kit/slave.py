@@ -80,6 +80,10 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     initially_idle: ClassVar[frozenset[str]] = frozenset()
     """Inputs and parameters on which not even the initial outputs depend."""
 
+    continuous_states: ClassVar[tuple[str, ...]] = ()
+    """Attributes with the continuous states, of which `derivatives` returns the derivatives: a native FMU of such a
+    slave offers model exchange too."""
+
     usual_parameters: ClassVar[Mapping[str, float | int | bool]] = {}
     """Values of parameters, by name, that a master sets when it computes many runs in SIMD lanes, where they differ
     from the start values: steps in lanes are optimised for these."""
@@ -184,6 +188,17 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     def step(self, t: float, h: float) -> None:
         """Advance from `t` to `t + h` [s] with the inputs held."""
 
+    def derivatives(self, t: float, since: float) -> tuple[Any, ...]:
+        """The derivatives of `continuous_states` at `t` [s], in their order; what else follows from these is set.
+
+        What jumps at times is as it is from `since` [s] on, the time of the last event, until the next one.
+        """
+        raise NotImplementedError
+
+    def next_jump(self) -> float:
+        """The time [s] of the next event of model exchange; one that is over: there is none."""
+        return -math.inf
+
     def internal_state(self) -> State:
         """The state of the model beside its variables, in JSON types; default: none."""
         kept = sorted(vars(self).keys() - self._base_attributes - {"_base_attributes"})
@@ -275,6 +290,22 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             self.step(current_time, step_size)
         except (ArithmeticError, ValueError) as error:  # a float left its range in a computation
             raise DivergenceError(f"at t = {current_time}: {error}, expected finite values") from error
+
+    def _derive(self, t: float, since: float) -> tuple[float, ...]:
+        """The numbers of all derivatives, and the next jump; an entry point of what is compiled to C."""
+        if self._stale:
+            self._take_parameters()
+        try:
+            found = self.derivatives(t, since)
+        except (ArithmeticError, ValueError) as error:
+            raise DivergenceError(f"at t = {t}: {error}, expected finite values") from error
+        frames = {each.attribute: each.frame for each in self._declared if each.frame is not None}
+        rates = [
+            frames[name](self.is_turned, rate) if name in frames else rate
+            for name, rate in zip(self.continuous_states, found, strict=True)
+        ]
+        numbers = [part for rate in rates for part in (rate if hasattr(rate, "__iter__") else (rate,))]
+        return (*numbers, self.next_jump())
 
     @guarded
     def terminate(self) -> None:

@@ -87,8 +87,8 @@ def generation_date() -> str:
     return datetime.datetime.fromtimestamp(int(epoch), datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
-def add_units(root: Element, variables: tuple[Variable, ...]) -> None:
-    """Add the units of variables, in base units, with the units that they are displayed in."""
+def add_units(root: Element, variables: tuple[Variable, ...]) -> Element:
+    """Add the units of variables, in base units, with the units that they are displayed in; return their list."""
     definitions = SubElement(root, "UnitDefinitions")
     for name in sorted({v.unit for v in variables if v.unit is not None}):
         unit = SubElement(definitions, "Unit", name=name)
@@ -97,6 +97,7 @@ def add_units(root: Element, variables: tuple[Variable, ...]) -> None:
         if name in DISPLAYED:
             shown, factor = DISPLAYED[name]
             SubElement(unit, "DisplayUnit", name=shown, factor=repr(factor))
+    return definitions
 
 
 def add_types(root: Element, variables: tuple[Variable, ...], add_type: Callable[[Element, str], Element]) -> None:

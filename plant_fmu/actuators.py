@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from fmu_kit.algebra import Vec3
+from fmu_kit.errors import require
 from fmu_kit.mixer import Mixer
 from fmu_kit.rigid_body import Wrench
 from fmu_kit.scalar import Scalar
@@ -58,6 +59,10 @@ class Box:
             target.d + left * (start.d - target.d),
         )
 
+    def rate(self, now: Channels, target: Channels) -> Channels:
+        """The derivative of thrust and torques [1/s of them]; without a lag they need none."""
+        return Channels(*(_rate(x, to, self.time_constant, self.time_constant) for x, to in zip(now, target)))
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Motors(Mixer):
@@ -93,6 +98,13 @@ class Motors(Mixer):
             _between(start.d, target.d, rising, falling),
         )
 
+    def rate(self, now: Channels, target: Channels) -> Channels:
+        """The derivative of the thrusts [N/s]; without a lag they need none."""
+        up, down = self.up, self.down
+        both = (up > 0.0) == (down > 0.0)
+        require(both, "motor.time_constant.up", up, f"a lag where motor.time_constant.down = {down} is one")
+        return Channels(*(_rate(x, to, up, down) for x, to in zip(now, target)))
+
     def _clamped(self, thrust: Scalar) -> Scalar:
         return min(max(thrust, self.thrust_min), self.thrust_max)
 
@@ -117,6 +129,12 @@ class Actuators:
             return self.motors.response(start, target, elapsed)
         return self.box.response(start, target, elapsed)
 
+    def rate(self, now: Channels, target: Channels) -> Channels:
+        """The derivative of the channels under a limited command that is `target` now."""
+        if self.motors.thrust_max > 0.0:
+            return self.motors.rate(now, target)
+        return self.box.rate(now, target)
+
     def wrench(self, channels: Channels) -> Wrench:
         """The wrench that acts on the body."""
         if self.motors.thrust_max > 0.0:
@@ -129,6 +147,13 @@ def _remaining(elapsed: float, time_constant: float) -> float:
     if time_constant == 0.0:
         return 0.0
     return math.exp(-elapsed / time_constant)
+
+
+def _rate(now: Scalar, target: Scalar, up: float, down: float) -> Scalar:
+    """The derivative of a value that follows `target` with these time constants [s]."""
+    if up == 0.0:
+        return 0.0
+    return (target - now) / (up if target > now else down)
 
 
 def _between(start: Scalar, target: Scalar, rising: float, falling: float) -> Scalar:

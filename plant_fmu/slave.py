@@ -3,7 +3,7 @@
 import math
 from dataclasses import replace
 
-from fmu_kit.algebra import Quaternion
+from fmu_kit.algebra import Quaternion, Vec3
 from fmu_kit.authors import AUTHOR, LICENSE
 from fmu_kit.errors import require, require_finite_state
 from fmu_kit.integrator import internal_steps, rk4_step
@@ -19,6 +19,8 @@ from plant_fmu.wind import Wind
 
 MAX_INTERNAL_STEPS = 100_000
 """Limit for one communication step: some seconds of work, which a master cannot interrupt"""
+RECALL = 1.0
+"""How fast the length of the attitude returns to one, in model exchange [1/s]"""
 _MOTION = tuple(each.name for each in PlantInterface.variables if each.causality == "output")
 
 
@@ -30,6 +32,7 @@ class QuadrotorPlant(PlantInterface):
 
     author, license = AUTHOR, LICENSE
     initial_outputs_depend_on_inputs = False
+    continuous_states = ("position", "velocity", "quaternion", "angular_velocity", "_channels")
 
     @classmethod
     def initial_dependencies(cls, output: str) -> frozenset[str]:
@@ -90,6 +93,33 @@ class QuadrotorPlant(PlantInterface):
         self._channels = actuators.response(start, target, h)
         self._write(t + h)
 
+    def derivatives(self, t: float, since: float) -> tuple[Vec3, Vec3, Quaternion, Vec3, Channels]:
+        """The right-hand side of the motion and of the actuators, with the payload that is carried `since` [s].
+
+        A solver does not keep the length of the attitude Q: dQ/dt has the term RECALL (1 - |Q|²) Q, which vanishes at
+        length one, and forces act along the axes of the unit quaternion in its direction.
+        """
+        actuators, target = self._actuators, self._actuators.limited(self._command())
+        channels = actuators.response(self._channels, target, 0.0)
+        state = RigidState(self.position, self.velocity, self.quaternion, self.angular_velocity)
+        force = self._wind.force(t) + self.external_force
+        moving = derivative(
+            state.normalised(), actuators.wrench(channels), force, self._body.with_mass(self._mass_at(since))
+        )
+        attitude = state.quaternion
+        recall = RECALL * (1.0 - attitude.vector @ attitude.vector - attitude.scalar * attitude.scalar)
+        turning = attitude.rate(state.angular_velocity).plus(recall, attitude)
+        rates = (*moving.position, *moving.velocity, *turning, *moving.angular_velocity)
+        if not math.isfinite(sum(rates)):
+            require_finite_state([f"der({name})" for name in _MOTION], rates)
+        self._look(t, attitude.normalised(), channels, self._mass_at(since))
+        return moving.position, moving.velocity, turning, moving.angular_velocity, actuators.rate(channels, target)
+
+    def next_jump(self) -> float:
+        """The time [s] at which the payload is dropped."""
+        dropped: float = self.payload_drop_time
+        return dropped
+
     def internal_state(self) -> State:
         """The actuators and the attitude; the rest of the motion is among the variables."""
         return {"actuators": list(self._channels), "attitude": list(self._state.quaternion)}
@@ -129,12 +159,14 @@ class QuadrotorPlant(PlantInterface):
             require_finite_state(_MOTION, values)
         self.position, self.velocity = state.position, state.velocity
         self.quaternion, self.angular_velocity = state.quaternion, state.angular_velocity
+        self._look(t, state.quaternion, self._channels, self._mass_at(t))
+
+    def _look(self, t: float, attitude: Quaternion, channels: Channels, mass: float) -> None:
+        """Set the variables that are for looking at."""
         wind = self._wind.force(t)
-        force = wind + self.external_force
-        thrust = self._actuators.wrench(self._channels).thrust
-        body = self._body.with_mass(self._mass_at(t))
-        self.acceleration = acceleration(state.quaternion, thrust, force, body)
-        self.wind_force, self.tilt = wind, tilt(state.quaternion)
+        thrust = self._actuators.wrench(channels).thrust
+        self.acceleration = acceleration(attitude, thrust, wind + self.external_force, self._body.with_mass(mass))
+        self.wind_force, self.tilt = wind, tilt(attitude)
 
 
 def _unless_zero(own: float, general: float) -> float:

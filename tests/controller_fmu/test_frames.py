@@ -83,6 +83,6 @@ def test_a_variant_with_its_axes_fixed_has_no_trace_of_others() -> None:
 def test_all_that_has_axes_is_turned_but_what_there_is_along_axes_of_the_body(slave: type[Slave]) -> None:
     along = ("gain", "limit")
     with_axes = [each for each in slave._declared if isinstance(each.start, Vec3 | Quaternion | Inertia)]
-    untold = [each.name for each in with_axes if each._frame is None]
+    untold = [each.name for each in with_axes if each.frame is None]
     assert [name for name in untold if not name.startswith(along)] == []
     assert len(with_axes) > len(untold)

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from fmu_kit.compiler.emit.c_code import ERRORS
 from fmu_kit.compiler.emit.c_names import c_string, place_names
+from fmu_kit.compiler.emit.exchange import continuous_states, others
 from fmu_kit.compiler.emit.sampling_clock import sampling_period
 from fmu_kit.compiler.emit.standards import Standard
 from fmu_kit.compiler.trace.errors import TraceError
@@ -48,6 +49,7 @@ def tables(program: Program, guid: str, standard: Standard) -> str:
         f"#define GUID {c_string(guid)}",
         f"#define MODEL {c_string(program.model)}",
         *(_clock(program.slave) if standard.has_clocks else ()),
+        *_states(program, standard),
         f"enum {{ REALS = {sum(v.type == 'Real' for v in variables)} }};",
         "typedef enum { REAL, INTEGER, BOOLEAN, STRING, ENUMERATION } Type;",
         "/* The type whose functions get and set each variable. */",
@@ -84,6 +86,23 @@ def _clock(slave: type[Slave]) -> Iterator[str]:
     if period is not None:
         yield f"enum {{ SAMPLE_PERIOD = {period} }};"
         yield f"#define CLOCK_INTERVAL {slave.default_experiment.step_size!r}"
+
+
+def _states(program: Program, standard: Standard) -> Iterator[str]:
+    """The continuous states, for model exchange; no array is empty."""
+    states = continuous_states(program, standard)
+    kept = [str(state.place) for state in states if state.is_kept]
+    yield f"enum {{ OTHERS = {others(program.slave, standard)}, KEPT_STATES = {len(kept)} }};"
+    yield f"#define STATES {len(states)} /* continuous states */"
+    yield f"enum {{ RATES = {program.of_derivatives[-1].results if states else 0} }}; /* results of model_derive */"
+    listed = {
+        "unsigned state_places": [str(state.place) for state in states],
+        "unsigned kept_places": kept,
+        "unsigned state_rates": [str(state.rate) for state in states],
+        "double nominals": [repr(state.variable.nominal or 1.0) for state in states],
+    }
+    for name, values in listed.items():
+        yield _array(f"{name}[{len(values) + 1}]", [*values, "0"])
 
 
 def places(program: Program) -> str:

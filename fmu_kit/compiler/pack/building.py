@@ -19,6 +19,7 @@ from fmu_kit import libraries, packaging
 from fmu_kit.archive import NATIVE_TABLES
 from fmu_kit.bundle import PackagingError, Target, bundled_sources, path_in_bundle
 from fmu_kit.compiler.emit.c_code import c_code
+from fmu_kit.compiler.emit.exchange import described
 from fmu_kit.compiler.emit.lane_code import lane_code
 from fmu_kit.compiler.emit.standards import CLOCKED, STANDARDS, Standard
 from fmu_kit.compiler.emit.tables import places, tables
@@ -34,7 +35,7 @@ from fmu_kit.documentation import BuildNotes
 from fmu_kit.packaging import add_description, insert_guid, licences_and_icon, origin, slave_class, write_fmu
 from fmu_kit.write_description import GUID_PLACEHOLDER
 
-BESIDE = ("instance.h", "integers.h", "lanes.c", "lanes.h", "mathematics.h", "text.h")
+BESIDE = ("exchange.h", "instance.h", "integers.h", "lanes.c", "lanes.h", "mathematics.h", "text.h")
 """Source files beside the file to compile, the same for every slave."""
 TABLES = NATIVE_TABLES.rpartition("/")[2]
 UNOPTIMISED = """
@@ -88,7 +89,7 @@ def build(
         status=f"fmi{version}Error",
         afterwards="After a failure, reset the instance, set it to a state that was saved before, or free it.",
     )
-    add_description(files, target, notes, standard.describe(slave_class(target), standard.main))
+    add_description(files, target, notes, described(program, standard))
     guid = insert_guid(files)
     sources = {**sources, TABLES: sources[TABLES].replace(GUID_PLACEHOLDER.encode(), guid.encode())}
     files[NATIVE_TABLES] = sources[TABLES]
@@ -116,10 +117,11 @@ def c_sources(program: Program, guid: str, standard: Standard) -> dict[str, byte
     """The sources of an FMU, by file name."""
     fixed = {name: (FOLDER / name).read_bytes() for name in (standard.main, *BESIDE)}
     derivatives = with_tangents(program, program.initialise)
+    rates = c_code(replace(program, functions=program.of_derivatives))
     generated = {
         "places.h": places(program),
         TABLES: tables(program, guid, standard),
-        "functions.h": f"{c_code(program)}\n{UNOPTIMISED}\n{c_code(derivatives)}\n{OPTIMISED}\n",
+        "functions.h": f"{c_code(program)}\n{rates}\n{UNOPTIMISED}\n{c_code(derivatives)}\n{OPTIMISED}\n",
         "lane_functions.h": lane_code(program, straightened(program)),
     }
     return {**fixed, **{name: text.encode() for name, text in generated.items()}}

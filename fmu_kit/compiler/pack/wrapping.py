@@ -41,7 +41,7 @@ REFUSED = 2
 """The exit code for code that cannot be wrapped as it is"""
 _LONGEST = 60.0
 """The most seconds that the code's initialisation may take"""
-_BESIDE = ("instance.h", "integers.h", "lanes.h", "mathematics.h", "text.h", "wrapped.h")
+_BESIDE = ("exchange.h", "instance.h", "integers.h", "lanes.h", "mathematics.h", "text.h", "wrapped.h")
 _OF_LANES = ("integers.h", "lanes.h", "mathematics.h", "places.h", "wrapped.h")
 _PROBE = """
 #include <stdio.h>
@@ -65,6 +65,7 @@ class _Program:
 
     model: str
     slave: type[Slave]
+    states: tuple[()] = ()
 
 
 def build(code: UserCode, out: Path, version: int = 2, systems: Sequence[str] = ()) -> Path:

@@ -5,8 +5,9 @@ typedef int Truth;
 #include "instance.h"
 
 #define FMI(name) fmi2##name
+#define NAME(name) "fmi2" #name
 
-enum { CO_SIMULATION = 1 };
+enum { MODEL_EXCHANGE, CO_SIMULATION };
 
 struct Host {
     void (*logger)(void *environment, Text instance, Status status, Text category, Text message, ...);
@@ -44,16 +45,20 @@ void *fmi2Instantiate(Text name, int kind, Text guid, Text location, const Host 
 {
     Instance *m;
     (void)location, (void)visible;
-    if (!host || !name || !guid || kind != CO_SIMULATION || strcmp(guid, GUID) != 0) {
+    const int is_offered = kind == CO_SIMULATION || (kind == MODEL_EXCHANGE && STATES);
+    if (!host || !name || !guid || !is_offered || strcmp(guid, GUID) != 0) {
         if (host && host->logger && name && guid)
             host->logger(host->environment, name, ERROR, "logStatusError",
-                         kind == CO_SIMULATION ? "GUID = %s: expected %s, that of this FMU"
-                                               : "fmuType of %s: expected fmi2CoSimulation of %s", guid, GUID);
+                         is_offered ? "GUID = %s: expected %s, that of this FMU"
+                                    : "fmuType of %s: expected fmi2CoSimulation of %s", guid, GUID);
         return NULL;
     }
     m = create(sizeof *m, name, logs);
-    if (m)
-        m->host = host;
+    if (!m)
+        return NULL;
+    m->host = host;
+    m->exchanges = kind == MODEL_EXCHANGE;
+    begin(m);
     return m;
 }
 
@@ -182,6 +187,47 @@ CALL(GetDirectionalDerivative, References z, size_t nz, References v, size_t nv,
 {
     INSTANCE;
     return derive(m, z, nz, v, nv, dv, dz);
+}
+
+/* -- model exchange ----------------------------------------------------------------------------------------------- */
+
+#include "exchange.h"
+
+typedef struct {
+    int again, terminate, nominals, continuous, has_next;
+    double next;
+} Update;
+
+CALL(GetDerivatives, double *values, size_t n)
+{
+    INSTANCE;
+    OF_STATES(GetDerivatives, n);
+    return get_of_states(m, values, n, 1);
+}
+
+PLAIN(EnterEventMode)
+{
+    INSTANCE;
+    IN_CONTINUOUS_TIME(EnterEventMode);
+    m->state.mode = EVENT_MODE;
+    return OK;
+}
+
+CALL(NewDiscreteStates, Update *found)
+{
+    INSTANCE;
+    IN_EXCHANGE(NewDiscreteStates, m->state.phase == STEPPING && m->state.mode == EVENT_MODE);
+    *found = (Update){0};
+    return update_at_event(m, &found->next, &found->has_next);
+}
+
+CALL(CompletedIntegratorStep, int no_set_state, int *event, int *terminate)
+{
+    INSTANCE;
+    (void)no_set_state;
+    IN_CONTINUOUS_TIME(CompletedIntegratorStep);
+    *event = *terminate = 0;
+    return OK;
 }
 
 /* -- functions that this FMU does not offer ----------------------------------------------------------------------- */

@@ -1,6 +1,6 @@
 /* A slave for hosts of FMI 3.0: the functions of the standard, each implemented by one of instance.h.
 
-   For co-simulation, without early return. A slave that samples (CLOCK_INTERVAL) has an input clock, which says in event
+   Without early return. A slave that samples (CLOCK_INTERVAL) has an input clock, which says in event
    mode when it does; without event mode its parameters say so. */
 
 #include <stdbool.h>
@@ -11,8 +11,7 @@ typedef bool Truth;
 #include "instance.h"
 
 #define FMI(name) fmi3##name
-
-enum { TIME = VARIABLES, CLOCK }; /* the independent variable, after all others, and the clock of samples, if any */
+#define NAME(name) "fmi3" #name
 
 #if defined(CLOCK_INTERVAL)
 enum { HAS_CLOCK = 1 };
@@ -45,20 +44,13 @@ Text fmi3GetVersion(void) { return "3.0"; }
 typedef void (*LogMessage)(void *environment, Status status, Text category, Text message);
 typedef void (*Callback)(void);
 
-EXPORT void *fmi3InstantiateCoSimulation(Text, Text, Text, bool, bool, bool, bool, References, size_t, void *,
-                                         LogMessage, Callback);
-void *fmi3InstantiateCoSimulation(Text name, Text token, Text resources, bool visible, bool logs, bool events,
-                                  bool early_return, References intermediate, size_t n, void *environment,
-                                  LogMessage log, Callback intermediate_update)
+static Whole *created(Text name, Text token, bool logs, void *environment, LogMessage log, Text refusal)
 {
     Whole *whole;
-    (void)resources, (void)visible, (void)early_return, (void)intermediate, (void)n, (void)intermediate_update;
-    const int no_events = events && !HAS_CLOCK;
-    if (!name || !token || no_events || strcmp(token, GUID) != 0) {
+    if (!name || !token || refusal || strcmp(token, GUID) != 0) {
         if (log)
             log(environment, ERROR, "logStatusError",
-                no_events ? "eventModeUsed: expected false, this FMU has no event mode"
-                       : "instantiationToken: expected " GUID ", that of this FMU");
+                refusal ? refusal : "instantiationToken: expected " GUID ", that of this FMU");
         return NULL;
     }
     whole = (Whole *)create(sizeof *whole, name, logs);
@@ -67,8 +59,21 @@ void *fmi3InstantiateCoSimulation(Text name, Text token, Text resources, bool vi
     whole->host.log = log;
     whole->host.environment = environment;
     whole->instance.host = &whole->host;
-    whole->instance.state.mode = events ? EVENT_MODE : NO_EVENTS;
     whole->instance.state.interval = CLOCK_INTERVAL;
+    return whole;
+}
+
+EXPORT void *fmi3InstantiateCoSimulation(Text, Text, Text, bool, bool, bool, bool, References, size_t, void *,
+                                         LogMessage, Callback);
+void *fmi3InstantiateCoSimulation(Text name, Text token, Text resources, bool visible, bool logs, bool events,
+                                  bool early_return, References intermediate, size_t n, void *environment,
+                                  LogMessage log, Callback intermediate_update)
+{
+    Text refusal = events && !HAS_CLOCK ? "eventModeUsed: expected false, this FMU has no event mode" : NULL;
+    Whole *whole = created(name, token, logs, environment, log, refusal);
+    (void)resources, (void)visible, (void)early_return, (void)intermediate, (void)n, (void)intermediate_update;
+    if (whole)
+        whole->instance.state.mode = events ? EVENT_MODE : NO_EVENTS;
     return whole;
 }
 
@@ -76,10 +81,14 @@ EXPORT void *fmi3InstantiateModelExchange(Text, Text, Text, bool, bool, void *, 
 void *fmi3InstantiateModelExchange(Text name, Text token, Text resources, bool visible, bool logs, void *environment,
                                    LogMessage log)
 {
-    (void)name, (void)token, (void)resources, (void)visible, (void)logs;
-    if (log)
-        log(environment, ERROR, "logStatusError", "fmi3InstantiateModelExchange: this FMU is for co-simulation");
-    return NULL;
+    Text refusal = STATES ? NULL : "fmi3InstantiateModelExchange: this FMU is for co-simulation";
+    Whole *whole = created(name, token, logs, environment, log, refusal);
+    (void)resources, (void)visible;
+    if (whole) {
+        whole->instance.exchanges = 1;
+        whole->instance.state.mode = EVENT_MODE;
+    }
+    return whole;
 }
 
 EXPORT void *fmi3InstantiateScheduledExecution(Text, Text, Text, bool, bool, void *, LogMessage, Callback, Callback,
@@ -107,7 +116,7 @@ CALL(EnterInitializationMode, bool has_tolerance, double tolerance, double start
 {
     INSTANCE;
     (void)has_tolerance, (void)tolerance;
-    if (m->state.mode != NO_EVENTS)
+    if (m->state.mode != NO_EVENTS && !m->exchanges)
         m->state.memory[SAMPLE_PERIOD] = 0.0; /* a sample at every tick */
     return set_times(m, start_time, has_stop, stop) == OK ? enter_initialization(m) : ERROR;
 }
@@ -155,20 +164,6 @@ static Status are_as_many(Instance *m, size_t references, size_t values)
     return refuse_with(m, "nValues: expected as many values as value references, for all variables are scalars", "", "");
 }
 
-/* Get Reals, among which may be the time. */
-static Status get_reals_and_time(Instance *m, References vr, size_t n, double *value)
-{
-    for (size_t from = 0, to; from < n; from = to + 1) {
-        for (to = from; to < n && vr[to] != TIME;)
-            to++;
-        if (get_reals(m, vr + from, to - from, value + from) != OK)
-            return ERROR;
-        if (to < n)
-            value[to] = m->state.time;
-    }
-    return OK;
-}
-
 GET(enumerations, ENUMERATION, int64_t, as_int)
 SET(enumerations, ENUMERATION, int64_t, (double)value[i])
 
@@ -184,7 +179,7 @@ SET(enumerations, ENUMERATION, int64_t, (double)value[i])
         return are_as_many(m, n, values) == OK ? set(m, vr, n, value) : ERROR; \
     }
 
-ACCESS(Float64, get_reals_and_time, set_reals, double)
+ACCESS(Float64, get_reals, set_reals, double)
 ACCESS(Int32, get_integers, set_integers, int32_t)
 ACCESS(Boolean, get_booleans, set_booleans, bool)
 ACCESS(Int64, get_enumerations, set_enumerations, int64_t)
@@ -361,6 +356,40 @@ WITHOUT(GetOutputDerivatives, References vr, size_t n, const int32_t *orders, do
 WITHOUT_PLAIN(EnterConfigurationMode)
 WITHOUT_PLAIN(ExitConfigurationMode)
 
+/* -- model exchange ---------------------------------------------------------------------------------------------- */
+
+#include "exchange.h"
+
+CALL(GetContinuousStateDerivatives, double *values, size_t n)
+{
+    INSTANCE;
+    OF_STATES(GetContinuousStateDerivatives, n);
+    return get_of_states(m, values, n, 1);
+}
+
+CALL(GetNumberOfContinuousStates, size_t *n)
+{
+    INSTANCE;
+    *n = STATES;
+    return OK;
+}
+
+CALL(GetNumberOfEventIndicators, size_t *n)
+{
+    INSTANCE;
+    *n = 0;
+    return OK;
+}
+
+CALL(CompletedIntegratorStep, bool no_set_state, bool *event, bool *terminate)
+{
+    INSTANCE;
+    (void)no_set_state;
+    IN_CONTINUOUS_TIME(CompletedIntegratorStep);
+    *event = *terminate = false;
+    return OK;
+}
+
 /* -- event mode, for a host that asked for it ------------------------------------------------------------------- */
 
 #define IN_MODE(name, condition) \
@@ -372,7 +401,7 @@ WITHOUT_PLAIN(ExitConfigurationMode)
 PLAIN(EnterEventMode)
 {
     INSTANCE;
-    IN_MODE(EnterEventMode, m->state.mode == STEP_MODE);
+    IN_MODE(EnterEventMode, m->state.mode == STEP_MODE || m->state.mode == CONTINUOUS_MODE);
     m->state.mode = EVENT_MODE;
     return OK;
 }
@@ -380,7 +409,7 @@ PLAIN(EnterEventMode)
 PLAIN(EnterStepMode)
 {
     INSTANCE;
-    IN_MODE(EnterStepMode, m->state.mode == EVENT_MODE && m->state.tick == NO_TICK);
+    IN_MODE(EnterStepMode, m->state.mode == EVENT_MODE && m->state.tick == NO_TICK && !m->exchanges);
     m->state.mode = STEP_MODE;
     return OK;
 }
@@ -390,32 +419,26 @@ PLAIN(EvaluateDiscreteStates)
     int error;
     INSTANCE;
     IN_MODE(EvaluateDiscreteStates, m->state.mode == EVENT_MODE);
-    error = m->state.tick == TICKS ? take_sample(m) : 0;
+    error = m->state.tick == TICKS ? compute(m) : 0;
     return error ? refuse(m, error) : OK;
 }
 
 CALL(UpdateDiscreteStates, bool *again, bool *terminate, bool *nominals, bool *continuous, bool *has_next, double *next)
 {
-    int error;
+    int error, follows = 0;
     INSTANCE;
     IN_MODE(UpdateDiscreteStates, m->state.mode == EVENT_MODE);
-    if (m->state.tick == TICKS && (error = take_sample(m)))
+    if (m->state.tick == TICKS && (error = compute(m)))
         return refuse(m, error);
     m->state.tick = NO_TICK;
     *again = *terminate = *nominals = *continuous = *has_next = false;
     *next = 0.0;
+    if (!m->exchanges)
+        return OK;
+    if (update_at_event(m, next, &follows) != OK)
+        return ERROR;
+    *has_next = follows;
     return OK;
 }
 
-/* Functions of model exchange and scheduled execution: some hosts require every function of the standard. */
-WITHOUT(SetTime, double t)
-WITHOUT(SetContinuousStates, const double *x, size_t n)
-WITHOUT(GetContinuousStates, double *x, size_t n)
-WITHOUT(GetContinuousStateDerivatives, double *dx, size_t n)
-WITHOUT(GetNominalsOfContinuousStates, double *nominals, size_t n)
-WITHOUT(GetNumberOfContinuousStates, size_t *n)
-WITHOUT(GetEventIndicators, double *z, size_t n)
-WITHOUT(GetNumberOfEventIndicators, size_t *n)
-WITHOUT(CompletedIntegratorStep, bool no_set_state, bool *event, bool *terminate)
 WITHOUT(ActivateModelPartition, unsigned clock, double t)
-WITHOUT_PLAIN(EnterContinuousTimeMode)

@@ -1,4 +1,4 @@
-/* An instance of a slave for any version of FMI for co-simulation: order of calls, values, states, messages.
+/* An instance of a slave for any version of FMI: order of calls, values, states, messages.
 
    places.h, tables.h and functions.h beside this file are specific to the slave: its memory, its variables, and its
    computations. quadcosim generates them from the slave's Python; nothing here depends on the model. An instance is
@@ -22,8 +22,8 @@
 
 typedef enum { OK, WARNING, DISCARD, ERROR, FATAL } Status;
 typedef enum { INSTANTIATED, INITIALIZATION, STEPPING, TERMINATED, FAILED, PHASES } Phase;
-typedef enum { NO_EVENTS, STEP_MODE, EVENT_MODE } Mode; /* of a host that says by a clock when to sample, FMI 3.0 */
-typedef enum { NO_TICK, TICKS, SAMPLED } Tick;
+typedef enum { NO_EVENTS, STEP_MODE, EVENT_MODE, CONTINUOUS_MODE } Mode; /* of a host that handles events */
+typedef enum { NO_TICK, TICKS, SAMPLED } Tick; /* TICKS: values are to be computed before any is read */
 typedef enum { LOG_WARNING, LOG_ERROR, LOG_DIVERGENCE, CATEGORIES } Category;
 enum { LONGEST_TEXT = 1024 };
 
@@ -33,6 +33,10 @@ typedef struct Host Host;
 
 #include "places.h"
 #include "tables.h"
+
+/* What is no variable of the slave, by value reference: of FMI 3.0 the time, and the clock if it samples; the derivative
+   of each continuous state; those states that are none of the variables. */
+enum { TIME = VARIABLES, CLOCK, FIRST_RATE = VARIABLES + OTHERS, FIRST_KEPT = FIRST_RATE + STATES };
 
 static const Text categories[CATEGORIES] = {"logStatusWarning", "logStatusError", "divergence"};
 
@@ -50,10 +54,11 @@ typedef struct {
     double reached;  /* start time of the next step; not a number before the first: any */
     double stop;     /* stop time; infinite if none is defined */
     double interval; /* of the clock */
+    double since;    /* in model exchange the time of the last event */
     unsigned warned; /* bits of the warnings that were sent */
     Phase phase;
     Mode mode;
-    Tick tick; /* of the clock, in event mode; SAMPLED: its outputs are computed */
+    Tick tick; /* of the clock, in event mode; SAMPLED: its outputs are computed. Of model exchange: a value was set */
 } State;
 
 /* Its bytes, for the host. */
@@ -71,6 +76,8 @@ typedef struct {
     const Host *host;
     int logs[CATEGORIES];
     double *tangents; /* of the memory, while derivatives are computed */
+    int exchanges;    /* it is for model exchange */
+    double rates[RATES + 1]; /* the derivatives of the states, and the time of the next event */
 } Instance;
 
 /* -- messages --------------------------------------------------------------------------------------------------- */
@@ -166,6 +173,7 @@ static void begin(Instance *m)
     m->state.reached = Q_NAN;
     m->state.stop = Q_INFINITY;
     m->state.phase = INSTANTIATED;
+    m->state.mode = m->exchanges ? EVENT_MODE : NO_EVENTS;
 }
 
 /* An instance, at the start of memory of this size or more; NULL if there is no memory. */
@@ -203,6 +211,22 @@ static Status enter_initialization(Instance *m)
     return OK;
 }
 
+/* The derivatives at the time and state that it has; in model exchange, with what else follows from these. */
+static int find_rates(Instance *m)
+{
+    int error = 0;
+#if STATES
+    if (m->exchanges && m->state.phase == STEPPING) {
+        m->state.tick = NO_TICK;
+        return model_derive(m, m->state.time, m->state.since, m->rates);
+    }
+    Instance copy = *m;
+    if ((error = model_derive(&copy, m->state.time, m->state.time, m->rates)))
+        memcpy(m->failure, copy.failure, sizeof m->failure);
+#endif
+    return error;
+}
+
 static Status exit_initialization(Instance *m)
 {
     int error;
@@ -211,7 +235,8 @@ static Status exit_initialization(Instance *m)
     if ((error = model_enter_stepping(m)))
         return refuse(m, error);
     m->state.phase = STEPPING;
-    return OK;
+    m->state.since = m->state.time;
+    return m->exchanges && (error = find_rates(m)) ? refuse(m, error) : OK;
 }
 
 /* A step begins where the last one ended, and does not end past the stop time; mirrors `_expect_in_time`. */
@@ -230,17 +255,19 @@ static Status advance(Instance *m, double t, double h)
     int error;
     if (expect(m, DO_STEP) != OK || expect_in_time(m, t, h) != OK)
         return ERROR;
-    if (m->state.mode == EVENT_MODE)
-        return refuse_with(m, "fmi3DoStep: expected fmi3EnterStepMode before", "", "");
+    if (m->state.mode >= EVENT_MODE)
+        return refuse_with(m, "a step: expected step mode, of co-simulation", "", "");
     if (m->state.mode == NO_EVENTS && (error = model_do_step(m, t, h)))
         return refuse(m, error);
     m->state.time = m->state.reached = t + h;
     return OK;
 }
 
-/* The sample of a tick of the clock, held until the next one. */
-static int take_sample(Instance *m)
+/* The sample of a tick of the clock, held until the next one; in model exchange, what follows from values that were set. */
+static int compute(Instance *m)
 {
+    if (m->exchanges)
+        return find_rates(m);
     m->state.tick = SAMPLED;
     return model_do_step(m, m->state.time, m->state.interval);
 }
@@ -255,13 +282,19 @@ static Status end(Instance *m)
 
 /* -- values ----------------------------------------------------------------------------------------------------- */
 
+/* Whether a reference is that of a Real that is no variable of the slave. */
+static int is_beside(unsigned vr)
+{
+    return vr >= VARIABLES && (vr < FIRST_RATE ? vr == TIME : vr < FIRST_KEPT + KEPT_STATES);
+}
+
 static Status refuse_references(Instance *m, References vr, size_t n, Type type)
 {
     int first = 1;
     text_begin(m);
     text_add(m, wrong_type[type][0]);
     for (size_t i = 0; i < n; i++) {
-        if (vr[i] < VARIABLES && types[vr[i]] == type)
+        if (vr[i] < VARIABLES ? types[vr[i]] == type : type == REAL && is_beside(vr[i]))
             continue;
         text_add(m, first ? "" : ", ");
         text_integer(m, vr[i]);
@@ -280,11 +313,11 @@ static int have_type(References vr, size_t n, Type type)
     return 1;
 }
 
-/* Compute the values to be read: at a tick, and in initialisation mode if others were set since they were computed. */
+/* Compute the values to be read: where they are to be, and in initialisation mode if others were set since they were computed. */
 static int bring_up_to_date(Instance *m, References vr, size_t n)
 {
     if (m->state.tick == TICKS)
-        return take_sample(m);
+        return compute(m);
     if (m->state.phase != INITIALIZATION || m->state.memory[KEPT_STALE] == 0.0)
         return 0;
     for (size_t i = 0; i < n; i++)
@@ -305,10 +338,10 @@ static Status expect_settable(Instance *m, unsigned vr, Type type)
         return refuse_with(m, "inputs: expected before any value is read at a tick", "", "");
     if (!(kinds[vr] & INPUT) || m->state.phase != STEPPING)
         m->state.memory[KEPT_STALE] = 1.0;
+    if (m->exchanges && m->state.phase == STEPPING)
+        m->state.tick = TICKS;
     return OK;
 }
-
-static double as_real(double x) { return x; }
 
 /* A computed value may be beyond the range of the interface. */
 static int as_int(double x) { return x >= 2147483647.0 ? 2147483647 : x > -2147483648.0 ? (int)x : -2147483647 - 1; }
@@ -337,11 +370,35 @@ static int as_int(double x) { return x >= 2147483647.0 ? 2147483647 : x > -21474
         return OK; \
     }
 
-GET(reals, REAL, double, as_real)
 GET(integers, INTEGER, int, as_int)
 GET(booleans, BOOLEAN, Truth, as_int)
 SET(integers, INTEGER, int, value[i])
 SET(booleans, BOOLEAN, Truth, value[i] != 0)
+
+static Status get_reals(Instance *m, References vr, size_t n, double *value)
+{
+    int error = bring_up_to_date(m, vr, n), has_rates = 0;
+    if (error)
+        return refuse(m, error);
+    if (have_type(vr, n, REAL)) {
+        for (size_t i = 0; i < n; i++)
+            value[i] = m->state.memory[vr[i]];
+        return OK;
+    }
+    for (size_t i = 0; i < n; i++) {
+        if (!have_type(vr + i, 1, REAL) && !is_beside(vr[i]))
+            return refuse_references(m, vr, n, REAL);
+        has_rates |= vr[i] >= FIRST_RATE && vr[i] < FIRST_KEPT;
+    }
+    if (has_rates && (error = find_rates(m)))
+        return refuse(m, error);
+    for (size_t i = 0; i < n; i++)
+        value[i] = vr[i] < VARIABLES    ? m->state.memory[vr[i]]
+                   : vr[i] < FIRST_RATE ? m->state.time
+                   : vr[i] < FIRST_KEPT ? m->rates[state_rates[vr[i] - FIRST_RATE]]
+                                        : m->state.memory[kept_places[vr[i] - FIRST_KEPT]];
+    return OK;
+}
 
 static Status set_reals(Instance *m, References vr, size_t n, const double *value)
 {
@@ -406,6 +463,8 @@ static Status restore(Instance *m, const void *state)
     if (expect_own_state(m, state, state ? sizeof(State) : 0) != OK)
         return ERROR;
     memcpy(&m->state, state, sizeof(State));
+    if (m->exchanges && m->state.phase == STEPPING)
+        m->state.tick = TICKS;
     return OK;
 }
 
@@ -469,7 +528,8 @@ static Status from_bytes(Instance *m, const void *bytes, size_t size, void **sta
 
 /* -- derivatives ------------------------------------------------------------------------------------------------- */
 
-/* During initialisation, outputs depend on the values that were set; between steps they depend on nothing. */
+/* During initialisation, outputs depend on the values that were set; between steps they depend on nothing. Those of
+   model exchange are not offered. */
 static Status derive(Instance *m, References z, size_t nz, References v, size_t nv, const double *dv, double *dz)
 {
     double tangents[PLACES] = {0.0};
@@ -479,6 +539,8 @@ static Status derive(Instance *m, References z, size_t nz, References v, size_t 
         return refuse_references(m, z, nz, REAL);
     if (!have_type(v, nv, REAL))
         return refuse_references(m, v, nv, REAL);
+    if (m->exchanges)
+        return refuse_with(m, "directional derivatives: not offered in model exchange", "", "");
     if (m->state.phase == INITIALIZATION) {
         copy = *m;
         copy.tangents = tangents;

@@ -32,7 +32,10 @@ from fmu_kit.slave import Phase, Slave
 
 _BASE_METHODS = ("_take_parameters", "_check_parameters")
 _UNTRACED = ("internal_state", "restore", "to_xml")
-_OPEN = frozenset({"__init__", "read_parameters", "initialise", "step", "internal_state", "restore", "to_xml"})
+_OPEN = frozenset({
+    "__init__", "read_parameters", "initialise", "step", "derivatives", "next_jump", "internal_state", "restore",
+    "to_xml",
+})  # fmt: skip
 """The methods of the base class that a slave may override."""
 MAX_WARNINGS = 32
 """Limit of the warnings of a slave; each key is a bit of its state."""
@@ -56,6 +59,10 @@ class Program:
     """keys of the warnings that are given once"""
     versions: Mapping[tuple[int, Statement], int]
     """Version of the memory after a call, by the one before it and the call"""
+    of_derivatives: tuple[Function, ...] = ()
+    """functions that only the derivatives need, which the last one computes: parameters t, since [s]"""
+    states: tuple[tuple[int, Place], ...] = ()
+    """the continuous states, each with the number of its derivative among the results"""
 
 
 def trace(slave: type[Slave], modules: list[types.ModuleType], *, digits: int = 53) -> Program:
@@ -87,7 +94,8 @@ def _known_after(program: Program, before: KnownMemory) -> KnownMemory:
     """What is known of the memory after a trace, in addition to what was known before."""
     first = {attribute_name(path) for path, _ in leaves(Memory(program.slave(instance_name="new"), {}).attributes())}
     kept = {place.name: place for place in program.places if place.reference is None and place.name not in first}
-    each = [each for function in program.functions for each in all_statements(function.body)]
+    functions = (*program.functions, *program.of_derivatives)
+    each = [each for function in functions for each in all_statements(function.body)]
     stored: dict[str, set[Symbol]] = {}
     for store in each:
         if store.op == "store":
@@ -139,6 +147,14 @@ def _traced(slave: type[Slave], modules: list[types.ModuleType], memory: Memory)
         if stepped is None:
             raise TraceError(f"{slave.__name__}.step always fails")
         memory.expect_as_before(after, stepped, "in a step", may_add=False)
+        stepping = tuple(explorer.functions)
+        if slave.continuous_states:
+            derive = functools.partial(Slave._derive, instance)
+            given = {"t": 0.0, "since": 0.0}
+            _, derived, _ = explorer.function(lambda t, since: derive(t, since), "derive", given, catches=True)
+            if derived is None:
+                raise TraceError(f"{slave.__name__}.derivatives always fails")
+            memory.expect_as_before(after, derived, "when derivatives are computed", may_add=False)
     variables = {place.reference: place for place in memory.places.values() if place.reference is not None}
     beside = [place for place in memory.places.values() if place.reference is None]
     kept = [place for place in beside if not memory.known.needs_no_place(place)]
@@ -146,12 +162,24 @@ def _traced(slave: type[Slave], modules: list[types.ModuleType], memory: Memory)
         model=slave.__name__,
         slave=slave,
         places=(*(variables[i] for i in range(len(slave.variables))), *kept),
-        functions=tuple(explorer.functions),
+        functions=stepping,
         initialise=initialise,
         do_step=do_step,
         warnings=tuple(warnings),
         versions=memory.versions,
+        of_derivatives=tuple(explorer.functions[len(stepping) :]),
+        states=tuple((i, p) for i, p in enumerate(_states(slave, memory, after)) if not memory.known.needs_no_place(p)),
     )
+
+
+def _states(slave: type[Slave], memory: Memory, after: Mapping[str, Any]) -> Iterator[Place]:
+    """The places of the continuous states; `after` are the attributes when initialisation has ended."""
+    declared = {each.attribute: each for each in slave._declared}
+    for attribute in slave.continuous_states:
+        if attribute in declared:
+            yield from (memory.places[v.name] for v in declared[attribute].variables())
+        else:
+            yield from (memory.places[attribute_name((attribute, *path))] for path, _ in leaves(after[attribute]))
 
 
 def _expect_no_override(slave: type[Slave]) -> None:

@@ -272,6 +272,12 @@ class Model:
                 f'"{clocks[0]}" }}'
             )
 
+    @cached_property
+    def for_solvers(self) -> frozenset[str]:
+        """Derivatives of one of this project's FMUs, and states beside its outputs: only recorded where named."""
+        derivatives = [one.variable for one in self.description.derivatives] if self.follows_kit else []
+        return frozenset(v.name for rate in derivatives for v in (rate, rate.derivative) if v.causality == "local")
+
     def names(self, *causalities: str, kinds: tuple[Kind, ...] = NUMERIC) -> tuple[str, ...]:
         """Variables of these causalities and types, in the order of the description."""
         return tuple(v.name for v in self.variables.values() if v.causality in causalities and v.kind in kinds)

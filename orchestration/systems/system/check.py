@@ -89,7 +89,7 @@ def recorded_variables(system: System, models: Mapping[str, Model]) -> dict[str,
             v.name
             for v in model.variables.values()
             if (v.causality == "output" and v.kind in NUMERIC)
-            or (v.causality == "local" and v.kind == "Real" and not v.is_constant)
+            or (v.causality == "local" and v.kind == "Real" and not v.is_constant and v.name not in model.for_solvers)
         ]
         found[name] = tuple(chosen)
     return found

@@ -65,11 +65,15 @@ def start_text(fmu: Fmu) -> Iterator[str]:
 
 
 def units(fmu: Fmu) -> Iterator[str]:
-    """Every Real has a unit, and every unit a definition by SI base units and a corresponding name."""
+    """Every Real has a unit, and every unit a definition by SI base units and a corresponding name.
+
+    That of a state beside the outputs may depend on parameters.
+    """
+    for_solvers = {v for one in fmu.description.derivatives for v in (one.variable, one.variable.derivative)}
     used = {attribute(v, "unit") for v in fmu.variables}
     for v in fmu.variables:
         has_unit = v.causality == "independent" or attribute(v, "unit") is not None  # that one is in seconds without
-        if kind_of(v) == "Real" and not has_unit:
+        if kind_of(v) == "Real" and not has_unit and v not in for_solvers:
             yield f"{v.name}: expected a unit, found none"
     for unit in fmu.description.unitDefinitions:
         if unit.baseUnit is None:
