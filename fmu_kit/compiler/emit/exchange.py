@@ -5,10 +5,9 @@ from __future__ import annotations
 import itertools
 from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 from xml.etree.ElementTree import Element, SubElement
 
-from fmu_kit.compiler.emit.sampling_clock import samples
 from fmu_kit.variables import Variable
 from fmu_kit.write_description import add_units, attributes, type_attributes
 
@@ -41,23 +40,18 @@ class ContinuousState:
     """whether it is none of the slave's variables"""
 
 
-def others(slave: Any, standard: Standard) -> int:
-    """How many value references are between those of the variables and of what is added: time and clock of FMI 3.0."""
-    return 0 if standard.version == 2 else 1 + (standard.has_clocks and samples(slave))
-
-
 Added: TypeAlias = tuple[Variable, int, ContinuousState | None]
 """A variable, its reference, and of a derivative its state"""
 
 
-def continuous_states(program: Program, standard: Standard) -> tuple[ContinuousState, ...]:
+def continuous_states(program: Program) -> tuple[ContinuousState, ...]:
     """The continuous states of a program, with their value references."""
-    return tuple(_continuous_states(program, standard))
+    return tuple(_continuous_states(program))
 
 
-def _continuous_states(program: Program, standard: Standard) -> Iterator[ContinuousState]:
+def _continuous_states(program: Program) -> Iterator[ContinuousState]:
     variables = program.slave.variables
-    first = len(variables) + others(program.slave, standard)
+    first = len(variables)
     free = itertools.count(first + len(program.states))
     for k, (rate, place) in enumerate(program.states):
         if place.reference is None:
@@ -84,7 +78,7 @@ def _local(name: str, description: str, unit: str | None) -> Variable:
 def described(program: Program, standard: Standard) -> Element:
     """The description of a program: of its slave, and of model exchange if it has continuous states."""
     root = standard.describe(program.slave, standard.main)
-    states = continuous_states(program, standard)
+    states = continuous_states(program)
     if not states:
         return root
     slave = root[0]
@@ -125,9 +119,12 @@ def _add_to_3(root: Element, states: Sequence[ContinuousState], added: Sequence[
     variables, structure = root.find("ModelVariables"), root.find("ModelStructure")
     assert variables is not None
     assert structure is not None
+    for place, later in enumerate(variables[added[0][1] :], added[-1][1] + 1):  # time and clock
+        later.set("valueReference", str(place))
     for variable, reference, state in added:
         of = {} if state is None else {"derivative": str(state.reference)}
-        SubElement(variables, "Float64", {**attributes(variable, reference), **type_attributes(variable), **of})
+        number = Element("Float64", {**attributes(variable, reference), **type_attributes(variable), **of})
+        variables.insert(reference, number)
         SubElement(structure, "InitialUnknown", valueReference=str(reference))
     outputs = structure.findall("Output")
     _depend_on_themselves(outputs, "valueReference", {str(state.reference) for state in states})

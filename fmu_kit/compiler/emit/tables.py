@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from fmu_kit.compiler.emit.c_code import ERRORS
 from fmu_kit.compiler.emit.c_names import c_string, place_names
-from fmu_kit.compiler.emit.exchange import continuous_states, others
+from fmu_kit.compiler.emit.exchange import continuous_states
 from fmu_kit.compiler.emit.sampling_clock import sampling_period
 from fmu_kit.compiler.emit.standards import Standard
 from fmu_kit.compiler.trace.errors import TraceError
@@ -49,7 +49,7 @@ def tables(program: Program, guid: str, standard: Standard) -> str:
         f"#define GUID {c_string(guid)}",
         f"#define MODEL {c_string(program.model)}",
         *(_clock(program.slave) if standard.has_clocks else ()),
-        *_states(program, standard),
+        *_states(program),
         f"enum {{ REALS = {sum(v.type == 'Real' for v in variables)} }};",
         "typedef enum { REAL, INTEGER, BOOLEAN, STRING, ENUMERATION } Type;",
         "/* The type whose functions get and set each variable. */",
@@ -88,11 +88,11 @@ def _clock(slave: type[Slave]) -> Iterator[str]:
         yield f"#define CLOCK_INTERVAL {slave.default_experiment.step_size!r}"
 
 
-def _states(program: Program, standard: Standard) -> Iterator[str]:
+def _states(program: Program) -> Iterator[str]:
     """The continuous states, for model exchange; no array is empty."""
-    states = continuous_states(program, standard)
+    states = continuous_states(program)
     kept = [str(state.place) for state in states if state.is_kept]
-    yield f"enum {{ OTHERS = {others(program.slave, standard)}, KEPT_STATES = {len(kept)} }};"
+    yield f"enum {{ KEPT_STATES = {len(kept)} }}; /* those that are no variables */"
     yield f"#define STATES {len(states)} /* continuous states */"
     yield f"enum {{ RATES = {program.of_derivatives[-1].results if states else 0} }}; /* results of model_derive */"
     listed = {

@@ -1,7 +1,6 @@
 /* Model exchange: the functions of FMI 2.0 and FMI 3.0 by which a solver of the host moves the continuous states.
 
-   The file of a version of FMI includes this one near its end; before the include it defines NAME(name), the full name
-   of a function as a text. */
+   The file of a version of FMI includes this one near its end. */
 
 #define IN_EXCHANGE(name, condition) \
     if (!m->exchanges || !(condition)) \

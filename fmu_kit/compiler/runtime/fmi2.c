@@ -2,10 +2,13 @@
 
 typedef int Truth;
 
+enum { HAS_TIME = 0 };
+
+#define NAME(name) "fmi2" #name
+
 #include "instance.h"
 
 #define FMI(name) fmi2##name
-#define NAME(name) "fmi2" #name
 
 enum { MODEL_EXCHANGE, CO_SIMULATION };
 

@@ -8,10 +8,13 @@
 
 typedef bool Truth;
 
+enum { HAS_TIME = 1 };
+
+#define NAME(name) "fmi3" #name
+
 #include "instance.h"
 
 #define FMI(name) fmi3##name
-#define NAME(name) "fmi3" #name
 
 #if defined(CLOCK_INTERVAL)
 enum { HAS_CLOCK = 1 };

@@ -5,7 +5,8 @@
    one piece of memory, made by `create` and never grown; instances share nothing.
 
    The file of a version of FMI includes this one, and has the functions that a host calls. Before the include it
-   defines Truth, the type of a Boolean; after it Host, the callbacks of the host, and `send_message`. */
+   defines Truth, the type of a Boolean, HAS_TIME, whether the time is a variable, and NAME(name), the full name of a
+   function as a text; after it Host, the callbacks of the host, and `send_message`. */
 
 #include <stdlib.h>
 #include <string.h>
@@ -34,9 +35,9 @@ typedef struct Host Host;
 #include "places.h"
 #include "tables.h"
 
-/* What is no variable of the slave, by value reference: of FMI 3.0 the time, and the clock if it samples; the derivative
-   of each continuous state; those states that are none of the variables. */
-enum { TIME = VARIABLES, CLOCK, FIRST_RATE = VARIABLES + OTHERS, FIRST_KEPT = FIRST_RATE + STATES };
+/* What is no variable of the slave, by value reference: the derivative of each continuous state; those states that are
+   none of the variables; of FMI 3.0 the time, and the clock if it samples. */
+enum { FIRST_RATE = VARIABLES, FIRST_KEPT = FIRST_RATE + STATES, TIME = FIRST_KEPT + KEPT_STATES, CLOCK };
 
 static const Text categories[CATEGORIES] = {"logStatusWarning", "logStatusError", "divergence"};
 
@@ -215,6 +216,7 @@ static Status enter_initialization(Instance *m)
 static int find_rates(Instance *m)
 {
     int error = 0;
+    (void)m;
 #if STATES
     if (m->exchanges && m->state.phase == STEPPING) {
         m->state.tick = NO_TICK;
@@ -256,7 +258,7 @@ static Status advance(Instance *m, double t, double h)
     if (expect(m, DO_STEP) != OK || expect_in_time(m, t, h) != OK)
         return ERROR;
     if (m->state.mode >= EVENT_MODE)
-        return refuse_with(m, "a step: expected step mode, of co-simulation", "", "");
+        return refuse_with(m, NAME(DoStep) ": expected step mode, of co-simulation", "", "");
     if (m->state.mode == NO_EVENTS && (error = model_do_step(m, t, h)))
         return refuse(m, error);
     m->state.time = m->state.reached = t + h;
@@ -285,7 +287,7 @@ static Status end(Instance *m)
 /* Whether a reference is that of a Real that is no variable of the slave. */
 static int is_beside(unsigned vr)
 {
-    return vr >= VARIABLES && (vr < FIRST_RATE ? vr == TIME : vr < FIRST_KEPT + KEPT_STATES);
+    return vr >= FIRST_RATE && vr < TIME + HAS_TIME;
 }
 
 static Status refuse_references(Instance *m, References vr, size_t n, Type type)
@@ -390,13 +392,13 @@ static Status get_reals(Instance *m, References vr, size_t n, double *value)
             return refuse_references(m, vr, n, REAL);
         has_rates |= vr[i] >= FIRST_RATE && vr[i] < FIRST_KEPT;
     }
-    if (has_rates && (error = find_rates(m)))
+    if (has_rates && m->state.phase != INSTANTIATED && m->state.phase != FAILED && (error = find_rates(m)))
         return refuse(m, error);
     for (size_t i = 0; i < n; i++)
         value[i] = vr[i] < VARIABLES    ? m->state.memory[vr[i]]
-                   : vr[i] < FIRST_RATE ? m->state.time
                    : vr[i] < FIRST_KEPT ? m->rates[state_rates[vr[i] - FIRST_RATE]]
-                                        : m->state.memory[kept_places[vr[i] - FIRST_KEPT]];
+                   : vr[i] < TIME       ? m->state.memory[kept_places[vr[i] - FIRST_KEPT]]
+                                        : m->state.time;
     return OK;
 }
 

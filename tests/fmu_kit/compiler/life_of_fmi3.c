@@ -72,12 +72,41 @@ static void live(void)
     fmi3FreeInstance(c);
 }
 
+static void exchange(void)
+{
+    const unsigned rates[2] = {FIRST_RATE + 5, AT_ACCELERATION_Z}, input = AT_THRUST;
+    const double thrust = 7.0;
+    void *c = fmi3InstantiateModelExchange("plant", GUID, "", false, true, NULL, print_message), *state = NULL;
+    double x[STATES], dx[STATES], next, values[2];
+    bool again, ends, nominals, continuous, has_next;
+    size_t n;
+
+    EXPECT(fmi3EnterInitializationMode(c, false, 0.0, 0.0, false, 0.0) == OK);
+    EXPECT(fmi3GetContinuousStateDerivatives(c, dx, STATES) == OK);
+    EXPECT(fmi3ExitInitializationMode(c) == OK && fmi3GetNumberOfContinuousStates(c, &n) == OK && n == STATES);
+    EXPECT(fmi3UpdateDiscreteStates(c, &again, &ends, &nominals, &continuous, &has_next, &next) == OK && !has_next);
+    EXPECT(fmi3EnterContinuousTimeMode(c) == OK && fmi3GetContinuousStates(c, x, STATES) == OK);
+    EXPECT(fmi3GetFMUState(c, &state) == OK && fmi3SetFloat64(c, &input, 1, &thrust, 1) == OK);
+    x[12] = 1.0;
+    EXPECT(fmi3SetTime(c, 0.5) == OK && fmi3SetContinuousStates(c, x, STATES) == OK);
+    EXPECT(fmi3GetFloat64(c, rates, 2, values, 2) == OK && values[0] == values[1]);
+    x[3] = Q_INFINITY;
+    EXPECT(fmi3SetContinuousStates(c, x, STATES) == DISCARD);
+    EXPECT(fmi3SetFMUState(c, state) == OK && fmi3GetContinuousStateDerivatives(c, x, STATES) == OK);
+    for (size_t i = 0; i < STATES; i++)
+        EXPECT(x[i] == dx[i]);
+    EXPECT(fmi3FreeFMUState(c, &state) == OK && fmi3DoStep(c, 0.5, 0.1, true, &again, &ends, &nominals, x) == ERROR);
+    fmi3FreeInstance(c);
+}
+
 int main(void)
 {
     EXPECT(!instantiate("of another FMU"));
-    EXPECT(!fmi3InstantiateModelExchange("plant", GUID, "", false, true, NULL, print_message));
+    EXPECT(!fmi3InstantiateScheduledExecution("plant", GUID, "", false, true, NULL, print_message, NULL, NULL, NULL));
     live();
+    exchange();
     live();
+    exchange();
     fmi3FreeInstance(NULL);
     return 0;
 }

@@ -27,7 +27,7 @@ from tests.fmu_kit.compiler.embedded import _succeeds, assert_its_header_is_kept
 from tests.fmu_kit.compiler.probes import Kept
 from tests.fmu_kit.compiler.twins import GUID, InC, InPython, answers, compiled
 
-FILES = ("instance.h", "fmi2.c", "fmi3.c", "lanes.c", "embedded.c", "embedded.h")
+FILES = ("exchange.h", "instance.h", "fmi2.c", "fmi3.c", "lanes.c", "embedded.c", "embedded.h")
 HERE = {
     name
     for file in FILES
