@@ -20,7 +20,7 @@ from plant_fmu.wind import Wind
 MAX_INTERNAL_STEPS = 100_000
 """Limit for one communication step: some seconds of work, which a master cannot interrupt"""
 RECALL = 1.0
-"""How fast the length of the attitude returns to one, in model exchange [1/s]"""
+"""Rate at which the length of the attitude returns to one, in model exchange [1/s]"""
 _MOTION = tuple(each.name for each in PlantInterface.variables if each.causality == "output")
 
 

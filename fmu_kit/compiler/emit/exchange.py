@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from fmu_kit.compiler.trace.tracing import Program
 
 _COMMON = ("modelIdentifier", "needsExecution", "canBeInstantiated", "canNotUseMemory", "canGetAnd", "canSerialize")
-"""How attributes begin that model exchange and co-simulation have"""
+"""Beginnings of attributes that model exchange and co-simulation have in common"""
 _NO_CALL_AFTER_STEPS = {
     2: ("completedIntegratorStepNotNeeded", "true"),
     3: ("needsCompletedIntegratorStep", "false"),
@@ -29,7 +29,7 @@ class ContinuousState:
     """A continuous state and its derivative."""
 
     place: int
-    """in the memory"""
+    """index in the memory"""
     rate: int
     """the place of its derivative among the results of the function that computes them"""
     variable: Variable
