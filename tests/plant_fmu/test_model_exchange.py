@@ -31,7 +31,10 @@ def plant(**values: float) -> QuadrotorPlant:
     slave = QuadrotorPlant()
     for name, value in values.items():
         vr = next(i for i, v in enumerate(slave.variables) if v.name == name)
-        (slave.set_real if slave.variables[vr].type == "Real" else slave.set_integer)([vr], [value])
+        if slave.variables[vr].type == "Real":
+            slave.set_real([vr], [value])
+        else:
+            slave.set_integer([vr], [int(value)])
     slave.setup_experiment(0.0)
     slave.enter_initialization_mode()
     slave.exit_initialization_mode()

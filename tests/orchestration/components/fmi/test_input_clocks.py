@@ -52,6 +52,28 @@ def test_a_clocked_law_holds_exactly(period: float, delay: float, known: float, 
     assert one.signals["law.period"][-1] == period
 
 
+def test_with_jitter_and_delay_each_row_is_that_of_the_exact_hold(tmp_path: Path) -> None:
+    system = loop(tmp_path, FAST, delay=0.07, period=0.3, jitter=0.1)
+    one, other = (quadcosim.run(system, engine=engine, in_process=True) for engine in ("python", "compiled"))
+    assert one.rows.tobytes() == other.rows.tobytes()
+    happened = [(event.time, event.kind, event.sample) for event in one.events if event.kind in ("sampled", "arrived")]
+    rows = [(round(t * 1e9), "row", i) for i, t in enumerate(one.signals["time"].tolist())]
+    x, v, u, now, sent = 1.0, 0.0, 0.0, 0, dict[int, float]()
+    expected = np.zeros((len(rows), 2))
+    for time, kind, number in sorted([*happened, *rows], key=lambda each: each[0]):
+        h = (time - now) / 1e9
+        x, v, now = x + h * v + h * h / 2.0 * u, v + h * u, time
+        if kind == "sampled":
+            sent[number] = -x - v
+        elif kind == "arrived":
+            u = sent[number]
+        else:
+            expected[number] = x, v
+    assert len(sent) > 60
+    assert len({time % 300_000_000 for time, kind, _ in happened if kind == "sampled"}) > 60
+    assert np.abs(np.transpose([one.signals["plant.x1"], one.signals["plant.x2"]]) - expected).max() < 1e-12
+
+
 def test_jitter_and_loss_apply_and_a_paused_run_goes_on(tmp_path: Path) -> None:
     system = loop(tmp_path, FAST, clock("slow", "fixed", 'intervalDecimal="1.5" shiftDecimal="1"', 31), jitter=0.2)
     system["connections"][0].update(delay=0.07, loss=0.3)
