@@ -21,7 +21,7 @@ from fmu_kit.scratch import temporary_folder
 
 OPTIONS = (
     *("-std=gnu11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno"),
-    "-s",
+    *("-s", "-U_FORTIFY_SOURCE"),  # some distributions define it, and would need more of the C library
 )
 OF_LIBRARY = ("-O1",)
 """Compiles faster than -O2, and steps are as fast: generated code is already simple."""

@@ -20,7 +20,7 @@ from fmu_kit.compiler.pack.c_compiler import compiler, output_of
 SECTION = "quadcosim_state"
 _OPTIONS = (
     *("-O2", "-g1", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-fno-strict-aliasing", "-fno-common", "-w"),
-    "-fdiagnostics-color=never",
+    *("-U_FORTIFY_SOURCE", "-fdiagnostics-color=never"),
 )
 _LIBRARY = (".a", ".o")
 """Endings of sources that are compiled already, such as static libraries of Rust"""
@@ -143,11 +143,12 @@ def _expect_usable(code: UserCode, joined: Path, folder: Path) -> bool:
     sections = output_of(["objdump", "-h", str(joined)], folder)
     if "THREAD_LOCAL" in sections:
         raise RefusedCodeError(f"{code.file}: sources: have thread-local variables: expected none, there is one thread")
-    undefined = output_of(["nm", "-u", str(joined)], folder).split()
-    used = [name for name in undefined if len(name) > 1 and name not in _PURE and not _PURE_KINDS.match(name)]
-    for symbol in used:
+    # A line has the symbol and, after a tab, the first line of the sources that uses it.
+    undefined = re.findall(r"^\s+U (\S+)(?:\t(.*))?$", output_of(["nm", "-u", "-l", str(joined)], folder), re.MULTILINE)
+    used = {name: line for name, line in undefined if name not in _PURE and not _PURE_KINDS.match(name)}
+    for symbol, line in used.items():
         if not _HEAP.match(symbol):
-            raise RefusedCodeError(f"{code.file}: {_refusal(symbol, _callers(symbol, joined, folder))}")
+            raise RefusedCodeError(f"{code.file}: {_refusal(symbol, Path(line).name or 'them')}")
     return not used
 
 
@@ -155,19 +156,11 @@ def _refusal(symbol: str, where: str) -> str:
     for what, names in _IMPURE.items():
         if symbol in names:
             advice = _ADVICE.get(what, "a stub of {} in a source").format(symbol)
-            return f"{symbol}, used {where}, {what}: expected {advice}"
+            return f"{symbol}, used in {where}, {what}: expected {advice}"
     return (
-        f"{symbol}, used {where}, is in none of the sources, nor a function of C that only computes: expected the "
+        f"{symbol}, used in {where}, is in none of the sources, nor a function of C that only computes: expected the "
         "source that defines it, or a stub"
     )
-
-
-def _callers(symbol: str, joined: Path, folder: Path) -> str:
-    """The first line that uses a symbol, by the linker's words."""
-    linked = [compiler(), "-shared", "-nostdlib", "-Wl,-z,defs", "-Wl,--warn-unresolved-symbols", str(joined)]
-    text = output_of([*linked, "-o", "unresolved.so"], folder)
-    found = re.search(rf"(\S+?:\d+): (?:warning: )?undefined reference to [`'‘]{re.escape(symbol)}['’]", text)
-    return f"in {Path(found[1]).name}" if found else "in them"
 
 
 def _with_one_section(joined: Path, folder: Path) -> tuple[Path, int]:

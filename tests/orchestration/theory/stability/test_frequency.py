@@ -50,13 +50,15 @@ def loop_gain(name: str) -> Any:
 @pytest.mark.parametrize("name", sample(NAMES, 1))
 def test_margins_are_those_of_python_control(name: str) -> None:
     control = pytest.importorskip("control")
-    gain, phase, distance, _, crossover = control.stability_margins(loop_gain(name))[:5]
+    gain = control.stability_margins(loop_gain(name))[0]
+    # Its roots of polynomials lose digits that its search along the response has.
+    _, phase, distance, _, crossover = control.stability_margins(loop_gain(name), method="frd")[:5]
     found = bode_of(name)
     (loop,) = found.loops
     assert found.stable
-    assert loop.gain_margin == pytest.approx(gain, rel=1e-5)
-    assert (loop.phase_margin, loop.crossover) == (pytest.approx(phase, abs=0.05), pytest.approx(crossover, rel=1e-3))
-    assert loop.sensitivity_peak == found.sensitivity_peak == pytest.approx(1.0 / distance, rel=1e-3)
+    assert loop.gain_margin == pytest.approx(gain, rel=1e-4)
+    assert (loop.phase_margin, loop.crossover) == (pytest.approx(phase, rel=1e-6), pytest.approx(crossover, rel=1e-6))
+    assert loop.sensitivity_peak == found.sensitivity_peak == pytest.approx(1.0 / distance, rel=1e-4)
     at = loop_gain(name)(np.exp(1j * np.array([loop.crossover, 1.0]) * found.dt))
     assert abs(at[0]) == pytest.approx(1.0, rel=1e-6)
     assert 180.0 + math.degrees(np.angle(at[0])) == pytest.approx(loop.phase_margin, abs=1e-4)
