@@ -8,6 +8,7 @@ from orchestration.components.checks.validation import (
     dependencies,
     description,
     own_rules,
+    reference_results,
     refusals,
     run_rules,
     structure,
@@ -18,7 +19,7 @@ from orchestration.components.checks.validation.own_description import own_descr
 
 OF_ARCHIVES = archive_rules.RULES
 OF_DESCRIPTIONS = (*description.RULES, *variables.RULES, *units.RULES, *structure.RULES)
-OF_RUNS = run_rules.RULES
+OF_RUNS = (*run_rules.RULES, *reference_results.RULES)
 """Rules that rely on `run_rules.FIRST`"""
 OF_EQUAL_RUNS = (*run_rules.COMPARED, *dependencies.RULES)
 """Rules for FMUs whose runs can be repeated"""
