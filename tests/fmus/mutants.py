@@ -39,6 +39,7 @@ from tests.fmus.damage import (
     without_unknown,
 )
 from tests.fmus.faulty import fault, faulty
+from tests.fmus.stepped_from_outside import BALL, LAW, stepped_from_outside
 from tests.fmus.verdicts import Verdict, as_markdown, verdicts
 
 PLANT, CONTROLLER = "QuadrotorPlant", "UnifiedController"
@@ -376,6 +377,77 @@ STRUCTURE = (
     ),
 )  # fmt: skip
 
+# -- those that the importer does more than to step ------------------------------------------------------
+
+
+def _no_derivative(root: Element) -> None:
+    declared = found(root, "ModelVariables/*[@name='dx1']")
+    del (declared[0] if declared.tag == "ScalarVariable" else declared).attrib["derivative"]
+
+
+def _listed(tag: str, name: str) -> Damage:
+    """A variable is one more in the model structure of FMI 3.0, in the place of its kind."""
+
+    def change(root: Element) -> None:
+        SubElement(found(root, "ModelStructure"), tag, valueReference=handle_of(root, name))
+
+    return description(change)
+
+
+def _without_listed(tag: str) -> Damage:
+    return description(lambda root: found(root, "ModelStructure").remove(found(root, f"ModelStructure/{tag}")))
+
+
+_CARRIED = "extra/org.fmi-standard.fmi-ls-ref/"
+_MANIFEST = b'<fmiReferences><Related type="text/csv" source="flight.csv" role="result"/></fmiReferences>'
+
+STEPPED_FROM_OUTSIDE = (
+    Mutant(
+        name="derivative of nothing", rule="derivatives", words=("dx1", "no attribute derivative"), model=BALL,
+        damage=description(_no_derivative), keeps_guid=True,
+    ),
+    Mutant(
+        name="state not listed", rule="numbers-of-states", words=("2 continuous states", "says 1"), model=BALL,
+        damage=_without_listed("ContinuousStateDerivative"), keeps_guid=True, versions=(3,),
+    ),
+    Mutant(
+        name="event indicators miscounted", rule="numbers-of-states", words=("1 event indicators", "says 3"),
+        model=BALL, damage=root(numberOfEventIndicators="3"), keeps_guid=True, words_3=("1 event indicators", "says 0"),
+        damage_3=_without_listed("EventIndicator"),
+    ),
+    Mutant(
+        name="clock without an interval", rule="clocks", words=("r: a constant clock without",), model=LAW,
+        damage=variable("r", intervalDecimal=None), keeps_guid=True, versions=(3,),
+    ),
+    Mutant(
+        name="clock that never ticks", rule="clocks", words=("r: intervalDecimal = 0",), model=LAW,
+        damage=variable("r", intervalDecimal="0"), keeps_guid=True, versions=(3,),
+    ),
+    Mutant(
+        name="clocked in continuous time", rule="clocks", words=("y: clocked, and continuous",), model=LAW,
+        damage=variable("y", variability="continuous"), keeps_guid=True, versions=(3,),
+    ),
+    Mutant(
+        name="clocked by a number", rule="clocks", words=("y: it ticks with p",), model=LAW,
+        damage=variable("y", clocks="7"), keeps_guid=True, versions=(3,),
+    ),
+    Mutant(
+        name="clocked output known at the start", rule="initial-unknowns", words=("y is there",), model=LAW,
+        damage=_listed("InitialUnknown", "y"), keeps_guid=True, versions=(3,),
+    ),
+    Mutant(
+        name="clock without event mode", rule="capabilities", words=("hasEventMode", "r"), model=LAW,
+        damage=element("CoSimulation", hasEventMode="false"), keeps_guid=True, versions=(3,),
+    ),
+    Mutant(
+        name="results of another run", rule="carried-results", words=("gravity = 9.9 in its row 2", "9.81"),
+        damage=every(
+            file(f"{_CARRIED}fmi-ls-manifest.xml", _MANIFEST),
+            file(f"{_CARRIED}flight.csv", b"time,gravity\n0,9.81\n0.01,9.9\n"),
+        ),
+    ),
+)  # fmt: skip
+
 _TILT = "self.wind_force, self.tilt = wind, tilt(state.quaternion)"
 _INITIAL_VELOCITY = "self.initial_velocity"
 _STEP = "body, wind, actuators = self._body, self._wind, self._actuators"
@@ -540,7 +612,7 @@ BEHAVIOUR = (
     ),
 )  # fmt: skip
 
-MUTANTS = (*ARCHIVE, *WHOLE, *VARIABLES, *STRUCTURE, *BEHAVIOUR)
+MUTANTS = (*ARCHIVE, *WHOLE, *VARIABLES, *STRUCTURE, *STEPPED_FROM_OUTSIDE, *BEHAVIOUR)
 
 
 def tables() -> dict[int, list[Verdict]]:
@@ -552,6 +624,7 @@ def tables() -> dict[int, list[Verdict]]:
                 subjects = {path.stem: path for path in builder.build(MODELS, Path(folder))}
             else:
                 subjects = {model: faulty(model, Path(folder)) for model in (PLANT, CONTROLLER)}
+            subjects |= stepped_from_outside(version, Path(folder))
             mutants = [mutant for mutant in MUTANTS if version in mutant.versions]
             found[version] = verdicts(mutants, subjects, Path(folder))
     return found

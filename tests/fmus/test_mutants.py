@@ -24,6 +24,7 @@ from tests.fmus.making import PAIR
 from tests.fmus.mutants import MUTANTS
 from tests.fmus.process import run_script
 from tests.fmus.scripts.find_mutants import WITHOUT_INSTANCES
+from tests.fmus.stepped_from_outside import stepped_from_outside
 from tests.fmus.verdicts import as_markdown, fmpy_finds, fmutool_finds, verdicts
 
 BY_NAME = {mutant.name: mutant for mutant in MUTANTS}
@@ -37,7 +38,11 @@ Make = Callable[[str], Path]
 def subjects(built: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Mapping[int, dict[str, Path]]:
     """The FMUs that are damaged, by the version of FMI and the model."""
     folder = tmp_path_factory.mktemp("faulty")
-    return {2: built, 3: {model: faulty(model, folder) for model in PAIR}}
+    known = {2: built, 3: {model: faulty(model, folder) for model in PAIR}}
+    return {
+        version: dict(of) | stepped_from_outside(version, tmp_path_factory.mktemp("from_outside"))
+        for version, of in known.items()
+    }
 
 
 @pytest.fixture(scope="module")
@@ -114,9 +119,11 @@ def test_the_rule_that_is_meant_for_it_finds_the_mutant(version: int, mutant: Mu
     assert not any("\n" in finding.text for finding in found)
 
 
-@pytest.mark.parametrize(("version", "without"), [(2, {"arrays"}), (3, {"slave-module", "own-description", "aliases"})])
+@pytest.mark.parametrize(
+    ("version", "without"), [(2, {"arrays", "clocks"}), (3, {"slave-module", "own-description", "aliases"})]
+)
 def test_every_rule_has_a_mutant_that_it_finds(version: int, without: set[str]) -> None:
-    """FMI 2.0 has no arrays, FMI 3.0 has other aliases; two rules are about Python inside, which its FMUs have not."""
+    """FMI 2.0 has no arrays and clocks, FMI 3.0 has other aliases, and in its FMUs is no Python, as for two rules."""
     names = {name_of(rule) for rule in (*rules.STANDARD, *rules.OURS)} | {READABLE, PROCESS, PLATFORM}
     assert {mutant.rule_of(version) for of, mutant in OF_VERSIONS if of == version} == names - without
 

@@ -175,6 +175,7 @@ class Component:
         if self.partition is not None:
             require(self.interface in (None, SCHEDULED), "interface", self.interface, f"{SCHEDULED} beside partition")
             require(self.step is None, "step", self.step, "none beside partition, which is sampled or a task")
+            require(self.start_time is None, "start_time", self.start_time, "none beside partition")
             own = None if self.sampling is None else self.sampling.fmu_clock
             require(own is None, "sampling.fmu_clock", own, "none beside partition, which is a clock")
         else:

@@ -1,5 +1,6 @@
 """An instance of an FMU under validation, for any variable type and any order of calls."""
 
+import ctypes
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -28,6 +29,8 @@ _CONVERT: Mapping[str, Callable[[float], Value]] = {
     "Boolean": bool,
 }
 """Conversions of numbers, by kind"""
+_MORE = 64
+"""Numbers watched beyond those that an FMU is asked for"""
 
 
 class CheckedInstance(NativeInstance):
@@ -75,6 +78,10 @@ class CheckedInstance(NativeInstance):
     def terminate(self) -> None:
         """End the run."""
         self._call("terminate")
+
+    def numbers_of_states(self) -> tuple[int, int]:
+        """The numbers of its continuous states and event indicators, for model exchange."""
+        return 0, 0
 
     def reset(self) -> None:
         """Return to the state after instantiation."""
@@ -214,9 +221,24 @@ class _CheckedModel(CheckedInstance, AdaptedInstance):
 class CheckedModel2(_CheckedModel, Adapted2):
     """An instance of FMI 2.0 for model exchange."""
 
+    def numbers_of_states(self) -> tuple[int, int]:
+        """As `CheckedInstance`: as many as it writes of those that are asked of it, by their numbers as described."""
+        states, indicators = self._sizes()
+        return self._written("getContinuousStates", states), self._written("getEventIndicators", indicators)
+
+    def _written(self, method: str, asked: int) -> int:
+        """How many numbers a function writes, up to the last that is none before."""
+        values = np.full(asked + _MORE, math.nan)
+        self._call(method, values.ctypes.data_as(ctypes.POINTER(ctypes.c_double)), asked)
+        return int(np.flatnonzero(~np.isnan(values)).max(initial=-1)) + 1
+
 
 class CheckedModel3(_CheckedModel, Adapted3):
     """An instance of FMI 3.0 for model exchange."""
+
+    def numbers_of_states(self) -> tuple[int, int]:
+        """As `CheckedInstance`."""
+        return self._sizes()
 
 
 def instance_of(model: Model, folder: Path, name: str, beat: Callable[[], None]) -> CheckedInstance:

@@ -5,8 +5,10 @@ The tables of the documentation are made of their docstrings by `docs/website/ru
 
 from orchestration.components.checks.validation import (
     archive_rules,
+    clocks,
     dependencies,
     description,
+    exchange_rules,
     own_rules,
     reference_results,
     refusals,
@@ -18,8 +20,15 @@ from orchestration.components.checks.validation import (
 from orchestration.components.checks.validation.own_description import own_description
 
 OF_ARCHIVES = archive_rules.RULES
-OF_DESCRIPTIONS = (*description.RULES, *variables.RULES, *units.RULES, *structure.RULES)
-OF_RUNS = (*run_rules.RULES, *reference_results.RULES)
+OF_DESCRIPTIONS = (
+    *description.RULES,
+    *variables.RULES,
+    *units.RULES,
+    *structure.RULES,
+    *clocks.RULES,
+    *exchange_rules.RULES,
+)
+OF_RUNS = (*run_rules.RULES, *exchange_rules.OF_RUNS, *reference_results.RULES)
 """Rules that rely on `run_rules.FIRST`"""
 OF_EQUAL_RUNS = (*run_rules.COMPARED, *dependencies.RULES)
 """Rules for FMUs whose runs can be repeated"""

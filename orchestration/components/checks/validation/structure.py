@@ -61,7 +61,7 @@ def initial_unknowns(fmu: Fmu) -> Iterator[str]:
     """InitialUnknowns lists the variables that initialisation calculates and others may read, in FMI 2.0 in order.
 
     Of variables with a derivative only those whose derivative is under Derivatives are states (FMI 2.0.4, section
-    2.2.8). Clocked variables may be listed, and need not.
+    2.2.8). Clocked variables have no value before they tick.
     """
     where, unknowns = _list(fmu, "InitialUnknown"), fmu.description.initialUnknowns
     derivatives = {unknown.variable for unknown in fmu.description.derivatives}
@@ -72,7 +72,7 @@ def initial_unknowns(fmu: Fmu) -> Iterator[str]:
         if v.causality == "calculatedParameter"
         or (v.initial in ("approx", "calculated") and (_is_output(v) or v in read) and not is_clocked(v))
     ]
-    yield from _compared(where, unknowns, expected, [v for v in fmu.variables if is_clocked(v)])
+    yield from _compared(where, unknowns, expected)
     if fmu.version == 2 and not _is_in_order(fmu, [unknown.variable for unknown in unknowns]):
         yield f"{where}: expected the entries in the order of their indices"
 
@@ -115,15 +115,12 @@ def _is_kept(fmu: Fmu, variable: ModelVariable) -> bool:
     return fmu.version > 2 and (parameter or variable.variability == "discrete")
 
 
-def _compared(
-    where: str, unknowns: Iterable[Unknown], expected: Iterable[ModelVariable], allowed: Iterable[ModelVariable] = ()
-) -> Iterator[str]:
+def _compared(where: str, unknowns: Iterable[Unknown], expected: Iterable[ModelVariable]) -> Iterator[str]:
     found, needed = Counter(unknown.variable for unknown in unknowns), dict.fromkeys(expected)
     for v in needed:
         if found[v] != 1:
             yield f"{where}: {v.name} is there {found[v]} times, expected once"
-    may_be = {*needed, *allowed}
-    yield from (f"{where}: {v.name} is there, expected it not to be" for v in found if v not in may_be)
+    yield from (f"{where}: {v.name} is there, expected it not to be" for v in found if v not in needed)
 
 
 RULES = (outputs, initial_unknowns, known_dependencies)
