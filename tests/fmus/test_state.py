@@ -114,14 +114,17 @@ def test_another_process_goes_on_from_the_state(
 
 
 def test_the_hidden_lag_of_the_actuators_is_in_the_state(built: dict[str, Path]) -> None:
-    """Two plants of which every variable is equal go on differently, each from its own state."""
+    """Two plants of which every variable is equal go on differently, each from its own state.
+
+    The channels of native ones are variables, too, for solvers.
+    """
     states, ends = [], []
     for torque in (0.0, 0.4):
         with Instance(built["QuadrotorPlant"]) as plant, Instance(built["QuadrotorPlant"]) as other:
             plant.initialise({"actuator_time_constant": 0.05, "torque.y": torque})
             other.restore(plant.save())
             other.set({"torque.y": 0.2})
-            states.append(other.everything())
+            states.append([text for text in other.everything() if not text.startswith(("der(", "channels."))])
             other.step(0.0, 0.01)
             ends.append(other.everything())
     assert states[0] == states[1]

@@ -205,7 +205,8 @@ def test_a_slave_answers_to_fmi_by_its_base_class_only(
     text = SLAVE.replace("{initialise}", "pass").replace("{step}", "pass")
     _, message = refusal(tmp_path, monkeypatch, f"{text}\n    def {name}(self, *given):\n        pass\n")
     assert message == (
-        f"Refused: Refused.{name}: expected initialise, internal_state, read_parameters, restore, step, to_xml only"
+        f"Refused: Refused.{name}: expected derivatives, initialise, internal_state, next_jump, read_parameters, "
+        "restore, step, to_xml only"
     )
 
 
