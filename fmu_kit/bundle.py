@@ -196,7 +196,7 @@ def rename_imports(text: str, bundle: str, target: Target) -> str:
     lines = text.encode().splitlines(keepends=True)
     imports = [
         node
-        for node in ast.walk(parse_module(text))
+        for node in statements(parse_module(text))
         if isinstance(node, ast.ImportFrom) and node.level == 0 and target.bundles(node.module or "")
     ]
     for node in sorted(imports, key=lambda node: -node.col_offset):  # from the right, so that columns stay valid
