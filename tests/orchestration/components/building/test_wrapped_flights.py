@@ -25,6 +25,7 @@ from tests.extent import sample
 from tests.orchestration.components.building.test_wrap import PD, PD_C, PD_H
 from tests.places import ROOT
 
+LAWS = sample([*CONTROLLERS], 1)
 EXAMPLE = ROOT / "examples" / "double_integrator"
 
 
@@ -105,9 +106,9 @@ values = [0.5, 1.0, 1.5]
 
 @pytest.fixture(scope="module")
 def exported(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of all laws as `export-c` writes them."""
+    """The folder of laws as `export-c` writes them."""
     folder = tmp_path_factory.mktemp("exported")
-    builder.export_c([Target.parse(MODELS[name]) for name in CONTROLLERS], folder)
+    builder.export_c([Target.parse(MODELS[name]) for name in LAWS], folder)
     return folder
 
 
@@ -141,7 +142,7 @@ def wrapped(name: str, folder: Path) -> Path:
     return folder / f"{name}.toml"
 
 
-@pytest.mark.parametrize("name", sample([*CONTROLLERS], 1))
+@pytest.mark.parametrize("name", LAWS)
 def test_a_law_exported_to_c_and_wrapped_again_flies_the_same_bits(name: str, exported: Path) -> None:
     flight = Scenario(stop_time=0.5, plant=FmuChoice(fmu="native/QuadrotorPlant"))
     one = run(flight.with_changes(controller=FmuChoice(fmu=f"native/{name}")))

@@ -494,11 +494,10 @@ def test_a_range_without_failures_or_without_good_values_is_noted(
 
 
 @pytest.mark.parametrize(
-    ("of", "timing"),
-    [("jitter", {}), ("loss", {}), ("period", {"noise": {"position": 0.001}}), ("delay", {"delay_jitter": 0.001}),
-     ("period", {"command_loss": 0.1})],
+    ("of", "timing", "confidence", "seeds"),
+    [("jitter", {}, 0.99, 44), ("loss", {}, 0.5, 7), ("period", {"noise": {"position": 0.001}}, 0.95, 29),
+     ("delay", {"delay_jitter": 0.001}, 0.5, 7), ("period", {"command_loss": 0.1}, 0.5, 7)],
 )  # fmt: skip
-@pytest.mark.parametrize(("confidence", "seeds"), [(0.95, 29), (0.5, 7), (0.99, 44)])
 def test_random_quantities_take_enough_seeds_for_nine_in_ten_at_the_confidence(
     stubbed: type[StubPool], of: str, timing: dict[str, Any], confidence: float, seeds: int
 ) -> None:

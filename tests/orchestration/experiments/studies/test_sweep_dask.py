@@ -20,7 +20,7 @@ from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
 from quadcosim import QuadcosimError
 from tests.commands import Main
-from tests.extent import in_test_all
+from tests.extent import in_test_all, sample
 from tests.orchestration.components.fmi.small import known, needs_compiler, small
 from tests.orchestration.experiments.studies.common import (
     PERIODS,
@@ -207,7 +207,7 @@ def test_a_scheduler_that_answers_again_is_waited_for_anew(capsys: pytest.Captur
     assert len(said(capsys)) == 1
 
 
-@pytest.mark.parametrize("end", [signal.SIGSTOP, signal.SIGKILL])
+@pytest.mark.parametrize("end", sample([signal.SIGSTOP, signal.SIGKILL], 1))
 def test_a_scheduler_that_is_stopped_ends_the_sweep_in_one_line_and_it_can_be_resumed(
     end: signal.Signals, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -15,6 +15,7 @@ from orchestration.systems.computers.bounds import Periodic, can, earliest_deadl
 from orchestration.systems.computers.compiled import scheduler
 from orchestration.systems.computers.parts import EARLIEST_DEADLINE, FIXED_PRIORITY
 from orchestration.systems.computers.results import Timeline
+from tests.extent import tries
 from tests.orchestration.systems.computers.described import Described
 
 MS = 1_000_000
@@ -142,7 +143,7 @@ def simulated(tasks, policy, random, *, preemptive: bool, switch: int) -> Timeli
 def test_no_response_exceeds_its_bound(policy, preemptive: bool, switch: int) -> None:
     random, bounded, reached = np.random.default_rng(7), 0, 0
     bounds = fixed_priority if policy == FIXED_PRIORITY else earliest_deadline
-    for _ in range(300):
+    for _ in range(many := tries(300, sampled=100)):
         tasks = task_set(random)
         found = simulated(tasks, policy, random, preemptive=preemptive, switch=switch)
         for name, bound in enumerate(bounds(tasks, preemptive=preemptive, switch=switch)):
@@ -150,13 +151,13 @@ def test_no_response_exceeds_its_bound(policy, preemptive: bool, switch: int) ->
             if bound is not None and jobs.done.any():
                 assert jobs.responses.max() <= bound, (tasks, name)
                 bounded, reached = bounded + 1, reached + (jobs.responses.max() == bound)
-    assert bounded > 100
+    assert bounded > many / 3
     assert policy == EARLIEST_DEADLINE or reached > bounded / 20
 
 
 def test_a_bound_is_reached_where_all_are_released_together_and_take_the_longest() -> None:
     random = np.random.default_rng(11)
-    for _ in range(200):
+    for _ in range(tries(200, sampled=50)):
         tasks = [replace(task, jitter=0, priority=i) for i, task in enumerate(task_set(random))]
         what = Described(stop=4_000)
         what.processor()
@@ -166,9 +167,9 @@ def test_a_bound_is_reached_where_all_are_released_together_and_take_the_longest
         assert [int(jobs.responses.max()) for jobs in what.timeline(scheduler).jobs.values()] == bounds
 
 
-def test_no_frame_on_can_exceeds_its_bound_over_a_thousand_buses() -> None:
+def test_no_frame_on_can_exceeds_its_bound() -> None:
     random, reached = np.random.default_rng(13), 0
-    for _ in range(1_000):
+    for _ in range(buses := tries(1_000, sampled=250)):
         count = int(random.integers(2, 7))
         lengths = random.integers(50, 136, count)
         load = random.uniform(0.3, 0.95)
@@ -186,7 +187,7 @@ def test_no_frame_on_can_exceeds_its_bound_over_a_thousand_buses() -> None:
             if bound is not None and len(responses):
                 assert responses.max() <= bound, frames
                 reached += responses.max() >= bound - 1
-    assert reached > 30
+    assert reached > 0.03 * buses
 
 
 def test_the_latest_frame_is_not_the_first_of_a_busy_period() -> None:
