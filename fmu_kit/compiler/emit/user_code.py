@@ -55,6 +55,10 @@ class Task:
 
     step: Code
     ratio: int = 1
+    name: str = ""
+    """Its name, as that of a partition of FMI 3.0; empty: it is none"""
+    period: float = 0.0
+    """The period that it believes [s]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,6 +93,11 @@ class UserCode:
         """Whether the statements are C++: some source is."""
         return any(source.endswith(CXX) for source in self.sources)
 
+    @property
+    def partitions(self) -> tuple[Task, ...]:
+        """The tasks that have a name, which FMI 3.0 can run one by one."""
+        return tuple(task for task in self.tasks if task.name)
+
     def having(self, causality: Causality) -> tuple[Place, ...]:
         """The places of a causality."""
         return tuple(place for place in self.places if place.causality == causality)
@@ -116,6 +125,7 @@ template <class T> struct quadcosim_kind<T &> : quadcosim_kind<T> {};
 extern "C" void quadcosim_init(void);
 extern "C" void quadcosim_after_parameters(void);
 extern "C" void quadcosim_step(void);
+extern "C" void quadcosim_run(unsigned);
 extern "C" void quadcosim_set_inputs(const double *, unsigned);
 extern "C" void quadcosim_set_parameters(const double *, unsigned);
 extern "C" void quadcosim_get_outputs(double *, unsigned);
@@ -149,6 +159,7 @@ def places(code: UserCode, starts: Sequence[float], state_bytes: int) -> str:
         f"FIRST_PARAMETER = {len(code.places) - len(parameters)}, VARIABLES = {len(code.places)} }};",
         "enum { KEPT_START_TIME = VARIABLES, KEPT_STALE, KEPT_STATE };",
         f"#define STATE_BYTES {state_bytes}",
+        *_partitions(code.partitions),
         "enum { PLACES = KEPT_STATE + (STATE_BYTES + 7) / 8 };",
         f"static const double starts[PLACES] = {{{', '.join(map(repr, (*starts, 0.0, 1.0)))}}};",
         _array("double lowest[]", (_number(v.minimum, "-") for v in parameters)),
@@ -156,6 +167,13 @@ def places(code: UserCode, starts: Sequence[float], state_bytes: int) -> str:
         "enum { OUT_OF_BOUNDS = 1, DIVERGENCE = 2 }; /* errors of instances and lanes */",
     ]
     return "\n".join(parts) + "\n"
+
+
+def _partitions(tasks: Sequence[Task]) -> Iterator[str]:
+    """The number of partitions, and the periods [s] that they believe."""
+    if tasks:
+        yield f"#define PARTITIONS {len(tasks)}"
+        yield f"static const double partition_intervals[] = {{{', '.join(repr(task.period) for task in tasks)}}};"
 
 
 def texts(code: UserCode) -> str:
@@ -176,13 +194,19 @@ def _number(bound: float | None, sign: str) -> str:
 
 
 def _step(code: UserCode) -> list[str]:
+    """The statements of each task, and the functions that run one of them, or those that are due at a step."""
+    lines = []
+    for number, task in enumerate(code.tasks):
+        lines += [f"static void quadcosim_task_{number}(void) {{", *_at(code, task.step), "}"]
+    numbers = range(len(code.tasks))
+    one = [f"if (quadcosim_task == {number}) quadcosim_task_{number}();" for number in numbers]
+    lines += ["void quadcosim_run(unsigned quadcosim_task) {", *one, "}"]
     if all(task.ratio == 1 for task in code.tasks):
-        body = [line for task in code.tasks for line in ("{", *_at(code, task.step), "}")]
-        return ["void quadcosim_step(void) {", *body, "}"]
-    lines = ["static unsigned long long quadcosim_ticks;", "void quadcosim_step(void) {"]
+        return [*lines, "void quadcosim_step(void) {", *(f"quadcosim_task_{number}();" for number in numbers), "}"]
+    lines += ["static unsigned long long quadcosim_ticks;", "void quadcosim_step(void) {"]
     lines += ["const unsigned long long quadcosim_tick = quadcosim_ticks++;"]
-    for task in code.tasks:
-        lines += [f"if (quadcosim_tick % {task.ratio}u == 0) {{", *_at(code, task.step), "}"]
+    for number, task in enumerate(code.tasks):
+        lines.append(f"if (quadcosim_tick % {task.ratio}u == 0) quadcosim_task_{number}();")
     return [*lines, "}"]
 
 

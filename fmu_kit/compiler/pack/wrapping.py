@@ -13,11 +13,11 @@ import re
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 from xml.dom.minidom import parseString
-from xml.etree.ElementTree import Element, tostring
+from xml.etree.ElementTree import Element, SubElement, tostring
 
 from fmu_kit import archive
 from fmu_kit.archive import WRAPPED_FILE, content_guid, write_archive
@@ -75,6 +75,8 @@ def build(code: UserCode, out: Path, version: int = 2, systems: Sequence[str] = 
     no sections with names, so that for all of them a process can have one instance, whose state is not saved.
     """
     standard = STANDARDS[version]
+    if version == 2:  # which has no partitions
+        code = replace(code, tasks=tuple(replace(task, name="") for task in code.tasks))
     here = c_compiler.host_platform(version)
     if here is None:
         raise PackagingError("wrap: expected Linux on x86-64 or ARM; it uses sections of ELF")
@@ -178,9 +180,37 @@ def _description(standard: Standard, slave: type[Slave], code: UserCode, *, once
     for name, answer in answers.items():
         if name in kind.attrib:
             kind.set(name, str(answer).lower())
+    if code.partitions:
+        _add_partitions(root, kind, code.partitions)
     root.set("generationTool", f"quadcosim-wrap {project_version()}")
     _drop_empty(root)
     return bytes(parseString(tostring(root)).toprettyxml(indent="  ", encoding="UTF-8"))
+
+
+def _add_partitions(root: Element, kind: Element, tasks: Sequence[Task]) -> None:
+    """Scheduled execution, and event mode: a clock for each task, and all inputs and outputs belong to each."""
+    scheduled = Element("ScheduledExecution", {
+        key: value for key, value in kind.attrib.items() if key in (
+            "modelIdentifier", "needsExecutionTool", "canBeInstantiatedOnlyOncePerProcess", "canGetAndSetFMUState",
+            "canSerializeFMUState",
+        )
+    })  # fmt: skip
+    kind.set("hasEventMode", "true")
+    root.insert([*root].index(kind) + 1, scheduled)
+    variables, structure = root.find("ModelVariables"), root.find("ModelStructure")
+    assert variables is not None
+    assert structure is not None
+    clocks = [str(len(variables) + number) for number in range(len(tasks))]
+    for variable in variables:
+        if variable.get("causality") in ("input", "output"):
+            variable.set("clocks", " ".join(clocks))
+    for reference, task in zip(clocks, tasks):
+        SubElement(
+            variables, "Clock", name=task.name, valueReference=reference, causality="input", variability="discrete",
+            intervalVariability="fixed", intervalDecimal=repr(task.period),
+        )  # fmt: skip
+    for unknown in structure.findall("InitialUnknown"):  # which are not clocked
+        structure.remove(unknown)
 
 
 def _drop_empty(root: Element) -> None:
@@ -256,7 +286,7 @@ def from_json(text: str) -> UserCode:
         given[name] = None if given[name] is None else Code(**given[name])
     lists = {name: tuple(given[name]) for name in ("sources", "include", "defines")}
     lists["headers"] = tuple(Code(**each) for each in given["headers"])
-    lists["tasks"] = tuple(Task(step=Code(**each["step"]), ratio=each["ratio"]) for each in given["tasks"])
+    lists["tasks"] = tuple(Task(**{**each, "step": Code(**each["step"])}) for each in given["tasks"])
     lists["places"] = tuple(Place(**{**each, "lvalue": Code(**each["lvalue"])}) for each in given["places"])
     return UserCode(**{**given, **lists})
 

@@ -1,7 +1,8 @@
 /* A slave for hosts of FMI 3.0: the functions of the standard, each implemented by one of instance.h.
 
-   Without early return. A slave that samples (CLOCK_INTERVAL) has an input clock, which says in event
-   mode when it does; without event mode its parameters say so. */
+   Without early return. A slave that samples (CLOCK_INTERVAL) has an input clock, which says in event mode when it does;
+   without event mode its parameters say so. One with PARTITIONS is for scheduled execution, too, with a clock for
+   each. */
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -17,10 +18,14 @@ enum { HAS_TIME = 1 };
 #define FMI(name) fmi3##name
 
 #if defined(CLOCK_INTERVAL)
-enum { HAS_CLOCK = 1 };
+enum { HAS_CLOCK = 1, HAS_PARTITIONS = 0, ALL_CLOCKS = 1 };
+static const double first_intervals[] = {CLOCK_INTERVAL};
+#elif defined(PARTITIONS)
+enum { HAS_CLOCK = 0, HAS_PARTITIONS = 1, SAMPLE_PERIOD = 0, ALL_CLOCKS = PARTITIONS };
+#define first_intervals partition_intervals
 #else
-enum { HAS_CLOCK = 0, SAMPLE_PERIOD = 0 };
-#define CLOCK_INTERVAL 0.0
+enum { HAS_CLOCK = 0, HAS_PARTITIONS = 0, SAMPLE_PERIOD = 0, ALL_CLOCKS = 0 };
+static const double first_intervals[CLOCKS];
 #endif
 
 struct Host {
@@ -37,6 +42,12 @@ static void send_message(const Instance *m, Status status, Text category, Text m
 {
     if (m->host->log)
         m->host->log(m->host->environment, status, category, message);
+}
+
+static void begin_in(Instance *m, Mode mode)
+{
+    m->state.mode = mode;
+    memcpy(m->state.interval, first_intervals, sizeof m->state.interval);
 }
 
 /* -- life cycle ------------------------------------------------------------------------------------------------- */
@@ -62,7 +73,7 @@ static Whole *created(Text name, Text token, bool logs, void *environment, LogMe
     whole->host.log = log;
     whole->host.environment = environment;
     whole->instance.host = &whole->host;
-    whole->instance.state.interval = CLOCK_INTERVAL;
+    begin_in(&whole->instance, NO_EVENTS);
     return whole;
 }
 
@@ -72,7 +83,7 @@ void *fmi3InstantiateCoSimulation(Text name, Text token, Text resources, bool vi
                                   bool early_return, References intermediate, size_t n, void *environment,
                                   LogMessage log, Callback intermediate_update)
 {
-    Text refusal = events && !HAS_CLOCK ? "eventModeUsed: expected false, this FMU has no event mode" : NULL;
+    Text refusal = events && !ALL_CLOCKS ? "eventModeUsed: expected false, this FMU has no event mode" : NULL;
     Whole *whole = created(name, token, logs, environment, log, refusal);
     (void)resources, (void)visible, (void)early_return, (void)intermediate, (void)n, (void)intermediate_update;
     if (whole)
@@ -100,10 +111,12 @@ void *fmi3InstantiateScheduledExecution(Text name, Text token, Text resources, b
                                         void *environment, LogMessage log, Callback update, Callback lock,
                                         Callback unlock)
 {
-    (void)name, (void)token, (void)resources, (void)visible, (void)logs, (void)update, (void)lock, (void)unlock;
-    if (log)
-        log(environment, ERROR, "logStatusError", "fmi3InstantiateScheduledExecution: this FMU is for co-simulation");
-    return NULL;
+    Text refusal = HAS_PARTITIONS ? NULL : "fmi3InstantiateScheduledExecution: this FMU is for co-simulation";
+    Whole *whole = created(name, token, logs, environment, log, refusal);
+    (void)resources, (void)visible, (void)update, (void)lock, (void)unlock;
+    if (whole)
+        whole->instance.state.mode = SCHEDULED;
+    return whole;
 }
 
 EXPORT void fmi3FreeInstance(void *);
@@ -119,7 +132,7 @@ CALL(EnterInitializationMode, bool has_tolerance, double tolerance, double start
 {
     INSTANCE;
     (void)has_tolerance, (void)tolerance;
-    if (m->state.mode != NO_EVENTS && !m->exchanges)
+    if (HAS_CLOCK && m->state.mode != NO_EVENTS && !m->exchanges)
         m->state.memory[SAMPLE_PERIOD] = 0.0; /* a sample at every tick */
     return set_times(m, start_time, has_stop, stop) == OK ? enter_initialization(m) : ERROR;
 }
@@ -151,10 +164,9 @@ PLAIN(Reset)
 {
     Mode mode;
     INSTANCE;
-    mode = m->state.mode == NO_EVENTS ? NO_EVENTS : EVENT_MODE;
+    mode = m->state.mode == NO_EVENTS || m->state.mode == SCHEDULED ? m->state.mode : EVENT_MODE;
     begin(m);
-    m->state.mode = mode;
-    m->state.interval = CLOCK_INTERVAL;
+    begin_in(m, mode);
     return OK;
 }
 
@@ -218,14 +230,14 @@ NO_VARIABLES(SetIntervalFraction, const uint64_t *counters, const uint64_t *reso
 NO_VARIABLES(GetShiftFraction, uint64_t *counters, uint64_t *resolutions)
 NO_VARIABLES(SetShiftFraction, const uint64_t *counters, const uint64_t *resolutions)
 
-/* -- the clock of samples --------------------------------------------------------------------------------------- */
+/* -- clocks ----------------------------------------------------------------------------------------------------- */
 
 enum { INTERVAL_CHANGED = 2 };
 
 static Status expect_clock(Instance *m, References vr, size_t n, int is_time)
 {
     for (size_t i = 0; i < n; i++)
-        if (!HAS_CLOCK || vr[i] != CLOCK)
+        if (vr[i] < CLOCK || vr[i] >= CLOCK + ALL_CLOCKS)
             return refuse_with(m, "value references: expected those of clocks", "", "");
     return is_time ? OK : refuse_with(m, "clock: expected ticks in event mode, and its interval set before steps", "", "");
 }
@@ -243,18 +255,25 @@ CALL(SetClock, References vr, size_t n, const bool *values)
     INSTANCE;
     if (expect_clock(m, vr, n, !n || m->state.mode == EVENT_MODE) != OK)
         return ERROR;
-    for (size_t i = 0; i < n; i++)
-        if (values[i] && m->state.tick == NO_TICK)
-            m->state.tick = TICKS;
+    for (size_t i = 0; i < n; i++) {
+        if (!values[i] || m->state.tick == SAMPLED)
+            continue;
+        m->state.tick = TICKS;
+#if defined(PARTITIONS)
+        m->state.ticks[vr[i] - CLOCK] = 1;
+#endif
+    }
     return OK;
 }
 
 CALL(GetIntervalDecimal, References vr, size_t n, double *intervals, int *qualifiers)
 {
     INSTANCE;
+    if (expect_clock(m, vr, n, 1) != OK)
+        return ERROR;
     for (size_t i = 0; i < n; i++)
-        intervals[i] = m->state.interval, qualifiers[i] = INTERVAL_CHANGED;
-    return expect_clock(m, vr, n, 1);
+        intervals[i] = m->state.interval[vr[i] - CLOCK], qualifiers[i] = INTERVAL_CHANGED;
+    return OK;
 }
 
 CALL(SetIntervalDecimal, References vr, size_t n, const double *intervals)
@@ -265,7 +284,7 @@ CALL(SetIntervalDecimal, References vr, size_t n, const double *intervals)
     for (size_t i = 0; i < n; i++) {
         if (!(intervals[i] > 0.0) || !q_isfinite(intervals[i]))
             return refuse_with(m, "interval of the clock: expected a positive number", "", "");
-        m->state.interval = intervals[i];
+        m->state.interval[vr[i] - CLOCK] = intervals[i];
     }
     return OK;
 }
@@ -396,7 +415,7 @@ CALL(CompletedIntegratorStep, bool no_set_state, bool *event, bool *terminate)
 /* -- event mode, for a host that asked for it ------------------------------------------------------------------- */
 
 #define IN_MODE(name, condition) \
-    if (m->state.mode == NO_EVENTS) \
+    if (m->state.mode == NO_EVENTS || m->state.mode == SCHEDULED) \
         return NOT_OFFERED(name); \
     if (m->state.phase != STEPPING || !(condition)) \
         return refuse_with(m, "fmi3" #name ": not allowed in this mode", "", "")
@@ -444,4 +463,20 @@ CALL(UpdateDiscreteStates, bool *again, bool *terminate, bool *nominals, bool *c
     return OK;
 }
 
+#if defined(PARTITIONS)
+CALL(ActivateModelPartition, unsigned clock, double t)
+{
+    int error;
+    INSTANCE;
+    if (m->state.mode != SCHEDULED || m->state.phase != STEPPING)
+        return refuse_with(m, "fmi3ActivateModelPartition: not allowed in this mode", "", "");
+    if (expect_clock(m, &clock, 1, 1) != OK)
+        return ERROR;
+    if ((error = model_run_task(m, clock - CLOCK)))
+        return refuse(m, error);
+    m->state.time = t;
+    return OK;
+}
+#else
 WITHOUT(ActivateModelPartition, unsigned clock, double t)
+#endif

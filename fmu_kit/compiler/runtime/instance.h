@@ -23,7 +23,7 @@
 
 typedef enum { OK, WARNING, DISCARD, ERROR, FATAL } Status;
 typedef enum { INSTANTIATED, INITIALIZATION, STEPPING, TERMINATED, FAILED, PHASES } Phase;
-typedef enum { NO_EVENTS, STEP_MODE, EVENT_MODE, CONTINUOUS_MODE } Mode; /* of a host that handles events */
+typedef enum { NO_EVENTS, STEP_MODE, EVENT_MODE, CONTINUOUS_MODE, SCHEDULED } Mode; /* of a host that handles events */
 typedef enum { NO_TICK, TICKS, SAMPLED } Tick; /* TICKS: values are to be computed before any is read */
 typedef enum { LOG_WARNING, LOG_ERROR, LOG_DIVERGENCE, CATEGORIES } Category;
 enum { LONGEST_TEXT = 1024 };
@@ -34,6 +34,12 @@ typedef struct Host Host;
 
 #include "places.h"
 #include "tables.h"
+
+#if defined(PARTITIONS)
+enum { CLOCKS = PARTITIONS };
+#else
+enum { CLOCKS = 1 };
+#endif
 
 /* What is no variable of the slave, by value reference: the derivative of each continuous state; those states that are
    none of the variables; of FMI 3.0 the time, and the clock if it samples. */
@@ -54,8 +60,11 @@ typedef struct {
     double time;     /* of the last communication point */
     double reached;  /* start time of the next step; not a number before the first: any */
     double stop;     /* stop time; infinite if none is defined */
-    double interval; /* of the clock */
-    double since;    /* in model exchange the time of the last event */
+    double interval[CLOCKS];
+    double since; /* in model exchange the time of the last event */
+#if defined(PARTITIONS)
+    unsigned char ticks[PARTITIONS]; /* the clocks that tick, in event mode */
+#endif
     unsigned warned; /* bits of the warnings that were sent */
     Phase phase;
     Mode mode;
@@ -271,7 +280,17 @@ static int compute(Instance *m)
     if (m->exchanges)
         return find_rates(m);
     m->state.tick = SAMPLED;
-    return model_do_step(m, m->state.time, m->state.interval);
+#if defined(PARTITIONS)
+    for (unsigned i = 0; i < PARTITIONS; i++) {
+        const int error = m->state.ticks[i] ? model_run_task(m, i) : 0;
+        m->state.ticks[i] = 0;
+        if (error)
+            return error;
+    }
+    return 0;
+#else
+    return model_do_step(m, m->state.time, m->state.interval[0]);
+#endif
 }
 
 static Status end(Instance *m)

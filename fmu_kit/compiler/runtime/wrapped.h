@@ -12,6 +12,7 @@
 void quadcosim_init(void);
 void quadcosim_after_parameters(void);
 void quadcosim_step(void);
+void quadcosim_run(unsigned task);
 void quadcosim_set_inputs(const double *values, unsigned apart);
 void quadcosim_set_parameters(const double *values, unsigned apart);
 void quadcosim_get_outputs(double *values, unsigned apart);
@@ -67,11 +68,17 @@ static unsigned begin_code(double *values, unsigned apart, double *state)
     return read_outputs(values, apart, state);
 }
 
-/* The code runs once a step, whatever its length: whoever steps it is its timer. */
-static unsigned step_code(double *values, unsigned apart, double *state)
+enum { ALL_DUE = -1 };
+
+/* The code runs once a step, whatever its length: whoever steps it is its timer. So does one of its tasks, or all that
+   are due. */
+static unsigned step_code(double *values, unsigned apart, double *state, int task)
 {
     put_state(state);
     quadcosim_set_inputs(values, apart);
-    quadcosim_step();
+    if (task == ALL_DUE)
+        quadcosim_step();
+    else
+        quadcosim_run((unsigned)task);
     return read_outputs(values, apart, state);
 }

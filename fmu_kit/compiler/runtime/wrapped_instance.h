@@ -33,13 +33,21 @@ static int model_do_step(Instance *m, double t, double h)
 {
     double *const memory = m->state.memory;
     if (h > 0.0 && q_isfinite(t + h))
-        return expect_finite(m, step_code(memory, 1, memory + KEPT_STATE));
+        return expect_finite(m, step_code(memory, 1, memory + KEPT_STATE, ALL_DUE));
     text_begin(m);
     text_add(m, q_isfinite(t) ? "communicationStepSize = " : "currentCommunicationPoint = ");
     text_real(m, q_isfinite(t) ? h : t);
     text_add(m, q_isfinite(t) ? ": expected a positive number of seconds" : ": expected a finite time");
     return fail(m, OUT_OF_BOUNDS);
 }
+
+#if defined(PARTITIONS)
+static int model_run_task(Instance *m, unsigned task)
+{
+    double *const memory = m->state.memory;
+    return expect_finite(m, step_code(memory, 1, memory + KEPT_STATE, (int)task));
+}
+#endif
 
 static int tangents_enter_stepping(Instance *m)
 {

@@ -24,7 +24,7 @@ static int begin_lane(double *values, double *state)
 
 static int step_lane(double *values, double *state)
 {
-    return step_code(values, LANES, state) == VARIABLES ? 0 : DIVERGENCE;
+    return step_code(values, LANES, state, ALL_DUE) == VARIABLES ? 0 : DIVERGENCE;
 }
 
 static q_mask model_enter_stepping(q_place *v, q_mask live, q_real *failed)

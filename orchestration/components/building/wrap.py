@@ -82,7 +82,7 @@ class WrapFile:
     step: str | None = None
     """Statements that are a step."""
     tasks: tuple[WrappedTask, ...] = ()
-    """Tasks of several periods, in place of `step`."""
+    """Tasks of several periods, in place of `step`; for FMI 3.0 each is a partition."""
     init: str = ""
     """Statements that run once, before the parameters are set."""
     after_parameters: str = ""
@@ -120,10 +120,8 @@ class WrapFile:
             raise UsageError("step: expected it, or [[tasks]] with name, period and step; not both")
         if self.period is None and not self.tasks:
             raise UsageError("period: expected the sampling period that the code believes [s]")
-        periods = {"period": self.period, **{f"tasks.{one.name}.period": one.period for one in self.tasks}}
-        for place, period in periods.items():
-            if period is not None and not (period > 0.0 and isfinite(period)):
-                raise UsageError(f"{place} = {period}: expected a positive number of seconds")
+        if self.period is not None:
+            _expect_period("period", self.period)
         if self.tasks and self.period is not None and self.period != self.shortest_period:
             raise UsageError(f"period = {self.period}: expected {self.shortest_period:g}, that of all tasks together")
         taken: dict[str, str] = {}
@@ -219,6 +217,8 @@ def build(path: Path, out: Path, *, version: int = 2, systems: str | None = None
     is missing here.
     """
     content = json.dumps(description_of(path))
+    if version == 3:
+        _expect_names_of_clocks(path)
     done = subprocess.run(
         subprocesses.command("fmu_kit.compiler.pack.wrapping", out.resolve(), version, systems or ""),
         input=content, capture_output=True, text=True, errors="replace", env=subprocesses.environment(), check=False,
@@ -229,6 +229,15 @@ def build(path: Path, out: Path, *, version: int = 2, systems: str | None = None
             raise UsageError(str(path.parent / said))
         raise QuadcosimError(f"building {out} failed: {said}")
     return out
+
+
+def _expect_names_of_clocks(path: Path) -> None:
+    """Raise `UsageError` for a variable with the name of a task, which is a clock of FMI 3.0."""
+    file = load(path)
+    tasks = {task.name for task in file.tasks}
+    for kind, name, _ in file.variables():
+        if name in tasks:
+            raise UsageError(f"{path}: {kind}.{name}: expected another name than that of a task, a clock in FMI 3.0")
 
 
 def _parsed(path: Path, text: str) -> WrapFile:
@@ -242,9 +251,8 @@ def _parsed(path: Path, text: str) -> WrapFile:
             found = tables.get(kind, {})
             if isinstance(found, dict):
                 tables[kind] = {name: _variable(kind, name, value) for name, value in _flat(found)}
-        tasks = tables.get("tasks", ())
-        if isinstance(tasks, list):
-            tables["tasks"] = tuple(_task(one) for one in tasks)
+    tables["tasks"] = _tasks(path, text.splitlines(), tables.get("tasks", ()))
+    with prefixed(f"{path}: "):
         return WrapFile(**tables)
 
 
@@ -264,11 +272,29 @@ def _variable(kind: str, name: str, value: Any) -> Any:
         return WrappedVariable(**value)
 
 
-def _task(value: Any) -> Any:
-    if not isinstance(value, dict):
-        return value
-    with prefixed("tasks: "):
-        return WrappedTask(**value)
+def _tasks(path: Path, lines: Sequence[str], given: Any) -> Any:
+    """The tasks of a file; raises `UsageError` with the line of what is wrong."""
+    if not isinstance(given, list):
+        return given
+    found: dict[str, WrappedTask] = {}
+    for number, one in enumerate(given):
+        with prefixed(f"{path}:{_line_of(lines, 'tasks', 'name', number)}: tasks: "):
+            if not isinstance(one, dict):
+                raise UsageError("expected [[tasks]] with name, period and step")
+            task = WrappedTask(**one)
+            if not re.fullmatch(r"[A-Za-z_]\w*", task.name, re.ASCII):
+                raise UsageError(f"name = {task.name!r}: expected letters, digits and _, no digit first")
+            if task.name in found:
+                raise UsageError(f"name = {task.name}: expected another name than that of a task before")
+        with prefixed(f"{path}:{_line_of(lines, 'tasks', 'period', number)}: tasks.{task.name}."):
+            _expect_period("period", task.period)
+        found[task.name] = task
+    return tuple(found.values())
+
+
+def _expect_period(place: str, period: float) -> None:
+    if not (period > 0.0 and isfinite(period)):
+        raise UsageError(f"{place} = {period}: expected a positive number of seconds")
 
 
 def description_of(path: Path) -> dict[str, Any]:
@@ -283,7 +309,12 @@ def description_of(path: Path) -> dict[str, Any]:
         return code(getattr(file, key), "", key) if getattr(file, key) else None
 
     steps = [
-        {"step": code(task.step, "tasks", "step", number), "ratio": file.ratio_of(task)}
+        {
+            "step": code(task.step, "tasks", "step", number),
+            "ratio": file.ratio_of(task),
+            "name": task.name,
+            "period": float(task.period),
+        }
         for number, task in enumerate(file.tasks)
     ]
     return {

@@ -261,11 +261,9 @@ class Model:
     def expect_clocks_that_tick(self) -> None:
         """Raise `UsageError` for an FMU with clocks that do not tick as it is called."""
         clocks = [v.name for v in self.variables.values() if v.kind == "Clock"]
-        offered = declared_of(self.description)
-        if clocks and not self.ticking and not self.follows_kit:  # which samples at every step without its clock
-            if SCHEDULED in offered and "event-mode" not in offered:
-                return  # they are of its partitions
-            if "event-mode" not in offered:
+        samples_without = self.follows_kit or read_wrapped(self.path) is not None  # at every step
+        if clocks and not self.ticking and not samples_without:
+            if "event-mode" not in declared_of(self.description):
                 raise UsageError(f"{self.path}: has clocks, but no event mode, in which they tick: {', '.join(clocks)}")
             raise UsageError(
                 f"{self.path}: its clocks {', '.join(clocks)} do not tick: expected sampling = {{ fmu_clock = "

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -402,6 +403,34 @@ def test_tasks_run_at_their_own_multiples_of_their_common_period(tmp_path: Path)
         seen.append(tuple(found.tolist()))
     assert seen[:6] == [(1, 1), (1, 1), (2, 1), (2, 1), (3, 1), (3, 2)]
     assert seen[10] == (6, 3)
+
+
+SECOND = [
+    (
+        'name = "fast"\nperiod = 0.01\nstep = "slow++;"',
+        "9: tasks: name = fast: expected another name than that of a task",
+    ),
+    ('name = "slow"\nperiod = 0\nstep = "slow++;"', "10: tasks.slow.period = 0: expected a positive number of seconds"),
+    ('name = "slow"\nperiod = 0.01\nstep = "later();"', ": later, used in tasks.toml:11, is in none of the sources"),
+    ('name = "slow"\nperiod = 0.01\nstep = "slow+;"', "11: error: expected expression before ';' token"),
+    ('name = "slow"\nperiod = 0.01', "9: tasks: step: expected a value"),
+    ('name = "s low"\nperiod = 0.01\nstep = ""', "9: tasks: name = 's low': expected letters, digits and _"),
+    (
+        'name = "slow"\nperiod = 0.01\nstep = ""\n[parameters]\nslow = "slow"',
+        "parameters.slow: expected another name than",
+    ),
+]
+
+
+@pytest.mark.parametrize(("task", "expected"), SECOND, ids=range(len(SECOND)))
+def test_what_is_wrong_with_a_task_has_its_line(task: str, expected: str, tmp_path: Path) -> None:
+    (tmp_path / "it.c").write_text("int nothing;\n")
+    file = tmp_path / "tasks.toml"
+    first = TASKS.partition('[[tasks]]\nname = "slow"')[0]
+    file.write_text(f'{first}[[tasks]]\n{task}\n[outputs]\nof_fast = "fast"\n')
+    with pytest.raises(UsageError, match=re.escape(expected)) as raised:
+        wrap.build(file, wrap.fmu_of(file, 3), version=3)
+    assert str(file) in str(raised.value)
 
 
 def _output(fmu: Path, inputs: dict[str, float]) -> float:

@@ -15,9 +15,11 @@ import pytest
 from fmu_kit.bundle import Target
 from orchestration.components.building import builder
 from orchestration.components.building.models import CONTROLLERS, MODELS
+from orchestration.components.fmi.read_description import read_model
 from orchestration.components.scaffold.folder import write
 from orchestration.experiments.studies.sweep import sweep
 from orchestration.foundation.basics.documents import read_toml
+from orchestration.simulation.runs.pause import resume, run_until
 from orchestration.simulation.runs.simulation import run
 from quadcosim import FmuChoice, Scenario, changed, load_study, load_system
 from tests.commands import Main
@@ -75,6 +77,90 @@ def test_a_task_of_a_computer_at_another_period_warns(integrator: Path) -> None:
     placed.write_text(f"{text}\n{task}")
     (told,) = run(changed(load_system(placed), {"stop_time": 1.0})).warnings
     assert told.startswith("controller (Pd): is sampled every 0.2 s, but its code believes 0.05 s")
+
+
+IN_TWO = """\
+name = "Pd"
+{period}sources = ["parts.c"]
+declare = "extern double x, v, u; void position_step(void); void speed_step(void);"
+{steps}
+[inputs]
+x = {{ c = "x", unit = "m" }}
+v = {{ c = "v", unit = "m/s" }}
+[outputs]
+u = {{ c = "u", unit = "m/s2" }}
+"""
+PARTS_C = """\
+double x, v, u;
+static double wanted;
+void position_step(void) { wanted = -x; }
+void speed_step(void) { static int calls; calls++; u = wanted - v + 0 * calls; }
+"""
+ONE_STEP = 'step = "position_step(); speed_step();"'
+TWO_TASKS = "".join(
+    f'[[tasks]]\nname = "{n}_task"\nperiod = 0.05\nstep = "{n}_step();"\n' for n in ("position", "speed")
+)
+
+
+@pytest.fixture(scope="module")
+def parts(integrator: Path) -> Path:
+    """The folder of a PD in two parts: in one step, and as two tasks, with the system of these."""
+    folder = integrator.parent
+    (folder / "parts.c").write_text(PARTS_C)
+    (folder / "one.toml").write_text(IN_TWO.format(period="period = 0.05\n", steps=ONE_STEP))
+    (folder / "two.toml").write_text(IN_TWO.format(period="", steps=TWO_TASKS))
+    text = integrator.read_text().replace("stop_time = 240.0", "stop_time = 12.0")
+    (folder / "one_step.toml").write_text(text.replace("pd.toml", "one.toml"))
+    begin, end = text.index("[components.controller]"), text.index("[objectives]")
+    lines = [f'[components.{n}]\nfmu = "two.toml"\npartition = "{n}_task"\n' for n in ("position", "speed")]
+    for name, start, to in (
+        ("a", "plant.x", "position.x"),
+        ("b", "plant.v", "speed.v"),
+        ("command", "speed.u", "plant.u"),
+    ):
+        lines.append(f'[[connections]]\nname = "{name}"\nfrom = ["{start}"]\nto = ["{to}"]\n')
+    (folder / "two_tasks.toml").write_text(text[:begin] + "\n".join(lines) + text[end:])
+    return folder
+
+
+def onboard(folder: Path, execution: float) -> Path:
+    """The system of two tasks, on a computer on which each takes as long as that."""
+    tasks = "".join(
+        f"[computers.cpu.tasks.{n}]\ncomponent = '{n}'\nperiod = 0.05\nexecution = {execution}\npriority = {i}\n"
+        for i, n in enumerate(("position", "speed"))
+    )
+    file = folder / f"onboard_{execution}.toml"
+    file.write_text(f"{(folder / 'two_tasks.toml').read_text()}\n{tasks}")
+    return file
+
+
+def test_tasks_of_one_period_are_their_statements_in_one_step(parts: Path) -> None:
+    whole = run(load_system(parts / "one_step.toml"), in_process=True)
+    assert abs(whole.signals["plant.x"][-1]) < 0.01
+    for file in (parts / "two_tasks.toml", onboard(parts, 0.0)):
+        for engine in ("python", "compiled"):
+            both = run(load_system(file), engine=engine, in_process=True)
+            for mine, name in (("controller.u", "speed.u"), ("plant.x", "plant.x"), ("plant.v", "plant.v")):
+                assert both.signals[name].tobytes() == whole.signals[mine].tobytes()
+            assert both.warnings == ()
+    assert read_model(parts / "fmi3" / "Pd.fmu").saves_state
+    text = (parts / "one_step.toml").read_text().replace("one.toml", "fmi3/Pd.fmu")
+    for sampling in ('fmu_clock = "speed_task"', "period = 0.05"):  # the clocks of both tick, or all that is due runs
+        (parts / "alone.toml").write_text(text.replace("period = 0.05", sampling))
+        alone = run(load_system(parts / "alone.toml"), in_process=True)
+        assert alone.rows.tobytes() == whole.rows.tobytes()
+
+
+def test_tasks_are_paused_whole_and_have_limits(parts: Path, main: Main) -> None:
+    file = onboard(parts, 0.01)
+    whole = run(load_system(file), in_process=True)
+    assert run_until(load_system(file), 3.015, parts / "paused", in_process=True) is None  # between the two jobs
+    assert resume(parts / "paused", in_process=True).rows.tobytes() == whole.rows.tobytes()
+    (told,) = run(changed(load_system(parts / "two_tasks.toml"), {"components.speed.sampling.period": 0.1})).warnings
+    assert told.startswith("speed (Pd): is sampled every 0.1 s, but its code believes 0.05 s")
+    asked = ("--of", "connections.command.delay", "--from", "0.6", "--to", "0.8", "--scan", "0.1", "--json", "--build")
+    found = json.loads(main("limit", parts / "two_tasks.toml", *asked, "--tolerance", "0.02", "--no-figures").stdout)
+    assert (found["large_signal_limit"], found["local_limit"]) == pytest.approx((0.686137, 0.686137), abs=0.02)
 
 
 def bits(path: Path) -> list[tuple[Any, ...]]:
