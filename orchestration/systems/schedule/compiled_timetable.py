@@ -276,12 +276,14 @@ class _Outline:
         largest = nanoseconds(jitter)
         if largest == 0:
             return self._constant(0)
-        if spread == "uniform":
-            return self._varying(self._c.UNIFORM, key, most=largest)
-        return self._varying(
-            self._c.NORMAL, key, most=largest, mean=NORMAL.mean, deviation=NORMAL.stdev, low=LOWEST,
-            width=HIGHEST - LOWEST,
-        )  # fmt: skip
+        match spread:
+            case "uniform":
+                return self._varying(self._c.UNIFORM, key, most=largest)
+            case "normal":
+                return self._varying(
+                    self._c.NORMAL, key, most=largest, mean=NORMAL.mean, deviation=NORMAL.stdev, low=LOWEST,
+                    width=HIGHEST - LOWEST,
+                )  # fmt: skip
 
     def _losses(self, loss: Varying, burst_length: float | None, key: Sequence[int]) -> Any:
         """As `lateness_and_loss.losses`."""

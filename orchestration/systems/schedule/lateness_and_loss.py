@@ -109,9 +109,11 @@ def lateness(jitter: Varying, spread: Spread, stream: Stream) -> Lateness:
     if largest == 0:
         return Constant(0)
     draw = stream().random
-    if spread == "normal":
-        return lambda count: np.array([math.floor(cut_normal(u) * largest) for u in draw(count).tolist()], np.int64)
-    return lambda count: np.floor(draw(count) * largest).astype(np.int64)
+    match spread:
+        case "normal":
+            return lambda count: np.array([math.floor(cut_normal(u) * largest) for u in draw(count).tolist()], np.int64)
+        case "uniform":
+            return lambda count: np.floor(draw(count) * largest).astype(np.int64)
 
 
 def losses(probability: Varying, burst_length: float | None, stream: Stream) -> Losses:

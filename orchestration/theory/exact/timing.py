@@ -5,6 +5,7 @@ from dataclasses import replace
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.systems.schedule.plan import Plan
+from orchestration.systems.system.choices import Spread
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.distribution import Distribution, Varying
 from orchestration.systems.system.model import System
@@ -102,11 +103,15 @@ def _attoseconds(seconds: float) -> int:
     return attoseconds(exact_seconds(seconds))
 
 
-def _jitter(largest: Varying, spread: str, place: str) -> RandomTime:
+def _jitter(largest: Varying, spread: Spread, place: str) -> RandomTime:
     """A jitter by its largest value, or by its distribution."""
     if isinstance(largest, Distribution):
         return _random_time(largest, place)
     if largest == 0.0:
         return CERTAIN
     high = _attoseconds(largest)
-    return normal(high / 2.0, high / 6.0, 0, high) if spread == "normal" else uniform(0, high)
+    match spread:
+        case "normal":
+            return normal(high / 2.0, high / 6.0, 0, high)
+        case "uniform":
+            return uniform(0, high)

@@ -25,6 +25,7 @@ from orchestration.systems.schedule.streams import (
     NOISE,
     Streams,
 )
+from orchestration.systems.system.choices import Spread
 from orchestration.systems.system.connection import component_of, variable_of
 
 _TABLES = {"exchanged": 0, "posted": 1, "measured": 2}
@@ -85,7 +86,7 @@ def _timing(shape: Shape, settings: Settings, sources: SourcesInC | None, given:
             f"{{{common.place[common.sender[i]]}, {common.place[common.receiver[i]]}, {int(x.order == 'jacobi')}, "
             f"{int(i in plan.read_ahead)}, {at.get(f'{place}.delay', -1)}, {at.get(f'{place}.delay_jitter', -1)}, "
             f"{at.get(f'{place}.loss', -1)}, {at.get(f'{place}.burst_length', -1)}, "
-            f"{int(x.jitter_distribution == 'normal')}, "
+            f"{_is_normal(x.jitter_distribution)}, "
             f"{', '.join(key_text(streams.key(place, key)) for key in keys)}, "
             f"{len(x.start)}, {int(any(x.noise.values()))}, {_TABLES[shape.wires.table(i)]}}}"
         )
@@ -97,7 +98,7 @@ def _timing(shape: Shape, settings: Settings, sources: SourcesInC | None, given:
         lines += [_ints(f"incoming{k}", incoming), _ints(f"outgoing{k}", outgoing)]
         of = ", ".join(str(at[f"{place}.sampling.{key}"]) for key in ("period", "offset", "jitter", "clock_ratio"))
         clocks.append(
-            f"{{{names.index(name)}, {of}, {int(sampling.jitter_distribution == 'normal')}, "
+            f"{{{names.index(name)}, {of}, {_is_normal(sampling.jitter_distribution)}, "
             f"{key_text(streams.key(place, JITTER))}, incoming{k}, outgoing{k}, {len(incoming)}, {len(outgoing)}}}"
         )
     posts = (
@@ -139,6 +140,14 @@ def _timing(shape: Shape, settings: Settings, sources: SourcesInC | None, given:
 
 
 # -- components, connections, expressions ------------------------------------------------------------------------------
+
+
+def _is_normal(spread: Spread) -> int:
+    match spread:
+        case "uniform":
+            return 0
+        case "normal":
+            return 1
 
 
 def _system(shape: Shape, settings: Settings, sources: SourcesInC | None, given: GivenTiming | None) -> str:

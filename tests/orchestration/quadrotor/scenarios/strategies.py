@@ -1,10 +1,11 @@
 """What hypothesis draws from: timings of every kind, with horizons that keep a run short."""
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 from hypothesis import strategies as st
 
 from orchestration.quadrotor.scenarios.timing import Timing
+from orchestration.systems.system.choices import Spread
 
 
 class Case(NamedTuple):
@@ -21,7 +22,7 @@ RATIOS = st.sampled_from((1.0, 1.0, 0.5, 0.9999, 1.001, 1.7))
 BURSTS = st.none() | st.floats(1.0, 20.0)
 INTERVALS = st.sampled_from((0.1, 0.5, 1.0, 3.0)) | st.floats(0.05, 20.0)
 ORDERS = st.sampled_from(("gauss-seidel", "jacobi"))
-DISTRIBUTIONS = st.sampled_from(("uniform", "normal"))
+DISTRIBUTIONS = st.sampled_from(get_args(Spread))
 PERIODS = st.integers(1, 30).map(float) | st.floats(0.01, 30.0)
 SEEDS = st.integers(0, 2**32)
 

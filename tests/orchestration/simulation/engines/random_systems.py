@@ -7,11 +7,11 @@ import functools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from hypothesis import strategies as st
 
-from orchestration.systems.system.choices import TraceOrder
+from orchestration.systems.system.choices import Spread, TraceOrder
 from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.distribution import Distribution
@@ -83,7 +83,7 @@ def jitters(
     """A jitter by what its largest value is of one of `values`, or as it is distributed up to `most`."""
     if draw(whole(0, 3)) == 0:
         return {key: draw(distributions(most))}
-    return {key: largest(draw(values)), "jitter_distribution": draw(chosen(("uniform", "normal")))}
+    return {key: largest(draw(values)), "jitter_distribution": draw(chosen(get_args(Spread)))}
 
 
 @functools.cache

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.systems.expressions.over_run import Recorded, evaluate
+from orchestration.systems.expressions.over_run import Recorded, evaluate, reductions
+from orchestration.systems.expressions.reductions import REDUCTIONS
 from orchestration.systems.expressions.syntax import parse
 
 TIME = np.array([0.0, 0.5, 1.0, 3.0])
@@ -121,6 +122,10 @@ EVERYTHING = {
         "at": "rms(sampled(c, a.x))", "grows": "growth_share(sampled(c, b.u), 0.1)", "nested": "share(a.x > mean(a.x))",
     }.items()
 }  # fmt: skip
+
+
+def test_every_reduction_is_among_them():
+    assert {call.function for node in EVERYTHING.values() for call in reductions(node)} == set(REDUCTIONS)
 
 
 @given(st.integers(2, 40), st.lists(st.integers(1, 39), max_size=4), st.integers(0, 2**31))

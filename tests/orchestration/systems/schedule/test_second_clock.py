@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 from hypothesis import given, reject, settings
@@ -26,6 +26,7 @@ from orchestration.systems.schedule import instant_arrays as position
 from orchestration.systems.schedule.fixed_step import FixedStep
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
+from orchestration.systems.system.choices import Spread
 from orchestration.systems.system.connection import variable_of
 from orchestration.systems.system.model import System
 from tests.orchestration.quadrotor.scenarios.strategies import Case, cases
@@ -149,7 +150,7 @@ ALL: dict[str, Any] = {
 
 
 @pytest.mark.parametrize("burst_length", [None, 1.0, 4.0])
-@pytest.mark.parametrize("distribution", ["uniform", "normal"])
+@pytest.mark.parametrize("distribution", get_args(Spread))
 @pytest.mark.parametrize("order", ["gauss-seidel", "jacobi"])
 def test_both_clocks_agree_over_many_samples_with_every_cause_on(
     order: Any, distribution: Any, burst_length: float | None

@@ -12,7 +12,6 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.simulation.engines.batch.batches import Batches
-from orchestration.simulation.engines.batch.folds import LANES
 from orchestration.simulation.runs.many_runs import located as with_files
 from orchestration.systems.expressions.reductions import REDUCTIONS
 from orchestration.systems.schedule import schedule_cache
@@ -89,9 +88,9 @@ def objectives() -> dict[str, str]:
     return {**every, **MORE}
 
 
-def test_every_reduction_is_compared_with_a_run_alone_and_has_its_form_in_lanes() -> None:
+def test_every_reduction_is_compared_with_a_run_alone() -> None:
     tested = {function.partition("(")[0] for function in F}
-    assert tested == set(REDUCTIONS) == set(LANES)
+    assert tested == set(REDUCTIONS)
 
 
 def test_every_function_over_every_kind_of_signal(fmu: Path, kept: Kept, tmp_path: Path) -> None:
