@@ -41,6 +41,11 @@ def test_the_page_of_figures_has_every_figure_of_a_run() -> None:
     assert words(*re.findall(r"^\| (`.*?`) \|", of_runs, re.M)) - {"--figure"} == {*FIGURES}
 
 
+@pytest.mark.parametrize("kind", VIEWS)
+def test_every_figure_has_its_maker(kind: str) -> None:
+    assert {*VIEWS[kind].load().makers} == {*VIEWS[kind].names}
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_page_and_a_test_have_every_command(name: str) -> None:
     assert any(re.search(rf"\bquadcosim {name}\b", text) for text in PAGES.values())
