@@ -211,4 +211,7 @@ def expect_rows(system: System, tasks: Sequence[SampledTask], links: Sequence[Ra
         if not on_grid and (not single or read_later):
             raise UsageError(f"--as-simulated: {link.name} arrives between the steps of {', '.join(continuous)}")
         if link.is_read_ahead and Fraction(link.longest_delay, ATTOSECONDS) % step:
-            raise UsageError(f"--as-simulated: {link.name} is measured between the steps of {', '.join(continuous)}")
+            raise UsageError(
+                f"--as-simulated: {link.name} is measured between the steps of {', '.join(continuous)}: "
+                f"expected a delay of whole steps, of {float(step):g} s each"
+            )

@@ -84,7 +84,7 @@ def _identified(loop: AtRest, name: str) -> IdentifiedComponent:
     if component.sampling is not None:
         part = SampledSystem(**vars(of_samples(tangent, step)), depends_on_step=depends_on_step(tangent, step))
     else:
-        matrices = in_continuous_time(tangent, step, DIFFERS if is_linear else INEXACT)
+        matrices = in_continuous_time(tangent, step, DIFFERS if is_linear else INEXACT, component.step)
         part = replace(matrices, step=tangent.derivatives)
     method = "saved states, to rounding" if is_linear else "saved states, by differences"
     return IdentifiedComponent(part=part, method=method, accuracy=max(ROUNDING, tangent.accuracy), tangent=tangent)

@@ -78,13 +78,19 @@ def of_samples(tangent: Tangent, period: float) -> Matrices:
     )  # fmt: skip
 
 
-def in_continuous_time(tangent: Tangent, first: float, differs: float = INEXACT) -> Continuous:
+def in_continuous_time(
+    tangent: Tangent, first: float, differs: float = INEXACT, own: float | None = None
+) -> Continuous:
     """The matrices of a component in continuous time.
 
-    `first` is a step [s] that it takes; two steps may differ from one of twice the length by `differs`, relative.
+    `first` is a step [s] that it takes; two steps may differ from one of twice the length by `differs`, relative. Where
+    they do, shorter ones are tried down to its `own`, with which it is simulated; default: `first`.
     """
     count = len(tangent.outputs)
     h = first if tangent.unit is not None else _informative_step(tangent, first)
+    shortest = first if own is None else min(own, first)
+    while h > shortest and _misfit(tangent, h, differs) is not None:
+        h = max(whole_nanoseconds(0.5 * h), shortest)
     by_state, by_input = tangent.derivatives(h)
     state, moved = by_state[count:], by_input[count:]
     change = state - np.eye(len(state))
@@ -92,7 +98,7 @@ def in_continuous_time(tangent: Tangent, first: float, differs: float = INEXACT)
         unfit: str | None = f"a step of {h:g} s is too long to show what happens within it"
         A, B, C, D = np.zeros_like(change), np.zeros_like(moved), by_state[:count], by_input[:count]
     else:
-        unfit = _misfit(tangent, state, h, differs)
+        unfit = _misfit(tangent, h, differs)
         A = _logarithm(change) / h
         B = np.asarray(np.linalg.solve(_mean_exponential(A * h), moved)) / h
         C = by_state[:count] @ np.linalg.inv(state)
@@ -137,10 +143,9 @@ def _feedthrough(whole: Floats, C: Floats, moved: Floats) -> Floats:
     return found
 
 
-def _misfit(tangent: Tangent, once: Floats, h: float, differs: float) -> str | None:
+def _misfit(tangent: Tangent, h: float, differs: float) -> str | None:
     """Why it is no linear system in continuous time; None: it is one."""
-    count = len(tangent.outputs)
-    twice = tangent.derivatives(2.0 * h)[0][count:]
+    once, twice = (tangent.derivatives(step)[0][len(tangent.outputs) :] for step in (h, 2.0 * h))
     difference = float(np.abs(twice - once @ once).max(initial=0.0)) / max(1.0, float(np.abs(twice).max(initial=0.0)))
     if difference <= differs:
         return None

@@ -130,7 +130,7 @@ def test_with_finer_noise_and_rows_it_becomes_that_of_white_noise() -> None:
 
 
 def test_as_simulated_refuses_rows_at_which_the_plant_is_not_stepped() -> None:
-    with pytest.raises(UsageError, match=r"connections\.measurement is measured between the steps of plant"):
+    with pytest.raises(UsageError, match=r"measurement is measured between the steps of plant: expected .* of 0\.1 s"):
         as_simulated(connections__measurement__delay=0.05)
 
 

@@ -1,5 +1,6 @@
 """Components as matrices, and in coordinates that are their outputs, now and later."""
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -49,15 +50,19 @@ class Stepped:
 
     outputs, inputs, unit = ("y",), ("u",), None
 
-    def __init__(self, flow: np.ndarray, feedthrough: float = 0.0, euler: bool = False) -> None:
-        self._flow, self._through, self._euler = flow, feedthrough, euler
+    def __init__(self, flow: np.ndarray, feedthrough: float = 0.0, order: int | None = None) -> None:
+        self._flow, self._through, self._order = flow, feedthrough, order
         self.state = np.zeros(len(flow) - 1)
 
     def derivatives(self, h: float) -> tuple[np.ndarray, np.ndarray]:
         n = len(self.state)
-        after = np.eye(n + 1) + h * self._flow if self._euler else expm(h * self._flow)
+        after = expm(h * self._flow) if self._order is None else _series(h * self._flow, self._order)
         after = np.vstack([after[0], after[:n]])
         return after[:, :n], after[:, n:] + self._through * np.eye(n + 1, 1)
+
+
+def _series(flow: np.ndarray, order: int) -> np.ndarray:
+    return np.sum([np.linalg.matrix_power(flow, k) / math.factorial(k) for k in range(order + 1)], axis=0)
 
 
 OSCILLATOR = np.array([[0.0, 3.0, 0.0], [-3.0, -0.2, 1.0], [0.0, 0.0, 0.0]])
@@ -75,7 +80,16 @@ def test_a_state_that_an_output_does_not_show_is_shown_a_period_later() -> None:
 
 
 def test_steps_that_are_no_flow_are_refused_with_the_reason() -> None:
-    tangent: Any = Stepped(OSCILLATOR, euler=True)
+    tangent: Any = Stepped(OSCILLATOR, order=1)
     unfit = in_continuous_time(tangent, 0.1).unfit
     assert unfit is not None
     assert unfit.startswith("a step of 0.2 s differs from two of 0.1 s by ")
+
+
+def test_steps_that_are_too_long_for_an_integrator_are_shortened_down_to_its_own() -> None:
+    """A Runge-Kutta step of 50 ms is no flow to 1e-7, one of 3 ms is; the system takes steps of 2 ms."""
+    tangent: Any = Stepped(OSCILLATOR, order=4)
+    assert in_continuous_time(tangent, 0.05).unfit is not None
+    found = in_continuous_time(tangent, 0.05, own=0.002)
+    assert found.unfit is None
+    assert np.linalg.eigvals(found.A) == pytest.approx(np.linalg.eigvals(OSCILLATOR[:2, :2]), abs=1e-7)
