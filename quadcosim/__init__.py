@@ -21,7 +21,8 @@ Where to begin:
 - `margin` certifies how far a delay, a jitter or a run of losses may vary without making the linear loop unstable;
 - `schedule` computes which task or message has each computer and network when, and bounds on response times;
 - `linearise` opens a loop about its operating point, sampled, held and delayed as it is: two state-space systems;
-- `bode` computes gain, phase and delay margins of a sampled loop with its delays, `step` how it takes back a step;
+- `bode` computes gain, phase and delay margins of a sampled loop with its delays, `step` how it takes back a step,
+  `locus` its poles over a quantity;
 - `sweep` runs a `Study` over axes, `compare` compares controllers, `tune` searches for gains: stored runs are not
   repeated, and results become a table with `to_pandas`;
 - `Simulation` stops a run at each sample, where your code takes the place of a controller or any other component;
@@ -97,6 +98,7 @@ if TYPE_CHECKING:  # also what `__getattr__` finds public names by
     from orchestration.theory.exact.expect import Expected, expect
     from orchestration.theory.stability.frequency import Bode, bode
     from orchestration.theory.stability.linearise import Linearised, linearise
+    from orchestration.theory.stability.root_locus import RootLocus, locus
     from orchestration.theory.stability.state_space import StateSpace
     from orchestration.theory.stability.step_response import Step, step
 
@@ -130,6 +132,7 @@ __all__ = [
     "ReferenceChoice",
     "Region",
     "Result",
+    "RootLocus",
     "RunInterrupted",
     "RunLost",
     "Sampling",
@@ -168,6 +171,7 @@ __all__ = [
     "load_system",
     "load_tuning",
     "load_vehicle",
+    "locus",
     "margin",
     "margin_region",
     "read_model",

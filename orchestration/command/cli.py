@@ -124,6 +124,7 @@ COMMANDS = {
         margin.linearise,
         loops.bode,
         loops.step,
+        loops.locus,
     ),
     "FMUs": (fmus.build, wrap.wrap, fmus.validate, fmus.doctor),
     "Other tools": (other_tools.export_c, other_tools.ssp, other_tools.interop),

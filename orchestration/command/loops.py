@@ -1,4 +1,4 @@
-"""The commands that draw a loop: over the frequency, and after a step."""
+"""The commands that draw a loop: over the frequency, after a step, and its poles over a quantity."""
 
 import dataclasses
 from pathlib import Path
@@ -87,6 +87,38 @@ def step(
     }
     lines = list(in_columns(rows, right=True))
     return CommandResult(document=document, verdict=verdicts.of_step(found), lines=lines)
+
+
+@flight_options
+def locus(
+    scenario: ScenarioFile = None,
+    timing: Timing = None,
+    of: Annotated[
+        str | None,
+        option("--of", "The quantity, as of limit; default: the period of what is sampled.", "period|delay|PATH"),
+    ] = None,
+    first: Annotated[float | None, option("--from", "Its lowest value.", "A")] = None,
+    last: Annotated[float | None, option("--to", "Its highest value.", "B")] = None,
+    count: Annotated[int, option("--count", "Values from the lowest to the highest.", "N")] = 40,
+    out: Folder = None,
+    *,
+    flags: FlightFlags,
+) -> CommandResult:
+    """Compute the poles of the sampled loop over a quantity, and where they leave the unit circle; draw them."""
+    from orchestration.theory.stability.root_locus import locus as locus_of
+
+    found = locus_of(request_from(scenario, flags, timing), of, first=first, last=last, count=count)
+    if out is not None:
+        _draw(found.plot(), out)
+    rows = [("crossing", "value", "pole", "frequency")]
+    for one in found.crossings:
+        pole = f"{one.real:.4f}" + (f" ± {one.imaginary:.4f}j" if one.imaginary else "")
+        way = "leaves" if one.leaves else "returns"
+        rows.append((way, quantity(one.value, found.unit, 6), pole, f"{one.frequency:.4g} rad/s"))
+    each = [[[pole.real, pole.imag] for pole in some if pole == pole] for some in found.poles.tolist()]
+    document = {**vars(found), "values": found.values.tolist(), "radius": found.radius.tolist(), "poles": each}
+    lines = list(in_columns(rows, right=True)) if found.crossings else []
+    return CommandResult(document=document, verdict=verdicts.of_locus(found), lines=lines)
 
 
 def _draw(figures: "Figures", out: Path) -> None:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from orchestration.theory.exact.expect import Expected
     from orchestration.theory.stability.frequency import Bode
     from orchestration.theory.stability.linearise import Linearised
+    from orchestration.theory.stability.root_locus import RootLocus
     from orchestration.theory.stability.step_response import Step
 
 DIGITS_OF_RUN = 3
@@ -198,6 +199,24 @@ def of_step(found: Step) -> str:
         f"a step on {slowest.output} {settled}{over}, {100.0 * slowest.steady_state:.4g} % taken back, "
         f"sampled every {quantity(found.dt, 's')} (small deviations)"
     )
+
+
+def of_locus(found: RootLocus) -> str:
+    """Where poles leave the unit circle and return, or that they do not."""
+
+    def shown(value: float) -> str:
+        return quantity(value, found.unit, DIGITS_OF_LIMIT)
+
+    first, last = shown(found.values[0]), shown(found.values[-1])
+    begins = "inside" if found.radius[0] < 1.0 else "not all inside"
+    if not found.crossings:
+        radii = f"spectral radius {found.radius.min():.4g} to {found.radius.max():.4g}"
+        return f"{found.of}: poles {begins} the unit circle from {first} to {last}, {radii} (small deviations)"
+    ways = [
+        f"{'leave' if one.leaves else 'return'} at {shown(one.value)}, {one.frequency:.4g} rad/s"
+        for one in found.crossings
+    ]
+    return f"{found.of}: poles {begins} the unit circle at {first}, {_some(ways, '; ')} (small deviations)"
 
 
 def of_schedule(found: Scheduled) -> str:

@@ -178,7 +178,7 @@ def _settle(simulation: PreparedRun, begin: Fraction, period: Fraction) -> None:
     master.initialise()
     rows = []
     for k in range(SETTLED):
-        if master.run(pause_at=math.floor(begin + k * period)):
+        if master.run(pause_at=round(begin + k * period)):
             why = master.divergence or master.running.termination or "it was interrupted"
             raise UsageError(f"the run leaves the operating point: {why}")
         rows.append([master.board.row[master.board.place[signal]] for signal in exchanged_signals(system)])

@@ -1,14 +1,20 @@
-"""Figures of loops: gain, phase and sensitivity over the frequency, and steps over time."""
+"""Figures of loops: over the frequency, after a step, and their poles over a quantity."""
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patches import Circle
 from matplotlib.ticker import MultipleLocator
 
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.simulation.figures.palette import CYCLE, DASHES, GREY
+from orchestration.simulation.figures.palette import BLACK, BLUE, CYCLE, DASHES, GREY, RED, SHADES
 from orchestration.simulation.figures.style import SCREEN, Style
+from orchestration.simulation.results.quantities import setting
 from orchestration.theory.stability.frequency import Bode, Complexes
+from orchestration.theory.stability.root_locus import RootLocus
 from orchestration.theory.stability.step_response import Step
+
+SHOWN = 1.4
+"""Largest part of a pole that is drawn"""
 
 
 def bode_figure(result: Bode, style: Style = SCREEN) -> Figure:
@@ -56,4 +62,31 @@ def step_figure(result: Step, style: Style = SCREEN) -> Figure:
     axes.axhline(1.0, color=GREY, linewidth=1.0, linestyle=":")
     axes.set(xlabel="time [s]", ylabel="taken back of a step of 1", xlim=(0.0, result.times[-1]))
     figure.legend(loc="outside lower center", ncols=2)
+    return figure
+
+
+def locus_figure(result: RootLocus, style: Style = SCREEN) -> Figure:
+    """The poles beside the unit circle, shaded by the quantity, and the spectral radius over it; crosses leave it."""
+    across = setting(result.of if "." in result.of else f"timing.{result.of}", result.values, result.unit)
+    figure = style.figure(36.0 if style.is_wide else 80.0)
+    plane, over = figure.subplots(1, 2) if style.is_wide else figure.subplots(2, 1)
+    values = across.of(result.values)
+    plane.axhline(0.0, color=GREY, linewidth=0.5)
+    plane.axvline(0.0, color=GREY, linewidth=0.5)
+    plane.add_patch(Circle((0.0, 0.0), 1.0, fill=False, color=BLACK, linewidth=1.0))
+    is_there = np.isfinite(result.poles) & (np.abs(result.poles) < 2.0 * SHOWN)
+    poles = result.poles[is_there]
+    shade = np.broadcast_to(values[:, None], result.poles.shape)[is_there]
+    dots = plane.scatter(poles.real, poles.imag, c=shade, cmap=SHADES, s=10.0, linewidths=0.0)
+    figure.colorbar(dots, ax=plane, label=across.title, location="bottom", aspect=30.0)
+    over.plot(values, result.radius, color=BLUE)
+    over.axhline(1.0, color=BLACK, linewidth=1.0)
+    for one in result.crossings:
+        plane.plot([one.real] * 2, [one.imaginary, -one.imaginary], "x", color=RED, linestyle="none")
+        at = (float(across.of(one.value)), 1.0)
+        over.plot(*at, "x", color=RED)
+        over.annotate(across.text_of(one.value, 4), at, xytext=(4.0, -12.0), textcoords="offset points")
+    plane.set(xlabel="real part", ylabel="imaginary part", xlim=(-SHOWN, SHOWN), ylim=(-SHOWN, SHOWN), aspect="equal")
+    over.set(xlabel=across.title, ylabel="spectral radius", xlim=(values[0], values[-1]))
+    over.set_ylim(min(0.95 * float(result.radius.min()), 0.9), min(max(1.1, 1.05 * float(result.radius.max())), SHOWN))
     return figure

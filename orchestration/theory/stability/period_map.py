@@ -40,7 +40,7 @@ def period_map(loop: AtRest, ports: Mapping[str, OpenPort] | None = None) -> Flo
     simulators = {**loop.tangents, **ports}
     master = _master(loop, simulators)
     master.initialise()
-    master.run(pause_at=math.floor(loop.begin))
+    master.run(pause_at=round(loop.begin))
     places = [*_state_parts(master, simulators), *(port.sent for port in ports.values())]
     received = [port.received for port in ports.values()]
     columns, rows = sum(map(len, places)), sum(map(len, [*_state_parts(master, simulators), *received]))
@@ -49,7 +49,7 @@ def period_map(loop: AtRest, ports: Mapping[str, OpenPort] | None = None) -> Flo
     result: Floats = np.zeros((rows, columns))
     for i, unit in enumerate(np.eye(columns)):
         _assign(unit, [*_state_parts(master, simulators), *(port.sent for port in ports.values())])
-        master.run(pause_at=math.floor(loop.begin + (i + 1) * loop.period))
+        master.run(pause_at=round(loop.begin + (i + 1) * loop.period))
         after = np.concatenate([*_state_parts(master, simulators), *received])
         if len(after) != rows:
             raise UsageError("the number of messages in transit changes over a period")

@@ -1,0 +1,198 @@
+"""The poles of a sampled loop over a quantity, and where they cross the unit circle."""
+
+import math
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from orchestration.components.fmi.foreign_calls import isolated_call
+from orchestration.components.fmi.reuse import Instances
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.extras import explains_missing
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.foundation.processes.passable import passable
+from orchestration.simulation.requests.ranges import Varied, default_quantity, search_range
+from orchestration.simulation.requests.request import RequestLike, request_of
+from orchestration.simulation.workers.choice import single_run_execution
+from orchestration.systems.system.files import files_of
+from orchestration.systems.system.paths import changed
+from orchestration.systems.system.request import errors_in_own_terms
+from orchestration.theory.stability.frequency import Complexes
+from orchestration.theory.stability.known_loops import rested
+from orchestration.theory.stability.loop_at_rest import KnownTangents, at_rest
+from orchestration.theory.stability.period_map import period_map
+
+if TYPE_CHECKING:
+    from orchestration.simulation.figures.gallery import Figures
+
+COUNT = 40
+"""Values by default"""
+MAX_COUNT = 10_000
+ON_CIRCLE = 1e-7
+"""Distance of a spectral radius from 1 at which a crossing is found"""
+TRIALS = 40
+"""Most values that are tried for a crossing"""
+NO_RANK = 1e-10
+"""Singular value, as a share of the largest, of what a period forgets"""
+
+
+@passable
+@dataclass(frozen=True, kw_only=True)
+class Crossing:
+    """A value at which poles cross the unit circle."""
+
+    value: float
+    """Its value, in the unit of the quantity."""
+    leaves: bool
+    """Whether the loop is unstable above it; else below."""
+    real: float
+    """The real part of the pole on the circle."""
+    imaginary: float
+    """Its imaginary part, of a pair that of the upper one."""
+    frequency: float
+    """Its frequency [rad/s]: 0 of a pole at 1, half the sampling rate of one at -1."""
+
+
+@passable
+@dataclass(frozen=True, kw_only=True)
+class RootLocus:
+    """The poles of a loop about its operating point, closed, over a period of its clock, for values of a quantity."""
+
+    of: str
+    """The quantity: a name, or a path."""
+    unit: str | None
+    """The unit of the quantity; None: it has none."""
+    values: Floats
+    """Values of the quantity, in rising order, shape (n,)."""
+    radius: Floats
+    """The spectral radius at each, shape (n,): below 1 small deviations decay."""
+    poles: Complexes = field(repr=False)
+    """The poles at each, shape (n, m), without those at 0, of what is forgotten; where there are fewer, NaN."""
+    crossings: tuple[Crossing, ...]
+    """Values at which poles cross the unit circle, in rising order."""
+
+    @explains_missing
+    def plot(self, *, style: Literal["screen", "paper", "slides"] = "screen") -> "Figures":
+        """The poles beside the unit circle, and the spectral radius over the quantity; a notebook shows them.
+
+        `style` sets sizes and fonts. Raises `UsageError` for an unknown style.
+        """
+        from orchestration.simulation.figures.gallery import Figures
+        from orchestration.simulation.figures.style import style_named
+        from orchestration.theory.stability.loop_figures import locus_figure
+
+        chosen = style_named(style)
+        with chosen.applied():
+            return Figures({"locus": locus_figure(self, chosen)}, chosen)
+
+
+def locus(
+    request: RequestLike,
+    of: str | None = None,
+    *,
+    first: float | None = None,
+    last: float | None = None,
+    count: int = COUNT,
+) -> RootLocus:
+    """The poles of a loop about its operating point, for `count` values of a quantity from `first` to `last`.
+
+    Quantity and range are those of `limit`: `of` is a path, or for the quadrotor `period` or `delay`; default: the
+    period of the only sampled component, from half to fifty times its value. Holds and delays are included; jitter,
+    loss, noise and quantisation are left out. A pair of crossings between two neighbouring values is not seen.
+
+    Raises `UsageError` for an invalid quantity or range, and as `linearise`.
+    """
+    if not 2 <= count <= MAX_COUNT:
+        raise UsageError(f"--count {count}: expected a number from 2 to {MAX_COUNT}")
+    loaded, _ = single_run_execution(request_of(request), "auto")
+    varied = Varied(request=loaded, of=of or default_quantity(loaded))
+    files = files_of(varied.system)
+    span = search_range(varied, files.models_of(varied.system), first=first, last=last, tolerance=None, scan=None)
+    unit = span.unit.strip() or None
+    values = [_short(float(value), unit) for value in np.linspace(span.values()[0], span.last, count)]
+    return isolated_call(files.fmus.values(), _root_locus, varied, values, unit)
+
+
+def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLocus:
+    with errors_in_own_terms(varied.request), closing(Instances()) as instances:
+        system, known = rested(varied.request), KnownTangents()
+        found: dict[float, tuple[Complexes, float]] = {}
+
+        def radius(value: float) -> float:
+            try:
+                with at_rest(changed(system, dict.fromkeys(varied.paths, value)), instances, known=known) as loop:
+                    found[value] = poles_of(period_map(loop)), float(loop.period) / NANOSECONDS
+            except UsageError as error:
+                raise UsageError(f"{varied.of} = {value:g}: {error}") from None
+            return float(np.abs(found[value][0]).max(initial=0.0))
+
+        radii = [radius(value) for value in values]
+        crossings = []
+        for (low, before), (high, after) in pairwise(zip(values, radii, strict=True)):
+            if (before < 1.0) == (after < 1.0):
+                continue
+            at = _zero(
+                lambda value: radius(value) - 1.0,
+                lambda value: _short(value, unit),
+                (low, before - 1.0),
+                (high, after - 1.0),
+            )
+            crossings.append(_crossing(at, *found[at], leaves=before < 1.0))
+    each = [found[value][0] for value in values]
+    poles = np.full((len(values), max(map(len, each))), np.nan, dtype=complex)
+    for row, some in zip(poles, each, strict=True):
+        row[: len(some)] = some
+    return RootLocus(
+        of=varied.of,
+        unit=unit,
+        values=np.array(values),
+        radius=np.array(radii),
+        poles=poles,
+        crossings=tuple(crossings),
+    )
+
+
+def _short(value: float, unit: str | None) -> float:
+    """A value with few digits; a time in whole nanoseconds."""
+    return round(value, 9) if unit == "s" else float(f"{value:.9g}")
+
+
+def _zero(
+    of: Callable[[float], float], short: Callable[[float], float], low: tuple[float, float], high: tuple[float, float]
+) -> float:
+    """Where a function is 0 between two points (x, y) with y of opposite signs: by secants, and halves at a jump."""
+    best = min(low, high, key=lambda point: abs(point[1]))
+    for trial in range(TRIALS):
+        (a, below), (b, above) = low, high
+        middle = 0.5 * (a + b) if trial % 3 == 2 else a - below * (b - a) / (above - below)
+        new = short(middle), of(short(middle))
+        best = min(best, new, key=lambda point: abs(point[1]))
+        if abs(best[1]) < ON_CIRCLE or b - a <= 1e-9 * max(abs(a), abs(b)):
+            break
+        low, high = (new, high) if (new[1] < 0.0) == (below < 0.0) else (low, new)
+    return best[0]
+
+
+def _crossing(value: float, poles: Complexes, period: float, *, leaves: bool) -> Crossing:
+    pole = complex(max(poles, key=lambda one: (round(abs(one), 9), one.imag)))
+    return Crossing(
+        value=value, leaves=leaves, real=pole.real, imaginary=pole.imag,
+        frequency=abs(math.atan2(pole.imag, pole.real)) / period,
+    )  # fmt: skip
+
+
+def poles_of(matrix: Floats) -> Complexes:
+    """The eigenvalues of a matrix without those at 0, which rounding would scatter where they are multiple."""
+    while len(matrix):
+        left, sizes, _ = np.linalg.svd(matrix)
+        rank = int((sizes > NO_RANK * max(1.0, float(sizes[0]))).sum())
+        if rank == len(matrix):
+            break
+        matrix = left[:, :rank].T @ matrix @ left[:, :rank]
+    found: Complexes = np.linalg.eigvals(matrix).astype(complex)
+    return found[np.argsort(-np.abs(found), kind="stable")]

@@ -1,0 +1,57 @@
+"""Poles over a quantity: those of python-control, which leave the unit circle where the delay margin says."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestration.systems.system.paths import changed
+from orchestration.theory.stability.root_locus import poles_of
+from quadcosim import UsageError, bode, linearise, locus
+from tests.commands import Main
+from tests.examples.common import example
+from tests.orchestration.experiments.studies.test_systems import DELAY
+from tests.places import EXAMPLES
+
+
+def test_poles_are_those_of_python_control_and_leave_the_circle_at_the_delay_margin(main: Main, tmp_path: Path) -> None:
+    file = EXAMPLES / "dc_servo" / "system.toml"
+    command = ("locus", file, "--of", DELAY, "--from", "0", "--to", "0.02", "--count", "3", "--json", "--out", tmp_path)
+    found = json.loads(main(*command).stdout)
+    assert found["values"] == [0.0, 0.01, 0.02]
+    assert found["verdict"] == (
+        f"{DELAY}: poles inside the unit circle at 0 s, leave at 13.4966 ms, 51.1 rad/s (small deviations)"
+    )
+    servo = example("dc_servo")
+    (crossing,) = found["crossings"]
+    assert crossing["value"] - 0.002 == pytest.approx(bode(servo).loops[0].delay_margin, abs=2e-8)
+    assert np.hypot(crossing["real"], crossing["imaginary"]) == pytest.approx(1.0, abs=1e-6)
+    assert crossing["frequency"] == pytest.approx(np.arctan2(crossing["imaginary"], crossing["real"]) / 0.006)
+    loop = linearise(changed(servo, {DELAY: 0.02}))
+    control = pytest.importorskip("control")
+    closed = control.feedback(loop.component.to_control() * loop.rest.to_control(), sign=1)
+    poles = np.sort_complex([complex(*pole) for pole in found["poles"][2]])
+    assert poles == pytest.approx(np.sort_complex(closed.poles()), abs=1e-6)
+    assert found["radius"][2] == pytest.approx(loop.radius, rel=1e-9)
+    assert (tmp_path / "locus.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_loop_sampled_between_whole_nanoseconds_has_the_radius_of_its_neighbour() -> None:
+    period = "components.controller.sampling.period"
+    between, whole = (linearise(example("dc_servo", {period: T})).radius for T in (0.0061234569, 0.006123457))
+    assert between == pytest.approx(whole, abs=1e-7)
+
+
+def test_what_is_forgotten_is_no_pole() -> None:
+    """A chain of eight delays alone has eigenvalues of 0, which rounding would move to 1e-2."""
+    rotation = np.linalg.qr(np.random.default_rng(3).normal(size=(10, 10)))[0]
+    chain = np.diag(np.ones(9), 1)
+    chain[7, 8] = chain[8, 9] = 0.0
+    chain[8, 8], chain[9, 9], chain[3, 9] = 0.5, -0.25, 4.0
+    assert np.sort(poles_of(rotation @ chain @ rotation.T).real) == pytest.approx([-0.25, 0.5])
+
+
+def test_a_locus_of_one_value_is_refused() -> None:
+    with pytest.raises(UsageError, match="count = 1: expected a number from 2"):
+        locus(example("dc_servo"), DELAY, first=0.0, last=0.02, count=1)
