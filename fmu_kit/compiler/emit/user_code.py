@@ -104,24 +104,13 @@ class UserCode:
 
 
 # Names of the user's own variables must not be hidden by those of the functions here.
-_ROUNDING_C = """\
-/* Integers are rounded, also those in bit fields, of which only the compiler knows that they are some. */
-#define QUADCOSIM_SET(lvalue) \\
-    do { \\
-        if (_Generic((lvalue), float: 1, double: 1, long double: 1, default: 0)) \\
-            lvalue = quadcosim_x; \\
-        else \\
-            lvalue = (long long)(quadcosim_x < 0.0 ? quadcosim_x - 0.5 : quadcosim_x + 0.5); \\
-    } while (0)
-"""
-_ROUNDING_CXX = """\
+_CXX = """\
 template <class T> struct quadcosim_kind {
     static T of(double x) { return (T)(long long)(x < 0.0 ? x - 0.5 : x + 0.5); }
 };
 template <> struct quadcosim_kind<float> { static float of(double x) { return (float)x; } };
 template <> struct quadcosim_kind<double> { static double of(double x) { return x; } };
 template <class T> struct quadcosim_kind<T &> : quadcosim_kind<T> {};
-#define QUADCOSIM_SET(lvalue) (lvalue) = quadcosim_kind<decltype(lvalue)>::of(quadcosim_x)
 extern "C" void quadcosim_init(void);
 extern "C" void quadcosim_after_parameters(void);
 extern "C" void quadcosim_step(void);
@@ -139,12 +128,13 @@ def user_code(code: UserCode) -> str:
     lines = [line for header in code.headers for line in _at(code, header, f'#include "{header.text}"')]
     if code.declare is not None:
         lines += _at(code, code.declare)
-    lines += [_ROUNDING_CXX if code.is_cxx else _ROUNDING_C, '#line 1 "user_code"']
+    lines += [*([_CXX] if code.is_cxx else []), '#line 1 "user_code"']
     lines += _function(code, "quadcosim_init", code.init)
     lines += _function(code, "quadcosim_after_parameters", code.after_parameters)
     lines += _step(code)
-    lines += _each(code, "set_inputs", "const ", code.having("input"), _TO_CODE)
-    lines += _each(code, "set_parameters", "const ", code.having("parameter"), _TO_CODE)
+    to_code = _TO_CXX if code.is_cxx else _TO_C
+    lines += _each(code, "set_inputs", "const ", code.having("input"), to_code)
+    lines += _each(code, "set_parameters", "const ", code.having("parameter"), to_code)
     lines += _each(code, "get_outputs", "", code.having("output"), _FROM_CODE)
     lines += _each(code, "get_all", "", code.places, _FROM_CODE)
     return "\n".join([*lines, ""])
@@ -214,7 +204,14 @@ def _function(code: UserCode, name: str, body: Code | None) -> list[str]:
     return [f"void {name}(void) {{", *([] if body is None else _at(code, body)), "}"]
 
 
-_TO_CODE = "{{ const double quadcosim_x = {value}; QUADCOSIM_SET({lvalue}); }}"
+# No macros, in whose place an error would have no line of the user's.
+_TO_C = (
+    "{{ const double quadcosim_x = {value}; "
+    "if (_Generic(({lvalue}), float: 1, double: 1, long double: 1, default: 0)) {lvalue} = quadcosim_x; "
+    # Integers are rounded, also those in bit fields, of which only the compiler knows that they are some.
+    "else {lvalue} = (long long)(quadcosim_x < 0.0 ? quadcosim_x - 0.5 : quadcosim_x + 0.5); }}"
+)
+_TO_CXX = "{{ const double quadcosim_x = {value}; ({lvalue}) = quadcosim_kind<decltype({lvalue})>::of(quadcosim_x); }}"
 _FROM_CODE = "{value} = (double)({lvalue});"
 
 

@@ -180,7 +180,7 @@ def output_of(command: Sequence[str], folder: Path) -> str:
         raise PackagingError(f"no program {command[0]}: install it (Debian, Ubuntu: apt install binutils)") from None
     if done.returncode != 0:
         lines = done.stderr.strip().splitlines() or ["no output"]
-        raise PackagingError(f"{command[0]}: {next((line for line in lines if 'error' in line), lines[-1])}")
+        raise PackagingError(f"{command[0]}: {next((line for line in lines if 'error: ' in line), lines[-1])}")
     return done.stdout + done.stderr
 
 

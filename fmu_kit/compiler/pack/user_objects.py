@@ -19,7 +19,7 @@ from fmu_kit.compiler.pack.c_compiler import compiler, output_of
 
 SECTION = "quadcosim_state"
 _OPTIONS = (
-    *("-O2", "-g1", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-fno-strict-aliasing", "-fno-common", "-w"),
+    *("-O2", "-g1", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-fno-strict-aliasing", "-fno-common"),
     *("-U_FORTIFY_SOURCE", "-fdiagnostics-color=never"),
 )
 _LIBRARY = (".a", ".o")
@@ -111,7 +111,8 @@ def libraries(code: UserCode) -> list[str]:
 
 def _compiler_of(source: Path) -> list[str]:
     if source.suffix not in CXX:
-        return [compiler(), "-std=gnu11"]
+        # A function without a declaration would be taken to return an int: wrong numbers, without a word.
+        return [compiler(), "-std=gnu11", "-Werror=implicit-function-declaration"]
     cxx = shutil.which("c++")
     if cxx is None:
         raise PackagingError("no C++ compiler that is called c++: install one (Debian, Ubuntu: apt install g++)")

@@ -69,11 +69,15 @@ class Substitute(Instance):
         return transfer
 
     def writer(self, names: Sequence[str], source: Floats) -> Transfer:
-        """As any instance."""
-        write, places = self._instance.writer(names, source), [self._measured.index(name) for name in names]
+        """As any instance; a reference that the FMU follows is no measurement."""
+        write, kept = (
+            self._instance.writer(names, source),
+            [i for i, name in enumerate(names) if name in self._measured],
+        )
+        places = [self._measured.index(names[i]) for i in kept]
 
         def transfer() -> None:
-            self.measurement[places] = source
+            self.measurement[places] = source[kept]
             if not self._has_begun:
                 write()
 

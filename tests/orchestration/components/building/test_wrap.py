@@ -236,6 +236,7 @@ def test_it_is_made_again_when_a_header_changes_only(of: Callable[..., Path], pd
     ("old", "new", "told"),
     [
         ("in.x", "in.q", "pd.toml:10: error: 'pd_in' has no member named 'q'"),
+        ("in.x", "in.x * 2", "pd.toml:10: error: lvalue required as left operand of assignment"),
         ("pd_init();", "pd_init()", "pd.toml:7: error: expected ';' before '}' token"),
         ('"pd_step(&in, &out);"', "'''\npd_step(&in, &out);\nno;\n'''", "pd.toml:10: error: 'no' undeclared"),
         ('include = ["."]', 'include = ["."]\ndefines = ["double=5"]', "pd.toml: defines: error: expected"),
@@ -248,8 +249,12 @@ def test_what_the_compiler_refuses_has_the_line_of_the_users_file(
     assert refusal(of(lambda text: text.replace(old, new))).startswith(told)
 
 
-def test_what_the_compiler_refuses_in_a_source_has_its_line(of: Callable[..., Path]) -> None:
-    assert refusal(of(pd_c="double f(void) {\n  return g;\n}\n")).startswith("pd.c:2:10: error: 'g' undeclared")
+@pytest.mark.parametrize(
+    ("value", "told"), [("g", "'g' undeclared"), ("g(1.0f)", "implicit declaration of function 'g'")]
+)
+def test_what_the_compiler_refuses_in_a_source_has_its_line(of: Callable[..., Path], value: str, told: str) -> None:
+    refused = refusal(of(pd_c=f"double f(void) {{\n  return {value};\n}}\n"))
+    assert refused.startswith(f"pd.c:2:10: error: {told}")
 
 
 @pytest.mark.parametrize(
