@@ -31,7 +31,7 @@ from orchestration.simulation.engines.batch.batches import Batches
 from orchestration.simulation.engines.batch.kernels import preferred_lanes
 from orchestration.simulation.engines.batch.shape import Shape
 from orchestration.simulation.engines.resolved import check_against_fmus
-from orchestration.simulation.runs.many_runs import located, run_many
+from orchestration.simulation.runs.many_runs import fly, located
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.systems.schedule.schedule_cache import ScheduleCache, schedule_key
 from orchestration.systems.system.model import System
@@ -130,7 +130,7 @@ def from_arrays(period: float, runs: int) -> tuple[float, float]:
     begin = time.process_time()
     batches.run(systems)
     between = time.process_time()
-    run_many(flight, {"plant.initial.position.x": places})
+    fly(flight, {"plant.initial.position.x": places})
     return between - begin, time.process_time() - between
 
 

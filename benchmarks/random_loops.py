@@ -16,7 +16,7 @@ import numpy as np
 
 from orchestration.components.building import fmus
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.simulation.runs.many_runs import run_many
+from orchestration.simulation.runs.many_runs import fly
 from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.file import load_system
@@ -125,7 +125,7 @@ def compare_means(system: System, found: Expected, runs: int) -> dict[str, tuple
     """By objective: the mean over runs, its standard error, and the expected value."""
     later = f"(time > {SETTLED} * stop_time) / (1 - {SETTLED})"
     counted = {name: f"mean(({_averaged(text)}) * {later})" for name, text in system.objectives.items()}
-    simulated = run_many(
+    simulated = fly(
         fmus.native_twins(dataclasses.replace(system, objectives=counted)),
         {"seed": np.arange(runs)},
         outputs=list(found.objectives),

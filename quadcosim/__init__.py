@@ -71,7 +71,7 @@ if TYPE_CHECKING:  # also what `__getattr__` finds public names by
     from orchestration.quadrotor.scenarios.translation import DisturbanceChoice, ReferenceChoice
     from orchestration.quadrotor.scenarios.vehicle import load_vehicle
     from orchestration.simulation.runs.flights import Flights
-    from orchestration.simulation.runs.many_runs import run_many as fly
+    from orchestration.simulation.runs.many_runs import fly
     from orchestration.simulation.runs.outcome import RunInterrupted, RunLost
     from orchestration.simulation.runs.pause import resume
     from orchestration.simulation.runs.pause import run_until as fly_until

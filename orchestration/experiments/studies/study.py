@@ -68,7 +68,7 @@ class Study:
         listed = [axis.name for axis in self.axes if axis.values is not None]
         if self.repeat is not None and self.repeat not in listed:
             raise UsageError(
-                f"design.repeat = {self.repeat}: {expected_name(self.repeat, listed)}, an axis with values"
+                f"design.repeat = {self.repeat}: {expected_name(self.repeat, listed)}, an axis with values or a number"
             )
         for each in self.together:
             if not set(each.axes) <= set(names):

@@ -67,8 +67,8 @@ class Flights(Mapping[str, Any]):
         """The outputs and what was recorded, over the axes of the given values, as a Dataset with units.
 
         An axis along which alone a single path varies has its name and values; others are called
-        `run`, or `axis_0` and so on. Rows have the dimension `time` if all runs have the same times, else `row`. Raises
-        `QuadcosimError` where xarray is not installed.
+        `run`, or `axis_0` and so on. Rows have the dimension `time` if the runs have the same times, as far as
+        they go, else `row`. Raises `QuadcosimError` where xarray is not installed.
         """
         import xarray as xr
 
@@ -77,9 +77,10 @@ class Flights(Mapping[str, Any]):
         variables = {name: (names, array) for name, array in self._outputs.items()}
         if self.recorded:
             time = self.arrays["time"].reshape(-1, self.arrays["time"].shape[-1])
-            is_common = bool((time == time[0]).all())
+            longest = time[np.isfinite(time[:, -1]).argmax()]
+            is_common = bool(((time == longest) | np.isnan(time)).all())
             rows = (*names, "time" if is_common else "row")
-            coordinates["time"] = ("time", time[0]) if is_common else (rows, self.arrays["time"])
+            coordinates["time"] = ("time", longest) if is_common else (rows, self.arrays["time"])
             variables |= {name: (rows, self.arrays[name]) for name in self.recorded if name != "time"}
         dataset = xr.Dataset(variables, coordinates)
         for name, unit in self.units.items():

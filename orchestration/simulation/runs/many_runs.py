@@ -31,7 +31,7 @@ from orchestration.systems.system.request import errors_in_own_terms
 _NOTES = logging.getLogger("quadcosim")
 
 
-def run_many(
+def fly(
     request: RequestLike,
     values: Mapping[str, Any],
     *,
@@ -47,7 +47,8 @@ def run_many(
     is `()`. `outputs` are names of objectives, or of `outcome`, `good`, `horizon` [s], `diverged`, `divergence_time`
     [s] and `steps`; default: all of them. `metrics` are objectives of your own by name, as expressions of the language
     of objectives. `record` are columns whose rows are kept, with their `time`
-    [s], along one axis more. Numbers are float64, truth values 0.0 and 1.0, outcomes words.
+    [s], along one axis more. Numbers are float64, outcomes words; truth values are booleans, or 0.0 and 1.0
+    where some run has none.
 
     Native FMUs run in lanes of vector registers where this machine has a C compiler and the FMUs have code for lanes,
     else each run is one of `run`. So it is with FMUs that were not built here from this project's sources, whose runs
@@ -108,7 +109,7 @@ class _Table:
     @property
     def arrays(self) -> dict[str, Any]:
         """All of them by name."""
-        outputs = {name: np.asarray(column).reshape(self._shape) for name, column in self._outputs.items()}
+        outputs = {name: _booleans(name, column).reshape(self._shape) for name, column in self._outputs.items()}
         return outputs | {name: rows.reshape(*self._shape, -1) for name, rows in zip(self.recorded, self._rows)}
 
     def put(self, run: _RunRow) -> None:
@@ -122,6 +123,12 @@ class _Table:
             if longer > 0:
                 self._rows = np.pad(self._rows, ((0, 0), (0, 0), (0, longer)), constant_values=np.nan)
             self._rows[:, run.place, : len(run.rows[0])] = run.rows
+
+
+def _booleans(name: str, column: Any) -> Any:
+    """The column of an output: truth values as such, if each run has one, so that they choose among the runs."""
+    is_of_truth = name in ("good", "diverged") and not np.isnan(column).any()
+    return np.asarray(column, dtype=np.bool_ if is_of_truth else None)
 
 
 def _in_lanes(runs: Columns, parameters: Mapping[str, float], record: Sequence[str]) -> Iterator[_RunRow]:

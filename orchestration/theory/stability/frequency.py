@@ -15,7 +15,6 @@ from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.processes.passable import passable
 from orchestration.simulation.requests.request import RequestLike, request_of
-from orchestration.simulation.workers.choice import single_run_execution
 from orchestration.systems.system.distribution import lowest
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
@@ -121,8 +120,7 @@ def bode(request: RequestLike, component: str | None = None) -> Bode:
 
     Raises `UsageError` as `linearise`, and for a loop whose stability rounding may decide.
     """
-    loaded, _ = single_run_execution(request_of(request), "auto")
-    return in_isolation(loaded, _bode, component)
+    return in_isolation(request, _bode, component)
 
 
 def expect_decided(loop: Linearised) -> None:

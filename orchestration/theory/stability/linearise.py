@@ -14,6 +14,7 @@ from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.foundation.processes.passable import passable
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.runs.replacement import component_named
+from orchestration.simulation.workers.choice import single_run_execution
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
@@ -59,8 +60,8 @@ def linearise(request: RequestLike, component: str | None = None) -> Linearised:
 
 
 def in_isolation(request: RequestLike, find: Callable[[Request, str | None], Found], component: str | None) -> Found:
-    """What `find` says of a request and a component, in a process that may load its FMUs."""
-    loaded = request_of(request)
+    """What `find` says of a request and a component, in a process that may load its FMUs, or their native twins."""
+    loaded, _ = single_run_execution(request_of(request), "auto")
     with errors_in_own_terms(loaded):
         files = files_of(system_of(loaded))
     return isolated_call(files.fmus.values(), find, loaded, component)

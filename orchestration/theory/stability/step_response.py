@@ -9,8 +9,7 @@ import numpy as np
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.simulation.requests.request import RequestLike, request_of
-from orchestration.simulation.workers.choice import single_run_execution
+from orchestration.simulation.requests.request import RequestLike
 from orchestration.theory.stability.frequency import closed_loop, expect_decided, receivers_of
 from orchestration.theory.stability.linearise import Linearised, linearise
 
@@ -87,8 +86,7 @@ def step(request: RequestLike, component: str | None = None) -> Step:
 
     Raises `UsageError` as `linearise`, and for a loop that is unstable.
     """
-    loaded, _ = single_run_execution(request_of(request), "auto")
-    loop = linearise(loaded, component)
+    loop = linearise(request, component)
     expect_decided(loop)
     if loop.radius > 1.0:
         raise UsageError(f"step: expected a stable loop; the spectral radius of this one is {loop.radius:.6g}")
@@ -98,7 +96,7 @@ def step(request: RequestLike, component: str | None = None) -> Step:
     responses = _responses(A, steps, commands, float(np.abs(np.linalg.eigvals(A)).max(initial=0.0)))
     times: Floats = loop.rest.dt * np.arange(responses.shape[1], dtype=float)
     final = -np.diag(commands @ np.linalg.solve(np.eye(len(A)) - A, steps))
-    found = (_figures(loop, loaded, i, times, responses[i], float(final[i])) for i in range(len(commands)))
+    found = (_figures(loop, request, i, times, responses[i], float(final[i])) for i in range(len(commands)))
     return Step(dt=loop.rest.dt, loops=tuple(found), times=times, responses=responses)
 
 

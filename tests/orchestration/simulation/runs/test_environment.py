@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import solve_discrete_are
 
 import quadcosim
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
@@ -114,6 +115,41 @@ def test_environments_in_lanes_have_the_episodes_of_each_alone() -> None:
 def far(random: np.random.Generator) -> dict[str, float]:
     """Starts of which some diverge before the end."""
     return {X: random.uniform(80.0, 98.0), "plant.initial.velocity.x": 100.0}
+
+
+@needs_compiler
+def test_an_lqr_policy_from_the_linearised_loop_comes_to_hover_from_everywhere_near() -> None:
+    hover = NATIVE.with_changes(stop_time=3.0, timing={"period": 0.02}, reference={"name": "hover"})
+    rest, input_cost = quadcosim.linearise(hover).rest, 0.1 * np.eye(4)
+    measurement_cost = np.diag([4.0] * 3 + [1.0] * 3 + [10.0] * 3 + [0.0] + [0.1] * 3)
+    P = solve_discrete_are(rest.A, rest.B, rest.C.T @ measurement_cost @ rest.C, input_cost)
+    gain = np.linalg.solve(input_cost + rest.B.T @ P @ rest.B, rest.B.T @ P @ rest.A) @ np.linalg.pinv(rest.C)
+    level = np.eye(13)[rest.outputs.index("quaternion.w")]
+    many = gymnasium.make_vec("quadcosim/Quadrotor-v0", num_envs=16, scenario=hover, starts=near)
+    observation, _ = many.reset(seed=0)
+    total, over = np.zeros(16), np.zeros(16, np.bool_)
+    while not over.any():
+        command = np.array([9.81, 0.0, 0.0, 0.0]) - (observation[:, :13] - level) @ gain.T
+        observation, got, terminated, truncated, _ = many.step(command)
+        total, over = total + got, terminated | truncated
+    many.close()
+    assert truncated.all()
+    assert not observation[:, 13:].any()  # the reference: the origin
+    assert np.linalg.norm(observation[:, :3], axis=1).max() < 0.05
+    assert total.min() > 100.0  # of 150
+
+
+def near(random: np.random.Generator) -> dict[str, float]:
+    return {f"plant.initial.position.{axis}": random.uniform(-1.0, 1.0) for axis in "xyz"}
+
+
+@needs_compiler
+def test_your_commands_stand_in_for_a_law_that_follows_a_reference() -> None:
+    one = gymnasium.make("quadcosim/Quadrotor-v0", scenario=SHORT.with_changes(reference={"name": "hover"}))
+    observation, _ = one.reset(seed=0)
+    assert observation.shape == (16,)
+    assert not observation[13:].any()
+    one.close()
 
 
 @needs_compiler
