@@ -3,7 +3,7 @@
 import ctypes
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from io import BytesIO
 from pathlib import Path
@@ -235,6 +235,11 @@ class AdaptedInstance(StepsWithEnd):
         begin = 8 + int.from_bytes(state[:8], "little")
         super().restore(state[begin:])
         self.restore_own(state[8:begin])
+
+    def slopes(self, outputs: Sequence[str], inputs: Sequence[str]) -> Floats | None:
+        """As `NativeInstance`, of an FMU that has left event mode."""
+        self._do("settle")
+        return super().slopes(outputs, inputs)
 
     def own_state(self) -> bytes:
         """What `adapter.c` knows beside the state of the FMU, which leaves event mode."""

@@ -101,6 +101,11 @@ class IsolatedInstance(Instance):
             return super().take_events()
         return np.frombuffer(self._exchange([("take_events",)]))
 
+    def slopes(self, outputs: Sequence[str], inputs: Sequence[str]) -> Floats | None:
+        """As any instance."""
+        content = self._request("slopes", tuple(outputs), tuple(inputs)) if self.model.has_slopes else None
+        return None if content is None else np.frombuffer(content).reshape(len(outputs), len(inputs))
+
     def close(self) -> None:
         """End the process."""
         self.failed = True

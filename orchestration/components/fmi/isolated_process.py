@@ -45,6 +45,11 @@ class _Server:
         assert self.instance is not None
         return self.instance.take_events().tobytes()
 
+    def _slopes(self, outputs: tuple[str, ...], inputs: tuple[str, ...]) -> bytes | None:
+        assert self.instance is not None
+        found = self.instance.slopes(outputs, inputs)
+        return None if found is None else found.tobytes()
+
     def _reader(self, names: tuple[str, ...]) -> None:
         assert self.instance is not None
         values: Floats = np.zeros(len(names))

@@ -226,6 +226,16 @@ class NativeInstance(Instance):
 
         return self._registered(write, "Set", parts, source)
 
+    def slopes(self, outputs: Sequence[str], inputs: Sequence[str]) -> Floats | None:
+        """As `Simulator`: directional derivatives, of scalars."""
+        of, by = ([self.variable(name) for name in names] for names in (outputs, inputs))
+        if not self.model.has_slopes or any(v.length or v.type not in ("Real", "Float64") for v in (*of, *by)):
+            return None
+        unknowns, counts = [v.reference for v in of], {"nSensitivity": len(of)} if self.counts_values else {}
+        columns = [self._call("getDirectionalDerivative", unknowns, [v.reference], [1.0], **counts) for v in by]
+        found: Floats = np.array(columns, dtype=np.float64).T
+        return found
+
     def set(self, name: str, value: Value) -> None:
         """Set one variable, converted to its type; raises `UsageError` for an invalid value."""
         self._expect_alive()

@@ -184,6 +184,14 @@ class Model:
         """Whether its state can be saved as bytes and restored."""
         return bool(self.capabilities.canGetAndSetFMUstate and self.capabilities.canSerializeFMUstate)
 
+    @cached_property
+    def has_slopes(self) -> bool:
+        """Whether it offers directional derivatives as it is called."""
+        interface = "ModelExchange" if self.interface == "model-exchange" else "CoSimulation"
+        element = read_root(read_archive(self.path, math.inf)).find(interface)  # fmpy does not read that of FMI 3.0
+        name = f"providesDirectionalDerivative{'s' if self.version == 3 else ''}"
+        return element is not None and element.get(name) in ("true", "1")
+
     @property
     def once_per_process(self) -> bool:
         """Whether a process can have one instance only."""

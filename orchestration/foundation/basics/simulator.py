@@ -34,6 +34,10 @@ class Simulator(Protocol):
         Raises `StoppedStepError` for a model that ends the run, or discards the step.
         """
 
+    def slopes(self, outputs: Sequence[str], inputs: Sequence[str]) -> Floats | None:
+        """d(outputs)/d(inputs) where it is, a row for each output; None: it does not know them."""
+        return None
+
     def save(self) -> bytes:
         """The whole state, serialised."""
 

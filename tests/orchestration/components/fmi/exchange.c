@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Value references: time is 0, X and DX two each, Y is p·u + q·w + x, C counts. */
+/* Value references: time is 0, X and DX two each, Y is p·u + q·w + x, of a curve p·u³ + q·w² + START, C counts. */
 enum { T, X1, X2, DX1, DX2, U, W, P, Q, Y, START, PERIOD, COUNT = 20, UPDATES, MISUSED, TICKS, CLOCK = 30, JOBS = 40 };
 
 typedef struct {
@@ -20,10 +20,10 @@ typedef struct {
     double next;
 } Model;
 
-static const char *kinds[] = {"integrator", "ball", "stair", "oscillator", "gain", "restless", "busy", "law", "clocks", NULL};
-enum { INTEGRATOR, BALL, STAIR, OSCILLATOR, GAIN, RESTLESS, BUSY, LAW, CLOCKS };
+static const char *kinds[] = {"integrator", "ball", "stair", "oscillator", "gain", "curve", "restless", "busy", "law", "clocks", NULL};
+enum { INTEGRATOR, BALL, STAIR, OSCILLATOR, GAIN, CURVE, RESTLESS, BUSY, LAW, CLOCKS };
 
-static int states_of(const Model *m) { return m->kind == STAIR || m->kind == GAIN || m->kind >= BUSY ? 0 : 2; }
+static int states_of(const Model *m) { return m->kind == STAIR || m->kind == GAIN || m->kind == CURVE || m->kind >= BUSY ? 0 : 2; }
 static int crossings_of(const Model *m) { return m->kind == BALL || m->kind == RESTLESS; }
 
 static void *make(const char *guid) {
@@ -44,6 +44,7 @@ static void evaluate(Model *m) {
     if (m->kind == CLOCKS) return;
     if (!m->mode) v[X1] = v[START];
     v[Y] = v[P] * v[U] + v[Q] * v[W] + (m->kind == GAIN || m->kind == LAW ? 0 : v[X1]);
+    if (m->kind == CURVE) v[Y] = v[P] * v[U] * v[U] * v[U] + v[Q] * v[W] * v[W] + v[START];
     v[DX1] = v[X2];
     if (m->kind == BALL) v[DX2] = v[X2] == 0 && v[X1] <= DBL_MIN ? 0 : -9.81;
     else if (m->kind == OSCILLATOR) v[DX2] = v[P] * (1 - v[X1] * v[X1]) * v[X2] - v[X1];
@@ -98,6 +99,12 @@ static int enter(Model *m, int from, int to) {
     m->mode = to;
     return 0;
 }
+/* Of curves; count says how often. */
+static int differentiate(Model *m, uint32_t r, double seed, double *out) {
+    m->count++;
+    *out = seed * (r == U ? 3 * m->v[P] * m->v[U] * m->v[U] : 2 * m->v[Q] * m->v[W]);
+    return m->mode == 2 || !m->mode ? 0 : 3;
+}
 static int indicate(Model *m, double *z, size_t n) {
     if (n) z[0] = m->v[X1];
     return 0;
@@ -150,6 +157,11 @@ int fmi3UpdateDiscreteStates(Model *m, bool *again, bool *ends, bool *nominals, 
     if (m->mode != 1) return 3;
     update(m, again, ends, has, next);
     return 0;
+}
+int fmi3GetDirectionalDerivative(
+    Model *m, const uint32_t *of, size_t n, const uint32_t *by, size_t k, const double *seed, size_t s, double *out,
+    size_t c) {
+    return differentiate(m, *by, *seed, out);
 }
 int fmi3SetTime(Model *m, double t) { m->v[T] = t; return 0; }
 int fmi3SetContinuousStates(Model *m, const double *x, size_t n) { memcpy(m->v + X1, x, n * 8); return 0; }
@@ -229,6 +241,10 @@ int fmi2NewDiscreteStates(Model *m, Info *info) {
     info->again = again, info->ends = ends, info->has_next = has_next, info->nominals = info->values = 0;
     return 0;
 }
+int fmi2GetDirectionalDerivative(
+    Model *m, const uint32_t *of, size_t n, const uint32_t *by, size_t k, const double *seed, double *out) {
+    return differentiate(m, *by, *seed, out);
+}
 int fmi2SetTime(Model *m, double t) { return fmi3SetTime(m, t); }
 int fmi2SetContinuousStates(Model *m, const double *x, size_t n) { return fmi3SetContinuousStates(m, x, n); }
 int fmi2GetContinuousStates(Model *m, double *x, size_t n) { return fmi3GetContinuousStates(m, x, n); }
@@ -250,7 +266,6 @@ int fmi2DeSerializeFMUstate(Model *m, const uint8_t *from, size_t n, void **s) {
 /* What FMI asks for and nobody here calls. */
 #define UNUSED(name) int name(void) { return 3; }
 UNUSED(fmi2GetBoolean)
-UNUSED(fmi2GetDirectionalDerivative)
 UNUSED(fmi2GetString)
 UNUSED(fmi2SetBoolean)
 UNUSED(fmi2SetInteger)
@@ -262,7 +277,6 @@ UNUSED(fmi3GetAdjointDerivative)
 UNUSED(fmi3GetBinary)
 UNUSED(fmi3GetBoolean)
 UNUSED(fmi3GetClock)
-UNUSED(fmi3GetDirectionalDerivative)
 UNUSED(fmi3GetFloat32)
 UNUSED(fmi3GetInt16)
 UNUSED(fmi3GetInt64)

@@ -99,23 +99,27 @@ _FMI2 = """<fmiModelDescription fmiVersion="2.0" modelName="{name}" guid="{guid}
 </fmiModelDescription>"""
 
 
-def exchange(folder: Path, kind: str, *, fmi: int = 3, event_mode: bool = False) -> Path:
-    """The FMU of a model of `exchange.c` in `folder`, for model exchange, or with `event_mode` for co-simulation."""
-    path = folder / f"{kind}{fmi}{'_events' if event_mode else ''}.fmu"
+def exchange(folder: Path, kind: str, *, fmi: int = 3, event_mode: bool = False, slopes: bool = False) -> Path:
+    """The FMU of a model of `exchange.c` in `folder`, for model exchange, or with `event_mode` for co-simulation.
+
+    `slopes`: it offers directional derivatives.
+    """
+    path = folder / f"{kind}{fmi}{'_events' if event_mode else ''}{'_slopes' if slopes else ''}.fmu"
     flags = "State" if fmi == 3 else "state"
     saves = f'canGetAndSetFMU{flags}="true" canSerializeFMU{flags}="true"'
     if event_mode:
         more = 'canHandleVariableCommunicationStepSize="true" hasEventMode="true"'
         interfaces = f'<CoSimulation modelIdentifier="{kind}" {saves} {more}/>'
     else:
-        interfaces = f'<ModelExchange modelIdentifier="{kind}" {saves}/>'
+        derivatives = f"providesDirectionalDerivative{'s' if fmi == 3 else ''}"
+        interfaces = f'<ModelExchange modelIdentifier="{kind}" {saves} {derivatives}="{str(slopes).lower()}"/>'
     crossings, has_states = _CROSSINGS.get(kind, 0), kind in _STATES
     if fmi == 3:
         states = '\n    <ContinuousStateDerivative valueReference="3"/><ContinuousStateDerivative valueReference="4"/>'
         states = states * has_states + '<EventIndicator valueReference="1"/>' * crossings
     else:
         states = '<Derivatives><Unknown index="3"/><Unknown index="4"/></Derivatives>' * has_states
-    feeds = "5 6" if kind == "gain" else ""
+    feeds = "5 6" if kind in ("gain", "curve") else ""
     text = (_FMI3 if fmi == 3 else _FMI2).format(
         name=kind.capitalize(), guid=kind, interfaces=interfaces, states=states, crossings=crossings, feeds=feeds,
         start=2 if kind == "oscillator" else 1, p=0.7 if kind == "ball" else 1,

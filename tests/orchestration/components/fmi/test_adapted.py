@@ -155,6 +155,18 @@ def test_a_value_that_is_set_is_seen_by_the_outputs_at_once(tmp_path: Path) -> N
         assert updates == before
 
 
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_the_slopes_of_an_output_are_those_that_the_fmu_offers(fmi: int, tmp_path: Path) -> None:
+    for load in (open_here, IsolatedInstance):
+        with load(exchange(tmp_path, "curve", fmi=fmi, slopes=True), "it") as it:
+            it.set("p", 0.5)
+            it.set("q", 3.0)
+            it.initialise(("u", "w"), np.array([2.0, -1.0]))
+            assert np.asarray(it.slopes(("y",), ("u", "w"))).tolist() == [[6.0, -6.0]]
+        with load(exchange(tmp_path, "curve", fmi=fmi), "it") as without:
+            assert without.slopes(("y",), ("u",)) is None
+
+
 def test_an_interface_that_is_not_offered_is_refused_by_name(tmp_path: Path) -> None:
     what = r"^components.it.interface = co-simulation: Ball does not offer it; expected model-exchange$"
     with pytest.raises(UsageError, match=what):

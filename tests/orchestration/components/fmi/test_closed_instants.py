@@ -42,9 +42,56 @@ def test_a_loop_is_closed_at_each_instant(fmi: int, d1: float, d2: float, tmp_pa
 
 
 def test_a_loop_that_has_no_values_is_named_with_what_was_found(tmp_path: Path) -> None:
-    found = r"loop a.y -> b.u; b.y -> a.u: after 100 exchanges and 50 with secants, b.u = \S+ becomes \S+; a.u"
+    after = "after 100 exchanges, 50 with secants and Newton's method from 10 values"
+    found = rf"loop a.y -> b.u; b.y -> a.u: {after}, b.u = \S+ becomes \S+; a.u"
     with pytest.raises(SimulatorError, match=found):
         quadcosim.run(gains(tmp_path, *RING, a=2.0, b=0.5), in_process=True)
+
+
+def curves(fmu: Path, *connections: tuple[str, str], **factors: tuple[float, float, float]) -> dict[str, Any]:
+    """Components y = p u³ + q w² + s with these p, q, s."""
+    components = {
+        name: {"fmu": str(fmu), "step": 0.1, "parameters": {"p": p, "q": q, "start": s}}
+        for name, (p, q, s) in factors.items()
+    }
+    wires = [{"from": [start], "to": [end]} for start, end in connections]
+    return {"stop_time": 0.2, "components": components, "connections": wires}
+
+
+@pytest.mark.parametrize(("fmi", "slopes"), [(2, False), (2, True), (3, False), (3, True)])
+def test_a_steep_loop_of_two_values_is_closed(fmi: int, slopes: bool, tmp_path: Path) -> None:
+    fmu = exchange(tmp_path, "curve", fmi=fmi, slopes=slopes)
+    rows = quadcosim.run(
+        curves(fmu, *RING, a=(2.0, 0.0, 1.5 + 2.0 * 0.8**3), b=(-1.5, 0.0, 1.5 * 1.5**3 - 0.8)), in_process=not slopes
+    ).signals
+    assert rows["a.y"] == pytest.approx(1.5, rel=1e-11)
+    assert rows["b.y"] == pytest.approx(-0.8, rel=1e-11)
+    assert bool(rows["a.count"][-1] > 1) is slopes  # how often it was asked for derivatives
+
+
+@pytest.mark.parametrize("slopes", [False, True])
+def test_a_bent_loop_of_five_values_is_closed(slopes: bool, tmp_path: Path) -> None:
+    names, y = "abcde", [1.2, -0.7, 0.5, 1.4, -1.1]
+    p, q = [0.9, -1.1, 0.8, 1.3, -0.6], [0.7, -0.4, 0.5, -0.8, 0.6]
+    factors = {
+        name: (p[i], q[i], y[i] - p[i] * y[i - 1] ** 3 - q[i] * y[(i + 1) % 5] ** 2) for i, name in enumerate(names)
+    }
+    wires = [(f"{names[i - 1]}.y", f"{name}.u") for i, name in enumerate(names)]
+    wires += [(f"{names[(i + 1) % 5]}.y", f"{name}.w") for i, name in enumerate(names)]
+    system = curves(exchange(tmp_path, "curve", slopes=slopes), *wires, **factors)
+    rows = quadcosim.run(system, in_process=True).signals
+    found = [rows[f"{name}.y"][-1] for name in names]
+    for i, (of_u, of_w, start) in enumerate(factors.values()):
+        assert of_u * found[i - 1] ** 3 + of_w * found[(i + 1) % 5] ** 2 + start == pytest.approx(found[i], rel=1e-10)
+
+
+@pytest.mark.parametrize("slopes", [False, True])
+def test_a_bent_loop_without_values_is_named(slopes: bool, tmp_path: Path) -> None:
+    system = curves(
+        exchange(tmp_path, "curve", slopes=slopes), ("a.y", "b.w"), ("b.y", "a.w"), a=(0.0, 1.0, 1.0), b=(0.0, 1.0, 1.0)
+    )
+    with pytest.raises(SimulatorError, match=r"no values found around the loop a.y -> b.w; b.y -> a.w: after 100 exch"):
+        quadcosim.run(system, in_process=True)
 
 
 def test_a_chain_has_no_lag_and_both_engines_give_its_rows(tmp_path: Path) -> None:

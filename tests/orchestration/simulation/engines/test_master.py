@@ -146,6 +146,6 @@ def test_secants_find_the_values_of_a_nonlinear_loop_of_vectors():
 def test_a_loop_without_a_solution_is_an_error_that_names_it_and_what_was_found():
     stubs = {name: Direct(lambda u: 1.0 + u, u=0.0, y=0.0) for name in "ab"}
     with pytest.raises(
-        SimulatorError, match=r"loop a.y -> b.u; b.y -> a.u: .* exchanges .* b.u = \S+ becomes \S+; a.u"
+        SimulatorError, match=r"loop a.y -> b.u; b.y -> a.u: .* exchanges, .* b.u = \S+ becomes \S+; a.u"
     ):
         run(RING, stubs, first_exchange=((0, 1),))
