@@ -227,7 +227,7 @@ class NativeInstance(Instance):
         return self._registered(write, "Set", parts, source)
 
     def slopes(self, outputs: Sequence[str], inputs: Sequence[str]) -> Floats | None:
-        """As `Simulator`: directional derivatives, of scalars."""
+        """As `Differentiable`: directional derivatives, of scalars."""
         of, by = ([self.variable(name) for name in names] for names in (outputs, inputs))
         if not self.model.has_slopes or any(v.length or v.type not in ("Real", "Float64") for v in (*of, *by)):
             return None

@@ -81,7 +81,9 @@ def live(
     loaded = default_request() if request is None else request_of(request)
     with errors_in_own_terms(loaded):
         system = located(loaded.as_system())
-        models = {each: read_model(Path(component.fmu)) for each, component in system.components.items()}
+        models = {
+            each: read_model(Path(component.fmu), component.access) for each, component in system.components.items()
+        }
         check(system, models)
         given = reason(connect_references(system, models))
         chosen = _chosen(loaded, system, models, vary, map, given)

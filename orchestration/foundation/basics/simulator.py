@@ -1,7 +1,7 @@
 """The protocol between the master and a simulator: an FMU behind an adapter, or a stub in a test."""
 
 from collections.abc import Callable, Sequence
-from typing import Protocol, TypeAlias
+from typing import Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -34,12 +34,16 @@ class Simulator(Protocol):
         Raises `StoppedStepError` for a model that ends the run, or discards the step.
         """
 
-    def slopes(self, outputs: Sequence[str], inputs: Sequence[str]) -> Floats | None:
-        """d(outputs)/d(inputs) where it is, a row for each output; None: it does not know them."""
-        return None
-
     def save(self) -> bytes:
         """The whole state, serialised."""
 
     def restore(self, state: bytes) -> None:
         """Restore a state returned by `save`."""
+
+
+@runtime_checkable
+class Differentiable(Protocol):
+    """A simulator that may know derivatives."""
+
+    def slopes(self, outputs: Sequence[str], inputs: Sequence[str]) -> Floats | None:
+        """d(outputs)/d(inputs) where it is, a row for each output; None: it does not know them."""

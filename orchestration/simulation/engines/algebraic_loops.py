@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from orchestration.foundation.basics.errors import SimulatorError
-from orchestration.foundation.basics.simulator import Booleans, Floats
+from orchestration.foundation.basics.simulator import Booleans, Differentiable, Floats
 from orchestration.simulation.engines import initial
 from orchestration.simulation.engines.initial import Dependencies
 from orchestration.simulation.engines.wiring_by_index import Wires
@@ -182,7 +182,9 @@ class AlgebraicLoop:
         for name in dict.fromkeys(each.sender for each in x):
             outputs = list(dict.fromkeys(start for start, _ in starts if component_of(start) == name))
             inputs = [end for end in ends if component_of(end) == name]
-            found = self._running.simulators[name].slopes([*map(variable_of, outputs)], [*map(variable_of, inputs)])
+            simulator, found = self._running.simulators[name], None
+            if isinstance(simulator, Differentiable):
+                found = simulator.slopes([*map(variable_of, outputs)], [*map(variable_of, inputs)])
             if found is None:
                 return None
             known |= dict(zip(itertools.product(outputs, inputs), found.ravel().tolist()))

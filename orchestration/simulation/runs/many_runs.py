@@ -60,7 +60,9 @@ def fly(
     loaded = request_of(request)
     with errors_in_own_terms(loaded):
         system = _measured(located(loaded.as_system()), metrics)
-        models = {name: read_model(Path(component.fmu)) for name, component in system.components.items()}
+        models = {
+            name: read_model(Path(component.fmu), component.access) for name, component in system.components.items()
+        }
         check(system, models)
         system = connect_references(system, models)
         fits = check_against_fmus(_recording(system, models, record), models)

@@ -109,7 +109,7 @@ def _expect_lanes(system: System, files: Files) -> None:
 
 
 def _compile_lanes(system: System) -> None:
-    models = {name: read_model(Path(component.fmu)) for name, component in system.components.items()}
+    models = {name: read_model(Path(each.fmu), each.access) for name, each in system.components.items()}
     expect_lanes(check_against_fmus(system, models).system, models)
 
 

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from orchestration.foundation.basics.simulator import Floats, Simulator, Transfer
+from orchestration.foundation.basics.simulator import Floats, Transfer
 
 
-class LinearSimulator(Simulator):
+class LinearSimulator:
     """A linear simulator that begins at rest: its state, and its exchange with a master."""
 
     def __init__(self, inputs: Sequence[str], outputs: Sequence[str], states: int) -> None:

@@ -97,7 +97,9 @@ class Batches:
 
     def _batch_of(self, key: Hashable, system: System) -> tuple[Shape, Batch]:
         if key not in self._shapes:
-            models = {name: read_model(Path(component.fmu)) for name, component in system.components.items()}
+            models = {
+                name: read_model(Path(component.fmu), component.access) for name, component in system.components.items()
+            }
             shape = Shape(system=check_against_fmus(system, models).system, models=models, lanes=self._lanes)
             self._shapes[key] = shape, Batch(shape, self._schedules)
         return self._shapes[key]

@@ -41,6 +41,10 @@ def component(name: str, model: Model, lanes: int, *, several: bool) -> Lanes:
 def sources_of(name: str, model: Model) -> Mapping[str, bytes]:
     """The sources of a component's lanes; raises `UsageError` naming it if its FMU has none."""
     sources = _sources_in(model.path, model.path.stat().st_mtime_ns)
+    if model.interface != "co-simulation":
+        raise UsageError(
+            f"components.{name}.interface = {model.interface}: expected co-simulation for one of many at once"
+        )
     if MAIN not in sources or model.version != 2:
         raise UsageError(
             f"components.{name}: {model.path.name}: expected a native FMU of this project's kit, as quadcosim build "

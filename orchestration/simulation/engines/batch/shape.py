@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from fmu_kit.compiler.pack.lanes import Lanes
 from orchestration.components.fmi.read_description import Model, Variable
+from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.identity import IdentityCache
 from orchestration.foundation.basics.simulator import Booleans
 from orchestration.simulation.engines import initial
@@ -41,7 +42,7 @@ _SIGNAL = re.compile(r"SIGNAL\((\d+), (\d+)\)")
 def outline(system: System) -> Hashable:
     """The key that systems must have in common to be run in one batch."""
     components = tuple(
-        (name, c.fmu, c.record, c.sampling and c.sampling.clock) for name, c in system.components.items()
+        (name, c.fmu, c.access, c.record, c.sampling and c.sampling.clock) for name, c in system.components.items()
     )
     others = _outline_between(system.connections, system.sources, system.networks, system.objectives)
     return components, others, system.optional, system.criterion
@@ -119,7 +120,12 @@ class Shape:
         return self.models[component_of(end)].variables[variable_of(end)]
 
     def place(self, end: str) -> tuple[int, int]:
-        """The component's index, and the place in its memory, of COMPONENT.VARIABLE."""
+        """The component's index, and the place in its memory, of COMPONENT.VARIABLE.
+
+        Raises `UsageError` for one that is none of its memory.
+        """
+        if variable_of(end) in self.models[component_of(end)].for_solvers:
+            raise UsageError(f"{end}: expected none of the variables that are for solvers, for one of many at once")
         return self.names.index(component_of(end)), self.variable(end).reference
 
     @cached_property
