@@ -64,9 +64,7 @@ def _warn_if_means_are_infinite(study: "Study") -> None:
     if study.base.kind not in LOOPS:
         files = study.files()
         first = range(min(len(study.points), FIRST))
-        exact.warn_if_means_are_infinite(
-            study.base, [study.system(i, files.start_values_of(study.origin)) for i in first], files
-        )
+        exact.warn_if_means_are_infinite(study.base, [study.system(i, files.start_values) for i in first], files)
 
 
 def status(study: StudyFile, out: Out = None) -> CommandResult:

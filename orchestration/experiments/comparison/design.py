@@ -8,7 +8,7 @@ from typing import Any
 from orchestration.components.building import fmus
 from orchestration.experiments.studies.axes import Axis, Value
 from orchestration.experiments.studies.linked_settings import Key, LinkedSettings
-from orchestration.experiments.studies.study import Study
+from orchestration.experiments.studies.study import StartValues, Study
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.records import record
 from orchestration.simulation.results.quantities import is_in_seconds
@@ -240,8 +240,8 @@ class Comparison:
         """The indices in the study of the runs of a cell."""
         return range(cell.index * len(self.initial_conditions), (cell.index + 1) * len(self.initial_conditions))
 
-    def request(self, index: int, starts: Mapping[str, float]) -> ControlLoop:
-        """A single run of the study as a request of the kind of the base; `starts` are the FMUs' default parameters."""
+    def request(self, index: int, starts: StartValues) -> ControlLoop:
+        """A single run of the study as a request of the kind of the base."""
         system = self.study.system(index, starts)
         targets = [*self.axis.targets, *(target for each in self.study.together for target in each.targets)]
         values = {target: value_at(system, path) for target in targets for path in self.base.paths_of(target)[:1]}

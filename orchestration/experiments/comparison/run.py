@@ -134,7 +134,7 @@ def rerun_cells(
     runs = [comparison.runs_of(comparison.cell(index)) for index in indices]
     comparison, files, how = _prepared(comparison, [of_cell[0] for of_cell in runs], engine)
     study = comparison.study
-    starts = files.start_values_of(study.origin)
+    starts = files.start_values
     systems = [study.system(i, starts) for i in chain(*runs)]
     with RunEvaluator(files, workers, how.engine) as pool:
         flights = pool.run_all(systems, in_lanes=how.in_lanes)
@@ -166,7 +166,7 @@ def flight(
     if not 0 <= start < len(runs):
         raise UsageError(f"--start {start}: expected a number from 0 to {len(runs) - 1}")
     comparison, files, how = _prepared(comparison, [runs[start]], engine)
-    request = comparison.request(runs[start], files.start_values_of(comparison.study.origin))
+    request = comparison.request(runs[start], files.start_values)
     keep_run(out, lambda to: fly(request, recorder=to, engine=how.engine), figures=figures)
 
 
@@ -182,7 +182,7 @@ def _prepared(
         study = replace(comparison, native=native).study
         files = study.files()
         with errors_in_own_terms(comparison.base):
-            systems = [study.system(index, files.start_values_of(study.origin)) for index in indices]
+            systems = [study.system(index, files.start_values) for index in indices]
             for system in systems:
                 check_against_fmus(system, files.models_of(system))
         return systems[0], files

@@ -42,7 +42,7 @@ def fastest(study: Study) -> tuple[Study, Files, bool]:
     def first(native: bool) -> tuple[System, Files]:
         variant = replace(study, native=native)
         files = variant.files()
-        return variant.system(0, files.start_values_of(variant.origin)), files
+        return variant.system(0, files.start_values), files
 
     how = choose_execution("auto", study.native, first)
     variant = replace(study, native=how.native)
@@ -54,16 +54,17 @@ def rerun(
     study: Study, files: Files, indices: Sequence[int], *, lanes: bool, progress: Progress | None = None
 ) -> Iterator[Rerun]:
     """Simulate runs of a study again by their indices; a run that fails is omitted."""
-    starts, paths = files.start_values_of(study.origin), {**files.fmus, **files.tables}
+    paths = {**files.fmus, **files.tables}
     batches, size = (Batches(), BATCH) if lanes else (None, 1)
     for first in range(0, len(indices), size):
         some = indices[first : first + size]
-        listed = [study.system(i, starts) for i in some]
+        listed = [study.system(i, files.start_values) for i in some]
         known = [connect_references(system, files.models_of(system)) for system in listed]
         systems, names = dict(zip(some, all_with_files(known, paths))), _columns(known, files)
         if batches is None:
             again = {index: _single_run(index, system, names) for index, system in systems.items()}
         else:
+            starts = {index: files.start_values_of(system) for index, system in zip(some, listed)}
             again = _in_lanes(systems, starts, batches, names)
         yield from (one for index in some if (one := again[index]) is not None)
         if progress is not None:
@@ -71,7 +72,7 @@ def rerun(
 
 
 def _in_lanes(
-    systems: Mapping[int, System], starts: Mapping[str, float], batches: Batches, names: Sequence[str]
+    systems: Mapping[int, System], starts: Mapping[int, Mapping[str, float]], batches: Batches, names: Sequence[str]
 ) -> dict[int, Rerun | None]:
     """The runs of systems by their indices, with the columns of these names; None for one that fails."""
     indices, listed = [*systems], [*systems.values()]
@@ -83,7 +84,7 @@ def _in_lanes(
             runs[index] = _single_run(index, system, names)
             continue
         signals = dict(zip(("time", *columns), rows.T.copy()))
-        signals |= _of_sources(system, starts, signals["time"])
+        signals |= _of_sources(system, starts[index], signals["time"])
         runs[index] = Rerun(
             index=index, system=system, signals=signals, metrics=summary.metrics, message=summary.message
         )

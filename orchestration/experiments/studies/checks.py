@@ -65,7 +65,7 @@ class _RunChecks:
         study = self._columns.study
         try:
             with errors_in_own_terms(study.base):
-                system = study.system(index, self._columns.starts)
+                system = study.system(index, self._columns.files.start_values)
                 self.systems.expect(system)
         except UsageError as error:
             return error

@@ -15,7 +15,7 @@ import numpy as np
 
 from orchestration.experiments.studies.axes import Axis, Value
 from orchestration.experiments.studies.run_key import KeyText
-from orchestration.experiments.studies.study import Study, names_fmu, product
+from orchestration.experiments.studies.study import Study, names_fmu
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Booleans, Floats, Integers
 from orchestration.simulation.workers.task import TaskBatch
@@ -162,7 +162,7 @@ class RunColumns:
         if kind not in self._kinds:
             if len(self._kinds) == MOST_KINDS:
                 self._kinds.clear()
-            system = self.study.system(index, self.starts)
+            system = self.study.system(index, self.files.start_values)
             names = [name for _, path, _ in self.open if (name := parameter_name(path)) is not None]
             self._kinds[kind] = _Made(system=system, key=KeyText(system, self.files, self.study.metrics, names))
         return self._kinds[kind]
@@ -185,7 +185,7 @@ class RunColumns:
             if not self._is_open(path) or any(type(value) is not kind for value in axis.values or (kind(),)):
                 return None
             try:
-                factors[path] = product(1.0, path, {}, study.origin, self.starts) if axis.multiplies else None
+                factors[path] = study.product(1.0, path, {}, self.files.start_values) if axis.multiplies else None
             except UsageError:  # every run is invalid
                 return None
         if any(path == _SEED for path in own) and not all(0 <= int(seed) < 2**63 for seed in axis.values or ()):

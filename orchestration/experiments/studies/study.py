@@ -15,12 +15,16 @@ from orchestration.foundation.basics.errors import UsageError, expected_name
 from orchestration.foundation.basics.records import record
 from orchestration.simulation.requests.ranges import paths_in
 from orchestration.simulation.results.own_metrics import OwnMetric
+from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.distribution import is_table, trace_path
 from orchestration.systems.system.files import Files, files_of
 from orchestration.systems.system.model import System
-from orchestration.systems.system.paths import changed, is_source_file, value_at
+from orchestration.systems.system.paths import changed, is_source_file, parameter_name, value_at
 from orchestration.systems.system.request import ControlLoop, Request, errors_in_own_terms, system_of
 from orchestration.systems.system.requirements import is_number
+
+StartValues = Mapping[str, Mapping[str, float]]
+"""The start values of FMUs, by FMU and name"""
 
 
 @record()
@@ -114,30 +118,46 @@ class Study:
         listed += [target for each in self.together for target in each.targets]
         return {target: paths_in(self.base, target) for target in dict.fromkeys(listed)}
 
-    def system(self, index: int, starts: Mapping[str, float]) -> System:
-        """The system of one run; `starts` are the FMUs' own parameters, as COMPONENT.NAME.
+    def system(self, index: int, starts: StartValues) -> System:
+        """The system of one run.
 
         Raises `UsageError` for an invalid value.
         """
         return self._system(self.points[index], starts)
 
-    def _system(self, point: Mapping[str, Value], starts: Mapping[str, float]) -> System:
+    def _system(self, point: Mapping[str, Value], starts: StartValues) -> System:
         changes: dict[str, Any] = {}
+        chosen = {
+            path: point[axis.name] for axis in self.axes for path in self.paths_of(axis.targets) if names_fmu(path)
+        }
         if self.vary_seed and "seed" not in point:
             changes["seed"] = _own_seed(self.origin.seed, point)
         with errors_in_own_terms(self.base):
             for axis in self.axes:
                 value = point[axis.name]
                 for path in self.paths_of(axis.targets):
-                    changes[path] = product(value, path, {}, self.origin, starts) if axis.multiplies else value
+                    changes[path] = self.product(value, path, chosen, starts) if axis.multiplies else value
             for each in self.together:
                 sets, multiplies = each.of(point)
                 changes |= {path: value for target, value in sets.items() for path in self._paths[target]}
                 for target, factor in multiplies.items():
                     for path in self._paths[target]:
-                        changes[path] = product(factor, path, changes, self.origin, starts)
+                        changes[path] = self.product(factor, path, changes, starts)
             system = changed(self.origin, changes)
         return native_twins(system) if self._varies_fmu else system
+
+    def product(self, value: Value, path: str, changes: Mapping[str, Any], starts: StartValues) -> float:
+        """`value` times the changed value at a path, else that of the base, else that of the FMU which the run has."""
+        if not isinstance(value, (int, float)):
+            raise UsageError(f"{path}: expected a number to multiply with, got {value}")
+        base = changes[path] if path in changes else value_at(self.origin, path)
+        if base is None and (name := parameter_name(path)) is not None:
+            component = component_of(name)
+            fmu = str(changes.get(f"components.{component}.fmu", self.origin.components[component].fmu))
+            base = starts.get(native_twin(fmu) if self.native else fmu, {}).get(variable_of(name))
+        if not is_number(base):
+            raise UsageError(f"{path}: expected a number of the base or of an FMU to multiply")
+        return float(value) * float(base)
 
     @cached_property
     def _varies_fmu(self) -> bool:
@@ -186,15 +206,3 @@ def _own_seed(seed: int, point: Mapping[str, Value]) -> int:
     """A seed determined by that of the base and the point only, so that a design may grow."""
     text = json.dumps([seed, dict(point)], sort_keys=True)
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:6], "big")
-
-
-def product(value: Value, path: str, changes: Mapping[str, Any], origin: System, starts: Mapping[str, float]) -> float:
-    """`value` times the changed value at a path, else that of the base, else that of its FMU."""
-    if not isinstance(value, (int, float)):
-        raise UsageError(f"{path}: expected a number to multiply with, got {value}")
-    base = changes[path] if path in changes else value_at(origin, path)
-    if base is None:
-        base = starts.get(path.removeprefix("components.").replace(".parameters.", ".", 1))
-    if not is_number(base):
-        raise UsageError(f"{path}: expected a number of the base or of an FMU to multiply")
-    return float(value) * float(base)

@@ -18,7 +18,7 @@ from orchestration.experiments.studies.lane_agreement import lane_agreement, wit
 from orchestration.experiments.studies.run_columns import TOGETHER, RunColumns
 from orchestration.experiments.studies.run_key import design_parts, difference, place_parts, study_parts
 from orchestration.experiments.studies.store_columns import UNITS
-from orchestration.experiments.studies.study import Study
+from orchestration.experiments.studies.study import StartValues, Study
 from orchestration.experiments.studies.swept import Swept
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
@@ -104,7 +104,7 @@ def sweep(
             if announce is not None and engine == "auto":
                 execution.tell(announce)
             all_files = with_python_twins(files) if execution.in_lanes else files
-            task_of = partial(_task, study, files.start_values_of(study.origin), time_limit)
+            task_of = partial(_task, study, files.start_values, time_limit)
             sample, chunk = Sample(), partial(chunks, total=len(missing), workers=workers)
             windows = _windows(opened, missing[:, 0])
             tasks: Iterable[RunTask | TaskBatch]
@@ -145,7 +145,7 @@ def prepare(study: Study, engine: EngineChoice) -> tuple[RunColumns, Execution, 
         candidate = replace(study, native=native)
         columns = RunColumns(candidate, candidate.files())
         candidates[native] = columns, check_design(columns)
-        return candidate.system(0, columns.starts), columns.files
+        return candidate.system(0, columns.files.start_values), columns.files
 
     no_lanes = "metrics that are functions need whole runs, one at a time" if study.metrics else None
     execution = choose_execution(engine, study.native, first, no_lanes=no_lanes)
@@ -233,7 +233,7 @@ def _in_lanes(
 
 def _task(
     study: Study,
-    starts: Mapping[str, float],
+    starts: StartValues,
     time_limit: float | None,
     index: int,
     key: str,
@@ -311,7 +311,7 @@ def _describe(opened: store.Store, columns: RunColumns) -> None:
 
 def _units(study: Study, files: Files) -> dict[str, str]:
     """The units of axes and metrics, as in the first run."""
-    first = study.system(0, files.start_values_of(study.origin))
+    first = study.system(0, files.start_values)
     models = files.models_of(first)
     of_axes = {
         axis.name: unit_at(paths_in(study.base, axis.targets[0])[0], models)

@@ -54,12 +54,19 @@ class Tuning(TuningProblem):
         return self.systems(self.periods[0], middle, replace(self.starts, count=1))[0], self.files()
 
     def systems(self, period: float, values: Mapping[str, float], starts: Starts) -> list[System]:
-        """The systems from an ensemble of initial conditions; raises `UsageError` for an invalid value."""
+        """The systems from an ensemble of initial conditions, each with its own seed, as in a comparison.
+
+        Raises `UsageError` for an invalid value.
+        """
         system = self.system(period, values)
         with errors_in_own_terms(self.base):
             return [
-                changed(system, {path: v for target, v in start.values.items() for path in self.base.paths_of(target)})
-                for start in self.base.initial_conditions(starts)
+                changed(
+                    system,
+                    {path: v for target, v in start.values.items() for path in self.base.paths_of(target)}
+                    | {"seed": self.base.seed + starts.first + index},
+                )
+                for index, start in enumerate(self.base.initial_conditions(starts))
             ]
 
     def judging_ensemble(self) -> Starts:

@@ -145,7 +145,7 @@ def test_a_comparison_judges_it_as_single_runs_do_by_any_engine(scenario: Scenar
 
 def flown_alone(comparison: Comparison, cell: int) -> tuple[int, int]:
     """How many starts of a cell survive and settle, each flown as `run` flies a scenario."""
-    starts = comparison.study.files().start_values_of(comparison.study.origin)
+    starts = comparison.study.files().start_values
     with errors_in_own_terms(comparison.base):
         metrics = [
             run(comparison.request(i, starts)).metrics for i in comparison.runs_of(comparison.cell(cell))

@@ -106,8 +106,8 @@ def swept(chosen: Study, folder: Path, **options: Any) -> Path:
     return sweep(chosen, folder=folder, **options).path
 
 
-def starts() -> dict[str, float]:
-    return files_in().start_values_of(short().as_system())
+def starts() -> dict[str, dict[str, float]]:
+    return files_in().start_values
 
 
 def files_in(scenario: Scenario | None = None) -> Files:

@@ -70,7 +70,7 @@ def test_settings_seeds_systems_and_keys_are_those_of_single_runs(chosen: Study,
     keys = columns.keys(block)
     batch = columns.batch(block, keys, None)
     for place, index in enumerate(indices.tolist()):
-        system = chosen.system(index, columns.starts)
+        system = chosen.system(index, columns.files.start_values)
         assert block.settings[place] == json.dumps(chosen.points[index])
         assert keys[place] == run_key(system, files)
         assert repr(dataclasses.asdict(batch.alone(place).system)) == repr(dataclasses.asdict(system))
@@ -108,7 +108,7 @@ def test_a_wrong_design_is_refused_for_its_first_wrong_run_in_the_words_of_that_
 ) -> None:
     sampling: dict[str, Any] = {"method": "random", "samples": 5}
     chosen = study(*axes, **(sampling if any(one.values is None for one in axes) else {}))
-    starts, errors = files.start_values_of(chosen.origin), []
+    starts, errors = files.start_values, []
     for index, point in enumerate(chosen.points):
         try:
             with errors_in_own_terms(chosen.base):

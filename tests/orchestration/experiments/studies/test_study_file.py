@@ -32,7 +32,8 @@ def refused(folder: Path, text: str) -> str:
 
 def flown(folder: Path, text: str, index: int = 0) -> System:
     """The system of one run of a study."""
-    return load(folder, text).system(index, starts())
+    study = load(folder, text)
+    return study.system(index, study.files().start_values)
 
 
 # -- good files -------------------------------------------------------------------------------------------
@@ -40,7 +41,8 @@ def flown(folder: Path, text: str, index: int = 0) -> System:
 
 @pytest.mark.parametrize("path", sorted((ROOT / "studies").glob("*.toml")), ids=lambda path: path.stem)
 def test_every_study_of_the_repository_loads_and_all_its_runs_are_scenarios(path: Path) -> None:
-    study, known = load_study(path), starts()
+    study = load_study(path)
+    known = study.files().start_values
     assert study.name == path.stem
     for index in sample(range(len(study.points)), 20):
         study.system(index, known)

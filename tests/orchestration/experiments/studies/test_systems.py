@@ -98,11 +98,26 @@ def test_the_figure_of_a_system_is_of_its_first_objective_that_varies(swept: tup
         draw_study(chosen, folder, "ultimate_bound")
 
 
+def test_an_axis_multiplies_what_the_law_of_the_run_has(tmp_path: Path) -> None:
+    """Not what that of the base has: a factor of 1 would be another gain."""
+    laws = {"UnifiedController": 15.0, "GeometricController": 104.26}
+    (tmp_path / "study.toml").write_text(
+        '[[axes]]\nname = "gain"\nmultiplies = ["controller.gain.attitude"]\nvalues = [1.0, 2.0]\n'
+        f'[[axes]]\nname = "controller"\nvalues = {[*laws]}\n'
+    )
+    chosen = load_study(tmp_path / "study.toml")
+    for native in (False, True):
+        variant = dataclasses.replace(chosen, native=native)
+        starts = variant.files().start_values
+        gains = [variant.system(i, starts).components["controller"].parameters["gain.attitude"] for i in range(4)]
+        assert gains == [*laws.values(), *(2.0 * gain for gain in laws.values())]
+
+
 def test_a_study_file_names_a_system_file_and_may_multiply_start_values_of_fmus(system: System, tmp_path: Path) -> None:
     file = tmp_path / "study.toml"
     file.write_text(f'scenario = "{FILE}"\n[[axes]]\nname = "gain"\nmultiplies = ["{K_D}"]\nvalues = [1.0, 3]\n')
     chosen = load_study(file)
-    starts = chosen.files().start_values_of(chosen.origin)
+    starts = chosen.files().start_values
     assert [chosen.system(i, starts).components["controller"].parameters for i in range(2)] == [
         {"k_d": 1.0}, {"k_d": 3.0},
     ]  # fmt: skip

@@ -133,6 +133,13 @@ def test_no_initial_condition_is_both_tuned_on_and_judged_on(tuning):
     assert not trained & judged
 
 
+def test_every_start_has_its_own_seed_as_in_a_comparison(tuning):
+    values = tuning.values([0.5, 0.5])
+    ensembles = tuning.starts, tuning.judging_ensemble()
+    seeds = [system.seed for starts in ensembles for system in tuning.systems(0.01, values, starts)]
+    assert seeds == [tuning.base.seed + start for start in range(7)]
+
+
 def test_runs_have_the_period_that_is_tuned_for(tuning):
     systems = tuning.systems(0.02, tuning.values([0.5, 0.5]), tuning.starts)
     assert {system.components["controller"].sampling.period for system in systems} == {0.02}

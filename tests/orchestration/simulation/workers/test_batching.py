@@ -181,7 +181,7 @@ def test_a_run_that_ends_its_process_in_lanes_fails_and_is_not_run_by_another_en
 def test_the_bits_of_a_run_in_lanes_do_not_depend_on_the_runs_beside_it(tmp_path: Path) -> None:
     chosen = dataclasses.replace(noisy(tmp_path), native=True)
     files = chosen.files()
-    starts = files.start_values_of(chosen.origin)
+    starts = files.start_values
     systems = [with_files(chosen.system(i, starts), files.fmus) for i in range(RUNS)]
     batches, order = Batches(), random.Random(1).sample(range(RUNS), RUNS)
     together = batches.run(systems)
