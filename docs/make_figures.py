@@ -7,6 +7,9 @@ from matplotlib.figure import Figure
 
 from docs import paper_flight, reference_figures
 from docs.pages import fill
+from orchestration.experiments.studies.drawing import study_figures
+from orchestration.experiments.studies.study_file import load_study
+from orchestration.experiments.studies.sweep import sweep
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.simulation.figures.palette import BLUE, GREEN, GREY, RED
@@ -40,9 +43,18 @@ def main() -> None:
         figures["gusts"] = reference_figures.wind(DOCS)
         figures["payload"] = reference_figures.payload(DOCS)
         figures["paper_figure_3"] = paper_flight.figure_3(flight, DOCS)
+    figures["study_two_laws"] = two_laws()
     for path in save(figures, FIGURES, DOCS):
         print(path)
     fill(FIGURES.with_name("figures.md"), {"statements": paper_flight.statements(flight)})
+
+
+def two_laws() -> Figure:
+    """The shares of two laws over period and loss, and their difference, of the runs of `studies/two_laws.toml`."""
+    study = load_study(FIGURES.parents[1] / "studies" / "two_laws.toml")
+    store = sweep(study, workers=2).path
+    drawn, _ = study_figures(study, store, None, DOCS)
+    return drawn["good_map"]
 
 
 def timing_diagram() -> Figure:

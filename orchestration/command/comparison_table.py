@@ -8,6 +8,7 @@ from orchestration.command.comparison_text import median_text, share_text
 from orchestration.experiments.comparison.cells import CellSummary
 from orchestration.experiments.comparison.design import Comparison
 from orchestration.experiments.comparison.outcome import Outcome
+from orchestration.experiments.studies.axis_labels import quantity_of
 from orchestration.foundation.basics.errors import UsageError
 
 FORMATS = ("csv", "markdown", "latex")
@@ -52,12 +53,26 @@ def _csv(outcome: Outcome) -> Iterator[str]:
 
 
 def _columns(comparison: Comparison, cells: Sequence[CellSummary]) -> tuple[list[str], list[list[str]]]:
+    if comparison.second is not None:  # as the columns are: all of one controller together
+        names, conditions = ([one.name for one in ones] for ones in (comparison.controllers, comparison.conditions))
+        of_file = [*dict.fromkeys(comparison.on_second[name].condition for name in conditions)]
+        cells = sorted(
+            cells,
+            key=lambda cell: (
+                [one.name for one in comparison.vehicles].index(cell.vehicle),
+                of_file.index(comparison.on_second[cell.condition].condition),
+                names.index(cell.controller),
+                cell.value,
+                conditions.index(cell.condition),
+            ),
+        )
     columns = {key: [getattr(cell, key) for cell in cells] for key in ("vehicle", "condition", "controller")}
     if comparison.second is not None:
         columns["condition"] = [comparison.on_second[cell.condition].condition for cell in cells]
     columns = {key: values for key, values in columns.items() if len({*values}) > 1}
-    for name in comparison.values_of(comparison.conditions[0].name, comparison.values[0]):
-        columns[name] = [f"{cell.values[name]:g}" for cell in cells]
+    for axis in filter(None, (comparison.axis, comparison.second)):
+        quantity = quantity_of(axis, {})
+        columns[quantity.title] = [f"{quantity.factor * cell.values[axis.name]:g}" for cell in cells]
     columns |= {
         "survives": [share_text(cell.survives) for cell in cells],
         "settles": [share_text(cell.settles) for cell in cells],

@@ -70,8 +70,10 @@ def share_text(share: Share) -> str:
 
 
 def median_text(median: Median) -> str:
-    """A median with its interval; a dash where no run has the value."""
+    """A median with its interval; a dash where no run has the value, no interval where too few have."""
     if median.value is None:
         return "-"
+    if median.low is None and median.high is None:
+        return f"{median.value:.4g}"
     low, high = ("?" if end is None else f"{end:.4g}" for end in (median.low, median.high))
     return f"{median.value:.4g} [{low}, {high}]"

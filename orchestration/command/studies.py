@@ -140,6 +140,8 @@ def draw(
 
         loaded = load_study(study)
         expect_metric(loaded, metric)
+        if store is not None and store.name == store_path(loaded.name, store).name:
+            store = store.parent
         if store is None and out is not None and store_path(loaded.name, out).is_file():
             store = out
         _current_store(study, store)

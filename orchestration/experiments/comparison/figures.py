@@ -19,6 +19,7 @@ from orchestration.experiments.comparison.limits import GridLimit
 from orchestration.experiments.studies.axes import Value
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.figures import cells
+from orchestration.simulation.figures.lines import abreast
 from orchestration.simulation.figures.palette import BLUE, CYCLE, DASHES, GREY, MARKS, ORANGE
 from orchestration.simulation.figures.style import SCREEN, Style
 from orchestration.simulation.figures.ticks import plain
@@ -44,11 +45,12 @@ def basins(by_size: Mapping[str, BySize], axis: Quantity, fate: str, title: str,
         mesh = cells.fill(panel, x, bins, share, vmin=0.0, vmax=1.0)
         cells.hatch(panel, x, bins, np.isnan(share))
         cells.limit(panel, x, bins, np.where(np.isnan(share), np.nan, share >= 0.5), colors="white")
+        cells.name_cells(panel, axis.of(values))
         panel.set_title(name)
     figure.colorbar(mesh, ax=panels.tolist(), label=f"share that {fate}s [1]")
     figure.supxlabel(axis.title)
     figure.supylabel("size of the initial error [1]")
-    figure.suptitle(f"{title}; above the white line less than half of the starts {fate}")
+    figure.suptitle(style.lines_of(_joined(title, f"above the white line less than half of the starts {fate}")))
     return figure
 
 
@@ -69,7 +71,7 @@ def shares(
         for name, those in curves.items():
             _shares_of(panel, axis, those, color=colors[name], dashes=dashes[name])
         runs = max((cell.count for cell in group), default=0)
-        panel.set_title(title if several else f"{title}; {runs} starts, 95 % intervals")
+        panel.set_title(title if several else _joined(title, f"{runs} starts, 95 % intervals"))
         panel.set_ylim(-0.02, 1.02)
         if not several:
             _name_curves(panel, axis, curves, colors, style)
@@ -101,8 +103,10 @@ def limits_of(reaches: Sequence[Reach], axis: Quantity, in_seconds: bool, style:
 
     If the axis is `in_seconds`, a third panel has the limits of settling times the bandwidth.
     """
-    figure = style.figure(2.5 * len(reaches) + 12.0)
-    panels = figure.subplots(1, 3 if in_seconds else 2, sharey=True, squeeze=False).ravel()
+    count = 3 if in_seconds else 2
+    rows, columns = (1, count) if style.is_wide else (count, 1)
+    figure = style.figure((2.5 * len(reaches) + (12.0 if style.is_wide else 6.0)) * rows)
+    panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
     for row, reach in enumerate(reaches):
         for limit in reach.limits:
             color, shift = (BLUE, -0.15) if limit.share == "half" else (ORANGE, 0.15)
@@ -112,11 +116,12 @@ def limits_of(reaches: Sequence[Reach], axis: Quantity, in_seconds: bool, style:
             if in_seconds and limit.bandwidth is not None and not survives:
                 _bar(panels[2], limit, reach.last, limit.bandwidth, row + shift, color, None)
     names = [reach.name for reach in reaches]
-    panels[0].set(yticks=range(len(names)), yticklabels=names, xlabel=f"survive up to {axis.title}")
-    panels[1].set(xlabel=f"settle up to {axis.title}")
-    panels[0].invert_yaxis()
-    if in_seconds:
-        panels[2].set(xlabel=f"settle: {axis.name} ·\nbandwidth of the\nattitude loop [rad]")
+    panels[0].set(yticks=range(len(names)), yticklabels=names, ylim=(len(names) - 0.5, -0.5))
+    titles = [f"survive up to\n{axis.title}", f"settle up to\n{axis.title}"]
+    titles += [f"settle: {axis.name} · bandwidth\nof the attitude loop [rad]"] if in_seconds else []
+    for panel, title in zip(panels, titles):
+        panel.margins(x=0.08)
+        panel.set_xlabel(title if style.is_wide else title.replace("\n", " "))
     figure.legend(loc="outside upper center", ncols=2)
     return figure
 
@@ -164,13 +169,21 @@ def fronts_of(
         plain(panel.xaxis)
         plain(panel.yaxis)
     handles = [Line2D([], [], linestyle="", marker=marks[n], color=c, label=n) for n, c in colors.items() if n in shown]
-    figure.legend(handles=handles, loc="outside right center")
+    if style.is_wide:
+        figure.legend(handles=handles, loc="outside right center")
+    else:
+        figure.legend(handles=handles, loc="outside lower center", ncols=abreast([*colors], style))
     figure.supxlabel(metrics[0])
     figure.supylabel(metrics[1])
     count = len({point.value for point in points})
     some = f"{len(values)} of {count} values; " if len(values) < count else ""
-    figure.suptitle(f"{title}: {some}medians over the starts that all survive; filled: on the front")
+    text = _joined(title, f"{some}medians over the starts that all survive; filled: on the front")
+    figure.suptitle(style.lines_of(text))
     return figure
+
+
+def _joined(title: str, text: str) -> str:
+    return f"{title}; {text}" if title else text
 
 
 FAR = 20.0
@@ -235,8 +248,9 @@ def _bar(panel: Axes, limit: GridLimit, last: float, factor: float, at: float, c
     high = last if limit.high is None else limit.high
     ends = [[factor * (limit.value - limit.low)], [factor * (high - limit.value)]]
     panel.errorbar(factor * limit.value, at, xerr=ends, fmt="o", color=color, markersize=5, capsize=2, label=label)
-    if limit.high is None:
-        panel.plot(factor * high, at, ">", color=color, markersize=6)
+    if limit.high is None:  # beside the last value, whose own mark stays visible
+        ahead = {"xytext": (16, 0), "textcoords": "offset points"}
+        panel.annotate("", (factor * high, at), **ahead, arrowprops={"arrowstyle": "<|-", "color": color})
 
 
 def _sides(median: Median) -> tuple[list[float], list[list[float]]]:

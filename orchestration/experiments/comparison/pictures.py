@@ -72,7 +72,8 @@ def _of_one(
     axis, colors = quantity_of(comparison.axis, units), colors_of([one.name for one in comparison.controllers])
     summaries = [cell for cell in outcome.cells if (cell.vehicle, cell.condition) == of]
     points = [point for point in outcome.fronts if (point.vehicle, point.condition) == of and _is_known(point)]
-    title, end = ", ".join(of), _file_name(of)
+    several = (len(comparison.vehicles) > 1, len(comparison.conditions) > 1)
+    title, end = ", ".join(name for name, is_one_of in zip(of, several) if is_one_of), _file_name(of)
     for fate in FATES:
         by_size = {
             name: (comparison.values, _by_size(comparison, group, fate))
@@ -108,7 +109,7 @@ def _maps(
             yield from keep(draw, folder / f"map_{fate}_{_file_name((vehicle, condition))}")
 
 
-_WORDS = {"survive": ("not diverged", "diverged"), "settle": ("settled", "not settled")}
+_WORDS = {"survive": ("surviving", "diverged"), "settle": ("settled", "not settled")}
 
 
 def _map(
@@ -128,11 +129,11 @@ def _file_name(names: Iterable[str]) -> str:
 
 def reaches_of(comparison: Comparison, limits: Sequence[GridLimit]) -> list[Reach]:
     """The limits of each controller, on each vehicle and under each condition if there are several."""
-    several = len(comparison.vehicles) * len(comparison.conditions) > 1
+    several = (len(comparison.vehicles) > 1, len(comparison.conditions) > 1)
     groups = itertools.groupby(limits, lambda one: (one.vehicle, one.condition, one.controller))
     return [
         Reach(
-            name=", ".join((key[2], *key[:2])) if several else key[2],
+            name=", ".join((key[2], *(name for name, is_one_of in zip(key, several) if is_one_of))),
             limits=[*group],
             last=float(comparison.values[-1]),
         )

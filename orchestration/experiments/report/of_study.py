@@ -95,7 +95,7 @@ def study_report(
     metric = metric_of(stored, study)
     embedded = embed(study, stored, tracks, wanted, metric, choose)
     by_chance = is_sample(stored, study)
-    overall = share_of("all runs", None, stored.rows, by_chance=by_chance)
+    overall = _overall(stored, study)
     words = words_of(stored, study)
     return Report(
         kind="study",
@@ -143,8 +143,14 @@ def _over(
 
 
 def _summary_of_other(name: str, stored: Stored, study: Study | None) -> str:
-    overall = share_of("all runs", None, stored.rows, by_chance=is_sample(stored, study))
+    overall = _overall(stored, study)
     return f" Over it {name}: {summary_of(overall, words_of(stored, study), stored)}"
+
+
+def _overall(stored: Stored, study: Study | None) -> ReportShare:
+    """The share over all runs; without an interval where values of axes were chosen, whatever seeds repeat them."""
+    drawn = study is None or all(axis.values is None or "seed" in axis.targets for axis in study.axes)
+    return share_of("all runs", None, stored.rows, by_chance=drawn and is_sample(stored, study))
 
 
 def axes_of(stored: Stored, study: Study | None) -> list[ColumnAxis]:

@@ -58,8 +58,9 @@ def cell_lines(
     if metric == GOOD:
         panel.set_ylim(-0.02, 1.02)
     if laws is not None:
-        figure.legend(loc="outside right upper", title=name_of(laws))
-    figure.suptitle(_repetitions(found, metric))
+        place = "outside right upper" if style.is_wide else "outside lower center"
+        figure.legend(loc=place, title=name_of(laws), ncols=1 if style.is_wide else len(groups))
+    figure.suptitle(style.lines_of(_repetitions(found, metric)))
     return figure
 
 
@@ -110,11 +111,12 @@ def cell_maps(
     for panel in panels[:count]:
         panel.set(xscale=SCALES[axes[0].scale], yscale=SCALES[axes[1].scale], xlabel=x.title)
         panel.xaxis.set_tick_params(labelbottom=True)
+        mesh.name_cells(panel, *(q.of(sorted(axis.values or ())) for q, axis in zip((x, y), axes)))
     for panel in panels[:count:columns]:
         panel.set_ylabel(y.title)
     dots = "; dots: that of the difference excludes 0" if metric == GOOD and len(groups) == 2 else ""
     repetitions = _repetitions(found, metric)
-    figure.suptitle(repetitions and repetitions + dots)
+    figure.suptitle(style.lines_of(repetitions and repetitions + dots))
     handles: list[Patch | Line2D] = []
     if any(_has_limit(grid["share"]) for grid in grids):
         handles.append(Line2D([], [], color=mesh.LIMIT["colors"], label=f"half of the runs {words[0]}"))
@@ -209,7 +211,7 @@ def _difference(
 
 def _title(metric: str, words: tuple[str, str], units: Mapping[str, str]) -> str:
     if metric == GOOD:
-        return f"share that is {words[0]} [1]"
+        return f"share of {words[0]} runs [1]"
     return f"median of {labels.metric_with_unit(metric, units.get(metric))}, where {words[0]}"
 
 

@@ -68,6 +68,8 @@ def study_figures(
     """
     expect_metric(study, metric)
     table, units = frame(store), units_in(store)
+    if not (table["status"] == "done").any():
+        raise UsageError(f"{store}: expected at least one finished run, as sweep makes them")
     if metric is None and study.repeat is not None:
         metric = GOOD
     if metric is None:

@@ -1,7 +1,7 @@
 """The four errors: their norms, and component by component as in Fig. 3 of the paper."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -48,12 +48,33 @@ def components_of_errors(runs: Sequence[DrawnRun], style: Style) -> Figure:
     """x, y and z of each error; with several runs a panel for each component."""
     if len(runs) > 1:
         return _overlaid(runs, style)
-    figure, panels = _panels(runs, style)
+    run = _cut(runs[0])
+    figure, panels = _panels([run], style)
+    if run is not runs[0]:
+        figure.supxlabel(f"flat from there to {runs[0].span[1]:g} s", fontsize="small")
     for i, (panel, error) in enumerate(panels):
-        draw_components(panel, runs[0], error, style)
+        draw_components(panel, run, error, style)
         if i == 0:
             panel.legend(loc="upper right", ncols=3)
     return figure
+
+
+FLAT, CUT = 0.02, 0.2
+"""Share of its range within which an error is flat; share of the run beyond which it is cut if all errors are"""
+
+
+def _cut(run: DrawnRun) -> DrawnRun:
+    """The run up to where its errors are flat, if they are for at least four fifths of it and it has no window."""
+    end = run.span[1]
+    if run.window is not None or not end:
+        return run
+    last = 0.0
+    for error in _available_errors([run]):
+        values = error.of(run)
+        assert values is not None
+        moves = np.abs(values - values[-1]) > FLAT * np.ptp(values)
+        last = max(last, float(run.time[moves.any(axis=1)].max(initial=0.0)))
+    return replace(run, window=(0.0, float(np.ceil(1.2 * last)))) if 0.0 < last <= CUT * end else run
 
 
 def draw_components(panel: Axes, run: DrawnRun, error: Error, style: Style, *, clips: bool = True) -> None:

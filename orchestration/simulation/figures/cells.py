@@ -17,6 +17,8 @@ from orchestration.simulation.figures.ticks import plain
 
 LIMIT = {"colors": RED, "linewidths": 1.8}
 """Style of the line between good and other cells"""
+FEW = 6
+"""Most values of an axis that all have a tick"""
 _HATCH: Mapping[str, Any] = {"facecolor": "none", "edgecolor": GREY, "hatch": "////", "linewidth": 0.0}
 
 
@@ -44,6 +46,13 @@ def fill(panel: Axes, x: Floats, y: Floats, values: Floats, **how: Any) -> Any:
     )
     panel.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
     return mesh
+
+
+def name_cells(panel: Axes, x: Floats | None = None, y: Floats | None = None) -> None:
+    """Ticks at the values of the cells of a linear axis where these are few, not at places between them."""
+    for axis, values in ((panel.xaxis, x), (panel.yaxis, y)):
+        if values is not None and len(values) <= FEW and axis.get_scale() == "linear":
+            axis.set_ticks([*values])
 
 
 def color_bar(panel: Axes, mesh: Any, values: Floats, label: str) -> None:

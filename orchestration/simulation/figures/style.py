@@ -1,5 +1,6 @@
 """The style of figures: sizes, fonts and lines; and how files of them are written."""
 
+import textwrap
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -23,6 +24,8 @@ INCH = 25.4
 """Length of an inch [mm]"""
 POINT = INCH / 72.0
 """Length of a point [mm]"""
+PAGE = 235.0
+"""Height of the text on a page of a journal [mm]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,11 +64,20 @@ class Style:
         return self.width >= 33.0 * self.font * POINT
 
     def figure(self, height: float, *, width: float = 1.0, **more: Any) -> Figure:
-        """An empty figure, `height` lines of text high unless the style has a height; `width`: share of the style's."""
+        """An empty figure, `height` lines of text high unless the style has a height; `width`: share of the style's.
+
+        For a paper it is at most a page high.
+        """
         high = self.height if self.height is not None else height * self.font * POINT
+        if self.height is None and not self.has_titles:
+            high = min(high, PAGE)
         figure = Figure(figsize=(width * self.width / INCH, high / INCH), **more)
         FigureCanvasAgg(figure)  # one renderer for layout and PNG: each text is measured once
         return figure
+
+    def lines_of(self, text: str) -> str:
+        """A text above all panels, broken into lines that fit the width."""
+        return textwrap.fill(text, max(20, round(self.width / (0.55 * self.font * POINT))))
 
     @contextmanager
     def applied(self) -> Iterator[None]:

@@ -267,7 +267,7 @@ def test_two_axes_make_cells_over_both_and_a_map_of_the_two_laws(
 @pytest.mark.parametrize(
     ("form", "first", "fourth"),
     [
-        ("markdown", "| controller | period | loss | survives |", "| coupled | 0.1 | 0 | 0.000 [0.000, 0.658] |"),
+        ("markdown", "| controller | period [ms] | loss | survives |", "| coupled | 20 | 0.3 | 1.000 [0.342, 1.000] |"),
         ("latex", r"\begin{tabular}{lllllll}", r"\midrule"),
         ("csv", "cell,vehicle,condition,controller,period,loss,count,", "2,base,loss 0,uncoupled,0.02,0.0,2,"),
     ],

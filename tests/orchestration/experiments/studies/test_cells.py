@@ -1,16 +1,22 @@
 """Cells of a study: shares of good runs with their intervals, laws side by side, their difference."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.text import Text
 
+from orchestration.experiments.studies import drawing
 from orchestration.experiments.studies.cell_figures import cell_lines, cell_maps
 from orchestration.experiments.studies.shares import cells_of, differ
 from orchestration.experiments.studies.study_file import load_study
+from orchestration.experiments.studies.table import frame
 from orchestration.foundation.basics.statistics import wilson
 from orchestration.quadrotor.scenarios.vehicle import load_vehicle
+from orchestration.simulation.figures.names import COLUMNS
+from orchestration.simulation.figures.style import INCH, PAGE, STYLES
 from quadcosim import Scenario, UsageError
 from tests.commands import Main
 from tests.orchestration.experiments.studies.common import axis, study
@@ -88,6 +94,18 @@ def test_a_map_of_two_laws_has_a_third_panel_with_their_difference() -> None:
     )
 
 
+def test_a_map_for_a_column_of_a_journal_is_a_page_high_and_no_text_is_wider_than_it() -> None:
+    style = replace(STYLES["paper"], width=COLUMNS["single"])
+    with style.applied():
+        figure = cell_maps(runs(), (PERIODS, LOSSES), LAWS, "good", WORDS, units={}, style=style)
+        figure.draw_without_rendering()
+        wide, high = figure.bbox.size
+        assert high < style.dpi * PAGE / INCH + 1.0
+        texts = [*figure.findobj(Text)]
+        assert all(box.x0 >= 0.0 and box.x1 <= wide for box in (text.get_window_extent() for text in texts))
+        assert [*figure.axes[0].get_yticks()] == [0.0, 0.1, 0.2]
+
+
 def test_one_law_alone_has_one_map_and_no_word_of_a_difference() -> None:
     alone = runs().query("controller == 'CascadedController'")
     law = axis("controller", "CascadedController")
@@ -100,7 +118,7 @@ def test_shares_over_one_axis_are_a_line_with_a_band_for_each_law() -> None:
     panel = figure.axes[0]
     assert [line.get_label() for line in panel.get_lines()] == list(LAWS.values or ())
     assert len(panel.collections) == 2
-    assert panel.get_ylabel() == "share that is settled [1]"
+    assert panel.get_ylabel() == "share of settled runs [1]"
 
 
 def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
@@ -125,11 +143,13 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
     main("sweep", "study.toml", "--engine", "compiled")
     drawn = main("draw", "study.toml", "--out", "figures", "--format", "png").stdout.splitlines()
     assert drawn == ["figures/good.png"]
-    main("draw", "study.toml", "--store", "results/study", "--out", "figures", "--format", "png")
+    main("draw", "study.toml", "--store", "results/study/study.sqlite", "--out", "figures", "--format", "png")
     main("export", "study.toml", "--format", "csv")
     shares = pd.read_csv(tmp_path / "results/study/shares.csv")
     assert list(shares) == ["controller", "timing.period", "count", "good", "share", "low", "high"]
     assert shares["count"].tolist() == [2, 2, 2, 2]
+    monkeypatch.setattr(drawing, "frame", lambda store: frame(store).assign(status=None))
+    assert "expected at least one finished run" in main("draw", "study.toml", code=2).stderr
 
 
 def test_a_study_that_cannot_be_drawn_as_cells_says_what_is_expected() -> None:

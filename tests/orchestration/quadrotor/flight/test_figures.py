@@ -250,6 +250,14 @@ def test_the_spectrum_is_of_the_window_alone(flight: Result) -> None:
 # -- peaks, limits, surfaces ------------------------------------------------------------------------------
 
 
+def test_errors_that_are_flat_for_four_fifths_are_cut_there_unless_a_window_is_given() -> None:
+    whole = quadcosim.run(native(stop_time=32.0))
+    for window, end in ((None, 7.0), ((0.0, 32.0), 32.0)):
+        figure = draw(whole, ["components"], window=window)["components"]
+        assert {axes.get_xlim() for axes in seen(figure)} == {(0.0, end)}
+        assert ("flat from there to 32 s" in figure.get_supxlabel()) is (window is None)
+
+
 def test_a_clipped_peak_is_noted_and_shown_in_an_inset(flight: Result) -> None:
     t = np.linspace(0.0, 10.0, 2001)
     peaked, calm = 0.5 * np.sin(t) - 100.0 * np.exp(-20.0 * t), np.sin(t) + 1.0
