@@ -10,6 +10,7 @@ from orchestration.experiments.comparison.design import Comparison
 from orchestration.experiments.comparison.outcome import Outcome
 from orchestration.experiments.studies.axis_labels import quantity_of
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.systems.system.requirements import is_number
 
 FORMATS = ("csv", "markdown", "latex")
 _UNITS = {"settling_time": "s", "residual": "m"}
@@ -71,8 +72,8 @@ def _columns(comparison: Comparison, cells: Sequence[CellSummary]) -> tuple[list
         columns["condition"] = [comparison.on_second[cell.condition].condition for cell in cells]
     columns = {key: values for key, values in columns.items() if len({*values}) > 1}
     for axis in filter(None, (comparison.axis, comparison.second)):
-        quantity = quantity_of(axis, {})
-        columns[quantity.title] = [f"{quantity.factor * cell.values[axis.name]:g}" for cell in cells]
+        quantity, values = quantity_of(axis, {}), [cell.values[axis.name] for cell in cells]
+        columns[quantity.title] = [f"{quantity.factor * v:g}" if is_number(v) else str(v) for v in values]
     columns |= {
         "survives": [share_text(cell.survives) for cell in cells],
         "settles": [share_text(cell.settles) for cell in cells],

@@ -249,8 +249,10 @@ def _bar(panel: Axes, limit: GridLimit, last: float, factor: float, at: float, c
     ends = [[factor * (limit.value - limit.low)], [factor * (high - limit.value)]]
     panel.errorbar(factor * limit.value, at, xerr=ends, fmt="o", color=color, markersize=5, capsize=2, label=label)
     if limit.high is None:  # beside the last value, whose own mark stays visible
-        ahead = {"xytext": (16, 0), "textcoords": "offset points"}
-        panel.annotate("", (factor * high, at), **ahead, arrowprops={"arrowstyle": "<|-", "color": color})
+        panel.annotate(
+            "", (factor * high, at), (16, 0), textcoords="offset points",
+            arrowprops={"arrowstyle": "<|-", "color": color},
+        )  # fmt: skip
 
 
 def _sides(median: Median) -> tuple[list[float], list[list[float]]]:
