@@ -32,7 +32,6 @@ REFERENCE = tuple(name for derivative in _REFERENCE_UNITS for name in components
 POSITION_REFERENCE = components("reference.position")
 """P_d as it is recorded beside the signals."""
 
-ATTITUDE_ERROR_SCALAR = "attitude_error.w"
 ENERGY = "energy"
 EXTERNAL_FORCE = components("external_force")
 DISTURBANCE = components("wind.amplitude") + EXTERNAL_FORCE

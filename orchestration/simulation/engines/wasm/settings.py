@@ -3,7 +3,6 @@
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from decimal import Decimal
 
 from orchestration.components.fmi.instance import convert_value, number_of
 from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
@@ -26,14 +25,6 @@ class Setting:
     high: float = _MOST
     excludes_low: bool = False
     is_whole: bool = False
-
-
-def decimal_of(value: float) -> tuple[int, int]:
-    """Digits and exponent of the shortest decimal form of a number: value = digits · 10^exponent."""
-    sign, digits, exponent = Decimal(repr(value)).normalize().as_tuple()
-    assert isinstance(exponent, int)
-    number = int("".join(map(str, digits)))
-    return (-number if sign else number), exponent if number else 0
 
 
 class Settings:

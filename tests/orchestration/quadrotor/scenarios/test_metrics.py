@@ -25,12 +25,13 @@ from plant_fmu.actuators import Channels, Motors
 Array = npt.NDArray[np.float64]
 
 TIME = np.linspace(0.0, 3.0, 3001)
-AT_SAMPLES = (wiring.ATTITUDE_ERROR_SCALAR, wiring.ENERGY)
+ATTITUDE_ERROR_SCALAR = "attitude_error.w"
+AT_SAMPLES = (ATTITUDE_ERROR_SCALAR, wiring.ENERGY)
 
 
 def attitude(scalar: Array) -> dict[str, Any]:
     """The scalar part of the attitude error, for `measured`."""
-    return {wiring.ATTITUDE_ERROR_SCALAR: scalar}
+    return {ATTITUDE_ERROR_SCALAR: scalar}
 
 
 def measured(
@@ -351,7 +352,7 @@ def test_metrics_do_not_depend_on_where_a_flight_is_cut(hold: Hold, cuts: tuple[
         "hold": hold,
         "thrust_max": 1.0,
         "torque_max": 1.5,
-        wiring.ATTITUDE_ERROR_SCALAR: np.cos(TIME),
+        ATTITUDE_ERROR_SCALAR: np.cos(TIME),
         wiring.ENERGY: np.exp(-TIME) * (1.0 + 0.1 * random.normal(size=3001)),
     }
     error = np.exp(-2.0 * TIME) * (1.0 + 0.3 * np.sin(40.0 * TIME))

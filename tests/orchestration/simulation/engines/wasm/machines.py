@@ -3,6 +3,7 @@
 import ctypes
 import hashlib
 import struct
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,6 @@ import numpy as np
 from orchestration.components.fmi.read_description import read_model
 from orchestration.simulation.engines.batch.shape import Shape
 from orchestration.simulation.engines.resolved import check_against_fmus
-from orchestration.simulation.engines.wasm.settings import decimal_of
 from orchestration.simulation.engines.wasm.tables_of_system import tables_of
 from orchestration.simulation.requests.request import request_of
 from orchestration.simulation.runs.many_runs import located
@@ -28,6 +28,14 @@ def tables(request, lanes):
     models = {name: read_model(Path(component.fmu)) for name, component in system.components.items()}
     system = check_against_fmus(connect_references(system, models), models).system
     return tables_of(Shape(system=system, models=models, lanes=lanes))
+
+
+def decimal_of(value: float) -> tuple[int, int]:
+    """Digits and exponent of the shortest decimal form of a number: value = digits · 10^exponent."""
+    sign, digits, exponent = Decimal(repr(value)).normalize().as_tuple()
+    assert isinstance(exponent, int)
+    number = int("".join(map(str, digits)))
+    return (-number if sign else number), exponent if number else 0
 
 
 class Native:
