@@ -3,15 +3,13 @@
 from html import escape
 from typing import Any
 
-import typer.main
-
 from docs.website.tables import inline_html, table
-from orchestration.command.cli import app
+from orchestration.command.cli import command_line
 
 
 def section() -> str:
     """The Markdown that follows the text of `docs/commands.md` on the site."""
-    group: Any = typer.main.get_command(app)
+    group: Any = command_line()
     listed = [(f'<a href="#{name}"><code>{name}</code></a>', _first(each.help)) for name, each in _commands(group)]
     return "\n## Every command\n\n" + table(listed) + "".join(_section(name, each) for name, each in _commands(group))
 

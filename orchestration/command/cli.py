@@ -2,6 +2,7 @@
 
 import copy
 import functools
+import importlib
 import sys
 import traceback
 from typing import Annotated, Any
@@ -9,25 +10,7 @@ from typing import Annotated, Any
 import typer
 import typer.core
 
-from orchestration.command import (
-    controllers,
-    exact,
-    fmus,
-    limit,
-    live,
-    loops,
-    margin,
-    new,
-    other_tools,
-    plotting,
-    registry,
-    report,
-    run,
-    scheduling,
-    studies,
-    systems,
-    wrap,
-)
+from orchestration.command import registry
 from orchestration.command.options import option
 from orchestration.command.plain_values import TakesPlainValues
 from orchestration.command.registry import OutputOptions, ask, option_group
@@ -100,39 +83,18 @@ def quadcosim(
 
 COMMANDS = {
     "Run": (
-        run.run,
-        scheduling.schedule,
-        plotting.plot,
-        report.report,
-        live.live,
-        new.new,
-        new.examples,
-        systems.show,
-        systems.connect,
-        systems.schema,
+        *("run.run", "scheduling.schedule", "plotting.plot", "report.report", "live.live"),
+        *("new.new", "new.examples", "systems.show", "systems.connect", "systems.schema"),
     ),
     "Study": (
-        limit.limit,
-        studies.sweep,
-        studies.status,
-        studies.draw,
-        studies.export,
-        controllers.compare,
-        controllers.tune,
-        exact.expect,
-        margin.margin,
-        margin.linearise,
-        loops.bode,
-        loops.step,
-        loops.locus,
+        *("limit.limit", "studies.sweep", "studies.status", "studies.draw", "studies.export"),
+        *("controllers.compare", "controllers.tune", "exact.expect"),
+        *("margin.margin", "margin.linearise", "loops.bode", "loops.step", "loops.locus"),
     ),
-    "FMUs": (fmus.build, wrap.wrap, fmus.validate, fmus.doctor),
-    "Other tools": (other_tools.export_c, other_tools.ssp, other_tools.interop),
+    "FMUs": ("fmus.build", "wrap.wrap", "fmus.validate", "fmus.doctor"),
+    "Other tools": ("other_tools.export_c", "other_tools.ssp", "other_tools.interop"),
 }
-"""Commands by their groups, in the order of the help"""
-
-for group, commands in COMMANDS.items():
-    registry.add(app, group, *commands)
+"""Modules of this package with the functions of commands, by groups, in the order of the help"""
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -147,8 +109,8 @@ def _run(arguments: list[str] | None) -> None:
     registry.set_output_options(OutputOptions(), anew=True)
     try:
         with banners_to_stderr(), consent.asking(ask):
-            command_line = _command_line(words[0] if words else "")
-            code = command_line(words or ["--help"], prog_name="quadcosim", standalone_mode=False)
+            parser = command_line(words[0] if words else "")
+            code = parser(words or ["--help"], prog_name="quadcosim", standalone_mode=False)
         sys.exit(code if words else 2)
     except (KeyboardInterrupt, _Interrupted) as stop:
         report_error(f"interrupted {stop}".rstrip())
@@ -160,17 +122,15 @@ def _run(arguments: list[str] | None) -> None:
 
 
 @functools.cache
-def _command_line(command: str) -> Any:
-    """A parser with one command, or all if there is none of this name; parsers of all commands are slow to make."""
-    named = [each for each in app.registered_commands if command == _name_of(each)]
+def command_line(command: str = "") -> Any:
+    """The parser of one command, or of all if there is none of this name; modules of all commands are slow to load."""
+    known = [(group, *place.split(".")) for group, places in COMMANDS.items() for place in places]
+    named = [each for each in known if typer.main.get_command_name(each[2]) == command]
     part = copy.copy(app)
-    part.registered_commands = named or app.registered_commands
+    part.registered_commands = []
+    for group, module, function in named or known:
+        registry.add(part, group, getattr(importlib.import_module(f"orchestration.command.{module}"), function))
     return typer.main.get_command(part)
-
-
-def _name_of(command: typer.models.CommandInfo) -> str:
-    assert command.callback is not None
-    return typer.main.get_command_name(command.callback.__name__)
 
 
 def _report(error: Exception) -> int:

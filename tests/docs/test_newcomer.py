@@ -9,13 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import typer.main
 
 from docs.newcomer.blocks import Block, blocks_of
 from docs.newcomer.following import BlockFailed, Newcomer
 from docs.newcomer.pages import pages
 from docs.newcomer.readers import reader_of
-from orchestration.command.cli import app
+from orchestration.command.cli import command_line
 from orchestration.foundation.basics.documents import read_toml
 from tests.commands import Main
 from tests.places import ROOT
@@ -26,7 +25,7 @@ LINES = [(block, line) for block in BLOCKS if block.is_shell and not block.name 
 COMMANDS = [
     (block, words[1:]) for block, line in LINES if (words := shlex.split(line, comments=True))[0] == "quadcosim"
 ]
-GROUP: Any = typer.main.get_command(app)
+GROUP: Any = command_line()
 
 
 def page(folder: Path, text: str) -> list[Block]:

@@ -12,15 +12,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import typer.main
 
-from orchestration.command.cli import app
+from orchestration.command.cli import command_line
 from orchestration.command.registry import CommandResult
 from orchestration.foundation.basics.terminal import configure
 from tests.commands import Main
 from tests.places import ROOT
 
-GROUP: Any = typer.main.get_command(app)
+GROUP: Any = command_line()
 COMMANDS = sorted(GROUP.commands)
 SHORT = ("run", "--native", "--stop-time", "0.01")
 STUDY = """

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import typer.main
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -30,7 +29,7 @@ from tests.orchestration.quadrotor.scenarios.strategies import Case, cases
 from tests.orchestration.quadrotor.scenarios.stubs import Instant, Sample
 
 SECOND = 10**9
-COMMANDS = typer.main.get_command(cli.app).commands  # type: ignore[attr-defined]
+COMMANDS = cli.command_line().commands
 
 
 def cursor_of(case: Case) -> Cursor:
