@@ -1,14 +1,17 @@
 """Checks a whole design before any run: names, types and ranges against the FMUs' descriptions."""
 
 from collections.abc import Hashable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from orchestration.components.fmi.read_description import Model, called
 from orchestration.experiments.studies.run_columns import MOST_KINDS, Kind, RunColumns
 from orchestration.experiments.studies.store_columns import expect_columns
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import warn
+from orchestration.simulation.engines.batch.kernels import sources_of
 from orchestration.simulation.engines.batch.shape import outline
 from orchestration.simulation.engines.resolved import check_against_fmus, other_periods_in_words, table_of
 from orchestration.systems.signals.waypoints import read_waypoints
@@ -19,8 +22,18 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.request import errors_in_own_terms
 
 
-def check_design(columns: RunColumns) -> tuple[str, ...]:
-    """The references of its runs and the components that follow them.
+@dataclass(frozen=True, kw_only=True)
+class Checked:
+    """Facts about all runs of a study."""
+
+    follows: tuple[str, ...]
+    """References and their followers"""
+    no_lanes: str | None
+    """why some run cannot be one of many at once; None: as far as FMUs go, all can"""
+
+
+def check_design(columns: RunColumns) -> Checked:
+    """Facts about its runs: the components that follow references, and whether all fly in SIMD lanes.
 
     Raises `UsageError` for the first invalid run of a study, with the number of further ones.
     """
@@ -42,7 +55,7 @@ def check_design(columns: RunColumns) -> tuple[str, ...]:
         expect_tables(connect_references(checks.longest, columns.files.models_of(checks.longest)))
     for remark in checks.systems.remarks:
         warn(remark)
-    return tuple(filter(None, checks.systems.follows))
+    return Checked(follows=tuple(filter(None, checks.systems.follows)), no_lanes=checks.systems.no_lanes)
 
 
 class _RunChecks:
@@ -82,6 +95,8 @@ class _SystemChecks:
         self._periods: set[tuple[float | None, ...]] = set()
         self.remarks: dict[str, None] = {}
         """Words on what the periods of some runs mean"""
+        self.no_lanes: str | None = None
+        """Reason why some system cannot be one of many at once"""
         self.follows: dict[str, None] = {}
         """References and their followers, in order of occurrence"""
 
@@ -93,16 +108,18 @@ class _SystemChecks:
         signals = tuple((source.signal, source.file) for source in system.sources.values())
         structure = outline(system), signals, tuple((name, key) for name, key, _ in parameters)
         if structure not in self._known:
-            self.follows[check_against_fmus(system, self._files.models_of(system)).follows] = None
+            models = self._files.models_of(system)
+            self.follows[check_against_fmus(system, models).follows] = None
+            self.no_lanes = self.no_lanes or _no_lanes(system, models)
             self._known[structure] = set(parameters)
             self._expect_believed(system)
             return
         self._expect_believed(system)
-        known, models = self._known[structure], None
+        known, of_new = self._known[structure], None
         for name, key, value in parameters:
             if (name, key, value) not in known:
-                models = models or self._files.models_of(system)
-                check_parameter(system, models, name, key)
+                of_new = of_new or self._files.models_of(system)
+                check_parameter(system, of_new, name, key)
                 known.add((name, key, value))
 
     def _expect_believed(self, system: System) -> None:
@@ -111,6 +128,16 @@ class _SystemChecks:
         if periods not in self._periods:
             self._periods.add(periods)
             self.remarks |= dict.fromkeys(other_periods_in_words(system, self._files.models_of(system)))
+
+
+def _no_lanes(system: System, models: Mapping[str, Model]) -> str | None:
+    """Why it cannot be one of many at once, as far as its FMUs go."""
+    try:
+        for name, model in models.items():
+            sources_of(name, called(model, system.components[name].access))
+    except UsageError as error:
+        return str(error)
+    return None
 
 
 def expect_tables(system: System) -> None:

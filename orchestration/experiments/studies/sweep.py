@@ -13,7 +13,7 @@ import numpy as np
 
 from fmu_kit.new_files import write_atomically
 from orchestration.experiments.studies import store
-from orchestration.experiments.studies.checks import check_design, describe_run
+from orchestration.experiments.studies.checks import Checked, check_design, describe_run
 from orchestration.experiments.studies.lane_agreement import lane_agreement, with_python_twins
 from orchestration.experiments.studies.run_columns import TOGETHER, RunColumns
 from orchestration.experiments.studies.run_key import design_parts, difference, place_parts, study_parts
@@ -139,7 +139,7 @@ def prepare(study: Study, engine: EngineChoice) -> tuple[RunColumns, Execution, 
 
     Raises `UsageError` for an invalid run.
     """
-    candidates: dict[bool, tuple[RunColumns, tuple[str, ...]]] = {}
+    candidates: dict[bool, tuple[RunColumns, Checked]] = {}
 
     def first(native: bool) -> tuple[System, Files]:
         candidate = replace(study, native=native)
@@ -147,12 +147,15 @@ def prepare(study: Study, engine: EngineChoice) -> tuple[RunColumns, Execution, 
         candidates[native] = columns, check_design(columns)
         return candidate.system(0, columns.files.start_values), columns.files
 
-    no_lanes = "metrics that are functions need whole runs, one at a time" if study.metrics else None
+    def no_lanes() -> str | None:
+        needs = "metrics that are functions need whole runs, one at a time"
+        return needs if study.metrics else candidates[True][1].no_lanes
+
     execution = choose_execution(engine, study.native, first, no_lanes=no_lanes)
     if execution.native not in candidates:
         first(execution.native)
-    columns, follows = candidates[execution.native]
-    return columns, execution, follows
+    columns, checked = candidates[execution.native]
+    return columns, execution, checked.follows
 
 
 def _expect_workers(workers: int, dask: str | None) -> None:

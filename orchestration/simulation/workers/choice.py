@@ -70,27 +70,32 @@ def engine_choice(name: str) -> EngineChoice:
 
 
 def choose_execution(
-    engine: EngineChoice, native: bool, first: Callable[[bool], tuple[System, Files]], *, no_lanes: str | None = None
+    engine: EngineChoice,
+    native: bool,
+    first: Callable[[bool], tuple[System, Files]],
+    *,
+    no_lanes: Callable[[], str | None] = lambda: None,
 ) -> Execution:
     """How runs are executed by an engine, with native twins if `native` is requested.
 
-    `first` returns the first run, checked, and its files, with native twins or not; `no_lanes` is a reason that rules
-    out lanes. Raises `UsageError`, naming the obstacle, if requested lanes are impossible.
+    `first` returns the first run, checked, and its files, with native twins or not; `no_lanes`, called after it, a
+    reason that rules out lanes. Raises `UsageError`, naming the obstacle, if requested lanes are impossible.
     """
     if engine in ("python", "compiled"):
         return Execution(native=native, in_lanes=False, engine=engine)
     if engine == BATCH:
-        if no_lanes is not None:
-            raise UsageError(f"--engine {engine}: {no_lanes}")
-        _expect_lanes(*first(True))
+        checked = first(True)
+        if (why := no_lanes()) is not None:
+            raise UsageError(f"--engine {engine}: {why}")
+        _expect_lanes(*checked)
         return Execution(native=True, in_lanes=True, engine=None)
     try:
         system, files = first(True)
     except QuadcosimError as error:  # an invalid request is reported when it is run
         return _slower(native, error)
     try:
-        if no_lanes is not None:
-            raise UsageError(no_lanes)
+        if (why := no_lanes()) is not None:
+            raise UsageError(why)
         _expect_lanes(system, files)
     except QuadcosimError as error:
         return _slower(True, error)

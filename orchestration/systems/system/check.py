@@ -85,11 +85,12 @@ def recorded_variables(system: System, models: Mapping[str, Model]) -> dict[str,
             needed = [v.name for v in model.variables.values() if f"{name}.{v.name}" in named and _is_recordable(v)]
             found[name] = (*component.record, *(v for v in needed if v not in component.record))
             continue
+        unnamed = {v for v in model.for_solvers if f"{name}.{v}" not in named}
         chosen = [
             v.name
             for v in model.variables.values()
             if (v.causality == "output" and v.kind in NUMERIC)
-            or (v.causality == "local" and v.kind == "Real" and not v.is_constant and v.name not in model.for_solvers)
+            or (v.causality == "local" and v.kind == "Real" and not v.is_constant and v.name not in unnamed)
         ]
         found[name] = tuple(chosen)
     return found
