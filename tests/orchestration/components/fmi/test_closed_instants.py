@@ -1,16 +1,22 @@
 """Instants of FMUs whose outputs follow inputs at once: values are passed on within an instant, also around a loop."""
 
+import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import tomli_w
 
 import quadcosim
-from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError
+from orchestration.components.fmi.reuse import Instances
+from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError
+from orchestration.simulation.requests.request import request_of
+from orchestration.theory.stability.period_map import growth_of_loop
 from tests.commands import Main
 from tests.orchestration.components.fmi.exchange import exchange
 from tests.orchestration.components.fmi.small import needs_compiler
+from tests.orchestration.components.fmi.test_adapted import loop
 
 pytestmark = needs_compiler
 
@@ -115,3 +121,37 @@ def test_show_and_run_say_how_a_loop_is_closed(main: Main, tmp_path: Path) -> No
         component["fmu"] = str(exchange(tmp_path, "gain", event_mode=True))
     file.write_text(tomli_w.dumps(system))
     assert "a.y -> b.u; b.y -> a.u: closed by the lag of a step" in main("show", file).stdout
+
+
+def test_a_loop_through_what_follows_at_once_is_linearised_rightly_or_refused_by_name(tmp_path: Path) -> None:
+    period, p, instances = 0.5, 0.3, Instances()
+
+    def radius(of: dict[str, Any]) -> float:
+        return math.exp(period * growth_of_loop(request_of(of).as_system(), instances))
+
+    system = loop(tmp_path, period)  # a double integrator, under u = -x - v or u = -y - v with y = x + p u
+    system["components"]["plant"]["parameters"] = {"start": 0.0, "p": p}
+    system["components"]["g"] = {"fmu": system["components"]["law"]["fmu"], "step": 0.1, "parameters": {"p": 1.0}}
+    rate = {"from": ["plant.x2"], "to": ["law.w"]}
+    system["connections"] = [
+        rate,
+        {"from": ["plant.x1"], "to": ["g.u"]},
+        {"from": ["g.y"], "to": ["law.u"]},
+        {"from": ["law.y"], "to": ["plant.u"]},
+    ]
+    step, push = np.array([[1.0, period], [0.0, 1.0]]), np.array([period**2 / 2.0, period])
+    closed = step - np.outer(push, [1.0, 1.0])
+    assert radius(system) == pytest.approx(np.abs(np.linalg.eigvals(closed)).max(), abs=1e-9)
+    direct = {
+        **system,
+        "components": {name: each for name, each in system["components"].items() if name != "g"},
+        "connections": [{"from": ["plant.y"], "to": ["law.u"]}, rate, system["connections"][-1]],
+    }
+    with_last = np.zeros((3, 3))
+    with_last[:2, :2], with_last[2] = step, [-1.0, -1.0, -p]
+    with_last[:2] += np.outer(push, with_last[2])
+    assert radius(direct) == pytest.approx(np.abs(np.linalg.eigvals(with_last)).max(), abs=1e-9)
+    system["components"]["h"] = system["components"]["g"]
+    system["connections"][2:3] = [{"from": ["g.y"], "to": ["h.u"]}, {"from": ["h.y"], "to": ["law.u"]}]
+    with pytest.raises(UsageError, match=r"follow inputs at once, and are passed on within an instant: g.y -> h.u"):
+        radius(system)
