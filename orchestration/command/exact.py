@@ -2,7 +2,6 @@
 
 from typing import TYPE_CHECKING, Annotated
 
-from orchestration.command import verdicts
 from orchestration.command.flags import FlightFlags, ScenarioFile, Timing, flight_options, request_from
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
@@ -34,7 +33,7 @@ def expect(
     from orchestration.theory.exact.expect import expect as expectations
 
     expected = expectations(request_from(scenario, flags, timing), as_simulated=as_simulated, horizon=horizon)
-    return CommandResult(document=expected, verdict=verdicts.of_expected(expected), lines=_lines(expected))
+    return CommandResult(document=expected, verdict=expected.verdict, lines=_lines(expected))
 
 
 def warn_if_means_are_infinite(

@@ -134,7 +134,8 @@ def validate(
             problems += count
             lines.append(f"{path}: {count or 'no'} problem{'' if count == 1 else 's'}{'' if count else ' found'}")
             lines.extend(f"  {finding}" for finding in findings)
-    return CommandResult(document=document, lines=lines, good=not problems)
+    verdict = verdicts.of_problems(problems, len(paths))
+    return CommandResult(document={"fmus": document}, verdict=verdict, lines=lines, good=not problems)
 
 
 @option_group("limits", LimitFlags)

@@ -5,7 +5,6 @@ from typing import Annotated
 
 import typer
 
-from orchestration.command import verdicts
 from orchestration.command.flags import FlightFlags, ScenarioFile, Timing, flight_options, request_from
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
@@ -79,4 +78,4 @@ def limit(
         for written in draw_limit(request, found, where):
             inform(str(written))
     lines = [f"{name:<19}  {value}" for name, value in limits.as_text(found).items()]
-    return CommandResult(document=found, verdict=verdicts.of_limit(found), lines=lines)
+    return CommandResult(document=found, verdict=found.verdict, lines=lines)

@@ -4,7 +4,6 @@ import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from orchestration.command import verdicts
 from orchestration.command.flags import FlightFlags, ScenarioFile, Timing, flight_options, request_from
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
@@ -56,7 +55,7 @@ def bode(
         "loops": [dataclasses.asdict(loop) for loop in found.loops],
     }
     lines = list(in_columns(rows, right=True)) if found.loops else []
-    return CommandResult(document=document, verdict=verdicts.of_bode(found), lines=lines)
+    return CommandResult(document=document, verdict=found.verdict, lines=lines)
 
 
 @flight_options
@@ -86,7 +85,7 @@ def step(
         "loops": [dataclasses.asdict(loop) for loop in found.loops],
     }
     lines = list(in_columns(rows, right=True))
-    return CommandResult(document=document, verdict=verdicts.of_step(found), lines=lines)
+    return CommandResult(document=document, verdict=found.verdict, lines=lines)
 
 
 @flight_options
@@ -118,7 +117,7 @@ def locus(
     each = [[[pole.real, pole.imag] for pole in some if pole == pole] for some in found.poles.tolist()]
     document = {**vars(found), "values": found.values.tolist(), "radius": found.radius.tolist(), "poles": each}
     lines = list(in_columns(rows, right=True)) if found.crossings else []
-    return CommandResult(document=document, verdict=verdicts.of_locus(found), lines=lines)
+    return CommandResult(document=document, verdict=found.verdict, lines=lines)
 
 
 def _draw(figures: "Figures", out: Path) -> None:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from orchestration.command import verdicts
 from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
@@ -80,7 +79,7 @@ def _certified(request: "Request", of: str, out: Path | None) -> CommandResult:
         "certificate": written or "-",
     }
     lines = [f"{name:<17}  {value}" for name, value in shown.items()]
-    return CommandResult(document=document, verdict=verdicts.of_margin(found), lines=lines)
+    return CommandResult(document=document, verdict=found.verdict, lines=lines)
 
 
 def _region(request: "Request", of: str, and_of: str, out: Path | None) -> CommandResult:
@@ -94,7 +93,7 @@ def _region(request: "Request", of: str, and_of: str, out: Path | None) -> Comma
     lines = [f"{of} and {and_of}", f"searched           {found.searched}"]
     lines += [f"certified          {a:.6g} s and {b:.6g} s" for a, b in found.certified]
     lines += [f"breaking           {a:.6g} s and {b:.6g} s" for a, b in found.breaking]
-    return CommandResult(document=document, verdict=verdicts.of_region(found), lines=lines)
+    return CommandResult(document=document, verdict=found.verdict, lines=lines)
 
 
 def _checked(path: Path, request: "Request | None") -> CommandResult:
@@ -113,7 +112,7 @@ def _checked(path: Path, request: "Request | None") -> CommandResult:
         lines.append(f"{'so it holds for':<17}  {of} from 0 to {found.up_to:.9g} s")
     if not of:
         lines.append(f"{'loop':<17}  the matrices in the file; no system was given")
-    return CommandResult(document=found, verdict=verdicts.of_check(found), lines=lines)
+    return CommandResult(document=found, verdict=found.verdict, lines=lines)
 
 
 def _of_hover(request: "Request") -> CommandResult:
@@ -131,7 +130,7 @@ def _of_hover(request: "Request") -> CommandResult:
     for name, value in document.items():
         shown = " ".join(f"{share:g}" for share in value) if isinstance(value, tuple) else value
         lines.append(f"{name:<17}  {f'{value:.6g} s' if isinstance(value, float) else '-' if value is None else shown}")
-    return CommandResult(document=document, verdict=verdicts.of_hover_margin(found), lines=lines)
+    return CommandResult(document=document, verdict=found.verdict, lines=lines)
 
 
 def _number(value: float | None, unit: str) -> str:
@@ -161,7 +160,7 @@ def linearise(
     halves = {loop.name: loop.component, "rest": loop.rest}
     document = {"name": loop.name, "component": _matrices(loop.component), "rest": _matrices(loop.rest)}
     lines = [f"{name:<17}  {_summary(half)}" for name, half in halves.items()]
-    return CommandResult(document=document, verdict=verdicts.of_linearised(loop), lines=lines)
+    return CommandResult(document=document, verdict=loop.verdict, lines=lines)
 
 
 def _matrices(system: "StateSpace") -> dict[str, object]:

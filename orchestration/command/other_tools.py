@@ -115,4 +115,6 @@ def interop(
     if far:
         inform(f"farther than {table.TOLERANCE:g} from this project's master: {'; '.join(far)}")
     verdict = verdicts.of_agreements(far, len(found), table.TOLERANCE)
-    return CommandResult(document=document, verdict=verdict, lines=table.text(found).splitlines(), good=not far)
+    return CommandResult(
+        document={"tools": document}, verdict=verdict, lines=table.text(found).splitlines(), good=not far
+    )

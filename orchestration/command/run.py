@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from orchestration.command import exact, registry, verdicts
+from orchestration.command import exact, registry
 from orchestration.command.flags import EngineFlag, FlightFlags, ScenarioFile, Timing, flight_options, request_from
 from orchestration.command.one_fmu import OneFmuFlags
 from orchestration.command.options import option
@@ -149,4 +149,4 @@ def _metrics(result: "Result") -> CommandResult:
     for name, value in shown.items():
         text = f"{value:.6g}" if isinstance(value, float) else "-" if value is None else str(value)
         lines.append(f"{name:<{width}}  {text}{'' if value is None else after(units.get(name))}")
-    return CommandResult(document=found, verdict=verdicts.of_run(result), lines=lines)
+    return CommandResult(document=found, verdict=result.verdict, lines=lines)

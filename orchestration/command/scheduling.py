@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from orchestration.command import verdicts
 from orchestration.command.flags import assigned
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
@@ -58,7 +57,7 @@ def schedule(
         "messages": {name: asdict(each) for name, each in found.messages.items()},
         "busy": found.busy,
     }
-    return CommandResult(document=document, verdict=verdicts.of_schedule(found), lines=list(_lines(found)))
+    return CommandResult(document=document, verdict=found.verdict, lines=list(_lines(found)))
 
 
 def _draw(found: "Scheduled", out: Path, start: float | None, end: float | None) -> Path:

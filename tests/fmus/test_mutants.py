@@ -183,7 +183,8 @@ def test_the_command_names_what_it_finds_and_ends_with_1(
     with pytest.raises(SystemExit) as end:
         cli.main(["validate", str(path)])
     assert end.value.code == 1
-    first, *lines = capsys.readouterr().out.splitlines()
+    verdict, first, *lines = capsys.readouterr().out.splitlines()
+    assert verdict == f"{len(lines)} problem{'s' if len(lines) > 1 else ''} in the FMU"
     assert first == f"{path}: {len(lines)} problem{'s' if len(lines) > 1 else ''}"
     assert any(line.startswith(f"  {BY_NAME[name].rule}: ") for line in lines)
     assert all(line.startswith("  ") for line in lines)
@@ -196,7 +197,9 @@ def test_the_command_gives_findings_as_json(
     with pytest.raises(SystemExit) as end:
         cli.main(["validate", "--json", str(damaged), str(sound)])
     assert end.value.code == 1
-    first, second = json.loads(capsys.readouterr().out)
+    document = json.loads(capsys.readouterr().out)
+    first, second = document["fmus"]
+    assert document["verdict"].endswith(" in 2 FMUs")
     assert first["fmu"] == str(damaged)
     text = "needsExecutionTool = true: expected false"
     assert {"rule": "execution-tool", "text": text, "note": False} in first["findings"]

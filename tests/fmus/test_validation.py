@@ -214,7 +214,8 @@ def test_a_file_that_is_no_fmu_is_one_problem(tmp_path: Path, capsys: pytest.Cap
     with pytest.raises(SystemExit) as end:
         cli.main(["validate", str(path)])
     assert end.value.code == 1
-    first, second = capsys.readouterr().out.splitlines()
+    verdict, first, second = capsys.readouterr().out.splitlines()
+    assert verdict == "1 problem in the FMU"
     assert first == f"{path}: 1 problem"
     assert second.startswith("  readable: expected a zip archive that is whole: ")
 

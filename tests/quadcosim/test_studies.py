@@ -191,7 +191,7 @@ def test_a_limit_is_a_table_of_what_was_tried(capsys: pytest.CaptureFixture[str]
     system = quadcosim.changed(quadcosim.load_system(tank), {"stop_time": 5.0})
     found = quadcosim.limit(system, "connections.valve.delay", first=0.0, last=0.2, scan=0.1, tolerance=0.05)
     assert found.to_pandas()["value"].tolist() == [one.value for one in found.tried]
-    assert repr(found) == f"<Limit of connections.valve.delay: {found.note}>"
+    assert repr(found) == f"<Limit: {found.verdict}>"
     assert "connections.valve.delay 0.1 s: good" in capsys.readouterr().err
     assert "last value that is good" in found._repr_html_()
     figure = found.plot(style="paper")["limit"]

@@ -206,14 +206,7 @@ def _note(
     span: Range, bracket: Bracket | None, trials: Evaluator, refuted: float | None, found: LinearLimit
 ) -> list[str]:
     local = found.limit
-    if bracket is None:
-        parts = [f"good throughout the range, to {span.last:g}{span.unit}"]
-    elif bracket.good is None:
-        failure = describe(trials.tried[bracket.bad])
-        parts = [f"not good at {bracket.bad:g}{span.unit}, the first value of the range ({failure})"]
-    else:
-        failure = describe(trials.tried[bracket.bad])
-        parts = [f"good at {bracket.good:.6g}{span.unit} and not at {bracket.bad:.6g}{span.unit} ({failure})"]
+    parts = []
     if refuted is not None:
         parts.append(
             f"that nine seeds in ten are good is refuted at {refuted:.6g}{span.unit}: {describe(trials.tried[refuted])}"

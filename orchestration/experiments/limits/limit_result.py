@@ -5,12 +5,17 @@ from typing import TYPE_CHECKING, Literal
 
 from orchestration.experiments.limits.evaluation import Evaluation
 from orchestration.foundation.basics.extras import explains_missing
+from orchestration.foundation.basics.number_text import quantity, some
 from orchestration.simulation.results import html
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from orchestration.simulation.figures.gallery import Figures
+
+
+DIGITS = 6
+"""Digits of its values in a sentence"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,10 +82,31 @@ class Limit:
     tried: tuple[Evaluation, ...]
     """All evaluated values, in rising order."""
     note: str
-    """A summary in one sentence."""
+    """Remarks beyond the verdict, in one sentence."""
+
+    @property
+    def verdict(self) -> str:
+        """The last good value, the first that is not and how it failed, and how finely that was searched."""
+
+        def shown(value: float) -> str:
+            return quantity(value, self.unit, DIGITS)
+
+        tolerance = quantity(self.tolerance, self.unit, DIGITS, self.scan)
+        resolution = f"scan {shown(self.scan)}, tolerance {tolerance}"
+        seeds = f", all of {self.seeds} seeds" if self.seeds > 1 else ""
+        good = self.large_signal_limit
+        failed = next((one for one in self.tried if not one.is_good and (good is None or one.value > good)), None)
+        if failed is None:
+            return f"{self.of} good throughout the scan, up to {shown(self.tried[-1].value)}{seeds} ({resolution})"
+        how = failed.outcome if failed.unmet is None else f"{failed.outcome}, {failed.unmet}"
+        fails = f"diverges at {shown(failed.value)}" if how == "diverged" else f"not at {shown(failed.value)}: {how}"
+        if good is None:
+            return f"{self.of} not good even at {shown(failed.value)}, where the scan begins: {how} ({resolution})"
+        again = f"; good again at {some(map(shown, self.flies_above))}" if self.flies_above else ""
+        return f"{self.of} good up to {shown(good)}{seeds}; {fails}{again} ({resolution})"
 
     def __repr__(self) -> str:
-        return f"<Limit of {self.of}: {self.note}>"
+        return f"<Limit: {self.verdict}>"
 
     def _repr_html_(self) -> str:
         """The form that notebooks show."""
@@ -91,9 +117,8 @@ class Limit:
             "refuted from": self.refuted_limit,
         }
         rows = [(name, html.number(value), "" if value is None else self.unit or "") for name, value in limits.items()]
-        return html.card(
-            f"The limit of {self.of}", None, None, self.note, [*rows, ("values tried", str(len(self.tried)), "")]
-        )
+        rows.append(("values tried", str(len(self.tried)), ""))
+        return html.card(f"The limit of {self.of}", None, None, f"{self.verdict}; {self.note}", rows)
 
     @explains_missing
     def plot(self, *, style: Literal["screen", "paper", "slides"] = "screen") -> "Figures":

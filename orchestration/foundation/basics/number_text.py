@@ -1,5 +1,7 @@
 """Numbers with their units, as people read them: with few digits, and a prefix where the unit takes one."""
 
+from collections.abc import Iterable
+
 from orchestration.foundation.basics.unit_algebra import after
 
 DIGITS = 4
@@ -9,6 +11,8 @@ EXACT_DIGITS = 9
 PREFIXES = (("", 1.0), ("m", 1e-3), ("µ", 1e-6), ("n", 1e-9))
 WITH_PREFIX = ("s", "m")
 """Units that take a prefix"""
+MAX_NAMED = 3
+"""Names, or values, in a sentence; more are counted"""
 
 
 def quantity(value: float, unit: str | None, digits: int = DIGITS, like: float | None = None) -> str:
@@ -24,3 +28,10 @@ def quantity(value: float, unit: str | None, digits: int = DIGITS, like: float |
 def time_text(value: float) -> str:
     """A time with a readable unit, exactly as it was set."""
     return quantity(value, "s", EXACT_DIGITS)
+
+
+def some(texts: Iterable[str], separator: str = ", ") -> str:
+    """The first few of some texts, and how many more there are."""
+    known = list(texts)
+    more = f" and {len(known) - MAX_NAMED} more" if len(known) > MAX_NAMED else ""
+    return separator.join(known[:MAX_NAMED]) + more

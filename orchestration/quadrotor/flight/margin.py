@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.number_text import quantity
 from orchestration.foundation.processes.passable import passable
 from orchestration.quadrotor.flight.hover_limit import local_limit
 from orchestration.quadrotor.flight.hover_loop import HoverLoop
@@ -27,6 +28,16 @@ class Margin:
     """the smallest addition found that can make it unstable; None: no sequence that was tried does"""
     breaking_sequence: tuple[float, ...]
     """the shares of it, in turn, that do"""
+
+    @property
+    def verdict(self) -> str:
+        """The delays of the command about hover that leave the loop stable."""
+        if self.delay_limit is None:
+            constant = "no constant delay of the range is its limit"
+        else:
+            constant = f"stable up to a constant delay of {quantity(self.delay_limit, 's')}"
+        varying = f"and with any sequence of delays up to {quantity(self.delay + self.certain_jitter, 's')}"
+        return f"{constant}, {varying}, sampled every {quantity(self.period, 's')} (small deviations from hover)"
 
 
 def margin_of(scenario: Scenario) -> Margin:

@@ -11,11 +11,12 @@ import numpy.typing as npt
 
 from orchestration.foundation.basics.errors import Named
 from orchestration.foundation.basics.extras import explains_missing
+from orchestration.foundation.basics.number_text import quantity
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import instants_of
 from orchestration.foundation.recording.recording import About, Event, Recording, events_of, rows_of
 from orchestration.simulation.results import display_names as labels
-from orchestration.simulation.results.objectives import Metrics, unmet
+from orchestration.simulation.results.objectives import Metrics, judged_objective, unmet
 from orchestration.simulation.results.units import ColumnInfo
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request
@@ -60,6 +61,10 @@ class Provenance(TypedDict, total=False):
     """The duration of the run [s]."""
 
 
+DIGITS = 3
+"""Digits of numbers in a sentence"""
+
+
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Result:
     """One run: its request, its recording and its metrics.
@@ -93,6 +98,31 @@ class Result:
     """Origin of the numbers: versions of the software, the GUID of each FMU, the engine, the wall time [s]."""
     warnings: tuple[str, ...] = ()
     """Warnings of likely mistakes in the request, and those of the FMUs, a sentence each."""
+
+    @property
+    def verdict(self) -> str:
+        """How a run ended, by the objective that its criterion judges, and its clock."""
+        from orchestration.systems.system.description import describe_clock
+
+        return f"{self._ending()}, {describe_clock(self.system)}"
+
+    def _ending(self) -> str:
+        metrics, units = self.metrics, self.units
+        if self.divergence is not None:
+            return f"diverged: {self.divergence}"
+        outcome, until = metrics["outcome"], f"at {quantity(self.end, 's')}"
+        if self.termination is not None:
+            return f"terminated {until}: {self.termination}"
+        if (missed := unmet(self.system, metrics, units)) is not None:
+            return f"{outcome}: {missed}"
+        name = judged_objective(self.system)
+        left = None if name is None else metrics.get(name)
+        text = quantity(left, units.get(name or ""), DIGITS) if isinstance(left, float) else "no value"
+        settled = metrics.get("settling_time")
+        if outcome == "settled" and isinstance(settled, float):
+            return f"settled in {quantity(settled, 's', DIGITS)}, {text} left"
+        judged = "" if name is None else f": {name} = {text}"
+        return f"{outcome or f'ended {until}'}{judged}"
 
     def __repr__(self) -> str:
         outcome = self.metrics["outcome"] or "run"

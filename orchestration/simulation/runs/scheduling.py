@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.number_text import quantity, some
 from orchestration.foundation.basics.times import seconds
 from orchestration.simulation.requests.request import (
     FMU,
@@ -41,6 +42,33 @@ class Scheduled:
     """The share of the time in which a computer was busy, switches included, or a link carried a frame."""
     timeline: Timeline
     """All jobs and frames, in nanoseconds."""
+
+    @property
+    def verdict(self) -> str:
+        """Which deadlines are missed, or how near the worst response comes to one, and what is busiest."""
+        each = {**self.tasks, **self.messages}
+        missed = {name: one.missed for name, one in each.items() if one.missed}
+        due = [name for name, one in each.items() if one.deadline is not None and one.missed is not None]
+        busiest = max(self.busy, key=lambda name: self.busy[name], default=None)
+        busy = "" if busiest is None else f"; {busiest} busy {100.0 * self.busy[busiest]:.3g} %"
+        until = f"in {quantity(self.until, 's')}"
+        if missed:
+            worst = [
+                f"{name} {100.0 * share:.3g} %" for name, share in sorted(missed.items(), key=lambda item: -item[1])
+            ]
+            return f"deadlines missed {until}: {some(worst)}{busy}"
+        if not due:
+            return f"no deadline to meet {until}{busy}"
+        margins = {
+            name: (one.response.max / one.deadline, one.response.max, one.deadline)
+            for name, one in each.items()
+            if one.response is not None and one.deadline
+        }
+        name = max(margins, key=lambda one: margins[one][0])
+        _, response, deadline = margins[name]
+        return (
+            f"all deadlines met {until}, {name} nearest: {quantity(response, 's')} of {quantity(deadline, 's')}{busy}"
+        )
 
     def plot(self, window: tuple[float, float] | None = None, style: str = "screen") -> "Figures":
         """Its Gantt chart, over a `window` of time [s]; default: from the start, as long as jobs can be told apart."""

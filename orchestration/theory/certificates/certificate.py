@@ -99,6 +99,12 @@ class Checked:
     up_to: float | None = None
     """Largest value of a path of a computer or a network [s] that delays the loop no more than these ranges."""
 
+    @property
+    def verdict(self) -> str:
+        """What a certificate proves, and about what."""
+        whose = " and ".join(self.of) + " of this system" if self.of else "the matrices in the file"
+        return f"the proof holds: no sequence makes the {self.states} numbers of the loop grow ({whose})"
+
 
 def words(certificate: Certificate, mode: int, length: int) -> Iterator[tuple[int, Word]]:
     """The words of labels of a length that may follow a mode, each with the mode that its first label leads to."""

@@ -12,6 +12,7 @@ from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import needs
+from orchestration.foundation.basics.number_text import quantity
 from orchestration.foundation.basics.progress import ShareProgress, share_reporter
 from orchestration.foundation.basics.terminal import Share
 from orchestration.foundation.basics.times import NANOSECONDS, floor_to_nanoseconds
@@ -65,6 +66,23 @@ class Certified:
     """The size of the state from period to period."""
     certificate: str | None = None
     """The proof, as the text of a file that `check` verifies."""
+
+    @property
+    def verdict(self) -> str:
+        """How far a quantity may vary with the loop proved stable, and what is known to break it."""
+
+        def shown(value: float) -> str:
+            return f"{value:g} in a row" if self.of.endswith("loss") else quantity(value, "s")
+
+        if self.breaking == 0.0:
+            return f"unstable even without variation of {self.of}"
+        proved = (
+            "no proof found" if self.certified is None else f"every sequence up to {shown(self.certified)} is stable"
+        )
+        broken = f"none found up to {shown(self.largest)} that breaks the loop"
+        if self.breaking is not None:
+            broken = f"one of {shown(self.breaking)} breaks the loop"
+        return f"{self.of}: {proved}, {broken} (small deviations)"
 
     def __post_init__(self) -> None:
         """Raise `RuntimeError` for what cannot be: a value that is proved to be stable, and breaks the loop."""

@@ -47,6 +47,11 @@ class Region:
     certificates: tuple[str, ...]
     """The proofs, one for each certified pair, as the texts of files that `check` verifies."""
 
+    @property
+    def verdict(self) -> str:
+        """How many pairs of values are proved stable, and how many break the loop."""
+        return f"{len(self.certified)} pairs are proved stable, {len(self.breaking)} break the loop (small deviations)"
+
     def save(self, folder: str | Path, style: Style = SCREEN) -> list[Path]:
         """Write the certificates, `1.json` and so on, and the figure, into a folder; the paths."""
         folder = Path(folder)

@@ -7,6 +7,7 @@ from typing import Any
 
 from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.number_text import quantity, some
 from orchestration.foundation.processes.passable import passable
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.systems.expressions.syntax import Call
@@ -42,6 +43,16 @@ class Expected:
     """The hyperperiod of all that samples [s]."""
     horizon: float | None = None
     """Time over which the means are, from initial conditions [s]; None: stationary ones."""
+
+    @property
+    def verdict(self) -> str:
+        """The expectations, or that there are none, by the growth of second moments."""
+        radius = f"mean-square radius {self.mean_square_radius:.4g} in {quantity(self.period, 's')}"
+        if self.horizon is None and self.mean_square_radius >= 1.0:
+            return f"no mean of squares is finite: {radius}"
+        known = [f"{name} = {value:.4g}" for name, value in self.objectives.items() if value is not None]
+        means = "stationary" if self.horizon is None else f"from 0 to {quantity(self.horizon, 's')}"
+        return f"{some(known) if known else 'no objective has an exact expectation'} ({means}); {radius}"
 
     def __repr__(self) -> str:
         listed = ", ".join(f"{name} {'-' if v is None else f'{v:.6g}'}" for name, v in self.objectives.items())

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
+from orchestration.foundation.basics.number_text import quantity
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.processes.passable import passable
 from orchestration.simulation.requests.request import RequestLike, request_of
@@ -21,11 +22,13 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
 from orchestration.theory.stability.known_loops import rested
 from orchestration.theory.stability.linearise import (
+    NEAR_ONE,
     Linearised,
     cut_open,
     in_isolation,
     rest_of_loop,
     sampled_component,
+    stability_of,
 )
 from orchestration.theory.stability.loop_at_rest import KnownTangents, at_rest
 from orchestration.theory.stability.operating_point import deterministic
@@ -36,8 +39,6 @@ if TYPE_CHECKING:
 
 Complexes = npt.NDArray[np.complex128]
 
-NEAR_ONE = 1e-7
-"""Distance of a spectral radius from 1 that rounding may explain"""
 LOWEST = 1e-5
 """Lowest frequency, as a share of the highest"""
 SLOWER = 0.03
@@ -95,6 +96,22 @@ class Bode:
     """Frequencies up to half the sampling rate [rad/s], shape (n,)."""
     gains: Complexes = field(repr=False)
     """Loop gains L at them, which negative feedback closes, shape (loops, n)."""
+
+    @property
+    def verdict(self) -> str:
+        """The smallest margins of a loop, or that it is unstable and has none."""
+        clock = f"sampled every {quantity(self.dt, 's')}"
+        if not self.stable:
+            return f"{stability_of(self.radius)}, {clock}: an unstable loop has no margins"
+        gains = [loop.gain_margin for loop in self.loops if loop.gain_margin is not None]
+        phases = [loop.phase_margin for loop in self.loops if loop.phase_margin is not None]
+        delays = [loop.delay_margin for loop in self.loops if loop.delay_margin is not None]
+        margins = [
+            f"gain margin {min(gains, key=lambda one: abs(math.log(one))):.3g}" if gains else "infinite gain margin",
+            f"phase margin {min(phases, key=abs):.3g}°" if phases else "infinite phase margin",
+            f"delay margin {quantity(min(delays), 's')}" if delays else "infinite delay margin",
+        ]
+        return f"stable, {clock}: {', '.join(margins)} (small deviations)"
 
     @explains_missing
     def plot(self, *, style: Literal["screen", "paper", "slides"] = "screen") -> "Figures":

@@ -1,5 +1,6 @@
 """A system about its operating point, cut open at one component: that component, and the rest of the loop."""
 
+import math
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ import numpy as np
 from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.number_text import quantity
 from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.foundation.processes.passable import passable
 from orchestration.simulation.requests.request import RequestLike, request_of
@@ -27,6 +29,9 @@ from orchestration.theory.stability.state_space import StateSpace, reduced
 
 Found = TypeVar("Found")
 
+NEAR_ONE = 1e-7
+"""Distance of a spectral radius from 1 that rounding may explain"""
+
 
 @passable
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +48,12 @@ class Linearised:
     radius: float
     """The spectral radius of the whole loop, closed, over a period, with what its halves leave out: below 1 small
     deviations decay."""
+
+    @property
+    def verdict(self) -> str:
+        """Whether the linear loop is stable, and its sizes."""
+        sizes = f"{self.name} with {_count_of(len(self.component.A))}, the rest with {_count_of(len(self.rest.A))}"
+        return f"{stability_of(self.radius)}, sampled every {quantity(self.rest.dt, 's')}: {sizes}"
 
 
 def linearise(request: RequestLike, component: str | None = None) -> Linearised:
@@ -109,3 +120,14 @@ def rest_of_loop(loop: AtRest, name: str) -> StateSpace:
     size = len(whole) - len(port.inputs)
     A, B, C = reduced(whole[:size, :size], whole[:size, size:], whole[size:, :size])
     return StateSpace(A=A, B=B, C=C, D=np.array(whole[size:, size:]), dt=dt, inputs=port.outputs, outputs=port.inputs)
+
+
+def stability_of(radius: float) -> str:
+    """Whether a loop with a spectral radius is stable, in words."""
+    if math.isclose(radius, 1.0, abs_tol=NEAR_ONE):
+        return f"not decidably stable: spectral radius {radius:.9g}"
+    return f"{'stable' if radius < 1.0 else 'unstable'}: spectral radius {radius:.4g}"
+
+
+def _count_of(count: int) -> str:
+    return f"{count} state{'' if count == 1 else 's'}"

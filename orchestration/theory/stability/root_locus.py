@@ -13,6 +13,7 @@ from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
+from orchestration.foundation.basics.number_text import quantity, some
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.foundation.processes.passable import passable
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
 COUNT = 40
 """Values by default"""
 MAX_COUNT = 10_000
+DIGITS = 6
+"""Digits of its values in a sentence"""
 ON_CIRCLE = 1e-7
 """Distance of a spectral radius from 1 at which a crossing is found"""
 TRIALS = 40
@@ -75,6 +78,24 @@ class RootLocus:
     """The poles at each, shape (n, m), without those at 0, of what is forgotten; where there are fewer, NaN."""
     crossings: tuple[Crossing, ...]
     """Values at which poles cross the unit circle, in rising order."""
+
+    @property
+    def verdict(self) -> str:
+        """Where poles leave the unit circle and return, or that they do not."""
+
+        def shown(value: float) -> str:
+            return quantity(value, self.unit, DIGITS)
+
+        first, last = shown(self.values[0]), shown(self.values[-1])
+        begins = "inside" if self.radius[0] < 1.0 else "not all inside"
+        if not self.crossings:
+            radii = f"spectral radius {self.radius.min():.4g} to {self.radius.max():.4g}"
+            return f"{self.of}: poles {begins} the unit circle from {first} to {last}, {radii} (small deviations)"
+        ways = [
+            f"{'leave' if one.leaves else 'return'} at {shown(one.value)}, {one.frequency:.4g} rad/s"
+            for one in self.crossings
+        ]
+        return f"{self.of}: poles {begins} the unit circle at {first}, {some(ways, '; ')} (small deviations)"
 
     @explains_missing
     def plot(self, *, style: Literal["screen", "paper", "slides"] = "screen") -> "Figures":
@@ -145,8 +166,8 @@ def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLo
             crossings.append(_crossing(at, *found[at], leaves=before < 1.0))
     each = [found[value][0] for value in values]
     poles = np.full((len(values), max(map(len, each))), np.nan, dtype=complex)
-    for row, some in zip(poles, each, strict=True):
-        row[: len(some)] = some
+    for row, known_poles in zip(poles, each, strict=True):
+        row[: len(known_poles)] = known_poles
     return RootLocus(
         of=varied.of,
         unit=unit,

@@ -8,6 +8,7 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
+from orchestration.foundation.basics.number_text import quantity
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.requests.request import RequestLike
 from orchestration.theory.stability.frequency import closed_loop, expect_decided, receivers_of
@@ -57,6 +58,17 @@ class Step:
     """Times of the samples [s], shape (n,)."""
     responses: Floats = field(repr=False)
     """Share of each step that the law takes back, shape (loops, n)."""
+
+    @property
+    def verdict(self) -> str:
+        """How long the slowest loop takes, and what it takes back."""
+        slowest = self.slowest
+        over = "" if slowest.overshoot is None else f", overshoot {slowest.overshoot:.3g} %"
+        settled = f"settles in {quantity(slowest.settling_time, 's')}"
+        return (
+            f"a step on {slowest.output} {settled}{over}, {100.0 * slowest.steady_state:.4g} % taken back, "
+            f"sampled every {quantity(self.dt, 's')} (small deviations)"
+        )
 
     @property
     def slowest(self) -> LoopStep:

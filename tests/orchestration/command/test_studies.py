@@ -204,7 +204,7 @@ def test_limit_takes_the_flags_of_a_flight(main: Main) -> None:
     done = main(*LIMIT, *still, *tilted, *flags)
     found = json.loads(done.stdout)
     assert (found["of"], found["confidence"], found["seeds"]) == ("loss", 0.1, 1)
-    assert found["note"].startswith("good throughout the range, to 1;")
+    assert "good throughout the scan, up to 1" in found["verdict"]
     assert len(done.stderr.splitlines()) == 22  # what flies, and 21 values
 
 
@@ -227,7 +227,7 @@ def test_limit_prints_both_figures_notes_that_they_differ_and_draws_them_on_requ
     assert found["large_signal_limit"] == "-"
     assert not {"continuous", "flies_above", "refuted_limit", "confidence"} & found.keys()
     assert (found["horizon"], found["scan"], found["tried"]) == ("50 ms", "5 ms", "5 values")
-    assert "the first value of the range (fails, bounded: ultimate_bound = " in found["note"]
+    assert "where the scan begins: bounded, ultimate_bound = " in found["verdict"]
     assert found["note"].endswith(f"; the local limit is {float(local) / 1e3:.6g} s")
 
 

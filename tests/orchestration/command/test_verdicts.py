@@ -6,11 +6,11 @@ from typing import Any, cast
 
 import pytest
 
-from orchestration.command import verdicts
 from orchestration.experiments.limits.evaluation import Evaluation
 from orchestration.experiments.limits.limit_result import Limit
 from orchestration.foundation.basics import terminal
 from orchestration.foundation.basics.number_text import quantity
+from quadcosim import Expected, Linearised
 
 GOOD = Evaluation(value=0.035250000000000004, outcome="settled", divergence_time=None, flew=1, runs=1, share=None)
 BAD = replace(GOOD, value=0.0355, outcome="diverged", divergence_time=3.0, flew=0)
@@ -68,7 +68,7 @@ def test_a_number_has_few_digits_and_a_prefix_where_its_unit_takes_one(
 def test_a_limit_states_the_last_good_value_the_first_bad_one_and_its_resolution(
     changes: dict[str, Any], expected: str
 ) -> None:
-    assert verdicts.of_limit(replace(LIMIT, **changes)) == expected
+    assert replace(LIMIT, **changes).verdict == expected
 
 
 def test_a_radius_that_rounding_may_put_on_either_side_of_one_decides_nothing() -> None:
@@ -76,7 +76,7 @@ def test_a_radius_that_rounding_may_put_on_either_side_of_one_decides_nothing() 
 
     def sentence(radius: float) -> str:
         loop = SimpleNamespace(name="law", component=half, rest=half, radius=radius)
-        return verdicts.of_linearised(cast("Any", loop))
+        return str(cast("Any", Linearised.verdict).fget(loop))
 
     assert sentence(0.9).startswith("stable: spectral radius 0.9, sampled every 10 ms: law with 1 state,")
     assert sentence(1.1).startswith("unstable: spectral radius 1.1")
@@ -85,7 +85,7 @@ def test_a_radius_that_rounding_may_put_on_either_side_of_one_decides_nothing() 
 
 def test_means_that_are_infinite_are_the_answer() -> None:
     found = SimpleNamespace(objectives={"J": None}, mean_square_radius=1.2, period=0.1, horizon=None)
-    assert verdicts.of_expected(cast("Any", found)) == "no mean of squares is finite: mean-square radius 1.2 in 100 ms"
+    assert cast("Any", Expected.verdict).fget(found) == "no mean of squares is finite: mean-square radius 1.2 in 100 ms"
 
 
 def test_progress_beside_a_bar_replaces_its_text_and_goes_with_it(monkeypatch: pytest.MonkeyPatch) -> None:

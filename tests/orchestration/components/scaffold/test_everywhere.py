@@ -167,7 +167,7 @@ def test_fmus_checks_other_masters_and_limits_take_it_as_any_controller(
         "mine.timing.toml has its timing, for quadcosim run\n"
     )
     grid = ("--plant-interval", "0.01", "--reference", "hover", "--tool", "fmpy, SSP", "--json")
-    (other,) = json.loads(main("interop", *flight, *grid).stdout)
+    (other,) = json.loads(main("interop", *flight, *grid).stdout)["tools"]
     assert other["steps"] == 30
     assert json.loads(main("margin", *flight, "--json").stdout)["delay_limit"] > 0.01
     found = json.loads(main("limit", *flight, "--from", "0.01", "--to", "0.02", "--scan", "0.01", "--json").stdout)

@@ -486,11 +486,11 @@ def test_a_range_without_failures_or_without_good_values_is_noted(
     monkeypatch.setattr(stubbed, "bound", lambda self, system: 0.01)
     nothing_fails = find(scenario_of(), "jitter")
     assert nothing_fails.large_signal_limit is None
-    assert "good throughout the range" in nothing_fails.note
+    assert "good throughout the scan" in nothing_fails.verdict
     monkeypatch.setattr(stubbed, "bound", lambda self, system: 1.0)
     nothing_good = find(scenario_of(), "delay")
     assert nothing_good.large_signal_limit is None
-    assert "not good at 0 s, the first value of the range" in nothing_good.note
+    assert "not good even at 0 s, where the scan begins" in nothing_good.verdict
 
 
 @pytest.mark.parametrize(
@@ -538,14 +538,14 @@ def test_good_values_above_the_limit_are_reported(stubbed: type[StubPool], monke
 
 @pytest.mark.parametrize(
     ("bound", "expected"),
-    [(1.0, "(fails, bounded: ultimate_bound = 1 m, expected < 0.05 m)"), (math.inf, "(fails, diverged at 3.25 s)")],
+    [(1.0, "not at 30 ms: bounded, ultimate_bound = 1 m, expected < 0.05 m"), (math.inf, "diverges at 30 ms")],
 )
-def test_the_outcome_of_the_failing_value_is_noted(
+def test_the_outcome_of_the_failing_value_is_in_the_verdict(
     stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch, bound: float, expected: str
 ) -> None:
     monkeypatch.setattr(stubbed, "bound", lambda self, system: 0.01 if at(system, "timing.period") < 0.03 else bound)
     found = find(scenario_of(), "period")
-    assert expected in found.note
+    assert expected in found.verdict
     assert found.horizon == 30.0
 
 
@@ -689,7 +689,7 @@ def test_find_of_a_random_quantity_is_the_same_with_any_number_of_workers(worker
     base = dataclasses.replace(hover_of(short()), stop_time=0.05)
     found = find(base, "loss", confidence=0.2, scan=0.25, tolerance=0.5, workers=workers)
     assert (found.seeds, found.large_signal_limit) == (3, None)
-    assert found.note.startswith("good throughout the range, to 1;")
+    assert "good throughout the scan, up to 1" in found.verdict
 
 
 @pytest.mark.parametrize(

@@ -86,7 +86,7 @@ def test_json_has_each_tool_once_and_the_chart_goes_to_out(tmp_path: Path, tempo
     names = ("ecos, SSP", "fmpy, controller alone", "ecos, SSP")
     chosen = [text for name in names for text in ("--tool", name)]
     done = interop(*chosen, "--json", "--out", tmp_path / "drawn")
-    found = json.loads(done.stdout)
+    found = json.loads(done.stdout)["tools"]
     assert [row["tool"] for row in found] == ["ecos, SSP", "fmpy, controller alone"]
     assert [row["agrees"] for row in found] == [True, True]
     assert found[0]["as_it_comes"].keys() >= {"plant.position.x", "controller.thrust"}
@@ -107,7 +107,7 @@ def test_a_tool_that_flies_with_another_gain_is_noticed(interop: Main, monkeypat
     monkeypatch.setattr(writing, "write", with_another_gain)
     chosen = ("--tool", "libcosim", "--tool", "libcosim, SSP", "--tool", "fmpy, SSP")
     done = interop(*chosen, "--json", code=1)
-    assert [row["agrees"] for row in json.loads(done.stdout)] == [True, False, False]
+    assert [row["agrees"] for row in json.loads(done.stdout)["tools"]] == [True, False, False]
     assert messages_of(done) == ["farther than 1e-09 from this project's master: libcosim, SSP; fmpy, SSP"]
 
 

@@ -118,7 +118,7 @@ def test_the_command_takes_any_system_and_leaves_out_tools_for_components_that_i
     path = EXAMPLES / COMMANDED / "system.toml"
     tools = ("--tool", "libcosim", "--tool", "fmucontainer -sequential")
     done = main("interop", path, "--stop-time", "2", *tools, "--json", "--out", tmp_path)
-    rows = json.loads(done.stdout)
+    rows = json.loads(done.stdout)["tools"]
     assert [row["order"] for row in rows] == ["jacobi", "gauss-seidel"]
     for row in rows:
         assert row["agrees"]
