@@ -269,7 +269,7 @@ class _Outline:
             more["last"] = max(i for i, share in enumerate(of.probabilities) if share > 0.0)
         return self._varying(kind, key, **more)
 
-    def _lateness(self, jitter: Varying, spread: Spread, key: Sequence[int]) -> Any:
+    def _lateness(self, jitter: Varying, spread: Spread, key: Sequence[int]) -> object:
         """As `lateness_and_loss.lateness`."""
         if isinstance(jitter, Distribution):
             return self._times(jitter, key)
