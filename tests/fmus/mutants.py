@@ -286,8 +286,8 @@ VARIABLES = (
     Mutant(name="factor wrong", rule="unit-meaning", words=("unit kg:", "0.001"), damage=unit("kg", factor="0.001")),
     Mutant(name="unit without base units", rule="units", words=("unit m:",), damage=_without_base_unit("m")),
     Mutant(
-        name="array of no elements", rule="arrays", words=("velocity.y: dimensions 0",), versions=(3,),
-        damage=_dimension("velocity.y", start="0"),
+        name="array of no elements", rule="arrays", words=("tilt: dimensions 0",), versions=(3,),
+        damage=_dimension("tilt", start="0"),
     ),
     Mutant(
         name="as many elements as a number", rule="indices", words=("velocity.y", "mass", "of Float64"), versions=(3,),
@@ -354,8 +354,8 @@ STRUCTURE = (
         damage=depends("Outputs", "position.y", "mass"), versions=(2,),  # FMI 3.0 has them known at any time
     ),
     Mutant(
-        name="dependency on an output", rule="known-dependencies", words=("position.y depends on velocity.y",),
-        damage=depends("InitialUnknowns", "position.y", "velocity.y"),
+        name="dependency on a result", rule="known-dependencies", words=("position.y depends on tilt, a local",),
+        damage=depends("InitialUnknowns", "position.y", "tilt"),
     ),
     Mutant(
         name="dependency added", rule="idle-dependency", words=("thrust", "position.y"),
@@ -448,7 +448,7 @@ STEPPED_FROM_OUTSIDE = (
     ),
 )  # fmt: skip
 
-_TILT = "self.wind_force, self.tilt = wind, tilt(state.quaternion)"
+_TILT = "self.wind_force, self.tilt = wind, tilt(attitude)"
 _INITIAL_VELOCITY = "self.initial_velocity"
 _STEP = "body, wind, actuators = self._body, self._wind, self._actuators"
 
@@ -472,7 +472,7 @@ BEHAVIOUR = (
     Mutant(
         name="state kept over reset", rule="reset", words=("without the run and reset before it",),
         damage=every(
-            source("plant_fmu/slave.py", _TILT, f"{_TILT}\n        _KEPT[self.instance_name] = state.velocity"),
+            source("plant_fmu/slave.py", _TILT, f"{_TILT}\n        _KEPT[self.instance_name] = self.velocity"),
             source("plant_fmu/slave.py", "_MOTION = ", "_KEPT = {}\n_MOTION = "),
             source("plant_fmu/slave.py", _INITIAL_VELOCITY, f"_KEPT.get(self.instance_name, {_INITIAL_VELOCITY})"),
         ),

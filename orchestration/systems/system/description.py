@@ -68,6 +68,11 @@ def as_text(
 
 def describe_rate(component: Component) -> str:
     """How a component is stepped."""
+    begins = f", its time begins at {time_text(component.start_time)}" if component.start_time else ""
+    return _rate(component) + begins
+
+
+def _rate(component: Component) -> str:
     if component.sampling is None:
         return f"continuous, step {time_text(component.step or 0.0)}" + (
             ", moved to its own grid" if component.align == "next" else ""

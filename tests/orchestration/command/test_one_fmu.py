@@ -7,8 +7,9 @@ import fmpy
 import pytest
 from fmpy.util import read_csv, write_csv
 
+from orchestration.simulation.engines.batch.shape import Shape
 from orchestration.simulation.requests.request import load_request
-from quadcosim import run
+from quadcosim import UsageError, run
 from tests.commands import Main
 from tests.orchestration.components.fmi.exchange import exchange
 from tests.orchestration.components.fmi.small import known, needs_compiler, small
@@ -122,3 +123,5 @@ def test_an_fmu_is_called_at_its_own_time_by_both_loops_and_its_events_are_at_th
         result = run({"stop_time": 3.5, "components": {"it": component}}, engine=engine, in_process=True)
         assert result.signals["it.count"].tolist() == [1, 2, 2, 3, 4, 5]
         assert [event.time for event in result.events] == [k * 10**9 + 5 * 10**8 for k in range(4)]
+    with pytest.raises(UsageError, match=r"components.it.start_time = 0.5: expected 0 for one of many at once"):
+        Shape(system=result.system, models={}, lanes=1)

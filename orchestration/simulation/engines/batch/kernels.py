@@ -50,10 +50,6 @@ def sources_of(name: str, model: Model) -> Mapping[str, bytes]:
             f"components.{name}: {model.path.name}: expected a native FMU of this project's kit, as quadcosim build "
             "--native makes them, to be one of many at once"
         )
-    if model.access.start_time:
-        raise UsageError(
-            f"components.{name}.start_time = {model.access.start_time:g}: expected 0 for one of many at once"
-        )
     return sources
 
 

@@ -84,6 +84,12 @@ class Shape:
     models: Mapping[str, Model]
     lanes: int
 
+    def __post_init__(self) -> None:
+        for name, one in self.system.components.items():
+            if one.start_time:
+                where = f"components.{name}.start_time = {one.start_time:g}"
+                raise UsageError(f"{where}: expected 0 for one of many at once, or in a page")
+
     # -- components and connections --------------------------------------------------------------------------------
 
     @cached_property

@@ -102,6 +102,7 @@ def _unsupported(system: System, models: Mapping[str, Model]) -> Iterator[str]:
         interface = called(models[name], component.access).interface
         if interface != "co-simulation":
             yield f"components.{name}.interface = {interface}: an SSP is written of co-simulation alone; expected that"
+        yield from _unsupported_fields(f"components.{name}", component, ("start_time",))
         if component.sampling is not None:
             yield from _unsupported_fields(f"components.{name}.sampling", component.sampling, ("jitter", "clock_ratio"))
     for table in ("computers", "networks"):
@@ -119,7 +120,7 @@ FAULTS = ("delay", "delay_jitter", "loss", "hold", "noise", "quantisation")
 """The fields of a connection that an SSP lacks"""
 
 
-def _unsupported_fields(place: str, of: Sampling | Connection, keys: tuple[str, ...]) -> Iterator[str]:
+def _unsupported_fields(place: str, of: Component | Sampling | Connection, keys: tuple[str, ...]) -> Iterator[str]:
     defaults = {f.name: f.default for f in fields(of)}
     for key in keys:
         value = getattr(of, key)
