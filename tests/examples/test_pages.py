@@ -9,6 +9,7 @@ import pytest
 from orchestration.systems.system.paths import value_at
 from tests.commands import Main
 from tests.examples.common import NAMES, example
+from tests.extent import sample
 from tests.places import EXAMPLES
 
 PAGES = [*(EXAMPLES / name / "README.md" for name in NAMES), EXAMPLES.parent / "README.md"]
@@ -33,7 +34,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("command", [*commands("run"), *commands("show"), *commands("build")], ids=" ".join)
+@pytest.mark.parametrize("command", sample([*commands("run"), *commands("show"), *commands("build")], 6), ids=" ".join)
 def test_a_command_that_is_shown_works(command: list[str], here: Path, main: Main) -> None:
     done = main(*command)
     assert done.returncode == 0, done.stderr

@@ -23,6 +23,7 @@ from fmu_kit.packaging import slave_class
 from fmu_kit.variables import Variable
 from orchestration.components.building import fmus
 from orchestration.components.building.models import MODELS
+from tests.extent import sample
 from tests.fmu_kit.compiler.compiled import compiler
 from tests.fmu_kit.compiler.in_lanes import Alone, Together, Values, bits
 from tests.fmu_kit.compiler.twins import GUID, compiled
@@ -76,7 +77,7 @@ def test_in_a_lane_are_the_bits_of_the_fmu(model: str, tmp_path: Path) -> None:
     assert _statuses(tmp_path, target, guid) >= {0, FMU_ERROR} | may_diverge
 
 
-@pytest.mark.parametrize("name", PROBES)
+@pytest.mark.parametrize("name", sample([*PROBES], 4))
 def test_all_features_of_slaves_work_in_lanes(name: str, tmp_path: Path) -> None:
     compiler("cc")
     target = Target.parse(f"tests.fmu_kit.compiler.probes:{name}")

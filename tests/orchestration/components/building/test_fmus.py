@@ -18,6 +18,7 @@ from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.processes import subprocesses
 from quadcosim import QuadcosimError, UsageError
+from tests.extent import sample
 
 
 @pytest.fixture
@@ -253,7 +254,7 @@ def test_somebody_elses_fmu_is_left_as_it_is_beside_a_slave_of_its_name(lamp: Pa
 
 
 @pytest.mark.parametrize(
-    "packing", [builder.IN_PYTHON, builder.NATIVE, builder.NATIVE_FMI_3], ids=lambda each: each.folder
+    "packing", sample([builder.IN_PYTHON, builder.NATIVE, builder.NATIVE_FMI_3], 1), ids=lambda each: each.folder
 )
 def test_a_variant_is_built_again_with_its_values_when_its_sources_change(packing: builder.Packing, lamp: Path) -> None:
     law = (lamp / "lamp.py").read_text(encoding="utf-8").replace("import Input,", "import Input, Parameter,")

@@ -21,6 +21,7 @@ from orchestration.theory.certificates.varying import BOXES, DELAY, JITTER, LATE
 from orchestration.theory.stability.loop_at_rest import at_rest
 from orchestration.theory.stability.period_map import growth_of_loop
 from tests.examples.common import example
+from tests.extent import sample
 from tests.orchestration.theory.certificates.loops import through_a_filter
 
 PERIOD = 0.5
@@ -61,24 +62,27 @@ def radius_of(family: LoopFamily, value: float) -> float:
 
 @pytest.mark.parametrize(
     ("varying", "path", "changes"),
-    [
-        (COMMAND, "connections.command.delay", {"connections.command.delay": 0.3}),
-        (COMMAND, "connections.command.delay", {"connections.command.delay": 1.2}),
-        (COMMAND, "connections.command.delay", {"connections.command.order": "jacobi"}),
-        (COMMAND, "connections.command.delay", {"connections.measurement.delay": 0.13}),
-        (
-            COMMAND,
-            "connections.command.delay",
-            {
-                "components.controller.sampling.offset": 0.2,
-                "components.controller.sampling.clock_ratio": 1.25,
-                "connections.command.scale": 0.7,
-                "connections.command.delay": 0.45,
-            },
-        ),
-        (MEASUREMENT, "connections.measurement.delay", {"connections.measurement.delay": 0.9}),
-        (MEASUREMENT, "connections.measurement.delay", {"connections.command.delay": 0.2}),
-    ],
+    sample(
+        [
+            (COMMAND, "connections.command.delay", {"connections.command.delay": 0.3}),
+            (COMMAND, "connections.command.delay", {"connections.command.delay": 1.2}),
+            (COMMAND, "connections.command.delay", {"connections.command.order": "jacobi"}),
+            (COMMAND, "connections.command.delay", {"connections.measurement.delay": 0.13}),
+            (
+                COMMAND,
+                "connections.command.delay",
+                {
+                    "components.controller.sampling.offset": 0.2,
+                    "components.controller.sampling.clock_ratio": 1.25,
+                    "connections.command.scale": 0.7,
+                    "connections.command.delay": 0.45,
+                },
+            ),
+            (MEASUREMENT, "connections.measurement.delay", {"connections.measurement.delay": 0.9}),
+            (MEASUREMENT, "connections.measurement.delay", {"connections.command.delay": 0.2}),
+        ],
+        4,
+    ),
 )
 def test_a_delay_that_stays_is_the_masters(
     system: System, instances: Instances, varying: Varying, path: str, changes: dict[str, Any]

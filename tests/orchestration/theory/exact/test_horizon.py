@@ -14,6 +14,7 @@ from orchestration.theory.exact.expect import expect
 from quadcosim import UsageError, run
 from tests.commands import Main
 from tests.examples.common import native_example as example
+from tests.extent import sample
 from tests.orchestration.theory.exact.common import GAIN
 from tests.places import EXAMPLES
 
@@ -88,16 +89,19 @@ def test_far_away_it_comes_to_the_stationary_value(changes: dict[str, Any]) -> N
 
 @pytest.mark.parametrize(
     "changes",
-    [
-        {},
-        {f"{COMMAND}.delay": 0.7},
-        {f"{COMMAND}.hold": "first", f"{COMMAND}.delay": 0.1},
-        {f"{COMMAND}.order": "jacobi", f"{COMMAND}.delay": 0.05},
-        {f"{MEASUREMENT}.delay": 0.5, f"{COMMAND}.scale": 0.9},
-        {f"{MEASUREMENT}.delay": 0.9, f"{MEASUREMENT}.hold": "first"},
-        {f"{SAMPLING}.offset": 0.2, f"{COMMAND}.delay": 0.1},
-    ],
-    ids=["prompt", "late", "first", "jacobi", "measured", "measured first", "offset"],
+    sample(
+        [
+            {},
+            {f"{COMMAND}.delay": 0.7},
+            {f"{COMMAND}.hold": "first", f"{COMMAND}.delay": 0.1},
+            {f"{COMMAND}.order": "jacobi", f"{COMMAND}.delay": 0.05},
+            {f"{MEASUREMENT}.delay": 0.5, f"{COMMAND}.scale": 0.9},
+            {f"{MEASUREMENT}.delay": 0.9, f"{MEASUREMENT}.hold": "first"},
+            {f"{SAMPLING}.offset": 0.2, f"{COMMAND}.delay": 0.1},
+        ],
+        4,
+    ),
+    ids=sample(["prompt", "late", "first", "jacobi", "measured", "measured first", "offset"], 4),
 )
 def test_without_chance_it_is_what_a_run_prints(changes: dict[str, Any]) -> None:
     """Of squares and of signals themselves, from where the example begins, to a time between two samples."""

@@ -21,6 +21,7 @@ from orchestration.theory.exact.timing import sampled_tasks
 from orchestration.theory.stability.matrices import Components, SampledSystem
 from quadcosim import run
 from tests.examples.common import native_example as example
+from tests.extent import sample
 from tests.places import EXAMPLES
 
 DELAY, DELAY_JITTER, LOSS = (f"connections.command.{key}" for key in ("delay", "delay_jitter", "loss"))
@@ -49,7 +50,7 @@ def of(system: System, **how: Any) -> dict[str, float]:
 @pytest.mark.parametrize(
     "how", [{}, {"as_simulated": True}, {"horizon": 7.3}], ids=["means", "as simulated", "horizon"]
 )
-@pytest.mark.parametrize("execution", [0.0, 0.1, 0.4])
+@pytest.mark.parametrize("execution", sample([0.0, 0.1, 0.4], 2))
 def test_one_task_alone_costs_what_a_delay_of_its_execution_does(execution: float, how: dict[str, Any]) -> None:
     by_delay = example("minimum_variance", {DELAY: execution})
     by_task = on_a_computer("minimum_variance", period=1.0, execution=execution)
@@ -107,18 +108,21 @@ TDMA = Network(
 
 @pytest.mark.parametrize(
     ("computer", "keys", "network"),
-    [
-        (Computer(switch=1e-5, tasks=LOAD), {}, None),
-        (Computer(scheduling="earliest-deadline-first", preemptive=False, tasks=LOAD), {"deadline": 0.002}, None),
-        (Computer(scheduling="first-come-first-served", tasks=LOAD), {"offset": 0.0031}, None),
-        (Computer(tasks=LOAD), {"read": "release", "write": "deadline", "deadline": 0.005}, None),
-        (Computer(tasks=LOAD), {"overrun": "abort", "deadline": 0.002}, None),
-        (Computer(tasks=LOAD), {"overrun": "skip", "execution": 0.0045}, None),
-        (Computer(tasks=LOAD), {}, CAN),
-        (Computer(tasks=LOAD), {}, TDMA),
-        (Computer(tasks=URGENT, clock_ratio=0.8), {}, None),
-    ],
-    ids=["switch", "deadlines", "first come", "logical", "abort", "skip", "can", "tdma", "clock"],
+    sample(
+        [
+            (Computer(switch=1e-5, tasks=LOAD), {}, None),
+            (Computer(scheduling="earliest-deadline-first", preemptive=False, tasks=LOAD), {"deadline": 0.002}, None),
+            (Computer(scheduling="first-come-first-served", tasks=LOAD), {"offset": 0.0031}, None),
+            (Computer(tasks=LOAD), {"read": "release", "write": "deadline", "deadline": 0.005}, None),
+            (Computer(tasks=LOAD), {"overrun": "abort", "deadline": 0.002}, None),
+            (Computer(tasks=LOAD), {"overrun": "skip", "execution": 0.0045}, None),
+            (Computer(tasks=LOAD), {}, CAN),
+            (Computer(tasks=LOAD), {}, TDMA),
+            (Computer(tasks=URGENT, clock_ratio=0.8), {}, None),
+        ],
+        5,
+    ),
+    ids=sample(["switch", "deadlines", "first come", "logical", "abort", "skip", "can", "tdma", "clock"], 5),
 )
 def test_over_a_horizon_it_is_what_a_run_prints(
     computer: Computer, keys: dict[str, Any], network: Network | None

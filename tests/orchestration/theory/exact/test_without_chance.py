@@ -9,23 +9,27 @@ from orchestration.components.fmi.reuse import Instances
 from orchestration.theory.exact.expect import expect
 from orchestration.theory.stability.period_map import growth_of_loop
 from tests.examples.common import example
+from tests.extent import sample
 
 PERIOD, DELAY = "components.controller.sampling.period", "connections.command.delay"
 
 
 @pytest.mark.parametrize(
     "changes",
-    [
-        {},
-        {DELAY: 0.7},
-        {"connections.command.hold": "first", DELAY: 0.1},
-        {"connections.measurement.delay": 0.13},
-        {"connections.measurement.delay": 0.5, "connections.measurement.hold": "first"},
-        {"connections.command.order": "jacobi", DELAY: 0.05},
-        {"components.controller.sampling.offset": 0.2, "components.controller.sampling.clock_ratio": 1.25},
-        {"connections.measurement.scale": 0.5},
-    ],
-    ids=["prompt", "late", "first", "measured", "measured first", "jacobi", "clock", "scale"],
+    sample(
+        [
+            {},
+            {DELAY: 0.7},
+            {"connections.command.hold": "first", DELAY: 0.1},
+            {"connections.measurement.delay": 0.13},
+            {"connections.measurement.delay": 0.5, "connections.measurement.hold": "first"},
+            {"connections.command.order": "jacobi", DELAY: 0.05},
+            {"components.controller.sampling.offset": 0.2, "components.controller.sampling.clock_ratio": 1.25},
+            {"connections.measurement.scale": 0.5},
+        ],
+        4,
+    ),
+    ids=sample(["prompt", "late", "first", "measured", "measured first", "jacobi", "clock", "scale"], 4),
 )
 def test_the_mean_square_radius_is_that_of_one_period_from_each_number(changes: dict[str, Any]) -> None:
     """As simulated: a first-order hold goes in steps of the plant, which both take."""
