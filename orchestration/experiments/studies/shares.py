@@ -47,12 +47,37 @@ def shares_of(table: "pd.DataFrame", by: Sequence[str]) -> "pd.DataFrame":
     return cells_of(table, by).drop(columns="value")
 
 
-def differ(one: Mapping[str, float], other: Mapping[str, float]) -> bool:
-    """Whether the 95 % interval of the difference of the shares of two cells, by Newcombe's method 10, excludes 0.
+def interval_of_difference(one: Mapping[str, float], other: Mapping[str, float]) -> tuple[float, float]:
+    """The 95 % interval of the share of one cell minus that of another, by Newcombe's method 10.
 
     Runs with the same seed are taken as independent, which makes it wider than a paired one where they are alike.
     """
     difference = one["share"] - other["share"]
     below = math.hypot(one["share"] - one["low"], other["high"] - other["share"])
     above = math.hypot(one["high"] - one["share"], other["share"] - other["low"])
-    return bool(difference - below > 0.0 or difference + above < 0.0)
+    return difference - below, difference + above
+
+
+def differ(one: Mapping[str, float], other: Mapping[str, float]) -> bool:
+    """Whether that interval excludes 0."""
+    low, high = interval_of_difference(one, other)
+    return low > 0.0 or high < 0.0
+
+
+def differences_of(table: "pd.DataFrame", by: Sequence[str], laws: str) -> "pd.DataFrame":
+    """The second law minus the first, by the values of the other axes: `difference`, `low` and `high`.
+
+    `laws` is the axis of two names; the columns `law` and `minus` have them, in the order of the runs.
+    """
+    import pandas as pd
+
+    second, first = reversed(table[laws].unique())
+    cells, others = shares_of(table, by), [name for name in by if name != laws]
+    both = cells[cells[laws] == second].merge(cells[cells[laws] == first], on=others, suffixes=("", ".other"))
+    rows = []
+    for row in both.to_dict("records"):
+        one, other = ({name: row[name + end] for name in ("share", "low", "high")} for end in ("", ".other"))
+        low, high = interval_of_difference(one, other)
+        key = {"law": second, "minus": first, **{name: row[name] for name in others}}
+        rows.append({**key, "difference": one["share"] - other["share"], "low": low, "high": high})
+    return pd.DataFrame(rows)

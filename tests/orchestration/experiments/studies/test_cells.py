@@ -10,7 +10,7 @@ from matplotlib.text import Text
 
 from orchestration.experiments.studies import drawing
 from orchestration.experiments.studies.cell_figures import cell_lines, cell_maps
-from orchestration.experiments.studies.shares import cells_of, differ
+from orchestration.experiments.studies.shares import cells_of, differ, differences_of, interval_of_difference
 from orchestration.experiments.studies.study_file import load_study
 from orchestration.experiments.studies.table import frame
 from orchestration.foundation.basics.statistics import wilson
@@ -79,6 +79,13 @@ def test_two_shares_differ_where_newcombes_interval_excludes_0() -> None:
     assert differ(cell(9, 10), cell(3, 10))
     assert differ(cell(0, 20), cell(10, 10))
     assert not differ(cell(5, 56), cell(0, 29))
+    assert interval_of_difference(cell(56, 70), cell(48, 80)) == pytest.approx((0.0524, 0.3339), abs=5e-5)
+    found = differences_of(runs(), ["controller", "timing.period", "timing.loss"], "controller").set_index(
+        ["timing.period", "timing.loss"]
+    )
+    assert found.loc[(0.01, 0.1), "difference"] == 3 / 8 - 1.0
+    expected = interval_of_difference(cell(3, 8), cell(8, 8))
+    assert tuple(found.loc[(0.01, 0.1), ["low", "high"]]) == expected
 
 
 def test_a_map_of_two_laws_has_a_third_panel_with_their_difference() -> None:
@@ -148,6 +155,9 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
     shares = pd.read_csv(tmp_path / "results/study/shares.csv")
     assert list(shares) == ["controller", "timing.period", "count", "good", "share", "low", "high"]
     assert shares["count"].tolist() == [2, 2, 2, 2]
+    differences = pd.read_csv(tmp_path / "results/study/differences.csv")
+    assert list(differences) == ["law", "minus", "timing.period", "difference", "low", "high"]
+    assert differences["minus"].tolist() == ["UnifiedController"] * 2
     monkeypatch.setattr(drawing, "frame", lambda store: frame(store).assign(status=None))
     assert "expected at least one finished run" in main("draw", "study.toml", code=2).stderr
 
