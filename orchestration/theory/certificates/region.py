@@ -14,6 +14,7 @@ from orchestration.foundation.basics.times import floor_to_nanoseconds
 from orchestration.simulation.figures.palette import BLUE, RED
 from orchestration.simulation.figures.style import SCREEN, Style, save
 from orchestration.simulation.requests.request import RequestLike, request_of
+from orchestration.simulation.results import display_names as labels
 from orchestration.theory.certificates import margin
 from orchestration.theory.certificates.breaking import BreakingSequence, least_breaking, unstable_sequence
 from orchestration.theory.certificates.family import LoopFamily
@@ -79,7 +80,8 @@ class Region:
             axes.plot(
                 *zip(*[(1e3 * a, 1e3 * b) for a, b in self.breaking]), "x-", color=RED, label="a sequence breaks it"
             )
-        axes.set(xlabel=f"{self.of[0]} [ms]", ylabel=f"{self.of[1]} [ms]", xlim=(0.0, None), ylim=(0.0, None))
+        across, up = (labels.with_unit(labels.setting(path), "ms") for path in self.of)
+        axes.set(xlabel=across, ylabel=up, xlim=(0.0, None), ylim=(0.0, None))
         figure.legend(loc="outside lower center", ncols=2)
         return figure
 
