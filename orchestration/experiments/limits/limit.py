@@ -217,6 +217,12 @@ def _note(
     measured = None if bracket is None else bracket.good
     if measured is None:
         return [*parts, f"the local limit is {local:.6g}{span.unit}"]
-    if abs(measured - local) > GAP * local:
-        return [*parts, f"more than a tenth from the local limit of {local:.6g}{span.unit}: large signals decide"]
+    if measured > (1.0 + GAP) * local:
+        return [
+            *parts,
+            f"more than a tenth beyond the local limit of {local:.6g}{span.unit}, from which on small motions grow: it "
+            "may oscillate, and what is judged is good still",
+        ]
+    if measured < (1.0 - GAP) * local:
+        return [*parts, f"more than a tenth below the local limit of {local:.6g}{span.unit}: large signals decide"]
     return [*parts, f"within a tenth of the local limit of {local:.6g}{span.unit}"]

@@ -92,7 +92,9 @@ def controller_at_hover(hover: Scenario, fleet: Instances) -> tuple[Floats, Floa
         away = at_rest + 1e3 * step
         later = [command(x) for x in (away, away, at_rest)]
         if np.abs(later[-1] - trim).max() > _FORGOTTEN * max(1.0, float(np.abs(trim).max())):
-            raise UsageError("the controller's command depends on what it measured before")
+            raise UsageError(
+                "the controller's command depends on what it measured before: expected a law without memory"
+            )
         return trim, np.column_stack(columns)
 
 

@@ -97,7 +97,9 @@ def _expect_one_rate(excitation: Excitation, sample: Rung) -> None:
         response = (perturbed - unperturbed) / excitation.pulse
         first = response if first is None else first
         if np.abs(response - first).max(initial=0.0) > TURN * max(1.0, np.abs(first).max(initial=0.0)):
-            raise UsageError(f"{excitation.name}: responds to a pulse differently from sample to sample")
+            raise UsageError(
+                f"{excitation.name}: responds to a pulse differently from sample to sample, as code that counts them"
+            )
 
 
 def _dead_samples(excitation: Excitation, ladder: Sequence[Rung]) -> int:

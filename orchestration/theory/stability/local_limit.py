@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
+from functools import partial
 
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.bisection import Range, first_failure
@@ -21,6 +22,11 @@ LOOP_TOLERANCE, TWINS_TOLERANCE = 0.01, 0.2
 TWINS = "growth of the difference of twin runs from the operating point, one of them perturbed by a pulse"
 OTHER_PULSE = 0.25
 """factor of the second pulse, whose growth is compared"""
+
+OTHER_SIZE = 100.0
+"""factor of the second pulse of twin runs, which has to confirm growth and decay"""
+NEAR = 0.1
+"""how far from the limit it has to, relative"""
 
 Growth = Callable[[float], float]
 """Growth rate of small deviations by the value of the quantity [1/s]"""
@@ -49,8 +55,7 @@ def about_rest(at: Callable[[float], System], span: Range) -> LinearLimit:
     except (UsageError, SimulatorError) as error:
         why = str(error)
     try:
-        with closing(Instances()) as instances:
-            found = _first_growth(lambda value: growth_of(at(value), instances).rate, span, TWINS_TOLERANCE, TWINS)
+        found = _by_twins(at, span)
     except (UsageError, SimulatorError) as error:
         return LinearLimit(reason=f"no local limit: {error}")
     return replace(found, method=f"{TWINS}, as saved states do not suffice: {why}")
@@ -71,6 +76,26 @@ def _through_saved_states(at: Callable[[float], System], span: Range, instances:
     slope = (growths[above] - growths[below]) / (above - below)
     difference = abs(growth_of_loop(at(below), instances, OTHER_PULSE) - growths[below])
     return replace(found, accuracy=found.accuracy + difference / slope)
+
+
+def _by_twins(at: Callable[[float], System], span: Range) -> LinearLimit:
+    """By perturbed twin runs; none where growth depends on the size of the pulse, as of code that rounds coarsely."""
+    for factor in (1.0, OTHER_SIZE):
+        with closing(Instances()) as instances:
+            found = _first_growth(partial(_rate, at, instances, factor), span, TWINS_TOLERANCE, TWINS)
+            if found.limit is None:
+                return found
+            near = (max(span.first, (1.0 - NEAR) * found.limit), min(span.last, (1.0 + NEAR) * found.limit))
+            if [_rate(at, instances, factor * OTHER_SIZE, value) > 0.0 for value in near] == [False, True]:
+                return found if factor == 1.0 else replace(found, accuracy=NEAR * found.limit)
+    return LinearLimit(
+        reason="no local limit: whether small deviations grow depends on how small they are, as of code in single "
+        "precision, or that switches"
+    )
+
+
+def _rate(at: Callable[[float], System], instances: Instances, factor: float, value: float) -> float:
+    return growth_of(at(value), instances, factor).rate
 
 
 def _first_growth(growth: Growth, span: Range, finer: float, method: str) -> LinearLimit:

@@ -51,15 +51,19 @@ class Growth:
     """Duration of the two runs [s]"""
 
 
-def growth_of(system: System, instances: Instances) -> Growth:
-    """The growth about the operating point of `system`; raises `UsageError` where the system does not rest there."""
+def growth_of(system: System, instances: Instances, factor: float = 1.0) -> Growth:
+    """The growth about the operating point of `system`; raises `UsageError` where the system does not rest there.
+
+    `factor` is that of the pulse.
+    """
     nominal = operating_point.deterministic(system)
     period = operating_point.hyperperiod_of(nominal) or operating_point.longest_period(nominal)
     horizon = max(exact_nanoseconds(nominal.stop_time), FEWEST_INSTANTS * period)
     nominal = replace(nominal, stop_time=float(horizon) / NANOSECONDS)
     interval = period * max(1, math.floor(horizon / period / MOST_INSTANTS))
     unperturbed, perturbed = (
-        _exchanged_rows(nominal, load, interval) for load in (instances.load, wrapping_loader(instances, Pulsed))
+        _exchanged_rows(nominal, load, interval)
+        for load in (instances.load, wrapping_loader(instances, lambda fmu: Pulsed(fmu, factor)))
     )
     operating_point.expect_rest(nominal, unperturbed[1:6])
     count = min(len(unperturbed), len(perturbed))
@@ -127,8 +131,8 @@ def _exchanged_rows(system: System, load: Loader, interval: Fraction) -> Floats:
 class Pulsed:
     """An FMU to whose Real inputs a pulse is added until its first step is done."""
 
-    def __init__(self, fmu: Instance) -> None:
-        self._fmu = fmu
+    def __init__(self, fmu: Instance, factor: float) -> None:
+        self._fmu, self._pulse = fmu, PULSE * factor
         self._stepped = False
 
     def __getattr__(self, name: str) -> Any:
@@ -139,7 +143,7 @@ class Pulsed:
         perturbed: Floats = np.zeros(len(names))
         write = self._fmu.writer(names, perturbed)
         real = [self._fmu.model.variables[name].kind == "Real" for name in names]
-        pulse = np.array([PULSE * _weight(name) if is_real else 0.0 for name, is_real in zip(names, real)])
+        pulse = np.array([self._pulse * _weight(name) if is_real else 0.0 for name, is_real in zip(names, real)])
 
         def transfer() -> None:
             perturbed[:] = source

@@ -470,7 +470,7 @@ def test_only_the_quantity_varies(stubbed: type[StubPool]) -> None:
 def test_a_gap_of_more_than_a_tenth_of_the_local_limit_is_noted() -> None:
     found = find(scenario_of(), "period")
     assert found.local_limit == pytest.approx(0.080, abs=0.0005)
-    assert "more than a tenth from the local limit" in found.note
+    assert "more than a tenth below the local limit" in found.note
 
 
 def test_a_limit_within_a_tenth_of_the_local_limit_is_noted(

@@ -1,0 +1,38 @@
+"""Local limits by twin runs, which a second pulse has to confirm."""
+
+from typing import Any
+
+import pytest
+
+from orchestration.foundation.basics.bisection import Range
+from orchestration.foundation.basics.errors import UsageError
+from orchestration.systems.system.component import Component
+from orchestration.systems.system.model import System
+from orchestration.theory.stability import local_limit
+from orchestration.theory.stability.perturbed_runs import Growth
+
+SPAN = Range(first=0.05, step=0.05, last=1.0, tolerance=5e-3)
+BLURRED = 0.2
+"""Where the growth of a difference as small as the rounding of single precision seems to begin"""
+
+
+@pytest.mark.parametrize(("enough", "limit"), [(1.0, 0.5), (100.0, 0.5), (1e9, None)])
+def test_a_pulse_that_rounding_blurs_is_not_believed(
+    monkeypatch: pytest.MonkeyPatch, enough: float, limit: float | None
+) -> None:
+    def growth(system: Any, _: Any, factor: float = 1.0) -> Growth:
+        true = system.stop_time - 0.5
+        return Growth(rate=true if factor >= enough else system.stop_time - BLURRED * factor**0.1, horizon=1.0)
+
+    def refuse(*_: Any, **__: Any) -> Any:
+        raise UsageError("no saved states")
+
+    monkeypatch.setattr(local_limit, "growth_of", growth)
+    monkeypatch.setattr(local_limit, "growth_of_loop", refuse)
+
+    def at(value: float) -> System:
+        return System(stop_time=value, components={"one": Component(fmu="one.fmu", step=0.01)})
+
+    found = local_limit.about_rest(at, SPAN)
+    assert found.limit == (limit if limit is None else pytest.approx(limit, abs=1e-2))
+    assert ("depends on how small they are" in found.reason) == (limit is None)
