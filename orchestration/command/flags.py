@@ -203,7 +203,8 @@ class FlightFlags:
         if of_quadrotor:
             flags = ", ".join(f"--{name.replace('_', '-')}" for name in of_quadrotor)
             raise UsageError(
-                f"{flags}: for the quadrotor only; expected --set PATH=V for a system, as connections.NAME.delay"
+                f"{flags}: for the quadrotor only; expected --set PATH=V for a system, as connections.NAME.delay or "
+                "components.NAME.sampling.period"
             )
         system = native_twins(system) if self.native else system
         return changed(system, {**top, **assigned("set", self.set)})

@@ -49,7 +49,12 @@ class Varied:
         if self.of in known:
             return paths_in(self.request, f"timing.{self.of}")
         if self.of in QUANTITIES:
-            raise UsageError(f"--of {self.of}: for the quadrotor only; expected a path, as connections.NAME.delay")
+            path = (
+                f"components.NAME.sampling.{self.of}"
+                if self.of in (PERIOD, "jitter")
+                else f"connections.NAME.{self.of}"
+            )
+            raise UsageError(f"--of {self.of}: for the quadrotor only; expected a path, as {path}")
         if "." not in self.of and self.of not in TOP:
             words = f"{expected_name(self.of, known)}, or" if known else "expected"
             raise UsageError(f"--of {self.of}: {words} a path, as connections.NAME.delay")

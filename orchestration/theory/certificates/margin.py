@@ -161,6 +161,10 @@ def varying_of(request: Request, of: str) -> Varying:
             return Varying(kind=key, name=name, path=path)
         if table == "components" and key == JITTER:
             return Varying(kind=key, name=name.removesuffix(".sampling"), path=path)
+    if of.endswith(".delay"):
+        raise UsageError(
+            f"--of {of}: expected a quantity that varies, as {of}_jitter; bode has the margin of a constant delay"
+        )
     raise UsageError(
         f"--of {of}: expected connections.NAME.delay_jitter, connections.NAME.loss, components.NAME.sampling.jitter, "
         "computers.NAME.tasks.NAME.execution or jitter, or networks.NAME.messages.NAME.jitter"
