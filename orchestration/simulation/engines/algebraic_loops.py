@@ -4,7 +4,7 @@ by Newton's method, with the derivatives of FMUs that offer them.
 So are instants closed: an output that follows its inputs at once is read again after these are set, and passed on. It
 is that of an FMU for model exchange or in event mode; plain co-simulation FMUs answer in their next step.
 
-Its numbers are the same on all machines: sums are those of Python, in one order.
+Its numbers are the same on all machines: sums are added up in one order.
 """
 
 import itertools
@@ -309,7 +309,10 @@ def _difference(one: Values, other: Values) -> Values:
 
 
 def _product(one: Values, other: Values) -> float:
-    return sum(a * b for a, b in zip(one, other))
+    total = 0.0  # the built-in sum of floats is compensated from Python 3.12 on
+    for a, b in zip(one, other):
+        total += a * b
+    return total
 
 
 def in_words(loop: Sequence[Connection]) -> str:
