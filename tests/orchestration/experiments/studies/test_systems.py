@@ -270,7 +270,7 @@ def test_without_an_operating_point_there_is_no_local_limit_with_the_reason_note
     [
         (
             {"of": "period"},
-            r"of = period: for the quadrotor only; expected a path, as components\.NAME\.sampling\.period",
+            "of = period: for the quadrotor only; expected a path, as components.NAME.sampling.period",
         ),
         ({"of": "mass"}, "of = mass: expected a path, as connections.NAME.delay"),
         ({"of": "connections.command.order"}, "of = connections.command.order: expected the path of a number"),
