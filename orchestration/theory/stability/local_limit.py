@@ -22,11 +22,10 @@ LOOP_TOLERANCE, TWINS_TOLERANCE = 0.01, 0.2
 TWINS = "growth of the difference of twin runs from the operating point, one of them perturbed by a pulse"
 OTHER_PULSE = 0.25
 """factor of the second pulse, whose growth is compared"""
-
 OTHER_SIZE = 100.0
-"""factor of the second pulse of twin runs, which has to confirm growth and decay"""
+"""Factor of the second pulse of twin runs, which has to confirm growth and decay"""
 NEAR = 0.1
-"""how far from the limit it has to, relative"""
+"""Distance from the limit at which it has to, relative"""
 
 Growth = Callable[[float], float]
 """Growth rate of small deviations by the value of the quantity [1/s]"""
