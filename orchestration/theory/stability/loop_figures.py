@@ -85,7 +85,9 @@ def locus_figure(result: RootLocus, style: Style = SCREEN) -> Figure:
         plane.plot([one.real] * 2, [one.imaginary, -one.imaginary], "x", color=RED, linestyle="none")
         at = (float(across.of(one.value)), 1.0)
         over.plot(*at, "x", color=RED)
-        over.annotate(across.text_of(one.value, 4), at, xytext=(4.0, -12.0), textcoords="offset points")
+        left = at[0] > 0.5 * (values[0] + values[-1])
+        beside = {"xytext": (-4.0 if left else 4.0, -12.0), "ha": "right" if left else "left"}
+        over.annotate(across.text_of(one.value, 4), at, textcoords="offset points", **beside)
     plane.set(xlabel="real part", ylabel="imaginary part", xlim=(-SHOWN, SHOWN), ylim=(-SHOWN, SHOWN), aspect="equal")
     over.set(xlabel=across.title, ylabel="spectral radius", xlim=(values[0], values[-1]))
     over.set_ylim(min(0.95 * float(result.radius.min()), 0.9), min(max(1.1, 1.05 * float(result.radius.max())), SHOWN))
