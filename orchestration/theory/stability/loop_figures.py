@@ -86,7 +86,7 @@ def locus_figure(result: RootLocus, style: Style = SCREEN) -> Figure:
         at = (float(across.of(one.value)), 1.0)
         over.plot(*at, "x", color=RED)
         left = at[0] > 0.5 * (values[0] + values[-1])
-        beside = {"xytext": (-4.0 if left else 4.0, -12.0), "ha": "right" if left else "left"}
+        beside = {"xytext": (-4.0, 5.0) if left else (4.0, -12.0), "ha": "right" if left else "left"}
         over.annotate(across.text_of(one.value, 4), at, textcoords="offset points", **beside)
     plane.set(xlabel="real part", ylabel="imaginary part", xlim=(-SHOWN, SHOWN), ylim=(-SHOWN, SHOWN), aspect="equal")
     over.set(xlabel=across.title, ylabel="spectral radius", xlim=(values[0], values[-1]))
