@@ -416,7 +416,7 @@ SECOND = [
         "9: tasks: name = fast: expected another name than that of a task",
     ),
     ('name = "slow"\nperiod = 0\nstep = "slow++;"', "10: tasks.slow.period = 0: expected a positive number of seconds"),
-    ('name = "slow"\nperiod = 0.01\nstep = "later();"', ": later, used in tasks.toml:11, is in none of the sources"),
+    ('name = "slow"\nperiod = 0.01\nstep = "later();"', "11: error: implicit declaration of function 'later'"),
     ('name = "slow"\nperiod = 0.01\nstep = "slow+;"', "11: error: expected expression before ';' token"),
     ('name = "slow"\nperiod = 0.01', "9: tasks: step: expected a value"),
     ('name = "s low"\nperiod = 0.01\nstep = ""', "9: tasks: name = 's low': expected letters, digits and _"),
