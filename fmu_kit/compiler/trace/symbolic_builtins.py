@@ -7,6 +7,7 @@ import contextlib
 import dataclasses
 import math
 import random
+import sys
 import time
 import types
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -173,10 +174,21 @@ def _sum(values: Iterable[Any], start: Any = 0) -> Any:
     given = list(values)
     if is_known(start, *given):
         return sum(given, start)
-    total = start
+    total, lost = start, 0.0
     for value in given:
-        total = total + value
-    return total
+        after = total + value
+        if _SUMS_ARE_COMPENSATED and _is_real(total) and _is_real(value):
+            lost += select(abs(total) >= abs(value), (total - after) + value, (value - after) + total)
+        total = after
+    return total if is_known(lost) and not lost else select(both(lost != 0.0, isfinite(lost)), total + lost, total)
+
+
+_SUMS_ARE_COMPENSATED = sys.version_info >= (3, 12)
+"""Python adds up floats with what each addition loses (Neumaier), and C is to have its bits"""
+
+
+def _is_real(value: Any) -> bool:
+    return value.kind == "real" if isinstance(value, Symbol) else isinstance(value, float)
 
 
 class _Converting(type):

@@ -163,10 +163,10 @@ class Arithmetic(Probe):
         self.y1 = abs(a) + math.fabs(b) - math.copysign(a, b)
         self.y2 = math.sin(a) + math.cos(b) + math.tan(a) + math.tanh(b)
         self.y3 = math.atan(a) + math.atan2(a, b)
-        self.y4 = min(a, b, 0.5) + max((a, b)) + sum((a, b, 1.0))
+        self.y4 = min(a, b, 0.5) + max((a, b))
         self.y5 = a**2 - b**-2.0 if b else a**0.5 if a > 0.0 else -a + +b
-        self.y6 = float(math.isnan(a / 2.0)) + (a == b) + float(n)
-        self.y7 = (n * n - n // 2) / 4
+        self.y6 = float(math.isnan(a / 2.0)) + (a == b) + float(n) + (n * n - n // 2) / 4
+        self.y7 = sum((a, b, 1.0, -a / 3.0, n))
 
 
 class Zeros(Slave):
