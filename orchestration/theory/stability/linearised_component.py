@@ -170,8 +170,9 @@ class Tangent(LinearSimulator):
 
     def _coordinates(self, futures: Floats, errors: Floats) -> tuple[Floats, list[int], Floats]:
         """The coordinates of what stands out of the errors: weights of the rows, columns that span, the way back."""
-        errors = errors + ROUNDING * np.abs(futures)
-        errors += 1e-30 * max(float(np.abs(futures).max(initial=0.0)), 1e-100)
+        largest = max(float(np.abs(futures).max(initial=0.0)), 1e-100)
+        errors = np.where(np.isfinite(errors), errors, largest)  # what could not be followed is not known at all
+        errors += ROUNDING * np.abs(futures) + 1e-30 * largest
         rows, columns = np.ones((len(futures), 1)), np.ones(futures.shape[1])
         for _ in range(SCALINGS):
             columns = 1.0 / np.sqrt(np.mean((errors * rows) ** 2, axis=0))

@@ -15,6 +15,7 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.number_text import quantity, some
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.terminal import progress_bar
 from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.foundation.processes.passable import passable
 from orchestration.simulation.requests.ranges import Varied, default_quantity, search_range
@@ -152,7 +153,11 @@ def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLo
                 raise UsageError(f"{varied.of} = {value:g}: {error}") from None
             return float(np.abs(found[value][0]).max(initial=0.0))
 
-        radii = [radius(value) for value in values]
+        radii = []
+        with progress_bar("poles") as report:
+            for done, value in enumerate(values, 1):
+                radii.append(radius(value))
+                report(done / len(values))
         crossings = []
         for (low, before), (high, after) in pairwise(zip(values, radii, strict=True)):
             if (before < 1.0) == (after < 1.0):

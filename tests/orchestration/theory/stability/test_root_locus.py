@@ -43,6 +43,12 @@ def test_a_loop_sampled_between_whole_nanoseconds_has_the_radius_of_its_neighbou
     assert between == pytest.approx(whole, abs=1e-7)
 
 
+def test_a_response_that_grows_until_it_cannot_be_followed_hides_no_poles() -> None:
+    """That to one input, over four times the period; not beside these values."""
+    radii = [linearise({"timing": {"period": period}}).radius for period in (0.3857, 0.385769231, 0.3858)]
+    assert radii == sorted(radii)
+
+
 def test_what_is_forgotten_is_no_pole() -> None:
     """A chain of eight delays alone has eigenvalues of 0, which rounding would move to 1e-2."""
     rotation = np.linalg.qr(np.random.default_rng(3).normal(size=(10, 10)))[0]
