@@ -25,7 +25,11 @@ def check(system: System, models: Mapping[str, Model]) -> None:
         for recorded in component.record or ():
             variable = models[name].variables.get(recorded)
             if variable is None:
-                recordable = [v.name for v in models[name].variables.values() if v.causality in ("output", "local")]
+                recordable = [
+                    v.name
+                    for v in models[name].variables.values()
+                    if v.causality in ("output", "local") and v.name not in models[name].for_solvers
+                ]
                 has_no = f"{place}.record: {models[name].name} has no variable {recorded}"
                 raise UsageError(f"{has_no}; {expected_name(recorded, recordable)}")
             if variable.kind not in NUMERIC:

@@ -83,6 +83,8 @@ def simulated() -> dict[str, list[float]]:
     return rows
 
 
+FOR_SOLVERS = ("p.der(", "p.channels.")
+"""What native FMUs have for the solvers of others"""
 RUNS = {
     "here": on_this_machine,
     "by_clang": functools.partial(on_this_machine, by="clang"),
@@ -103,7 +105,7 @@ def test_in_double_precision_every_variable_is_that_of_the_native_fmu_to_the_bit
     names = to_note(sides[0], sides[1], tmp_path)
     lines = RUNS[where]("embedded_flight.c", sides, tmp_path, *FLAGS, f"-DSAMPLE_PERIOD={H}")
     expected = np.array([simulated[name] for name in names]).T.copy()
-    assert sorted(names) == sorted(simulated)
+    assert sorted(names) == sorted(name for name in simulated if not name.startswith(FOR_SOLVERS))
     assert rows_of(lines).tobytes() == expected[99::100].tobytes()
     assert int(lines[-1], 16) == zlib.crc32(expected.tobytes())
 

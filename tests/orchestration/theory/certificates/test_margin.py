@@ -138,9 +138,10 @@ def test_two_at_once_leave_less_of_each(system: System, tmp_path: Path, monkeypa
 
 
 def test_what_it_is_not_for_is_refused(system: System) -> None:
-    for path in ("connections.command.delay", "stop_time"):
-        with pytest.raises(UsageError, match=r"expected connections\.NAME\.delay_jitter"):
-            margin(system, path)
+    with pytest.raises(UsageError, match=r"expected a quantity that varies, as connections\.command\.delay_jitter"):
+        margin(system, "connections.command.delay")
+    with pytest.raises(UsageError, match=r"expected connections\.NAME\.delay_jitter"):
+        margin(system, "stop_time")
     with pytest.raises(UsageError, match="expected two different"):
         region(system, COMMAND, COMMAND)
 
@@ -244,7 +245,7 @@ def test_the_command_writes_what_it_checks(
         (["--out", "x.json"], "--out: expected --of PATH beside it"),
         (["--check", "x.json", "--of", COMMAND], "--check: expected neither --of nor --out"),
         (["--check", "x.json"], "x.json: expected a readable certificate"),
-        (["--of", "connections.command.delay"], "--of connections.command.delay: expected connections.NAME"),
+        (["--of", "connections.command.delay"], "--of connections.command.delay: expected a quantity that varies"),
     ],
 )
 def test_flags_that_do_not_go_together_are_refused_in_a_line(
