@@ -78,7 +78,7 @@ def _rate(component: Component) -> str:
             ", moved to its own grid" if component.align == "next" else ""
         )
     if isinstance(component.sampling, TaskSampling):
-        return component.sampling.task
+        return f"by {component.sampling.task}"
     if isinstance(component.sampling, SamplingOnArrival):
         return f"on {component.sampling.on}"
     return describe_sampling(component.sampling)
