@@ -92,7 +92,7 @@ def expect_fixed_periods(system: "System") -> None:
     placed += [message.place for message in messages_by_connection(system).values()]
     placed += [f"components.{name}.sampling.on" for name in _by_arrivals(system)]
     if placed:
-        raise UsageError(f"{placed[0]}: has no fixed period, which a linearised loop needs")
+        raise UsageError(f"{placed[0]}: its instants are scheduled, and a linearised loop needs a fixed period")
 
 
 def _by_arrivals(system: "System") -> dict[str, str]:
