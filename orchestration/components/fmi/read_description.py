@@ -376,7 +376,8 @@ def called(model: Model, access: Access) -> Model:
         raise UsageError(f"interface = {interface}: {model.name} does not offer it; expected {' or '.join(offered)}")
     if access.clock is not None and access.clock not in [clock.name for clock in model.clocks]:
         clocks = ", ".join(clock.name for clock in model.clocks) or "no clocks"
-        raise UsageError(f"sampling.fmu_clock = {access.clock}: {model.name} has {clocks}; expected one of its clocks")
+        key = "partition" if interface == SCHEDULED else "sampling.fmu_clock"
+        raise UsageError(f"{key} = {access.clock}: {model.name} has {clocks}; expected one of its clocks")
     if access.solver is not None and interface != "model-exchange":
         raise UsageError(f"solver = {access.solver}: expected none with {interface}: {model.name} has its own")
     if interface == SCHEDULED:

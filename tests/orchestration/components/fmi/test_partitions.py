@@ -108,6 +108,13 @@ def test_what_is_no_partition_is_refused(of: dict[str, Any], expected: str, tmp_
         quadcosim.run(sampled(tmp_path, **of), in_process=True)
 
 
+def test_a_task_that_is_no_partition_is_refused_by_the_key_that_names_it(tmp_path: Path) -> None:
+    system = ecu(tmp_path)
+    system["components"]["first"]["partition"] = "inClock4"
+    with pytest.raises(UsageError, match=r"components.first.partition = inClock4: .*expected one of its clocks$"):
+        quadcosim.run(system, in_process=True)
+
+
 @pytest.mark.parametrize("kind", ["triggered", "countdown", "changing"])
 def test_clocks_with_instants_of_their_own_are_refused_by_name(kind: str, tmp_path: Path) -> None:
     fmu = partitions(tmp_path, clock("other", kind, "", 33))
